@@ -1,0 +1,39 @@
+# Every target works on a fresh clone: the first one called creates .venv from the lock file.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+
+.PHONY: help demo test lint lock clean
+
+help:
+	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
+	@echo "make test   lint, type check and test everything"
+	@echo "make lint   only the linters and the type checker"
+	@echo "make lock   renew requirements.lock from pyproject.toml"
+
+$(INSTALLED): requirements.lock pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, this is " + sys.version.split()[0])'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+demo: $(INSTALLED)
+	$(BIN)/workbench run procedures/calibrate-flat.yaml procedures/accuracy-flat.yaml --rig rigs/thesis-emulated.yaml
+
+lint: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint
+	$(BIN)/python -m pytest
+
+lock:
+	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --fork-strategy fewest \
+		--generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements.lock
+
+clean:
+	rm -rf $(VENV) sessions build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

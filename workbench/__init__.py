@@ -1,0 +1,1 @@
+"""Calibration and lab-measurement workbench for laser-spot range sensors."""

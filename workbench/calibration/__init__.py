@@ -1,0 +1,1 @@
+"""Parameters, priors, fit, covariance and what the data cannot determine."""

@@ -1,0 +1,1 @@
+"""Commands, terminal output and prompts; nothing else talks to a person."""

@@ -1,0 +1,1 @@
+"""Device protocols and their real drivers."""

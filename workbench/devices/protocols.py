@@ -1,0 +1,94 @@
+"""What the procedures ask of a bench. A driver implements these; nothing above knows which one it talks to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.model.target import Placement
+
+Image = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One grey frame, (height, width), uint8 or uint16, and the wall clock at its exposure in ns since 1970."""
+
+    image: Image
+    time_ns: int
+
+
+class Camera(Protocol):
+    """A grey camera."""
+
+    def grab(self) -> Frame:
+        """A frame whose exposure began after this call.
+
+        Raises:
+            RigNotReadyError: the camera does not deliver.
+        """
+
+    def close(self) -> None:
+        """Release the device."""
+
+
+class LaserBank(Protocol):
+    """The lasers. There is one way to switch one on, and it ends by itself."""
+
+    ids: tuple[str, ...]
+
+    def lit(self, ids: Sequence[str], for_s: float) -> AbstractContextManager[None]:
+        """Hold the lasers `ids` lit inside the `with` block, `for_s` seconds at the most.
+
+        Leaving the block puts every laser off and asks the controller whether it did.
+
+        Raises:
+            RigNotReadyError: the controller refuses or does not answer.
+            LaserOffNotConfirmedError: the controller did not confirm that all are off.
+        """
+
+    def all_off(self) -> None:
+        """Put every laser off and verify it; the errors of `lit`."""
+
+    def close(self) -> None:
+        """All off, then release the device."""
+
+
+class Target(Protocol):
+    """Whatever puts the target in its place: a person, a rail, an emulated bench."""
+
+    def place(self, placement: Placement) -> Placement:
+        """Put the target there; returns the placement as it was measured by the ruler."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """The devices of one rig, opened together and closed together."""
+
+    camera: Camera
+    lasers: LaserBank
+    target: Target
+    mark: Callable[[str], None] = lambda key: None
+    """Called with the key of the capture about to be taken. An emulated bench keys its noise by it, so that a
+    capture taken again after a stop is the same to the bit; a real bench has no use for it."""
+
+    def __enter__(self) -> Bench:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Lasers off first, whatever the camera does."""
+        try:
+            self.lasers.close()
+        finally:
+            self.camera.close()

@@ -1,0 +1,32 @@
+"""From the `driver` of a rig file to an opened bench."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from workbench.devices.protocols import Bench
+from workbench.model.errors import BadInputError
+from workbench.model.rig import Rig
+
+GROUP = "workbench.benches"
+
+
+def open_bench(rig: Rig, session_dir: Path) -> Bench:
+    """Open the bench that the rig names.
+
+    A driver is an entry point in the group `workbench.benches`: a function (rig, session_dir) -> Bench.
+
+    Raises:
+        BadInputError: the rig names no driver, or one that is not installed.
+        RigNotReadyError: a device does not answer.
+    """
+    drivers = entry_points(group=GROUP)
+    if rig.driver is None or rig.driver not in drivers.names:
+        known = ", ".join(sorted(drivers.names)) or "none"
+        raise BadInputError(
+            f"rig {rig.rig}: driver: expected the name of an installed bench driver ({known}), got {rig.driver};"
+            " a rig without a driver can be fitted but not run"
+        )
+    bench: Bench = drivers[rig.driver].load()(rig, session_dir)
+    return bench

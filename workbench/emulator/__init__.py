@@ -1,0 +1,1 @@
+"""The virtual bench, reached only by its name in a rig file."""

@@ -1,0 +1,1 @@
+"""Schemas, units and the error hierarchy; imports nothing of the workbench."""

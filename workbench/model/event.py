@@ -1,0 +1,244 @@
+"""What happens in a session, one typed record each: the journal's lines and the viewer's only input.
+
+A consumer is anything callable with a `Record`. Records name frames by their path in the session folder, so
+that every view (the recording, a table, a report) can be made again from the folder alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from workbench.model.target import Placement
+from workbench.model.yamlfile import FileModel
+
+
+class SessionStarted(FileModel):
+    """First record of a session."""
+
+    kind: Literal["session_started"] = "session_started"
+    session: str
+    rig: str
+    procedures: tuple[str, ...]
+
+
+class ProcedureStarted(FileModel):
+    """A procedure's first step is about to start."""
+
+    kind: Literal["procedure_started"] = "procedure_started"
+    procedure: str
+    title: str
+    steps: int
+
+
+class StepStarted(FileModel):
+    """A step is about to run. `index` counts from 1 within its procedure."""
+
+    kind: Literal["step_started"] = "step_started"
+    procedure: str
+    index: int
+    step: str
+    title: str
+    shots: int
+    """Captures that the step will take, 0 for a step that takes none."""
+
+
+class StepFinished(FileModel):
+    """A step has ended well; a step that failed ends the session instead."""
+
+    kind: Literal["step_finished"] = "step_finished"
+    procedure: str
+    index: int
+    outcome: str
+
+
+class TargetPlaced(FileModel):
+    """The target stands where it was asked to, or where the technician says that it stands."""
+
+    kind: Literal["target_placed"] = "target_placed"
+    placement: Placement
+
+
+class FrameRef(FileModel):
+    """A stored frame."""
+
+    path: str
+    """Relative to the session folder."""
+    sha256: str
+    time_ns: int
+    """Wall clock at exposure, nanoseconds since 1970 (UTC)."""
+
+
+class CaptureTaken(FileModel):
+    """A pair of frames, lasers on and off. Its frames are on disk before this is written."""
+
+    kind: Literal["capture_taken"] = "capture_taken"
+    key: str
+    """Unique in the session."""
+    purpose: Literal["calibration", "trial"]
+    scene: str | None = None
+    laser_id: str
+    """`all` when every laser is lit."""
+    placement_key: str
+    standoff_mm: float
+    repeat: int
+    on: FrameRef
+    off: FrameRef | None = None
+
+
+class SpotRecord(FileModel):
+    """One spot of a capture; pixels, standard deviations are 1 sigma."""
+
+    laser_id: str | None
+    """None while no laser has been assigned."""
+    u_px: float
+    v_px: float
+    u_sd_px: float
+    v_sd_px: float
+    flux_dn: float
+    width_px: float
+    """Standard deviation of the spot's profile, geometric mean of both axes."""
+    peak_dn: float
+    flags: tuple[str, ...] = ()
+
+
+class SpotsFound(FileModel):
+    """The spots of one capture, and why others were not found."""
+
+    kind: Literal["spots_found"] = "spots_found"
+    key: str
+    spots: tuple[SpotRecord, ...]
+    failures: tuple[str, ...] = ()
+
+
+class ParameterRecord(FileModel):
+    """One fitted parameter; standard deviations are 1 sigma."""
+
+    name: str
+    unit: str
+    value: float
+    sd: float
+    prior_value: float
+    prior_sd: float
+    data_share: float
+    determined_by: Literal["data", "joint", "prior"]
+
+
+class ResidualRecord(FileModel):
+    """Measured minus predicted position of one laser at one placement, mean of its repeats."""
+
+    laser_id: str
+    standoff_mm: float
+    u_px: float | None
+    v_px: float | None
+    u_sd_px: float | None
+    v_sd_px: float | None
+
+
+class FitFinished(FileModel):
+    """A calibration has been fitted, accepted or not."""
+
+    kind: Literal["fit_finished"] = "fit_finished"
+    parameters: tuple[ParameterRecord, ...]
+    residuals: tuple[ResidualRecord, ...]
+    rms_px: float
+    observations: int
+    rejected: int
+    verdict: Literal["accepted", "refused"]
+    reasons: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+class CalibrationExported(FileModel):
+    """The calibration YAML is on disk."""
+
+    kind: Literal["calibration_exported"] = "calibration_exported"
+    path: str
+    sha256: str
+
+
+class LaserRange(FileModel):
+    """Range of one laser's spot, from the reference plane; 1 sigma."""
+
+    laser_id: str
+    range_mm: float
+    sigma_mm: float
+    u_px: float
+    v_px: float
+
+
+class ReadingTaken(FileModel):
+    """One reading of a trial."""
+
+    kind: Literal["reading_taken"] = "reading_taken"
+    trial: str
+    scene: str
+    standoff_mm: float
+    reading: int
+    status: Literal["done", "not_enough_points", "no_points"]
+    range_mm: float | None
+    sigma_mm: float | None
+    lasers: tuple[LaserRange, ...]
+
+
+class TrialRow(FileModel):
+    """Statistics of one standoff of an accuracy trial; errors are measured - true, in mm, 1 sigma."""
+
+    standoff_mm: float
+    readings: int
+    mean_error_mm: float
+    max_error_mm: float
+    min_error_mm: float
+    sd_mm: float
+    range_sd_mm: float
+    """Stated standard deviation of one reading: calibration and spots."""
+    reference_sd_mm: float
+    """Standard deviation of the true range itself: placement and ruler."""
+
+
+class TrialFinished(FileModel):
+    """A trial's table."""
+
+    kind: Literal["trial_finished"] = "trial_finished"
+    trial: str
+    rows: tuple[TrialRow, ...]
+
+
+class SessionFinished(FileModel):
+    """Last record of a session that ended, well or not."""
+
+    kind: Literal["session_finished"] = "session_finished"
+    exit_code: int
+    message: str
+
+
+Event = Annotated[
+    SessionStarted
+    | ProcedureStarted
+    | StepStarted
+    | StepFinished
+    | TargetPlaced
+    | CaptureTaken
+    | SpotsFound
+    | FitFinished
+    | CalibrationExported
+    | ReadingTaken
+    | TrialFinished
+    | SessionFinished,
+    Field(discriminator="kind"),
+]
+
+
+class Record(FileModel):
+    """An event with its place in the session."""
+
+    n: int
+    """Counts from 0 without a gap."""
+    time_ns: int
+    """Wall clock, nanoseconds since 1970 (UTC)."""
+    event: Event
+
+
+Consumer = Callable[[Record], None]

@@ -1,0 +1,135 @@
+"""The rig file: what is known of a sensor and its bench before any measurement, and how to reach them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from workbench.model.yamlfile import FileModel, load_yaml_model
+
+PositiveFloat = Annotated[float, Field(gt=0)]
+NonNegativeFloat = Annotated[float, Field(ge=0)]
+# YAML reads `id: 1` as a number; to the workbench an id is a name.
+Name = Annotated[
+    str, BeforeValidator(lambda v: str(v) if isinstance(v, int) and not isinstance(v, bool) else v)
+]
+
+
+class Prior(FileModel):
+    """A value known before the measurement, with its standard deviation (1 sigma, Gaussian).
+
+    `sd: 0` means known exactly: the value is then a constant of the fit.
+    """
+
+    value: float
+    sd: NonNegativeFloat
+
+
+def exactly(value: float) -> Prior:
+    """A constant."""
+    return Prior(value=value, sd=0.0)
+
+
+class CameraSpec(FileModel):
+    """Camera: image format, and the lens as the data sheet tells it (OpenCV's pinhole and Brown-Conrady)."""
+
+    width_px: Annotated[int, Field(gt=0)]
+    height_px: Annotated[int, Field(gt=0)]
+    bits: Annotated[int, Field(ge=8, le=16)] = 8
+    f_px: Prior
+    cx_px: Prior
+    cy_px: Prior
+    k1: Prior = exactly(0.0)
+    k2: Prior = exactly(0.0)
+    p1: Prior = exactly(0.0)
+    p2: Prior = exactly(0.0)
+    k3: Prior = exactly(0.0)
+
+
+class LaserSpec(FileModel):
+    """One laser as a ray in the camera frame: origin (x, y, 0) mm, direction (tx, ty, 1)."""
+
+    id: Name
+    axis: Literal["u", "v"]
+    """Image axis along which the spot moves with range: u for a laser beside the camera, v above or below."""
+    x_mm: Prior
+    y_mm: Prior
+    tx: Prior = exactly(0.0)
+    ty: Prior = exactly(0.0)
+
+    @model_validator(mode="after")
+    def _has_a_baseline(self) -> LaserSpec:
+        if self.id == "all":
+            raise ValueError("a laser may not be called 'all': captures.csv means every laser by it")
+        along, name = (self.x_mm, "x_mm") if self.axis == "u" else (self.y_mm, "y_mm")
+        if along.value == 0:
+            raise ValueError(f"a laser on axis {self.axis} needs a baseline: {name} must not be 0")
+        return self
+
+
+class BenchSpec(FileModel):
+    """Ruler and target: how well a standoff is known. All standard deviations are 1 sigma."""
+
+    offset_mm: Prior = exactly(0.0)
+    """Distance of the pinhole behind the rig's reference plane: z = standoff + offset."""
+    ruler_scale: Prior = exactly(0.0)
+    """Relative error of the ruler: true standoff = ruler reading x (1 + ruler_scale)."""
+    placement_sd_mm: NonNegativeFloat = 0.0
+    tilt_sd_deg: NonNegativeFloat = 0.0
+    """Tilt of a flat target about each of its two axes, anew at every placement."""
+
+
+class NoiseSpec(FileModel):
+    """Noise of a spot's position, where the captures do not tell it. 1 sigma, pixels."""
+
+    spot_sd_px: PositiveFloat = 0.1
+    """Of one spot, where its row states none."""
+    speckle_sd_px: NonNegativeFloat = 0.0
+    """Shared by all repeats of one laser at one placement: the speckle pattern stands still."""
+
+
+class LaserController(FileModel):
+    """How the laser controller is reached."""
+
+    port: str
+    baud: Annotated[int, Field(gt=0)] = 115200
+
+
+class Rig(FileModel):
+    """A rig file, format 1."""
+
+    format: Literal[1]
+    rig: str
+    serial: Name = "unknown"
+    driver: str | None = None
+    """Entry point in the group `workbench.benches`; without one the rig can be fitted but not run."""
+    camera: CameraSpec
+    lasers: Annotated[tuple[LaserSpec, ...], Field(min_length=1)]
+    bench: BenchSpec = BenchSpec()
+    noise: NoiseSpec = NoiseSpec()
+    controller: LaserController | None = None
+    emulator: dict[str, Any] | None = None
+    """Read by the emulated bench alone, which validates it."""
+
+    @model_validator(mode="after")
+    def _laser_ids_differ(self) -> Rig:
+        ids = [laser.id for laser in self.lasers]
+        if len(set(ids)) != len(ids):
+            raise ValueError(f"laser ids must differ, got {ids}")
+        return self
+
+    @property
+    def laser_ids(self) -> tuple[str, ...]:
+        """Ids in the order of the file."""
+        return tuple(laser.id for laser in self.lasers)
+
+
+def load_rig(path: Path) -> Rig:
+    """Read a rig file.
+
+    Raises:
+        BadInputError: see `load_yaml_model`.
+    """
+    return load_yaml_model(path, Rig)

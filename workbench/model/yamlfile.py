@@ -1,0 +1,89 @@
+"""YAML files that people edit, read into typed models with errors that name file and line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from workbench.model.errors import BadInputError
+
+
+class FileModel(BaseModel):
+    """Base of everything read from a file: unknown keys are mistakes, values do not change after reading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def load_yaml_model(path: Path, model: type[Model]) -> Model:
+    """Read `path` and validate it as `model`.
+
+    Raises:
+        BadInputError: the file is missing, is not YAML, or does not fit; one line for each problem, with
+            file, line, key, what was expected and what came.
+    """
+    data = load_yaml(path)
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        problems = [_describe(path, data, dict(problem)) for problem in error.errors()]
+        raise BadInputError("\n".join(problems)) from None
+
+
+def load_yaml(path: Path) -> Any:
+    """Read `path` with YAML's safe subset; mappings and lists keep their line numbers.
+
+    Raises:
+        BadInputError: the file cannot be read or is not one YAML document.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise BadInputError(f"{path}: no such file; expected a YAML file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInputError(f"{path}: expected a readable UTF-8 YAML file: {error}") from None
+    try:
+        data = YAML(typ="rt").load(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = "" if mark is None else f":{mark.line + 1}"
+        raise BadInputError(f"{path}{line}: not valid YAML: {error.problem or error.context}") from None
+    except YAMLError as error:
+        raise BadInputError(f"{path}: not valid YAML: {error}") from None
+    if data is None:
+        raise BadInputError(f"{path}:1: expected a YAML mapping, the file is empty")
+    return data
+
+
+def _describe(path: Path, data: Any, problem: dict[str, Any]) -> str:
+    """One line for one pydantic problem."""
+    location = tuple(problem["loc"])
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+    message = problem["msg"][:1].lower() + problem["msg"][1:]
+    came = "" if problem["type"] in {"missing", "extra_forbidden"} else f", got {_short(problem['input'])}"
+    return f"{path}:{_line(data, location)}: {key or 'document'}: {message}{came}"
+
+
+def _line(data: Any, location: tuple[int | str, ...]) -> int:
+    """Line (from 1) of the deepest part of `location` that stands in the file."""
+    line = 1
+    node = data
+    for part in location:
+        position = getattr(node, "lc", None)
+        known = position is not None and position.data and part in position.data
+        if not known:
+            break
+        line = position.data[part][0] + 1
+        node = node[part]
+    return line
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

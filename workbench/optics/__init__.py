@@ -1,0 +1,1 @@
+"""Pure maths of lens, rays and target, in JAX; no input or output."""

@@ -1,0 +1,1 @@
+"""The ranger: from spots and a calibration to ranges."""

@@ -1,0 +1,1 @@
+"""The session folder: journal, frame store, manifest."""

@@ -1,0 +1,1 @@
+"""The trials and their statistics."""

@@ -1,0 +1,1 @@
+"""The Rerun recording: a view made from the session's records."""
