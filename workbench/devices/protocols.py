@@ -1,4 +1,4 @@
-"""What the procedures ask of a bench. A driver implements these; nothing above knows which one it talks to."""
+"""What the procedures ask of a bench; nothing above a driver knows which one it talks to."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 @dataclass(frozen=True)
 class Frame:
-    """One grey frame, (height, width), uint8 or uint16, and the wall clock at its exposure in ns since 1970."""
+    """One grey frame, (height, width), uint8 or uint16, and the wall clock at its exposure (ns since 1970)."""
 
     image: Image
     time_ns: int

@@ -25,7 +25,7 @@ def open_bench(rig: Rig, session_dir: Path) -> Bench:
     if rig.driver is None or rig.driver not in drivers.names:
         known = ", ".join(sorted(drivers.names)) or "none"
         raise BadInputError(
-            f"rig {rig.rig}: driver: expected the name of an installed bench driver ({known}), got {rig.driver};"
+            f"rig {rig.rig}: driver: expected an installed bench driver ({known}), got {rig.driver};"
             " a rig without a driver can be fitted but not run"
         )
     bench: Bench = drivers[rig.driver].load()(rig, session_dir)
