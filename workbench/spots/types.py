@@ -1,20 +1,23 @@
-"""A spot and why one was not found."""
+"""A spot, the line it may lie on, and why one was not found."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 
 class Failure(StrEnum):
-    """Named failures of spot finding; `Finding.explain` tells cause and remedy."""
+    """What went wrong with a capture, or with one of its spots; `explain` tells cause and remedy."""
 
     NO_SPOT = "no_spot"
+    TOO_FEW = "too_few"
     TOO_MANY = "too_many"
     TOO_DIM = "too_dim"
     SATURATED = "saturated"
@@ -24,7 +27,10 @@ class Failure(StrEnum):
     AT_EDGE = "at_edge"
 
 
-@dataclass(frozen=True)
+NO_FLAGS: frozenset[Failure] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
 class Spot:
     """A laser spot in a frame: (0, 0) is the centre of the top-left pixel, u right, v down, sd 1 sigma."""
 
@@ -33,12 +39,15 @@ class Spot:
     u_sd_px: float
     v_sd_px: float
     flux_dn: float
+    """Sum over the whole spot, above the background."""
     width_px: float
+    """Standard deviation of the profile before the pixel integrates it, geometric mean of both axes."""
     peak_dn: float
-    flags: frozenset[Failure] = field(default_factory=frozenset)
+    """Highest pixel-integrated value of the fitted profile above the background, also where it was clipped."""
+    flags: frozenset[Failure] = NO_FLAGS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Scanline:
     """Where spots may lie: the image line through (u0, v0) with direction (du, dv), and a half-width."""
 
@@ -49,9 +58,9 @@ class Scanline:
     half_width_px: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Finding:
-    """Spots of one capture, in order along the scanline (else by u, then v), and what went wrong."""
+    """Spots of one capture, in order along the first scanline (else by u, then v), and what went wrong."""
 
     spots: tuple[Spot, ...]
     failures: tuple[Failure, ...] = ()

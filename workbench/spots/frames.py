@@ -1,0 +1,62 @@
+"""Checks of the frames at the door, so that nothing behind it meets an image it was not made for."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from workbench.model.errors import BadInputError
+from workbench.spots.types import Image
+
+_DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16))
+_FULL_SCALES_IN_16_BITS = tuple(2**bits - 1 for bits in (10, 12, 14))
+
+
+def check_frame(frame: object, name: str) -> Image:
+    """`frame` itself if it is a grey image of uint8 or uint16 with at least one pixel.
+
+    Raises:
+        BadInputError: it is not; says what was expected, what came and what to do.
+    """
+    expected = f"frame '{name}': expected a grey image (rows x columns, uint8 or uint16)"
+    if not isinstance(frame, np.ndarray):
+        raise BadInputError(f"{expected}, got {type(frame).__name__}; read the image with cv2.imread first")
+    if frame.ndim != 2:
+        remedy = "convert colour with cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY), or store it grey"
+        raise BadInputError(f"{expected}, got an array of shape {frame.shape}; {remedy}")
+    if frame.dtype not in _DTYPES:
+        raise BadInputError(f"{expected}, got dtype {frame.dtype}; store the camera's raw numbers unscaled")
+    if frame.size == 0:
+        raise BadInputError(f"{expected}, got no pixel (shape {frame.shape}); check the file or the crop")
+    return cast(Image, frame)
+
+
+def check_pair(on: object, off: object | None) -> tuple[Image, Image | None]:
+    """Both frames checked, and that they fit each other.
+
+    Raises:
+        BadInputError: a frame is no grey uint8 or uint16 image, or the two differ in size or depth.
+    """
+    on = check_frame(on, "on")
+    if off is None:
+        return on, None
+    off = check_frame(off, "off")
+    if off.shape != on.shape or off.dtype != on.dtype:
+        raise BadInputError(
+            f"frame 'off': expected the size and depth of 'on', {on.shape} {on.dtype}, got {off.shape} {off.dtype}; "
+            "take both frames with the same camera settings"
+        )
+    return on, off
+
+
+def default_saturation_dn(on: Image) -> int:
+    """Value at which a pixel counts as clipped: the full scale of the depth.
+
+    A camera of 10, 12 or 14 bits delivers uint16; its full scale is recognised when the frame's highest value
+    is exactly that.
+    """
+    if on.dtype == np.uint8:
+        return 255
+    highest = int(on.max())
+    return highest if highest in _FULL_SCALES_IN_16_BITS else 65535
