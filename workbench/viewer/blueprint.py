@@ -1,0 +1,91 @@
+"""How the viewer lays a recording out: one tab for the technician at the bench, three for the engineer."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from workbench.model.rig import Rig
+from workbench.viewer import entities as at
+from workbench.viewer.chart import BOUNDS_X, BOUNDS_Y
+
+PICTURE_VIEW = "Picture, lasers on"
+"""Name of the view with the frames, by which a test finds it."""
+
+
+def blueprint(rig: Rig) -> rrb.Blueprint:
+    """The layout for one rig; the technician's tab is in front, the cursor follows what comes in."""
+    return rrb.Blueprint(
+        rrb.Tabs(_live(rig), _fit(), _trial(), _bench(), active_tab=0),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=at.CAPTURE, play_state="following"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _live(rig: Rig) -> rrb.Container:
+    axis = f"{rig.lasers[0].axis}_px"
+    picture = rrb.Spatial2DView(
+        origin=at.CAMERA, name=PICTURE_VIEW, visual_bounds=_frame_bounds(rig), background=[0, 0, 0]
+    )
+    curves = rrb.Vertical(
+        rrb.TimeSeriesView(origin=at.STANDOFF_SCALAR, name="Standoff [mm]"),
+        rrb.TimeSeriesView(origin=f"{at.SPOTS}/{axis}", name=f"Spot position {axis[0]} [px]"),
+        rrb.TimeSeriesView(origin=f"{at.SPOTS}/peak_dn", name="Peak brightness [DN]"),
+    )
+    doing = rrb.Horizontal(
+        rrb.StateTimelineView(origin=at.LANES, name="Steps"),
+        rrb.TextLogView(origin=at.STEP_LOG, name="Log"),
+    )
+    return rrb.Vertical(
+        rrb.Horizontal(picture, curves, column_shares=[3, 2]), doing, row_shares=[3, 1], name="Live"
+    )
+
+
+def _fit() -> rrb.Container:
+    charts = rrb.Vertical(
+        _chart(f"{at.FIT_CHART}/u", "Residual u against standoff, bars 1 sigma"),
+        _chart(f"{at.FIT_CHART}/v", "Residual v against standoff, bars 1 sigma"),
+    )
+    words = rrb.Vertical(
+        rrb.TextDocumentView(origin=at.FIT_SUMMARY, name="Verdict"),
+        rrb.TextDocumentView(origin=at.FIT_TABLE, name="Parameters"),
+        row_shares=[1, 2],
+    )
+    return rrb.Horizontal(charts, words, column_shares=[3, 2], name="Fit")
+
+
+def _trial() -> rrb.Container:
+    return rrb.Vertical(
+        _chart(at.TRIAL_CHART, "Error of every reading against true range, bars stated 1 sigma"),
+        rrb.Horizontal(
+            rrb.TimeSeriesView(origin=at.TRIAL_ERRORS, name="Error [mm] as the trial went"),
+            rrb.TextDocumentView(origin=at.TRIAL_SUMMARY, name="Table"),
+        ),
+        row_shares=[3, 2],
+        name="Trial",
+    )
+
+
+def _bench() -> rrb.Container:
+    eye = rrb.EyeControls3D(
+        kind="Orbital",
+        position=(-1800.0, -1100.0, -900.0),
+        look_target=(0.0, 0.0, 900.0),
+        eye_up=(0.0, -1.0, 0.0),
+    )
+    return rrb.Horizontal(
+        rrb.Spatial3DView(origin=at.BENCH, name="Bench: rays, target, spots", eye_controls=eye), name="3D"
+    )
+
+
+def _chart(origin: str, name: str) -> rrb.View:
+    bounds = rrb.VisualBounds2D(x_range=BOUNDS_X, y_range=BOUNDS_Y)
+    return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=bounds, background=[18, 20, 22])
+
+
+def _frame_bounds(rig: Rig) -> rrb.VisualBounds2D:
+    return rrb.VisualBounds2D(
+        x_range=(0.0, float(rig.camera.width_px)), y_range=(0.0, float(rig.camera.height_px))
+    )

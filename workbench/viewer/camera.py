@@ -1,0 +1,65 @@
+"""The picture and the spots found in it.
+
+Only frames with the lasers on are logged. A frame with the lasers off is dark, serves the subtraction alone
+and would double the recording; it stays in the session folder.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+
+import rerun as rr
+
+from workbench.model.event import SpotRecord
+from workbench.viewer import entities as at
+from workbench.viewer.stream import Stream
+
+QUANTITIES = ("u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "peak_dn")
+RERUN_PIXEL_CENTRE = 0.5
+"""Rerun's (0, 0) is the top-left pixel's corner, the workbench's its centre. Only drawings are shifted."""
+_CIRCLE_PX = 6.0
+
+
+def log_series_styles(stream: Stream, colors: Mapping[str, at.Rgb]) -> None:
+    """Name and colour of every laser's curve, once."""
+    for quantity in QUANTITIES:
+        for laser, color in colors.items():
+            style = rr.SeriesPoints(colors=color, names=laser, markers="circle", marker_sizes=3.0)
+            stream.log(at.under(at.SPOTS, quantity, laser), style, static=True)
+
+
+def log_frame(stream: Stream, png: bytes) -> None:
+    """The picture with the lasers on, exactly as stored."""
+    stream.log(at.IMAGE, rr.EncodedImage(contents=png, media_type="image/png"))
+
+
+def log_spots(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> None:
+    """The spots of one capture: drawn into the picture, and as numbers for curves and for a later fit."""
+    stream.log(at.SPOTS_IN_IMAGE, _drawn(spots, colors))
+    by_laser: dict[str, list[SpotRecord]] = defaultdict(list)
+    for spot in spots:
+        by_laser[spot.laser_id or at.UNASSIGNED].append(spot)
+    for laser, found in by_laser.items():
+        for quantity in QUANTITIES:
+            values = [getattr(spot, quantity) for spot in found]
+            stream.log(at.under(at.SPOTS, quantity, laser), rr.Scalars(values))
+
+
+def _drawn(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
+    return rr.Points2D(
+        [(spot.u_px + RERUN_PIXEL_CENTRE, spot.v_px + RERUN_PIXEL_CENTRE) for spot in spots],
+        colors=[_color(spot, colors) for spot in spots],
+        labels=[_label(spot) for spot in spots],
+        show_labels=True,
+        radii=rr.Radius.ui_points(_CIRCLE_PX) if spots else None,
+    )
+
+
+def _color(spot: SpotRecord, colors: Mapping[str, at.Rgb]) -> at.Rgb:
+    return colors.get(spot.laser_id or at.UNASSIGNED, at.WHITE)
+
+
+def _label(spot: SpotRecord) -> str:
+    flags = f" ({', '.join(spot.flags)})" if spot.flags else ""
+    return f"{spot.laser_id or '?'}{flags}"

@@ -1,0 +1,82 @@
+"""What an engineer reads about a fit and a trial, as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import floor, log10
+
+from workbench.model.event import FitFinished, ParameterRecord, ReadingTaken, TrialFinished, TrialRow
+
+
+def fit_summary(fit: FitFinished) -> str:
+    """Verdict first, then why, then how good."""
+    lines = [
+        f"# Calibration {fit.verdict}",
+        _bullets("Why", fit.reasons),
+        _bullets("Warnings", fit.warnings),
+        f"**Residual** {fit.rms_px:.3f} px rms over {fit.observations} observations, "
+        f"{fit.rejected} rejected.",
+    ]
+    return "\n\n".join(line for line in lines if line)
+
+
+def parameter_table(parameters: Sequence[ParameterRecord]) -> str:
+    """Every parameter with its standard deviation, its prior, and who determined it."""
+    rows = [
+        (
+            one.name,
+            plus_minus(one.value, one.sd),
+            one.unit if one.unit != "1" else "",
+            plus_minus(one.prior_value, one.prior_sd),
+            f"{100 * one.data_share:.0f} %",
+            one.determined_by,
+        )
+        for one in parameters
+    ]
+    head = ("parameter", "value", "unit", "prior", "from the data", "determined by")
+    return "\n\n".join(["# Parameters (one sigma)", _table(head, rows)])
+
+
+def trial_table(trial: TrialFinished, readings: Sequence[ReadingTaken]) -> str:
+    """The table of an accuracy trial, and the readings that gave no range."""
+    head = ("true mm", "n", "mean error", "max", "min", "sd", "stated sd", "sd of the true range")
+    rows = [_trial_row(row) for row in trial.rows]
+    parts = [f"# Trial {trial.trial}", "Errors are measured - true, in mm.", _table(head, rows)]
+    return "\n\n".join([*parts, *_without_range(readings)])
+
+
+def _trial_row(row: TrialRow) -> tuple[str, ...]:
+    signed = (row.mean_error_mm, row.max_error_mm, row.min_error_mm)
+    return (
+        f"{row.standoff_mm:g}",
+        str(row.readings),
+        *(f"{value:+.2f}" for value in signed),
+        *(f"{value:.2f}" for value in (row.sd_mm, row.range_sd_mm, row.reference_sd_mm)),
+    )
+
+
+def _without_range(readings: Iterable[ReadingTaken]) -> list[str]:
+    missing = [
+        f"{one.standoff_mm:g} mm, reading {one.reading}: {one.status}"
+        for one in readings
+        if one.range_mm is None
+    ]
+    return [_bullets("Readings without a range", missing)] if missing else []
+
+
+def plus_minus(value: float, sd: float) -> str:
+    """A value to the second digit of its standard deviation; a constant as it is."""
+    if sd <= 0:
+        return f"{value:g} (fixed)"
+    digits = max(0, 1 - floor(log10(sd)))
+    return f"{value:.{digits}f} ± {sd:.{digits}f}"
+
+
+def _bullets(title: str, lines: Iterable[str]) -> str:
+    items = "\n".join(f"- {line}" for line in lines)
+    return f"**{title}**\n\n{items}" if items else ""
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    rule = ["---"] * len(head)
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in (head, rule, *rows))

@@ -1,0 +1,74 @@
+"""Names of entities and timelines, and each laser's colour: what is logged and what is shown share them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+APPLICATION = "workbench"
+
+CAPTURE = "capture"
+"""Timeline: captures counted from 1; what prepares a capture bears the number of the capture it prepares."""
+STEP = "step"
+"""Timeline: steps counted from 1 through all procedures of the session."""
+WALL_CLOCK = "time"
+"""Timeline: wall clock; frames and their spots stand at the exposure."""
+STANDOFF = "standoff_mm"
+"""Timeline: standoff by the ruler in whole millimetres, of what was measured at one."""
+
+BENCH = "bench"
+CAMERA = f"{BENCH}/camera"
+IMAGE = f"{CAMERA}/image"
+SPOTS_IN_IMAGE = f"{CAMERA}/spots"
+RAYS = f"{BENCH}/rays"
+TARGET = f"{BENCH}/target"
+SPOTS_ON_TARGET = f"{BENCH}/spots"
+RANGED_POINTS = f"{BENCH}/ranged"
+
+SPOTS = "spots"
+UNASSIGNED = "unassigned"
+STANDOFF_SCALAR = "target/standoff_mm"
+
+STEP_LOG = "steps/log"
+LANES = "steps/lanes"
+LANE_PROCEDURE = f"{LANES}/procedure"
+LANE_STEP = f"{LANES}/step"
+LANE_LASER = f"{LANES}/laser"
+
+FIT_SUMMARY = "fit/summary"
+FIT_TABLE = "fit/parameter_table"
+FIT_PARAMETERS = "fit/parameters"
+FIT_RESIDUALS = "fit/residuals"
+FIT_CHART = "fit/chart"
+
+TRIAL_SUMMARY = "trial/summary"
+TRIAL_ERRORS = "trial/errors"
+TRIAL_CHART = "trial/chart"
+
+Rgb = tuple[int, int, int]
+
+# Okabe and Ito's palette, which people with any colour vision can tell apart, without its black.
+_PALETTE: tuple[Rgb, ...] = (
+    (86, 180, 233),
+    (230, 159, 0),
+    (0, 158, 115),
+    (204, 121, 167),
+    (240, 228, 66),
+    (213, 94, 0),
+    (0, 114, 178),
+)
+GREY: Rgb = (150, 150, 150)
+WHITE: Rgb = (235, 235, 235)
+RED: Rgb = (255, 70, 70)
+GREEN: Rgb = (90, 200, 110)
+
+
+def laser_colors(laser_ids: Sequence[str]) -> dict[str, Rgb]:
+    """One colour a laser, in the order of the rig file; they repeat after seven."""
+    return {laser: _PALETTE[i % len(_PALETTE)] for i, laser in enumerate(laser_ids)}
+
+
+def under(parent: str, *parts: str) -> str:
+    """Entity path of `parts` below `parent`, whatever characters a name from a file has."""
+    import rerun as rr
+
+    return "/".join([parent, *(rr.escape_entity_path_part(part) for part in parts)])

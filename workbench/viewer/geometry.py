@@ -1,0 +1,85 @@
+"""The sensor as it is believed to be: from the rig file at first, from the fit once there is one.
+
+For drawing only. Camera frame, millimetres: x right, y down, z forward, origin in the pinhole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import radians, tan
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.model.event import ParameterRecord
+from workbench.model.rig import Rig
+from workbench.model.target import FlatTarget
+
+Array = NDArray[np.float64]
+_LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
+_RAY = ("x_mm", "y_mm", "tx", "ty")
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Lens, laser rays and the pinhole's distance behind the reference plane."""
+
+    lens: Mapping[str, float]
+    offset_mm: float
+    rays: Mapping[str, tuple[float, float, float, float]]
+    """(x_mm, y_mm, tx, ty) of each laser."""
+
+    @classmethod
+    def of_rig(cls, rig: Rig) -> Geometry:
+        """What the rig file says, before any measurement."""
+        return cls(
+            lens={name: getattr(rig.camera, name).value for name in _LENS},
+            offset_mm=rig.bench.offset_mm.value,
+            rays={
+                laser.id: (laser.x_mm.value, laser.y_mm.value, laser.tx.value, laser.ty.value)
+                for laser in rig.lasers
+            },
+        )
+
+    def fitted(self, parameters: Iterable[ParameterRecord]) -> Geometry:
+        """The same with every value that a fit names (`f_px`, `offset_mm`, `<laser id>.x_mm`, ...)."""
+        fit = {parameter.name: parameter.value for parameter in parameters}
+        rays = {}
+        for laser, (x, y, tx, ty) in self.rays.items():
+            old = dict(zip(_RAY, (x, y, tx, ty), strict=True))
+            rays[laser] = tuple(fit.get(f"{laser}.{name}", old[name]) for name in _RAY)
+        return Geometry(
+            lens={name: fit.get(name, value) for name, value in self.lens.items()},
+            offset_mm=fit.get("offset_mm", self.offset_mm),
+            rays={laser: (ray[0], ray[1], ray[2], ray[3]) for laser, ray in rays.items()},
+        )
+
+    @property
+    def camera_matrix(self) -> Array:
+        """(3, 3), pixels; the centre of the top-left pixel is (0, 0)."""
+        f, cx, cy = (self.lens[name] for name in ("f_px", "cx_px", "cy_px"))
+        return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+
+    def ray_at(self, laser: str, z_mm: float) -> tuple[float, float, float]:
+        """Point of a laser's ray at depth `z_mm`."""
+        x, y, tx, ty = self.rays[laser]
+        return (x + tx * z_mm, y + ty * z_mm, z_mm)
+
+    def seen_on(self, target: FlatTarget, standoff_mm: float, pixels: Array) -> Array:
+        """Where the lines of sight of `pixels`, (N, 2), meet a flat target: (N, 3) mm."""
+        slope_x, slope_y = tan(radians(target.yaw_deg)), tan(radians(target.pitch_deg))
+        sight = self._directions(pixels)
+        facing = 1.0 - slope_x * sight[:, 0] - slope_y * sight[:, 1]
+        depth = (standoff_mm + self.offset_mm) / facing
+        return np.column_stack([sight * depth[:, None], depth])
+
+    def _directions(self, pixels: Array) -> Array:
+        """Undistorted (x/z, y/z) of `pixels`, both (N, 2)."""
+        if not len(pixels):
+            return np.zeros((0, 2))
+        distortion = np.array([self.lens[name] for name in ("k1", "k2", "p1", "p2", "k3")])
+        points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
+        seen = cv2.undistortPoints(points, self.camera_matrix, distortion)
+        return np.asarray(seen, dtype=np.float64).reshape(-1, 2)

@@ -1,0 +1,220 @@
+"""The recording of a session: a view for the Rerun viewer, made from the session's records alone.
+
+The journal and the frames are the record. The recording can be made again from them with the same code, so a
+recording that is damaged, or that an interrupted session left incomplete, costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import singledispatchmethod
+from pathlib import Path
+from types import TracebackType
+
+from workbench.model import event as ev
+from workbench.model.errors import BadInputError
+from workbench.model.rig import Rig
+from workbench.model.target import Placement
+from workbench.viewer import camera, fit, scene, steps
+from workbench.viewer import entities as at
+from workbench.viewer.blueprint import blueprint
+from workbench.viewer.geometry import Geometry
+from workbench.viewer.stream import Moment, Stream
+from workbench.viewer.trial import Trial
+
+RECORDING_FILE = "recording.rrd"
+
+
+class RecordingConsumer:
+    """Writes `recording.rrd` into the session folder as records come.
+
+    An existing recording is replaced at the first record: whoever resumes a session gives the consumer the
+    records of the journal first. Use it as a context manager, or call `close`; without that everything logged
+    is in the file, only the footer is missing (`rerun rrd merge` adds it).
+
+    Raises:
+        BadInputError: a record names a frame that is not in the session folder.
+    """
+
+    def __init__(self, session_dir: Path, rig: Rig, out: Path | None = None) -> None:
+        self._session_dir = session_dir
+        self._rig = rig
+        self._out = out or session_dir / RECORDING_FILE
+        self._colors = at.laser_colors(rig.laser_ids)
+        self._open: _OpenRecording | None = None
+
+    def __call__(self, record: ev.Record) -> None:
+        """Log one record. The first one must be `SessionStarted`: it names the recording."""
+        if self._open is None:
+            if not isinstance(record.event, ev.SessionStarted):
+                raise ValueError(f"expected session_started as the first record, got {record.event.kind}")
+            stream = Stream(self._out, record.event.session, blueprint(self._rig))
+            self._open = _OpenRecording(stream, self._session_dir, self._rig)
+        self._open.take(record)
+
+    def close(self) -> None:
+        """Write everything out and close the file; a second call does nothing."""
+        if self._open is not None:
+            self._open.stream.close()
+            self._open = None
+
+    def __enter__(self) -> RecordingConsumer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path) -> None:
+    """Make the recording again from the records of a session; `out` is replaced only by a complete one.
+
+    Raises:
+        BadInputError: a record names a frame that is not in the session folder.
+    """
+    partial = out.with_name(out.name + ".partial")
+    try:
+        with RecordingConsumer(session_dir, rig, partial) as consumer:
+            for record in records:
+                consumer(record)
+        partial.replace(out)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+class _OpenRecording:
+    """What has to be remembered from one record to the next."""
+
+    def __init__(self, stream: Stream, session_dir: Path, rig: Rig) -> None:
+        self.stream = stream
+        self._session_dir = session_dir
+        self._rig = rig
+        self._colors = at.laser_colors(rig.laser_ids)
+        self._geometry = Geometry.of_rig(rig)
+        self._trial = Trial(stream, self._colors)
+        self._placement: Placement | None = None
+        self._captures: dict[str, tuple[int, ev.CaptureTaken]] = {}
+        self._capture = 0
+        self._step = 0
+
+    def take(self, record: ev.Record) -> None:
+        """Log one record where it belongs on the timelines."""
+        self._advance(record.event)
+        moment = Moment(self._capture, self._step, record.time_ns)
+        self.stream.at(moment)
+        self._log(record.event, moment)
+
+    def _advance(self, event: object) -> None:
+        """Count captures and steps.
+
+        What prepares a capture (a step, a placement) bears the number of the capture to come. With the number
+        of the one before, the last picture of every standoff would show the target of the next.
+        """
+        taken = len(self._captures)
+        if isinstance(event, ev.StepStarted):
+            self._step += 1
+        if isinstance(event, ev.CaptureTaken | ev.StepStarted | ev.TargetPlaced):
+            self._capture = taken + 1
+
+    @singledispatchmethod
+    def _log(self, event: object, moment: Moment) -> None:
+        raise TypeError(f"no handler for {type(event).__name__}")
+
+    @_log.register
+    def _(self, event: ev.SessionStarted, moment: Moment) -> None:
+        rig = self._rig
+        self.stream.describe("session", id=event.session, rig=event.rig, serial=rig.serial)
+        scene.log_axes(self.stream)
+        scene.log_sensor(self.stream, rig.camera, self._geometry, self._colors)
+        camera.log_series_styles(self.stream, self._colors)
+        fit.log_no_fit_yet(self.stream, self._colors)
+        self._trial.log_none_yet()
+        steps.say(self.stream, f"Session {event.session} on {event.rig}: {', '.join(event.procedures)}")
+
+    @_log.register
+    def _(self, event: ev.ProcedureStarted, moment: Moment) -> None:
+        steps.lane(self.stream, at.LANE_PROCEDURE, event.procedure)
+        steps.say(self.stream, f"{event.procedure}: {event.title} ({event.steps} steps)")
+
+    @_log.register
+    def _(self, event: ev.StepStarted, moment: Moment) -> None:
+        steps.lane(self.stream, at.LANE_STEP, event.title)
+        steps.say(self.stream, f"Step {event.index}: {event.title}")
+
+    @_log.register
+    def _(self, event: ev.StepFinished, moment: Moment) -> None:
+        steps.lane(self.stream, at.LANE_LASER, steps.LASERS_OFF)
+        steps.say(self.stream, f"Step {event.index} done: {event.outcome}")
+
+    @_log.register
+    def _(self, event: ev.TargetPlaced, moment: Moment) -> None:
+        self._placement = event.placement
+        scene.log_target(self.stream, event.placement, self._geometry)
+        steps.say(self.stream, f"Target placed at {event.placement.standoff_mm:g} mm")
+
+    @_log.register
+    def _(self, event: ev.CaptureTaken, moment: Moment) -> None:
+        self._captures[event.key] = (moment.capture, event)
+        self.stream.at(Moment(moment.capture, moment.step, event.on.time_ns, event.standoff_mm))
+        camera.log_frame(self.stream, self._read(event.on))
+        steps.lane(self.stream, at.LANE_LASER, event.laser_id)
+
+    @_log.register
+    def _(self, event: ev.SpotsFound, moment: Moment) -> None:
+        number, capture = self._captures[event.key]
+        self.stream.at(Moment(number, moment.step, capture.on.time_ns, capture.standoff_mm))
+        camera.log_spots(self.stream, event.spots, self._colors)
+        if self._placement is not None:
+            scene.log_spots_on_target(self.stream, event.spots, self._placement, self._geometry, self._colors)
+        for failure in event.failures:
+            steps.say(self.stream, f"Capture {event.key}: {failure}", steps.WARN)
+
+    @_log.register
+    def _(self, event: ev.FitFinished, moment: Moment) -> None:
+        self._geometry = self._geometry.fitted(event.parameters)
+        scene.log_sensor(self.stream, self._rig.camera, self._geometry, self._colors)
+        fit.log_fit(self.stream, event, moment, self._colors)
+        good = event.verdict == "accepted"
+        steps.say(
+            self.stream,
+            f"Calibration {event.verdict}, residual {event.rms_px:.3f} px rms. {' '.join(event.reasons)}",
+            steps.INFO if good else steps.ERROR,
+        )
+        for warning in event.warnings:
+            steps.say(self.stream, warning, steps.WARN)
+
+    @_log.register
+    def _(self, event: ev.CalibrationExported, moment: Moment) -> None:
+        steps.say(self.stream, f"Calibration written to {event.path}")
+
+    @_log.register
+    def _(self, event: ev.ReadingTaken, moment: Moment) -> None:
+        self.stream.at(Moment(moment.capture, moment.step, moment.time_ns, event.standoff_mm))
+        self._trial.take(event)
+        scene.log_ranged(self.stream, event.lasers, self._geometry, self._colors)
+        if event.status != "done":
+            text = f"{event.scene}, reading {event.reading} at {event.standoff_mm:g} mm: {event.status}"
+            steps.say(self.stream, text, steps.WARN)
+
+    @_log.register
+    def _(self, event: ev.TrialFinished, moment: Moment) -> None:
+        self._trial.finish(event)
+        steps.say(self.stream, f"Trial {event.trial} finished, {len(event.rows)} standoffs")
+
+    @_log.register
+    def _(self, event: ev.SessionFinished, moment: Moment) -> None:
+        self._trial.stop()
+        steps.end_all(self.stream)
+        level = steps.INFO if event.exit_code == 0 else steps.ERROR
+        steps.say(self.stream, f"Session ended ({event.exit_code}): {event.message}", level)
+
+    def _read(self, frame: ev.FrameRef) -> bytes:
+        path = self._session_dir / frame.path
+        try:
+            return path.read_bytes()
+        except OSError as error:
+            raise BadInputError(
+                f"{path}: expected the frame that the journal names, cannot read it ({error.strerror}); "
+                "restore it from a copy of the session folder"
+            ) from None

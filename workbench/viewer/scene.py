@@ -1,0 +1,142 @@
+"""The bench in 3D: camera, laser rays, target, and the spots on it. Millimetres in the camera frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import cos, pi, radians, sin, tan
+
+import numpy as np
+import rerun as rr
+
+from workbench.model.event import LaserRange, SpotRecord
+from workbench.model.rig import CameraSpec
+from workbench.model.target import (
+    CylinderTarget,
+    FlatTarget,
+    NoTarget,
+    Placement,
+    PolynomialTarget,
+)
+from workbench.viewer import entities as at
+from workbench.viewer.camera import RERUN_PIXEL_CENTRE
+from workbench.viewer.geometry import Geometry
+from workbench.viewer.stream import Stream
+
+RAY_LENGTH_MM = 5000.0
+TARGET_HALF_MM = 150.0
+"""Half side of the target as drawn; its real size is not known and does not matter."""
+_IMAGE_PLANE_MM = 150.0
+_LINE = rr.Radius.ui_points(1.5)
+_DOT = rr.Radius.ui_points(5.0)
+
+Point = tuple[float, float, float]
+
+
+def log_axes(stream: Stream) -> None:
+    """Which way is up, once."""
+    stream.log(at.BENCH, rr.ViewCoordinates.RDF, static=True)
+
+
+def log_sensor(stream: Stream, camera: CameraSpec, geometry: Geometry, colors: Mapping[str, at.Rgb]) -> None:
+    """Camera and laser rays as they are believed to be from now on."""
+    matrix = geometry.camera_matrix
+    matrix[:2, 2] += RERUN_PIXEL_CENTRE
+    pinhole = rr.Pinhole(
+        image_from_camera=matrix,
+        resolution=[camera.width_px, camera.height_px],
+        camera_xyz=rr.ViewCoordinates.RDF,
+        image_plane_distance=_IMAGE_PLANE_MM,
+    )
+    stream.log(at.CAMERA, pinhole)
+    for laser, color in colors.items():
+        ray = [geometry.ray_at(laser, 0.0), geometry.ray_at(laser, RAY_LENGTH_MM)]
+        stream.log(at.under(at.RAYS, laser), rr.LineStrips3D([ray], colors=color, radii=_LINE))
+
+
+def log_target(stream: Stream, placement: Placement, geometry: Geometry) -> None:
+    """The target where the ruler says it is; measured points of the placement before it go away."""
+    outline = _outline(placement, placement.standoff_mm + geometry.offset_mm)
+    label = [f"target at {placement.standoff_mm:g} mm"] if outline else []
+    strips = rr.LineStrips3D(outline, colors=at.WHITE, radii=_LINE, labels=label * len(outline[:1]))
+    stream.log(at.TARGET, strips)
+    stream.log(at.STANDOFF_SCALAR, rr.Scalars(placement.standoff_mm))
+    for entity in (at.SPOTS_ON_TARGET, at.RANGED_POINTS):
+        stream.log(entity, rr.Clear(recursive=True))
+
+
+def log_spots_on_target(
+    stream: Stream,
+    spots: Sequence[SpotRecord],
+    placement: Placement,
+    geometry: Geometry,
+    colors: Mapping[str, at.Rgb],
+) -> None:
+    """Spots where the camera sees them on a flat target; off its ray, one shows the calibration's error."""
+    if not isinstance(placement.target, FlatTarget) or not spots:
+        return
+    pixels = np.array([(spot.u_px, spot.v_px) for spot in spots])
+    points = geometry.seen_on(placement.target, placement.standoff_mm, pixels)
+    for spot, point in zip(spots, points, strict=True):
+        laser = spot.laser_id or at.UNASSIGNED
+        dot = rr.Points3D([point], colors=colors.get(laser, at.WHITE), radii=_DOT)
+        stream.log(at.under(at.SPOTS_ON_TARGET, laser), dot)
+
+
+def log_ranged(
+    stream: Stream, lasers: Sequence[LaserRange], geometry: Geometry, colors: Mapping[str, at.Rgb]
+) -> None:
+    """Points that the sensor has ranged, on their rays."""
+    points = [geometry.ray_at(one.laser_id, one.range_mm + geometry.offset_mm) for one in lasers]
+    labels = [f"{one.laser_id}: {one.range_mm:.1f} mm" for one in lasers]
+    dots = rr.Points3D(
+        points, colors=[colors[one.laser_id] for one in lasers], radii=_DOT if points else None, labels=labels
+    )
+    stream.log(at.RANGED_POINTS, dots)
+
+
+def _outline(placement: Placement, z_mm: float) -> list[list[Point]]:
+    """Lines that draw the target whose standoff point lies at depth `z_mm`."""
+    target = placement.target
+    match target:
+        case FlatTarget():
+            return _flat(target, z_mm)
+        case CylinderTarget():
+            return _cylinder(target, z_mm)
+        case PolynomialTarget():
+            return _upright([(x, z_mm + _polynomial(target, x)) for x in _across()])
+        case NoTarget():
+            return []
+
+
+def _flat(target: FlatTarget, z_mm: float) -> list[list[Point]]:
+    h = TARGET_HALF_MM
+    slope_x, slope_y = tan(radians(target.yaw_deg)), tan(radians(target.pitch_deg))
+    corners = [(-h, -h), (h, -h), (h, h), (-h, h), (-h, -h)]
+    edge = [(x, y, z_mm + slope_x * x + slope_y * y) for x, y in corners]
+    cross = [[(-h, 0.0, z_mm - slope_x * h), (h, 0.0, z_mm + slope_x * h)]]
+    return [edge, *cross, [(0.0, -h, z_mm - slope_y * h), (0.0, h, z_mm + slope_y * h)]]
+
+
+def _cylinder(target: CylinderTarget, z_mm: float) -> list[list[Point]]:
+    r = target.diameter_mm / 2
+    angles = np.linspace(0.0, 2 * pi, 49)
+    return _upright([(target.shift_mm + r * sin(a), z_mm + r * (1 - cos(a))) for a in angles.tolist()])
+
+
+def _polynomial(target: PolynomialTarget, x_mm: float) -> float:
+    x = x_mm - target.shift_mm
+    return float(sum(c * x ** (k + 1) for k, c in enumerate(target.coefficients)))
+
+
+def _across() -> list[float]:
+    return [float(x) for x in np.linspace(-TARGET_HALF_MM, TARGET_HALF_MM, 33)]
+
+
+def _upright(section: Sequence[tuple[float, float]]) -> list[list[Point]]:
+    """A vertical surface by its (x, z) section: three copies of it and the edges between them."""
+    levels = (-TARGET_HALF_MM, 0.0, TARGET_HALF_MM)
+    copies: list[list[Point]] = [[(x, y, z) for x, z in section] for y in levels]
+    edges: list[list[Point]] = [
+        [(x, levels[0], z), (x, levels[-1], z)] for x, z in section[:: len(section) - 1]
+    ]
+    return copies + edges
