@@ -1,0 +1,48 @@
+"""A Gaussian laser beam in free space."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.emulator.spec import BeamSpec
+from workbench.emulator.truth import Ray
+
+Array = NDArray[np.float64]
+
+
+class Beam:
+    """One laser's beam. Camera frame, mm."""
+
+    def __init__(self, ray: Ray, spec: BeamSpec) -> None:
+        self.origin = np.array([ray.x_mm, ray.y_mm, 0.0])
+        self.direction = np.array([ray.tx, ray.ty, 1.0])
+        """Third component 1, as everywhere; not a unit vector."""
+        self._axis = self.direction / np.linalg.norm(self.direction)
+        self._power_w = spec.power_mw * 1e-3
+        self._exit_mm = spec.exit_diameter_mm
+        self._divergence = spec.divergence_mrad * 1e-3
+
+    def irradiance(self, points: Array, normals: Array) -> Array:
+        """Power per area of the surface (W / mm^2) at points (n, 3) with unit front normals (n, 3).
+
+        Gaussian of 1/e^2 diameter exit + divergence x path, 2 P / (pi w^2) on its axis so that its integral
+        over any cross-section is P; times the cosine of incidence, 0 where the surface looks away. Beams
+        begin at their origin: nothing behind it is lit.
+        """
+        to_point = points - self.origin
+        path = to_point @ self._axis
+        rho2 = np.einsum("ij,ij->i", to_point, to_point) - path**2
+        radius = (self._exit_mm + self._divergence * path) / 2
+        peak = 2 * self._power_w / (np.pi * radius**2)
+        cosine = np.maximum(0.0, -normals @ self._axis)
+        return np.where(path > 0, peak * np.exp(-2 * rho2 / radius**2) * cosine, 0.0)
+
+    def outline(self, radii: float, count: int) -> tuple[Array, Array]:
+        """Rays (origins (n, 3), directions (n, 3)) on the cone at `radii` times the beam's 1/e^2 radius.
+
+        The radius grows linearly with the path, so this outline is made of straight lines.
+        """
+        angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
+        across = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1) * radii / 2
+        return self.origin + across * self._exit_mm, self.direction + across * self._divergence

@@ -1,0 +1,65 @@
+"""The virtual bench's devices, opened together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from workbench.devices.protocols import Bench
+from workbench.devices.serial_lasers import SerialLaserBank
+from workbench.emulator.camera import EmulatedCamera
+from workbench.emulator.controller import Controller
+from workbench.emulator.pty import PtyServer
+from workbench.emulator.scene import Scene
+from workbench.emulator.sensor import Sensor
+from workbench.emulator.spec import emulator_spec
+from workbench.emulator.spot import ImageFormat
+from workbench.emulator.truth import draw_truth, truth_path
+from workbench.model.rig import Rig
+
+
+@dataclass(frozen=True, kw_only=True)
+class EmulatedBench(Bench):
+    """A bench whose parts tests can reach: the camera, the controller behind the port, the port itself."""
+
+    camera: EmulatedCamera
+    lasers: SerialLaserBank
+    target: Scene
+    controller: Controller
+    server: PtyServer
+
+    def close(self) -> None:
+        """As every bench, then hang up the controller's line."""
+        try:
+            super().close()
+        finally:
+            self.server.close()
+
+
+def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
+    """Open the virtual bench of `rig`; its truth goes to the file beside `session_dir`.
+
+    Raises:
+        BadInputError: the rig's `emulator:` block is wrong.
+        RigNotReadyError, LaserOffNotConfirmedError: the emulated controller's fault shows at connect.
+    """
+    spec = emulator_spec(rig)
+    truth = draw_truth(rig, spec)
+    scene = Scene(rig, spec, truth, truth_path(session_dir))
+    sensor = Sensor(spec, ImageFormat(rig.camera.width_px, rig.camera.height_px), rig.camera.bits)
+    controller = Controller(rig.laser_ids, spec.controller)
+    camera = EmulatedCamera(spec, scene, sensor, controller.lit)
+    server = PtyServer(controller.receive)
+    try:
+        lasers = SerialLaserBank(server.port, rig.laser_ids)
+    except BaseException:
+        server.close()
+        raise
+    return EmulatedBench(
+        camera=camera,
+        lasers=lasers,
+        target=scene,
+        mark=camera.mark,
+        controller=controller,
+        server=server,
+    )

@@ -1,0 +1,116 @@
+"""The emulated camera: a stream of frames that follow one another, and the driver that grabs from it."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.devices.protocols import Frame
+from workbench.emulator.keyed import generator
+from workbench.emulator.scene import Scene
+from workbench.emulator.sensor import Sensor
+from workbench.emulator.spec import EmulatorSpec
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """What one frame was exposed to."""
+
+    lit: tuple[str, ...]
+    key: str
+    number: int
+    """Counts the frames of one capture key from 0."""
+    exposure_s: float
+    f_scale: float
+
+
+class EmulatedCamera:
+    """Camera of the virtual bench.
+
+    `exposure_s` (None: metered at every placement) and `gain` may be set at any time and hold from the next
+    frame on. `discard_frames` is what the driver believes the latency to be: `grab` throws that many away.
+    """
+
+    def __init__(
+        self, spec: EmulatorSpec, scene: Scene, sensor: Sensor, lasers: Callable[[], tuple[str, ...]]
+    ) -> None:
+        self._spec, self._scene, self._sensor, self._lasers = spec, scene, sensor, lasers
+        self.exposure_s = spec.camera.exposure_s
+        self.gain = spec.camera.gain
+        self.discard_frames = spec.camera.latency_frames
+        self._key, self._number = "", 0
+        self._frames = 0
+        self._metered: tuple[int, float, float] | None = None
+        self._last: Frame | None = None
+        self._queue: deque[Exposure] = deque(self._expose(()) for _ in range(spec.camera.latency_frames))
+
+    def mark(self, key: str) -> None:
+        """Name the capture about to be taken; its frames' noise belongs to the name."""
+        self._key, self._number = key, 0
+
+    def grab(self) -> Frame:
+        """A frame whose exposure began after this call, `discard_frames` frames being on their way."""
+        for _ in range(self.discard_frames):
+            self._next()
+        return self.read()
+
+    def read(self) -> Frame:
+        """The next frame of the stream, as old as the latency makes it."""
+        exposure = self._next()
+        chance = generator(self._spec.seed, "stream", exposure.key, exposure.number).random(2)
+        if chance[0] < self._spec.camera.dropped:
+            return self.read()
+        if self._last is None or chance[1] >= self._spec.camera.repeated:
+            self._last = self._develop(exposure)
+        return self._last
+
+    def meter(self) -> float:
+        """Exposure (s) that puts the brightest spot of the present placement at `metered_peak`, gain as set.
+
+        As an automatic exposure does with all lasers lit, speckle and ambient light included; within the
+        shortest and the longest exposure of the camera.
+        """
+        if self._metered is None or self._metered[:2] != (self._scene.moves, self.gain):
+            spots = [spot for name in self._scene.laser_ids for spot in self._scene.spots(name)]
+            spec = self._spec.camera
+            exposure = self._sensor.metered_exposure(spots, self.gain, spec.metered_peak)
+            exposure = min(max(exposure, spec.shortest_exposure_s), spec.longest_exposure_s)
+            self._metered = (self._scene.moves, self.gain, exposure)
+        return self._metered[2]
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def _next(self) -> Exposure:
+        """Expose a frame and take the oldest one that is on its way."""
+        self._queue.append(self._expose(self._lasers()))
+        return self._queue.popleft()
+
+    def _expose(self, lit: tuple[str, ...]) -> Exposure:
+        warm = self._spec.warm_up
+        f_scale = 1 + warm.f_relative * float(np.exp(-self._frames / warm.time_constant_frames))
+        exposure_s = self.meter() if self.exposure_s is None else self.exposure_s
+        exposure = Exposure(lit, self._key, self._number, exposure_s, f_scale)
+        self._frames += 1
+        self._number += 1
+        return exposure
+
+    def _develop(self, exposure: Exposure) -> Frame:
+        rng = generator(self._spec.seed, "frame", exposure.key, exposure.number)
+        spots = [spot for name in exposure.lit for spot in self._scene.spots(name, exposure.f_scale)]
+        ambient = self._ambient(exposure, float(rng.random()))
+        image = self._sensor.expose(spots, exposure.exposure_s, self.gain, ambient, rng)
+        if self._spec.camera.mirrored:
+            image = np.ascontiguousarray(image[:, ::-1])
+        return Frame(image, time.time_ns())
+
+    def _ambient(self, exposure: Exposure, phase: float) -> float:
+        """Ambient light of one exposure: lamps at twice the mains frequency, averaged over it."""
+        spec = self._spec.ambient
+        cycles = 2 * spec.mains_hz * exposure.exposure_s
+        flicker = 1 + spec.flicker_depth * float(np.sinc(cycles)) * float(np.cos(2 * np.pi * phase))
+        return flicker * (1 if exposure.lit else 1 + spec.off_jump)

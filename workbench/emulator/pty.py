@@ -1,0 +1,43 @@
+"""A serial line without a cable: a thread that lets a controller speak on a pseudo-terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import threading
+import tty
+from collections.abc import Callable
+
+
+class PtyServer:
+    """Serves `receive` (bytes in, bytes out) on a pseudo-terminal until it is closed."""
+
+    def __init__(self, receive: Callable[[bytes], bytes]) -> None:
+        self._receive = receive
+        self._ours, self._theirs = os.openpty()
+        tty.setraw(self._theirs)
+        self.port = os.ttyname(self._theirs)
+        """Device path for the other side."""
+        self._wake, self._waker = os.pipe()
+        self._thread = threading.Thread(target=self._serve, name="laser controller", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Hang up. The other side sees the line go dead. Closing again does nothing."""
+        if not self._thread.is_alive():
+            return
+        os.write(self._waker, b"x")
+        self._thread.join()
+        for descriptor in (self._ours, self._theirs, self._wake, self._waker):
+            with contextlib.suppress(OSError):
+                os.close(descriptor)
+
+    def _serve(self) -> None:
+        while True:
+            ready, _, _ = select.select([self._ours, self._wake], [], [])
+            if self._wake in ready:
+                return
+            answer = self._receive(os.read(self._ours, 4096))
+            if answer:
+                os.write(self._ours, answer)

@@ -1,0 +1,105 @@
+"""What stands in front of the emulated sensor, and what the sensor sees of each laser on it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from workbench.emulator.beam import Beam
+from workbench.emulator.lens import Lens
+from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
+from workbench.emulator.spot import ImageFormat, Spot, SpotPainter
+from workbench.emulator.surfaces import Cylinder, Plane, Polynomial, Surface
+from workbench.emulator.truth import PlacementError, Truth, draw_placement_error, write_truth
+from workbench.model.errors import BadInputError
+from workbench.model.rig import Rig
+from workbench.model.target import (
+    CylinderTarget,
+    FlatTarget,
+    Placement,
+    PolynomialTarget,
+    TargetShape,
+)
+
+F_STEP = 1e-6
+"""Relative: spots are painted anew when the focal length has drifted by this (3e-4 px at the image's edge)."""
+
+
+class Scene:
+    """The target bench: puts targets where they are asked for, with the errors of the hidden truth."""
+
+    def __init__(self, rig: Rig, spec: EmulatorSpec, truth: Truth, truth_file: Path) -> None:
+        self._rig, self._spec, self._truth, self._file = rig, spec, truth, truth_file
+        self._image = ImageFormat(rig.camera.width_px, rig.camera.height_px)
+        self._beams = {name: Beam(ray, spec.beam) for name, ray in truth.lasers.items()}
+        self._errors: dict[str, PlacementError] = {}
+        self._surfaces: tuple[tuple[Surface, float], ...] = ()
+        self._key = ""
+        self._f_step = 0
+        self._spots: dict[str, list[Spot]] = {}
+        self.moves = 0
+        """Counts placements."""
+        write_truth(self._file, spec, truth, self._errors)
+
+    @property
+    def laser_ids(self) -> tuple[str, ...]:
+        """Every laser of the rig."""
+        return tuple(self._beams)
+
+    def place(self, placement: Placement) -> Placement:
+        """Put the target there; the ruler shows what was asked for, the truth is something else.
+
+        Raises:
+            BadInputError: a flat target is turned by 90 degrees or more.
+        """
+        error = draw_placement_error(self._rig, self._spec, placement.key)
+        z_mm = placement.standoff_mm * (1 + self._truth.ruler_scale) + error.error_mm + self._truth.offset_mm
+        self._surfaces = _surfaces(placement.target, z_mm, error, self._spec.surface)
+        self._key = placement.key
+        self._spots = {}
+        self.moves += 1
+        self._errors[placement.key] = error
+        write_truth(self._file, self._spec, self._truth, self._errors)
+        return placement
+
+    def spots(self, laser_id: str, f_scale: float = 1.0) -> list[Spot]:
+        """What one laser alone adds to the image (a mirror-like target shows two spots), at a drifted f."""
+        f_step = round((f_scale - 1) / F_STEP)
+        if f_step != self._f_step:
+            self._f_step, self._spots = f_step, {}
+        if laser_id not in self._spots:
+            self._spots[laser_id] = self._paint(laser_id)
+        return self._spots[laser_id]
+
+    def _paint(self, laser_id: str) -> list[Spot]:
+        lens = Lens(self._truth, 1 + self._f_step * F_STEP)
+        painter = SpotPainter(self._spec, lens, self._image, self._truth.f_px)
+        painted = [
+            painter.paint(self._beams[laser_id], surface, gain, (self._key, laser_id, str(index)))
+            for index, (surface, gain) in enumerate(self._surfaces)
+        ]
+        return [spot for spot in painted if spot is not None]
+
+
+def _surfaces(
+    target: TargetShape, z_mm: float, error: PlacementError, finish: SurfaceSpec
+) -> tuple[tuple[Surface, float], ...]:
+    """The target's surfaces, each with the share of light that reaches it and comes back."""
+    if isinstance(target, FlatTarget):
+        return ((_plane(target, z_mm, error, finish.albedo), 1.0),)
+    if isinstance(target, CylinderTarget):
+        radius = target.diameter_mm / 2
+        return ((Cylinder(target.shift_mm, z_mm + radius, radius, finish.albedo), 1.0),)
+    if isinstance(target, PolynomialTarget):
+        return ((Polynomial(z_mm, target.coefficients, target.shift_mm, finish.albedo), 1.0),)
+    return ()
+
+
+def _plane(target: FlatTarget, z_mm: float, error: PlacementError, albedo: float) -> Plane:
+    yaw, pitch = target.yaw_deg + error.yaw_deg, target.pitch_deg + error.pitch_deg
+    if max(abs(yaw), abs(pitch)) >= 90:
+        raise BadInputError(
+            f"flat target: expected a turn of less than 90 deg (tilt of the placement included),"
+            f" got yaw {yaw:.3g} and pitch {pitch:.3g}"
+        )
+    return Plane(z_mm, math.tan(math.radians(yaw)), math.tan(math.radians(pitch)), albedo)

@@ -1,0 +1,84 @@
+"""From electrons to numbers: shot and read noise, hot pixels, ambient light, gain, saturation, quantisation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from workbench.devices.protocols import Image
+from workbench.emulator.keyed import generator
+from workbench.emulator.spec import AmbientSpec, EmulatorSpec
+from workbench.emulator.spot import ImageFormat, Spot
+
+Map = NDArray[np.float32]
+
+
+class Sensor:
+    """A grey sensor of a linear response; numbers are clipped to [0, 2^bits - 1]."""
+
+    def __init__(self, spec: EmulatorSpec, image: ImageFormat, bits: int) -> None:
+        self._spec = spec.sensor
+        self._full_scale = 2**bits - 1
+        self._ambient = _ambient_map(spec.ambient, image)
+        self._hot = _hot_map(spec, image)
+        self._type = cv2.CV_8U if bits == 8 else cv2.CV_16U
+        self._brightest_ambient = float(self._ambient.max())
+
+    def expose(
+        self, spots: Sequence[Spot], exposure_s: float, gain: float, ambient: float, rng: Generator
+    ) -> Image:
+        """One frame; `ambient` multiplies the ambient light.
+
+        Shot noise is Poisson's where a spot shines and its Gaussian approximation elsewhere, where the read
+        noise drowns the difference: both have the right mean and variance.
+        """
+        mean = self._ambient * np.float32(ambient * exposure_s)
+        mean += self._hot * np.float32(exposure_s)
+        for spot in spots:
+            _window(mean, spot)[:] += spot.rate * np.float32(exposure_s)
+        noise = rng.standard_normal(mean.shape, dtype=np.float32)
+        read = [np.float32(self._spec.read_noise_e) * _window(noise, spot) for spot in spots]
+        noise *= np.sqrt(mean + np.float32(self._spec.read_noise_e**2))
+        noise += mean
+        for spot, of_reading in zip(spots, read, strict=True):
+            _window(noise, spot)[:] = rng.poisson(_window(mean, spot)) + of_reading
+        return self._digitise(noise, gain)
+
+    def metered_exposure(self, spots: Sequence[Spot], gain: float, peak: float) -> float:
+        """Exposure (s) that puts the brightest pixel of all `spots` at the fraction `peak` of full scale."""
+        rate = max((float(spot.rate.max()) for spot in spots), default=0.0) + self._brightest_ambient
+        level = (peak - self._spec.black_level) * self._spec.full_well_e / gain
+        return level / rate if rate > 0 else float("inf")
+
+    def _digitise(self, electrons: Map, gain: float) -> Image:
+        electrons *= np.float32(gain * self._full_scale / self._spec.full_well_e)
+        electrons += np.float32(self._spec.black_level * self._full_scale)
+        if self._type == cv2.CV_16U:
+            np.minimum(electrons, np.float32(self._full_scale), out=electrons)
+        # OpenCV's conversion rounds to nearest and saturates.
+        image: Image = cv2.add(electrons, 0.0, dtype=self._type)
+        return image
+
+
+def _window(image: Map, spot: Spot) -> Map:
+    height, width = spot.rate.shape
+    return image[spot.top : spot.top + height, spot.left : spot.left + width]
+
+
+def _ambient_map(spec: AmbientSpec, image: ImageFormat) -> Map:
+    u = (np.arange(image.width) / max(image.width - 1, 1) - 0.5) * spec.gradient_u
+    v = (np.arange(image.height) / max(image.height - 1, 1) - 0.5) * spec.gradient_v
+    return (spec.level_e_per_s * (1 + u[None, :] + v[:, None])).astype(np.float32)
+
+
+def _hot_map(spec: EmulatorSpec, image: ImageFormat) -> Map:
+    rng = generator(spec.seed, "hot pixels")
+    pixels = np.zeros(image.width * image.height, dtype=np.float32)
+    count = min(spec.sensor.hot_pixels, pixels.size)
+    where = rng.choice(pixels.size, size=count, replace=False)
+    pixels[where] = rng.exponential(spec.sensor.hot_pixel_e_per_s, size=count)
+    return pixels.reshape(image.height, image.width)

@@ -1,0 +1,189 @@
+"""The `emulator:` block of a rig file: what the virtual bench is made of. Every parameter has a default."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from workbench.model.errors import BadInputError
+from workbench.model.rig import NonNegativeFloat, PositiveFloat, Rig
+from workbench.model.yamlfile import FileModel
+
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=0)]
+
+
+class BeamSpec(FileModel):
+    """Laser beams, all alike: Gaussian, 1/e^2 diameter = exit diameter + divergence x path."""
+
+    power_mw: PositiveFloat = 1.0
+    exit_diameter_mm: PositiveFloat = 1.5
+    divergence_mrad: NonNegativeFloat = 1.6
+    """Full angle."""
+    wavelength_nm: PositiveFloat = 650.0
+    speckle_contrast: Fraction = 1.0
+    """Before the pixel averages over grains: 1 for a target that keeps the polarisation, 0 for no speckle."""
+
+
+class LensSpec(FileModel):
+    """What the pinhole does not tell about the lens."""
+
+    f_number: PositiveFloat = 2.0
+    blur_px: NonNegativeFloat = 0.7
+    """Standard deviation of the Gaussian point spread, without the pixel's own width."""
+    transmission: Fraction = 0.6
+    """Lens and band-pass filter at the laser's wavelength."""
+
+
+class SensorSpec(FileModel):
+    """Sensor. The defaults are a 1/3" CCD of 45 dB: full well / read noise = 10^(45 / 20)."""
+
+    pitch_um: PositiveFloat = 7.5
+    quantum_efficiency: Fraction = 0.3
+    full_well_e: PositiveFloat = 40_000.0
+    """Electrons that make the largest number at gain 1."""
+    read_noise_e: NonNegativeFloat = 225.0
+    black_level: Annotated[float, Field(ge=0, lt=0.5)] = 0.03
+    """Pedestal as a fraction of full scale; keeps the noise of a dark pixel from being cut at 0."""
+    hot_pixels: Count = 20
+    hot_pixel_e_per_s: NonNegativeFloat = 3e5
+    """Mean dark current of a hot pixel; the currents are spread exponentially."""
+
+
+class AmbientSpec(FileModel):
+    """Room light that passes the band-pass filter."""
+
+    level_e_per_s: NonNegativeFloat = 5e4
+    """At the image centre: some 500 lx of room light on white paper through an 11 nm filter at f/2."""
+    gradient_u: Annotated[float, Field(ge=-1, le=1)] = 0.2
+    """Relative change over the image's full width."""
+    gradient_v: Annotated[float, Field(ge=-1, le=1)] = 0.1
+    """Relative change over the image's full height."""
+    flicker_depth: Fraction = 0.1
+    mains_hz: PositiveFloat = 60.0
+    """Light flickers at twice this."""
+    off_jump: Annotated[float, Field(ge=-1)] = 0.0
+    """Relative change of the ambient light whenever no laser is lit."""
+
+
+class StreamSpec(FileModel):
+    """Exposure, and how the frames arrive."""
+
+    exposure_s: PositiveFloat | None = None
+    """Fixed exposure; without one the camera meters at every placement."""
+    gain: Annotated[float, Field(ge=1)] = 1.0
+    metered_peak: Annotated[float, Field(gt=0, lt=1)] = 0.7
+    """Where metering puts the brightest pixel, as a fraction of full scale."""
+    shortest_exposure_s: PositiveFloat = 2e-6
+    longest_exposure_s: PositiveFloat = 0.033
+    mirrored: bool = False
+    """The image arrives with left and right exchanged."""
+    latency_frames: Count = 0
+    """Frames between a laser command and the first one that shows it."""
+    dropped: Fraction = 0.0
+    """Share of frames that are lost on their way."""
+    repeated: Fraction = 0.0
+    """Share of frames in whose place the one before arrives again."""
+
+
+class WarmUpSpec(FileModel):
+    """Drift of the focal length: f (1 + relative exp(-frames / time constant)). Off by default."""
+
+    f_relative: Annotated[float, Field(gt=-0.5, lt=0.5)] = 0.0
+    time_constant_frames: PositiveFloat = 2000.0
+
+
+class SurfaceSpec(FileModel):
+    """Finishes of the targets."""
+
+    albedo: Fraction = 0.8
+    """Diffuse reflectance of paper."""
+    absorbent_albedo: Fraction = 0.01
+    mirror_albedo: Fraction = 0.05
+    """Diffuse reflectance that a mirror-like target keeps (dust, scratches)."""
+    mirror_reflectance: Fraction = 0.8
+    wall_behind_mm: PositiveFloat = 1500.0
+    """From the pinhole back to the wall that a mirror-like target shows the camera."""
+
+
+class LaserTruth(FileModel):
+    """Pinned values of one laser."""
+
+    x_mm: float | None = None
+    y_mm: float | None = None
+    tx: float | None = None
+    ty: float | None = None
+
+
+class PlacementTruth(FileModel):
+    """Pinned errors of one placement."""
+
+    error_mm: float | None = None
+    yaw_deg: float | None = None
+    pitch_deg: float | None = None
+
+
+class TruthSpec(FileModel):
+    """Values that are pinned instead of drawn from the rig's tolerances."""
+
+    f_px: PositiveFloat | None = None
+    cx_px: float | None = None
+    cy_px: float | None = None
+    k1: float | None = None
+    k2: float | None = None
+    p1: float | None = None
+    p2: float | None = None
+    k3: float | None = None
+    offset_mm: float | None = None
+    ruler_scale: float | None = None
+    lasers: dict[str, LaserTruth] = {}
+    placements: dict[str, PlacementTruth] = {}
+
+
+class ControllerSpec(FileModel):
+    """Laser controller, and the fault that it has."""
+
+    fault: Literal["none", "ignores_off", "hides_stuck_beam", "garbles", "silent", "stutters"] = "none"
+    interlock_closed: bool = True
+
+
+class EmulatorSpec(FileModel):
+    """The `emulator:` block."""
+
+    seed: int
+    beam: BeamSpec = BeamSpec()
+    lens: LensSpec = LensSpec()
+    sensor: SensorSpec = SensorSpec()
+    ambient: AmbientSpec = AmbientSpec()
+    camera: StreamSpec = StreamSpec()
+    warm_up: WarmUpSpec = WarmUpSpec()
+    surface: SurfaceSpec = SurfaceSpec()
+    truth: TruthSpec = TruthSpec()
+    controller: ControllerSpec = ControllerSpec()
+
+
+def emulator_spec(rig: Rig) -> EmulatorSpec:
+    """Validate the rig's `emulator:` block.
+
+    Raises:
+        BadInputError: one line for each problem, with the key, what was expected and what came.
+    """
+    block: dict[str, Any] = {} if rig.emulator is None else rig.emulator
+    try:
+        spec = EmulatorSpec.model_validate(block)
+    except ValidationError as error:
+        raise BadInputError("\n".join(_describe(rig, dict(p)) for p in error.errors())) from None
+    for name in spec.truth.lasers:
+        if name not in rig.laser_ids:
+            known = ", ".join(rig.laser_ids)
+            raise BadInputError(
+                f"rig {rig.rig}: emulator.truth.lasers.{name}: expected a laser of the rig ({known})"
+            )
+    return spec
+
+
+def _describe(rig: Rig, problem: dict[str, Any]) -> str:
+    key = ".".join(["emulator", *(str(part) for part in problem["loc"])])
+    came = "" if problem["type"] in {"missing", "extra_forbidden"} else f", got {problem['input']!r}"
+    return f"rig {rig.rig}: {key}: {problem['msg'][:1].lower()}{problem['msg'][1:]}{came}"

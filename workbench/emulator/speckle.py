@@ -1,0 +1,35 @@
+"""Speckle on the sensor: the interference pattern of a rough surface seen through the lens's pupil."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+
+def subsamples(grain_px: float) -> int:
+    """Samples along a pixel's side: 1.5 to a grain of lambda N (in pixels), no fewer than 4, no more than 16.
+
+    The pattern's amplitude holds frequencies up to 0.5 / (lambda N); its intensity, up to 1 / (lambda N).
+    """
+    return int(np.clip(np.ceil(1.5 / grain_px), 4, 16))
+
+
+def speckle_field(
+    shape: tuple[int, int], step_px: float, grain_px: float, contrast: float, rng: Generator
+) -> NDArray[np.float64]:
+    """Relative intensity of a speckle pattern: mean 1, standard deviation `contrast`, sampled every `step_px`.
+
+    A circular pupil of diameter 1 / (lambda N) in spatial frequency passes random, independent amplitudes;
+    the squared modulus of their transform has the negative exponential statistics of fully developed speckle
+    and grains of area (4 / pi) (lambda N)^2 (J. W. Goodman, Speckle Phenomena in Optics, 2007, sections 3.2
+    and 4.4). A contrast below 1 stands for a surface that depolarises.
+    """
+    frequency_v = np.fft.fftfreq(shape[0], step_px)[:, None]
+    frequency_u = np.fft.fftfreq(shape[1], step_px)[None, :]
+    pupil = np.hypot(frequency_u, frequency_v) <= 0.5 / grain_px
+    amplitudes = np.zeros(shape, dtype=np.complex128)
+    count = int(pupil.sum())
+    amplitudes[pupil] = rng.standard_normal(count) + 1j * rng.standard_normal(count)
+    intensity = np.abs(np.fft.ifft2(amplitudes)) ** 2 * (amplitudes.size**2 / (2 * count))
+    return np.asarray(1 + contrast * (intensity - 1))

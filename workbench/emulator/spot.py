@@ -1,0 +1,121 @@
+"""The image of one beam on one surface, in electrons per second and pixel, before any noise.
+
+Radiometry. A surface patch under irradiance E (W/mm^2 of surface) has the radiance L = albedo E / pi in every
+direction (Lambert). A pixel whose lines of sight cover d(x, y) in the plane z = 1, at angle alpha off the axis,
+sees the solid angle cos^3(alpha) d(x, y); the pupil of area A shows it A cos(alpha). So the pixel takes in
+L A cos^4(alpha) d(x, y). Obliquity of the surface to the camera is not a factor of its own: a pixel sees a
+longer patch of a tilted surface, but the patch is foreshortened as much. Integrated over the whole spot this is
+P albedo A cos(alpha) cos(theta) / (pi r^2), theta between the line of sight and the normal, r the distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.constants import c, h
+from scipy.ndimage import gaussian_filter
+
+from workbench.emulator.beam import Beam
+from workbench.emulator.keyed import generator
+from workbench.emulator.lens import Lens
+from workbench.emulator.spec import EmulatorSpec
+from workbench.emulator.speckle import speckle_field, subsamples
+from workbench.emulator.surfaces import Surface
+
+Array = NDArray[np.float64]
+OUTLINE_RADII = 3.0
+"""A window ends where the beam is down to exp(-18) of its peak, and five standard deviations of blur beyond."""
+LARGEST_WINDOW = 1_500_000
+"""Samples: a spot smeared across the whole image by grazing incidence is sampled more coarsely than a small one."""
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Electrons per second, (height, width), its first pixel at (`left`, `top`) of the image."""
+
+    left: int
+    top: int
+    rate: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class ImageFormat:
+    """Size of the image, pixels."""
+
+    width: int
+    height: int
+
+
+class SpotPainter:
+    """Paints beams on surfaces as one camera sees them."""
+
+    def __init__(self, spec: EmulatorSpec, lens: Lens, image: ImageFormat, f_px: float) -> None:
+        self._spec = spec
+        self._lens = lens
+        self._image = image
+        wavelength_mm = spec.beam.wavelength_nm * 1e-6
+        self._grain_px = wavelength_mm * 1e3 * spec.lens.f_number / spec.sensor.pitch_um
+        pupil_mm2 = np.pi / 4 * (f_px * spec.sensor.pitch_um * 1e-3 / spec.lens.f_number) ** 2
+        electrons_per_joule = spec.sensor.quantum_efficiency * wavelength_mm * 1e-3 / (h * c)
+        self._response = pupil_mm2 * spec.lens.transmission * electrons_per_joule / np.pi
+
+    def paint(self, beam: Beam, surface: Surface, gain: float, key: Sequence[str]) -> Spot | None:
+        """The spot, its speckle drawn by `key`; None where the camera does not see it.
+
+        `gain` multiplies the surface's albedo (a mirror in between takes its share).
+        """
+        box = self._window(beam, surface)
+        if box is None:
+            return None
+        left, top, width, height = box
+        n = subsamples(self._grain_px)
+        n = max(2, min(n, int(np.sqrt(LARGEST_WINDOW / (width * height)))))
+        samples = self._samples(beam, surface, box, n)
+        blur = self._spec.lens.blur_px * n
+        if blur > 0:
+            samples = gaussian_filter(samples, blur, mode="constant", truncate=5.0)
+        if self._spec.beam.speckle_contrast > 0:
+            rng = generator(self._spec.seed, "speckle", *key)
+            contrast = self._spec.beam.speckle_contrast
+            samples *= speckle_field(samples.shape, 1 / n, self._grain_px, contrast, rng)
+        rate = samples.reshape(height, n, width, n).mean(axis=(1, 3)) * (
+            self._response * surface.albedo * gain
+        )
+        return Spot(left, top, rate.astype(np.float32)) if rate.max() > 0 else None
+
+    def _window(self, beam: Beam, surface: Surface) -> tuple[int, int, int, int] | None:
+        """Left, top, width, height of the pixels that the spot may touch; None if there are none."""
+        origins, directions = beam.outline(OUTLINE_RADII, 32)
+        origins, directions = np.vstack([origins, beam.origin]), np.vstack([directions, beam.direction])
+        depths = surface.depth(origins, directions)
+        if np.isnan(depths).all():
+            return None
+        depths = np.where(np.isnan(depths), np.nanmedian(depths), depths)
+        pixels = self._lens.project(origins + depths[:, None] * directions)
+        margin = 5 * self._spec.lens.blur_px + 1.5
+        low = np.floor(pixels.min(axis=0) - margin)
+        high = np.ceil(pixels.max(axis=0) + margin) + 1
+        size = (self._image.width, self._image.height)
+        left, top = (int(np.clip(a, 0, s)) for a, s in zip(low, size, strict=True))
+        right, bottom = (int(np.clip(a, 0, s)) for a, s in zip(high, size, strict=True))
+        return (left, top, right - left, bottom - top) if right > left and bottom > top else None
+
+    def _samples(self, beam: Beam, surface: Surface, box: tuple[int, int, int, int], n: int) -> Array:
+        """Power from each of n x n points a pixel, as if it filled the pixel: E cos^4(alpha) d(x, y)."""
+        left, top, width, height = box
+        offsets = (np.arange(n) + 0.5) / n - 0.5
+        u = (np.arange(left, left + width)[:, None] + offsets).ravel()
+        v = (np.arange(top, top + height)[:, None] + offsets).ravel()
+        uu, vv = np.meshgrid(u, v)
+        sight = self._lens.back_project(uu.ravel(), vv.ravel())
+        direction = np.column_stack([sight.x, sight.y, np.ones(len(sight.x))])
+        depth = surface.depth(np.zeros(3), direction)
+        power = np.zeros(len(depth))
+        met = np.isfinite(depth) & np.isfinite(sight.area)
+        points = depth[met, None] * direction[met]
+        cos2 = 1 / np.einsum("ij,ij->i", direction[met], direction[met])
+        power[met] = beam.irradiance(points, surface.normal(points)) * cos2**2 * sight.area[met]
+        return power.reshape(height * n, width * n)

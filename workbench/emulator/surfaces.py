@@ -1,0 +1,130 @@
+"""Surfaces that beams and lines of sight meet. Camera frame, mm; front is the side that faces the sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+FARTHEST_INVERSE = 1e-6
+"""1/mm: what lies a kilometre away is not there."""
+
+
+class Surface(Protocol):
+    """Something opaque in front of the sensor."""
+
+    albedo: float
+    """Diffuse reflectance."""
+
+    def depth(self, origin: Array, direction: Array) -> Array:
+        """First t > 0 at which origin + t direction meets the surface, NaN where it does not.
+
+        Shapes: origin (3,) or (n, 3), direction (n, 3) with third component 1, result (n,).
+        """
+
+    def normal(self, points: Array) -> Array:
+        """Unit normals (n, 3) towards the front at points (n, 3) on the surface."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """z = z0 + slope_x x + slope_y y, bounded at half sizes from (centre_x, 0) where they are finite."""
+
+    z0_mm: float
+    slope_x: float
+    slope_y: float
+    albedo: float
+    half_width_mm: float = np.inf
+    half_height_mm: float = np.inf
+    centre_x_mm: float = 0.0
+
+    def depth(self, origin: Array, direction: Array) -> Array:
+        """See `Surface`."""
+        gradient = np.array([-self.slope_x, -self.slope_y, 1.0])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = (self.z0_mm - origin @ gradient) / (direction @ gradient)
+        with np.errstate(invalid="ignore"):
+            x = (origin[..., 0] + t * direction[:, 0] - self.centre_x_mm) * np.hypot(1, self.slope_x)
+            y = (origin[..., 1] + t * direction[:, 1]) * np.hypot(1, self.slope_y)
+            met = (t > 0) & (np.abs(x) <= self.half_width_mm) & (np.abs(y) <= self.half_height_mm)
+        return np.where(met, t, np.nan)
+
+    def normal(self, points: Array) -> Array:
+        """See `Surface`."""
+        normal = np.array([self.slope_x, self.slope_y, -1.0])
+        return np.broadcast_to(normal / np.linalg.norm(normal), points.shape)
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Vertical cylinder, its axis through (axis_x, axis_z)."""
+
+    axis_x_mm: float
+    axis_z_mm: float
+    radius_mm: float
+    albedo: float
+
+    def depth(self, origin: Array, direction: Array) -> Array:
+        """See `Surface`."""
+        ox, oz = origin[..., 0] - self.axis_x_mm, origin[..., 2] - self.axis_z_mm
+        dx, dz = direction[:, 0], direction[:, 2]
+        a, half_b, c = dx**2 + dz**2, ox * dx + oz * dz, ox**2 + oz**2 - self.radius_mm**2
+        root = half_b**2 - a * c
+        t = (-half_b - np.sqrt(np.where(root >= 0, root, np.nan))) / a
+        return np.where(t > 0, t, np.nan)
+
+    def normal(self, points: Array) -> Array:
+        """See `Surface`."""
+        out = points - np.array([self.axis_x_mm, 0.0, self.axis_z_mm])
+        out[:, 1] = 0.0
+        return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """z = z0 + sum of c[k] (x - shift)^(k + 1), the same at every height."""
+
+    z0_mm: float
+    coefficients: tuple[float, ...]
+    shift_mm: float
+    albedo: float
+
+    def depth(self, origin: Array, direction: Array) -> Array:
+        """See `Surface`.
+
+        Every crossing is an eigenvalue of a companion matrix, so that the first one is the first. The unknown
+        is 1/t: the leading coefficient is then the gap at the ray's origin, which does not vanish, and a
+        degree lost along a ray of constant x shows as 1/t = 0 instead of a division by it.
+        """
+        p = self._along(origin, direction)
+        degree = p.shape[1] - 1
+        companion = np.zeros((len(p), degree, degree))
+        companion[:, 1:, :-1] = np.eye(degree - 1)
+        companion[:, :, -1] = -p[:, :0:-1] / p[:, :1]
+        inverse = np.linalg.eigvals(companion)
+        real = np.abs(inverse.imag) <= 1e-7 * np.abs(inverse)
+        first = np.where(real, inverse.real, -np.inf).max(axis=1)
+        return np.where(first > FARTHEST_INVERSE, 1 / np.maximum(first, FARTHEST_INVERSE), np.nan)
+
+    def normal(self, points: Array) -> Array:
+        """See `Surface`."""
+        slope = np.polynomial.Polynomial([0.0, *self.coefficients]).deriv()(points[:, 0] - self.shift_mm)
+        out = np.stack([slope, np.zeros_like(slope), -np.ones_like(slope)], axis=1)
+        return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
+
+    def _along(self, origin: Array, direction: Array) -> Array:
+        """Coefficients (n, degree + 1) of surface minus ray in powers of t."""
+        x0 = np.broadcast_to(origin[..., 0] - self.shift_mm, len(direction))
+        total = np.zeros((len(direction), len(self.coefficients) + 1))
+        total[:, 0] = self.z0_mm - origin[..., 2]
+        total[:, 1] = -direction[:, 2]
+        power = np.zeros_like(total)
+        power[:, 0] = 1.0
+        for c in self.coefficients:
+            shifted = np.concatenate([np.zeros((len(power), 1)), power[:, :-1]], axis=1)
+            power = x0[:, None] * power + direction[:, :1] * shifted
+            total += c * power
+        return total

@@ -1,0 +1,173 @@
+"""The hidden truth of a virtual bench: drawn once by seed, written where only tests look."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict, dataclass
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+from numpy.random import Generator
+from ruamel.yaml import YAML
+
+from workbench.emulator.keyed import generator
+from workbench.emulator.spec import EmulatorSpec, LaserTruth, PlacementTruth
+from workbench.model.errors import BadInputError
+from workbench.model.rig import CameraSpec, Prior, Rig
+from workbench.model.yamlfile import FileModel
+
+LENS_NAMES = ("k1", "k2", "p1", "p2", "k3")
+
+
+@dataclass(frozen=True)
+class Ray:
+    """A laser: origin (x, y, 0) mm, direction (tx, ty, 1), camera frame."""
+
+    x_mm: float
+    y_mm: float
+    tx: float
+    ty: float
+
+
+@dataclass(frozen=True)
+class PlacementError:
+    """How far a placement is off: along the axis, and a flat target's turn about its two axes."""
+
+    error_mm: float
+    yaw_deg: float
+    pitch_deg: float
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the bench really is. Units and frames as in the rig file."""
+
+    f_px: float
+    cx_px: float
+    cy_px: float
+    k1: float
+    k2: float
+    p1: float
+    p2: float
+    k3: float
+    offset_mm: float
+    ruler_scale: float
+    lasers: dict[str, Ray]
+
+
+def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
+    """Draw every value from its prior in the rig file, unless `emulator.truth` pins it.
+
+    Each value has a key of its own, so that pinning one leaves the others as they were. Lens coefficients
+    are drawn again, all together, while the lens would fold inside the image: no such lens is sold.
+
+    Raises:
+        BadInputError: the tolerances (or pins) of the lens leave none that does not fold.
+    """
+    pins = spec.truth
+    camera = rig.camera
+    focal = {
+        name: _value(spec.seed, name, getattr(camera, name), pins) for name in ("f_px", "cx_px", "cy_px")
+    }
+    return Truth(
+        **focal,
+        **_draw_lens(camera, spec, focal),
+        offset_mm=_value(spec.seed, "offset_mm", rig.bench.offset_mm, pins),
+        ruler_scale=_value(spec.seed, "ruler_scale", rig.bench.ruler_scale, pins),
+        lasers={
+            laser.id: Ray(
+                **{
+                    name: _value(
+                        spec.seed,
+                        name,
+                        getattr(laser, name),
+                        pins.lasers.get(laser.id, LaserTruth()),
+                        laser.id,
+                    )
+                    for name in ("x_mm", "y_mm", "tx", "ty")
+                }
+            )
+            for laser in rig.lasers
+        },
+    )
+
+
+def draw_placement_error(rig: Rig, spec: EmulatorSpec, key: str) -> PlacementError:
+    """Errors of the placement `key`, the same whenever the target is put there again."""
+    rng = generator(spec.seed, "placement", key)
+    error, yaw, pitch = rng.standard_normal(3)
+    pins = spec.truth.placements.get(key, PlacementTruth())
+    return PlacementError(
+        error_mm=_pinned(pins.error_mm, rig.bench.placement_sd_mm * error),
+        yaw_deg=_pinned(pins.yaw_deg, rig.bench.tilt_sd_deg * yaw),
+        pitch_deg=_pinned(pins.pitch_deg, rig.bench.tilt_sd_deg * pitch),
+    )
+
+
+def truth_path(session_dir: Path) -> Path:
+    """Where the truth lies: beside the session, not in it."""
+    return session_dir.with_name(session_dir.name + ".truth.yaml")
+
+
+def write_truth(path: Path, spec: EmulatorSpec, truth: Truth, placements: dict[str, PlacementError]) -> None:
+    """Write the truth, and the placements' errors so far, in one step (write, sync, rename)."""
+    document = {
+        "seed": spec.seed,
+        **asdict(truth),
+        "placements": {key: asdict(error) for key, error in placements.items()},
+    }
+    text = StringIO()
+    YAML(typ="safe", pure=True).dump(document, text)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    with part.open("w", encoding="utf-8") as file:
+        file.write(text.getvalue())
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(path)
+
+
+def _draw_lens(camera: CameraSpec, spec: EmulatorSpec, focal: dict[str, float]) -> dict[str, float]:
+    rngs = {name: generator(spec.seed, "truth", name) for name in LENS_NAMES}
+    corner = _corner_radius(camera, focal)
+    for _ in range(1000):
+        lens = {
+            name: _pinned(getattr(spec.truth, name), _drawn(rngs[name], getattr(camera, name)))
+            for name in LENS_NAMES
+        }
+        if _reaches_corner(lens, corner):
+            return lens
+    raise BadInputError(
+        "emulator.truth: expected lens coefficients k1, k2, k3 (pinned, or drawn from the rig's camera) whose"
+        f" radial curve climbs to the image corner at {corner:.3g} focal lengths; none of 1000 draws does"
+    )
+
+
+def _corner_radius(camera: CameraSpec, focal: dict[str, float]) -> float:
+    """Distorted radius of the farthest image corner, in focal lengths."""
+    du = max(focal["cx_px"], camera.width_px - 1 - focal["cx_px"]) + 0.5
+    dv = max(focal["cy_px"], camera.height_px - 1 - focal["cy_px"]) + 0.5
+    return float(np.hypot(du, dv)) / focal["f_px"]
+
+
+def _reaches_corner(lens: dict[str, float], corner: float) -> bool:
+    """Whether the radial curve r (1 + k1 r^2 + k2 r^4 + k3 r^6) climbs, at a slope of 0.3 or more, to the corner."""
+    r = np.linspace(0.0, 3.0 * corner, 3001)
+    k1, k2, k3 = lens["k1"], lens["k2"], lens["k3"]
+    slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
+    height = r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+    climbing = np.logical_and.accumulate(slope >= 0.3)
+    return bool(np.any(climbing & (height >= corner)))
+
+
+def _value(seed: int, name: str, prior: Prior, pins: FileModel, *owner: str) -> float:
+    return _pinned(getattr(pins, name), _drawn(generator(seed, "truth", *owner, name), prior))
+
+
+def _drawn(rng: Generator, prior: Prior) -> float:
+    return prior.value + prior.sd * float(rng.standard_normal())
+
+
+def _pinned(pin: float | None, drawn: float) -> float:
+    return float(drawn) if pin is None else float(pin)
