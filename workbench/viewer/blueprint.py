@@ -36,7 +36,9 @@ def _live(rig: Rig) -> rrb.Container:
     )
     doing = rrb.Horizontal(
         rrb.StateTimelineView(origin=at.LANES, name="Steps"),
-        rrb.TextLogView(origin=at.STEP_LOG, name="Log"),
+        rrb.TextLogView(
+            origin=at.STEP_LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
+        ),
     )
     return rrb.Vertical(
         rrb.Horizontal(picture, curves, column_shares=[3, 2]), doing, row_shares=[3, 1], name="Live"
@@ -57,22 +59,22 @@ def _fit() -> rrb.Container:
 
 
 def _trial() -> rrb.Container:
-    return rrb.Vertical(
+    curves = rrb.Vertical(
         _chart(at.TRIAL_CHART, "Error of every reading against true range, bars stated 1 sigma"),
-        rrb.Horizontal(
-            rrb.TimeSeriesView(origin=at.TRIAL_ERRORS, name="Error [mm] as the trial went"),
-            rrb.TextDocumentView(origin=at.TRIAL_SUMMARY, name="Table"),
+        rrb.TimeSeriesView(
+            origin=f"{at.TRIAL_ERRORS}/{at.SENSOR}", name="Error of the sensor [mm] as the trial went"
         ),
         row_shares=[3, 2],
-        name="Trial",
     )
+    table = rrb.TextDocumentView(origin=at.TRIAL_SUMMARY, name="Table")
+    return rrb.Horizontal(curves, table, column_shares=[3, 2], name="Trial")
 
 
 def _bench() -> rrb.Container:
     eye = rrb.EyeControls3D(
         kind="Orbital",
-        position=(-1800.0, -1100.0, -900.0),
-        look_target=(0.0, 0.0, 900.0),
+        position=(-330.0, -280.0, -400.0),
+        look_target=(0.0, 30.0, 700.0),
         eye_up=(0.0, -1.0, 0.0),
     )
     return rrb.Horizontal(

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import rerun as rr
 
 from workbench.model.event import SpotRecord
@@ -18,7 +19,10 @@ from workbench.viewer.stream import Stream
 QUANTITIES = ("u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "peak_dn")
 RERUN_PIXEL_CENTRE = 0.5
 """Rerun's (0, 0) is the top-left pixel's corner, the workbench's its centre. Only drawings are shifted."""
-_CIRCLE_PX = 6.0
+_DOT = rr.Radius.ui_points(1.0)
+_RING = rr.Radius.ui_points(1.0)
+_RING_PX = 9.0
+_RING_CORNERS = 36
 
 
 def log_series_styles(stream: Stream, colors: Mapping[str, at.Rgb]) -> None:
@@ -36,7 +40,8 @@ def log_frame(stream: Stream, png: bytes) -> None:
 
 def log_spots(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> None:
     """The spots of one capture: drawn into the picture, and as numbers for curves and for a later fit."""
-    stream.log(at.SPOTS_IN_IMAGE, _drawn(spots, colors))
+    stream.log(at.SPOTS_IN_IMAGE, _dots(spots, colors))
+    stream.log(at.RINGS_IN_IMAGE, _rings(spots, colors))
     by_laser: dict[str, list[SpotRecord]] = defaultdict(list)
     for spot in spots:
         by_laser[spot.laser_id or at.UNASSIGNED].append(spot)
@@ -46,13 +51,24 @@ def log_spots(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, 
             stream.log(at.under(at.SPOTS, quantity, laser), rr.Scalars(values))
 
 
-def _drawn(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
+def _dots(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
     return rr.Points2D(
         [(spot.u_px + RERUN_PIXEL_CENTRE, spot.v_px + RERUN_PIXEL_CENTRE) for spot in spots],
         colors=[_color(spot, colors) for spot in spots],
         labels=[_label(spot) for spot in spots],
         show_labels=True,
-        radii=rr.Radius.ui_points(_CIRCLE_PX) if spots else None,
+        radii=_DOT if spots else None,
+    )
+
+
+def _rings(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.LineStrips2D:
+    """A ring about each spot: a dot large enough to be seen would cover the very light that it marks."""
+    turn = np.linspace(0.0, 2 * np.pi, _RING_CORNERS + 1)
+    ring = _RING_PX * np.column_stack([np.cos(turn), np.sin(turn)]) + RERUN_PIXEL_CENTRE
+    return rr.LineStrips2D(
+        [ring + np.array([spot.u_px, spot.v_px]) for spot in spots],
+        colors=[_color(spot, colors) for spot in spots],
+        radii=_RING if spots else None,
     )
 
 

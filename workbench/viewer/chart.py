@@ -21,7 +21,10 @@ BOUNDS_X, BOUNDS_Y = (-110.0, 1040.0), (-60.0, 490.0)
 OUTLIER_SIGMA = 3.0
 _DODGE = 7.0
 """Sideways shift from one series to the next, so that their bars do not cover each other."""
-_MIN_TICK_DISTANCE = 62.0
+_MIN_TICK_DISTANCE = 80.0
+_LABEL_RISE = 17.0
+"""The viewer hangs a label below its point; raised by this, it stands beside a line of the grid."""
+_LEGEND_Y = -42.0
 _THIN = rr.Radius.ui_points(0.7)
 _BAR = rr.Radius.ui_points(1.2)
 _DOT = rr.Radius.ui_points(4.0)
@@ -103,7 +106,9 @@ def _log_axes(stream: Stream, entity: str, chart: Chart) -> None:
     lines: list[Strip] = [[(chart.x(s), 0.0), (chart.x(s), HEIGHT)] for s in chart.standoffs]
     colors = [at.GREY if value == 0 else _GRID for value in values] + [_GRID] * len(lines)
     stream.log(f"{entity}/grid", rr.LineStrips2D(rows + lines, colors=colors, radii=_THIN, draw_order=-10.0))
-    places = [(-55.0, chart.y(value)) for value in values] + [(x, HEIGHT + 22.0) for x, _ in columns]
+    places = [(-55.0, chart.y(value) - _LABEL_RISE) for value in values] + [
+        (x, HEIGHT + 10.0) for x, _ in columns
+    ]
     texts = [f"{value:+.3g} {chart.unit}" if value else "0" for value in values]
     texts += [f"{standoff:g} mm" for _, standoff in columns]
     labels = rr.Points2D(places, labels=texts, colors=at.GREY, radii=_NONE, show_labels=True)
@@ -113,7 +118,7 @@ def _log_axes(stream: Stream, entity: str, chart: Chart) -> None:
 def _log_series(stream: Stream, entity: str, chart: Chart, series: str, position: int) -> None:
     color = chart.colors[series]
     marks = [mark for mark in chart.marks if mark.series == series]
-    legend = (40.0 + 130.0 * position, -25.0)
+    legend = (40.0 + 130.0 * position, _LEGEND_Y)
     labels = [series] + [""] * len(marks)
     points = [legend, *(chart.place(mark) for mark in marks)]
     stream.log(entity, rr.Points2D(points, colors=color, radii=_DOT, labels=labels, show_labels=True))

@@ -19,6 +19,7 @@ BENCH = "bench"
 CAMERA = f"{BENCH}/camera"
 IMAGE = f"{CAMERA}/image"
 SPOTS_IN_IMAGE = f"{CAMERA}/spots"
+RINGS_IN_IMAGE = f"{CAMERA}/rings"
 RAYS = f"{BENCH}/rays"
 TARGET = f"{BENCH}/target"
 SPOTS_ON_TARGET = f"{BENCH}/spots"
@@ -43,6 +44,8 @@ FIT_CHART = "fit/chart"
 TRIAL_SUMMARY = "trial/summary"
 TRIAL_ERRORS = "trial/errors"
 TRIAL_CHART = "trial/chart"
+SENSOR = "sensor"
+"""Series of the readings themselves, beside those of the single lasers."""
 
 Rgb = tuple[int, int, int]
 

@@ -125,7 +125,7 @@ class _OpenRecording:
     def _(self, event: ev.SessionStarted, moment: Moment) -> None:
         rig = self._rig
         self.stream.describe("session", id=event.session, rig=event.rig, serial=rig.serial)
-        scene.log_axes(self.stream)
+        scene.log_styles(self.stream)
         scene.log_sensor(self.stream, rig.camera, self._geometry, self._colors)
         camera.log_series_styles(self.stream, self._colors)
         fit.log_no_fit_yet(self.stream, self._colors)
@@ -140,11 +140,12 @@ class _OpenRecording:
     @_log.register
     def _(self, event: ev.StepStarted, moment: Moment) -> None:
         steps.lane(self.stream, at.LANE_STEP, event.title)
+        if event.shots == 0:
+            steps.lane(self.stream, at.LANE_LASER, steps.LASERS_OFF)
         steps.say(self.stream, f"Step {event.index}: {event.title}")
 
     @_log.register
     def _(self, event: ev.StepFinished, moment: Moment) -> None:
-        steps.lane(self.stream, at.LANE_LASER, steps.LASERS_OFF)
         steps.say(self.stream, f"Step {event.index} done: {event.outcome}")
 
     @_log.register

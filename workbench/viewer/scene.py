@@ -32,9 +32,11 @@ _DOT = rr.Radius.ui_points(5.0)
 Point = tuple[float, float, float]
 
 
-def log_axes(stream: Stream) -> None:
-    """Which way is up, once."""
+def log_styles(stream: Stream) -> None:
+    """Which way is up, and that a standoff stays until the next placement; once."""
     stream.log(at.BENCH, rr.ViewCoordinates.RDF, static=True)
+    stairs = rr.SeriesLines(colors=at.WHITE, names="standoff", interpolation_mode="StepAfter")
+    stream.log(at.STANDOFF_SCALAR, stairs, static=True)
 
 
 def log_sensor(stream: Stream, camera: CameraSpec, geometry: Geometry, colors: Mapping[str, at.Rgb]) -> None:
@@ -55,10 +57,15 @@ def log_sensor(stream: Stream, camera: CameraSpec, geometry: Geometry, colors: M
 
 def log_target(stream: Stream, placement: Placement, geometry: Geometry) -> None:
     """The target where the ruler says it is; measured points of the placement before it go away."""
-    outline = _outline(placement, placement.standoff_mm + geometry.offset_mm)
-    label = [f"target at {placement.standoff_mm:g} mm"] if outline else []
-    strips = rr.LineStrips3D(outline, colors=at.WHITE, radii=_LINE, labels=label * len(outline[:1]))
-    stream.log(at.TARGET, strips)
+    z_mm = placement.standoff_mm + geometry.offset_mm
+    outline = _outline(placement, z_mm)
+    stream.log(at.TARGET, rr.LineStrips3D(outline, colors=at.WHITE, radii=_LINE))
+    # Below the target: a label of the outline itself would stand in its middle, over the spots.
+    below = [(0.0, TARGET_HALF_MM, z_mm)] if outline else []
+    label = rr.Points3D(
+        below, labels=[f"target at {placement.standoff_mm:g} mm"] * len(below), colors=at.WHITE
+    )
+    stream.log(f"{at.TARGET}/label", label)
     stream.log(at.STANDOFF_SCALAR, rr.Scalars(placement.standoff_mm))
     for entity in (at.SPOTS_ON_TARGET, at.RANGED_POINTS):
         stream.log(entity, rr.Clear(recursive=True))
@@ -87,9 +94,8 @@ def log_ranged(
 ) -> None:
     """Points that the sensor has ranged, on their rays."""
     points = [geometry.ray_at(one.laser_id, one.range_mm + geometry.offset_mm) for one in lasers]
-    labels = [f"{one.laser_id}: {one.range_mm:.1f} mm" for one in lasers]
     dots = rr.Points3D(
-        points, colors=[colors[one.laser_id] for one in lasers], radii=_DOT if points else None, labels=labels
+        points, colors=[colors[one.laser_id] for one in lasers], radii=_DOT if points else None
     )
     stream.log(at.RANGED_POINTS, dots)
 

@@ -13,8 +13,6 @@ from workbench.viewer import entities as at
 from workbench.viewer.chart import Chart, Mark, log_chart
 from workbench.viewer.stream import Stream
 
-SENSOR = "sensor"
-"""The reading itself, beside the ranges of its lasers."""
 PERCENT = 100.0
 
 
@@ -39,7 +37,7 @@ class Trial:
             self._log_chart()
             self._document(f"# Trial {reading.trial}\n\n{len(self.readings)} readings so far.")
         self.readings.append(reading)
-        log_errors(self.stream, reading)
+        log_errors(self.stream, reading, self.colors)
 
     def finish(self, trial: TrialFinished) -> None:
         """Log the table, and the chart of all readings."""
@@ -52,24 +50,24 @@ class Trial:
             self._log_chart()
 
     def _log_chart(self) -> None:
-        colors = {**self.colors, SENSOR: at.WHITE}
+        colors = {**self.colors, at.SENSOR: at.WHITE}
         log_chart(self.stream, at.TRIAL_CHART, Chart("%", error_marks(self.readings), colors), "no trial yet")
 
     def _document(self, text: str) -> None:
         self.stream.log(at.TRIAL_SUMMARY, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
 
 
-def log_errors(stream: Stream, reading: ReadingTaken) -> None:
+def log_errors(stream: Stream, reading: ReadingTaken, colors: Mapping[str, at.Rgb]) -> None:
     """Errors (measured - true, mm) of a reading and of its lasers, with a band of the stated one sigma."""
     if reading.range_mm is not None:
-        _log_error(stream, SENSOR, reading.range_mm - reading.standoff_mm, reading.sigma_mm, at.WHITE)
+        _log_error(stream, at.SENSOR, reading.range_mm - reading.standoff_mm, reading.sigma_mm, at.WHITE)
     for one in reading.lasers:
-        _log_error(stream, one.laser_id, one.range_mm - reading.standoff_mm, one.sigma_mm, None)
+        _log_error(
+            stream, one.laser_id, one.range_mm - reading.standoff_mm, one.sigma_mm, colors[one.laser_id]
+        )
 
 
-def _log_error(
-    stream: Stream, who: str, error_mm: float, sigma_mm: float | None, color: at.Rgb | None
-) -> None:
+def _log_error(stream: Stream, who: str, error_mm: float, sigma_mm: float | None, color: at.Rgb) -> None:
     variances = None if sigma_mm is None else [sigma_mm**2]
     error = rr.Measurements(values=[error_mm], variances=variances, units="mm", names=who, colors=color)
     stream.log(at.under(at.TRIAL_ERRORS, who), error)
@@ -82,7 +80,7 @@ def error_marks(readings: Sequence[ReadingTaken]) -> list[Mark]:
         true_mm = reading.standoff_mm
         ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in reading.lasers]
         if reading.range_mm is not None and reading.sigma_mm is not None:
-            ranges.append((SENSOR, reading.range_mm, reading.sigma_mm))
+            ranges.append((at.SENSOR, reading.range_mm, reading.sigma_mm))
         marks += [
             Mark(who, true_mm, PERCENT * (r / true_mm - 1), PERCENT * sd / true_mm) for who, r, sd in ranges
         ]

@@ -1,0 +1,157 @@
+"""The real Rerun viewer in a test, without a display: started on loopback, asked what it shows, and ended."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from workbench.viewer.window import LOOPBACK, viewer_environment, viewer_executable
+
+REQUIRE = "WORKBENCH_REQUIRE_VIEWER"
+"""Set to 1, a machine that cannot run the viewer fails the test instead of skipping it."""
+START_SECONDS = 30.0
+SETTLE_SECONDS = 20.0
+STOP_SECONDS = 5.0
+_ICD_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
+
+Picture = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Viewer:
+    """A running viewer."""
+
+    client: Any
+    """A `rerun.experimental.ViewerClient`: experimental, so it is not leant on by type."""
+    log_file: Path
+
+    def open(self, recording: Path) -> None:
+        """Load a recording and wait until it is the one on screen."""
+        self.client.open(str(recording))
+
+    def state(self) -> Any:
+        """Recordings, timelines and views, with what the views report."""
+        return self.client.get_state()
+
+    def problems(self) -> list[str]:
+        """Everything that the viewer and its views complain of."""
+        logs = [
+            str(entry) for entry in self.client.get_logs() if "ERROR" in str(entry) or "WARN" in str(entry)
+        ]
+        reports = [f"{view.name}: {report}" for view in self.state().views for report in view.reports]
+        return logs + reports
+
+    def show_tab(self, name: str) -> None:
+        """Bring a tab of the layout to the front: a view in a hidden tab cannot be photographed."""
+        layout = self.client.get_blueprint().blueprint
+        tabs = {
+            parts["ContainerBlueprint"].get("display_name"): path.lstrip("/")
+            for path, parts in layout.items()
+            if "ContainerBlueprint" in parts
+        }
+        for parts in layout.values():
+            container = parts.get("ContainerBlueprint", {})
+            if container.get("container_kind") == "Tabs":
+                container["active_tab"] = tabs[name]
+        self.client.set_blueprint(layout, "recording")
+
+    def shot(self, view_id: Any = None) -> Picture:
+        """A screenshot (H, W, 3) BGR once two in a row are the same: what a recording holds is loaded lazily.
+
+        Raises:
+            AssertionError: the picture does not come to rest.
+        """
+        deadline = time.monotonic() + SETTLE_SECONDS
+        before = b""
+        while time.monotonic() < deadline:
+            now = self.client.take_screenshot(view_id)
+            if now == before:
+                return _decoded(now)
+            before = now
+            time.sleep(0.3)
+        raise AssertionError(f"the viewer's picture still changes after {SETTLE_SECONDS} s")
+
+
+@contextmanager
+def headless_viewer(folder: Path, size: str = "1600x900") -> Iterator[Viewer]:
+    """Run the viewer until the block ends, its files in `folder`; skips the test where it cannot run."""
+    _need_vulkan()
+    port = _free_port()
+    command = [str(viewer_executable()), "--headless", "--bind", LOOPBACK, "--port", str(port)]
+    command += ["--window-size", size, "--hide-welcome-screen"]
+    home = folder / "viewer-home"
+    home.mkdir()
+    environment = {**viewer_environment(), "HOME": str(home)}
+    log_file = folder / "viewer.log"
+    with log_file.open("wb") as log:
+        process = subprocess.Popen(command, env=environment, stdout=log, stderr=log, cwd=folder)
+        try:
+            yield Viewer(_connected(process, port, log_file), log_file)
+        finally:
+            _end(process)
+
+
+def distinct_colors(picture: Picture) -> int:
+    """How many colours a picture has."""
+    return len(np.unique(picture.reshape(-1, 3), axis=0))
+
+
+def _connected(process: subprocess.Popen[bytes], port: int, log_file: Path) -> Any:
+    from rerun.experimental import ViewerClient
+
+    deadline = time.monotonic() + START_SECONDS
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            _cannot(f"the viewer ended with {process.returncode}: {log_file.read_text()[-2000:]}")
+        try:
+            client = ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
+            client.get_state()
+        except (ConnectionError, RuntimeError, OSError):
+            time.sleep(0.2)
+        else:
+            return client
+    return _cannot(f"the viewer did not answer in {START_SECONDS} s: {log_file.read_text()[-2000:]}")
+
+
+def _need_vulkan() -> None:
+    if not any(folder.glob("*.json") for folder in _ICD_FOLDERS if folder.is_dir()):
+        _cannot("no Vulkan driver (Debian: mesa-vulkan-drivers libvulkan1)")
+
+
+def _cannot(reason: str) -> Any:
+    if os.environ.get(REQUIRE) == "1":
+        pytest.fail(f"{REQUIRE}=1, but {reason}")
+    pytest.skip(f"the viewer cannot run here: {reason}")
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(STOP_SECONDS)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait(STOP_SECONDS)
+
+
+def _decoded(png: bytes) -> Picture:
+    picture = cv2.imdecode(np.frombuffer(png, dtype=np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None, "the viewer's screenshot is not a picture"
+    return np.asarray(picture, dtype=np.uint8)
