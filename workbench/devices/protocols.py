@@ -18,7 +18,7 @@ Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 @dataclass(frozen=True)
 class Frame:
-    """One grey frame, (height, width), uint8 or uint16, and the wall clock at its exposure (ns since 1970)."""
+    """One grey frame, (height, width), uint8 or uint16, and the wall clock at its exposure, ns since 1970."""
 
     image: Image
     time_ns: int

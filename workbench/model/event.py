@@ -165,8 +165,8 @@ class LaserRange(FileModel):
     laser_id: str
     range_mm: float
     sigma_mm: float
-    u_px: float
-    v_px: float
+    u_px: float | None
+    v_px: float | None
 
 
 class ReadingTaken(FileModel):
@@ -188,11 +188,14 @@ class TrialRow(FileModel):
 
     standoff_mm: float
     readings: int
-    mean_error_mm: float
-    max_error_mm: float
-    min_error_mm: float
-    sd_mm: float
-    range_sd_mm: float
+    """With a range; the numbers below are of these, and None where there are too few of them."""
+    missing: int = 0
+    """Readings without a range."""
+    mean_error_mm: float | None = None
+    max_error_mm: float | None = None
+    min_error_mm: float | None = None
+    sd_mm: float | None = None
+    range_sd_mm: float | None = None
     """Stated standard deviation of one reading: calibration and spots."""
     reference_sd_mm: float
     """Standard deviation of the true range itself: placement and ruler."""

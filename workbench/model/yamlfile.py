@@ -76,8 +76,7 @@ def _line(data: Any, location: tuple[int | str, ...]) -> int:
     node = data
     for part in location:
         position = getattr(node, "lc", None)
-        known = position is not None and position.data and part in position.data
-        if not known:
+        if position is None or part not in (position.data or {}):
             break
         line = position.data[part][0] + 1
         node = node[part]

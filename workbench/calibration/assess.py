@@ -1,0 +1,168 @@
+"""Is the calibration good enough, and what can it not tell?"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from workbench.calibration.fit import Fit
+from workbench.calibration.parameters import LENS, RAY, REFERENCE
+from workbench.model.calibration import DeterminedBy
+from workbench.model.rig import PositiveFloat
+from workbench.model.yamlfile import FileModel
+from workbench.optics.lens import Lens
+from workbench.optics.rays import Ray, spot_at_inverse_depth
+
+DATA_SHARE_DETERMINED = 0.9
+PRIOR_UNMOVED = 0.9
+"""A posterior sd above this part of the prior's: neither data nor other priors told anything."""
+FEWEST_STANDOFFS = 3
+"""Two fix a laser's line; the third is the first that can contradict."""
+
+
+class Acceptance(FileModel):
+    """Limits that a calibration must keep to be exported."""
+
+    max_rms_px: PositiveFloat = 1.0
+    max_relative_range_sd: PositiveFloat = 0.05
+    """1 sigma over the range, for any laser between the nearest and the farthest standoff."""
+    min_standoffs: Annotated[int, Field(ge=FEWEST_STANDOFFS)] = FEWEST_STANDOFFS
+    """For each laser."""
+
+
+@dataclass(frozen=True)
+class Derived:
+    """What a laser's data do determine whatever the priors say. 1 sigma."""
+
+    laser_id: str
+    f_b_px_mm: float
+    """Focal length times the baseline: its distance from the pinhole, positive on either side."""
+    f_b_sd: float
+    infinity_px: float
+    """Where the spot of a target at infinity would lie, along the laser's axis."""
+    infinity_sd: float
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """The verdict on a fit."""
+
+    verdict: Literal["accepted", "refused"]
+    reasons: tuple[str, ...]
+    """Why refused; empty when accepted."""
+    warnings: tuple[str, ...]
+
+
+def determined_by(fit: Fit) -> tuple[DeterminedBy, ...]:
+    """For each parameter, what it rests on.
+
+    `data`: on the data alone. `prior`: on its own prior, hardly narrowed. `joint`: the data tie it to other
+    parameters and those parameters' priors do the rest.
+    """
+    prior_sd = fit.table.prior_sd
+    return tuple(
+        "data"
+        if share >= DATA_SHARE_DETERMINED
+        else "prior"
+        if prior == 0 or sd > PRIOR_UNMOVED * prior
+        else "joint"
+        for share, sd, prior in zip(fit.data_share, fit.sd, prior_sd, strict=True)
+    )
+
+
+def derive(fit: Fit) -> tuple[Derived, ...]:
+    """`Derived` of every laser, with the full covariance."""
+    return tuple(_derive_one(fit, index) for index in range(len(fit.rig.lasers)))
+
+
+def judge(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> Assessment:
+    """Hold a fit against the limits.
+
+    Args:
+        fit: the fit.
+        limits: what to hold it against.
+        max_relative_range_sd: as in the calibration's `validity`.
+    """
+    reasons = _too_few_standoffs(fit, limits)
+    if not fit.converged:
+        reasons.append("the solver did not converge; check the standoffs and the laser ids")
+    if fit.rms_px > limits.max_rms_px:
+        reasons.append(f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px")
+    if not max_relative_range_sd <= limits.max_relative_range_sd:
+        reasons.append(
+            f"standard deviation of a range up to {100 * max_relative_range_sd:.2g} % of it,"
+            f" expected at most {100 * limits.max_relative_range_sd:g} %"
+        )
+    return Assessment("refused" if reasons else "accepted", tuple(reasons), tuple(_warnings(fit)))
+
+
+def _derive_one(fit: Fit, index: int) -> Derived:
+    laser = fit.rig.lasers[index]
+    lens = slice(0, len(LENS))
+    start = len(LENS) + len(REFERENCE) + len(RAY) * index
+    ray = slice(start, start + len(RAY))
+
+    baseline = float(np.hypot(*fit.values[ray][:2]))
+    product = np.zeros(len(fit.values))
+    product[0] = baseline
+    product[ray.start : ray.start + 2] = fit.values[0] * fit.values[ray][:2] / baseline
+
+    import jax  # the only function here that differentiates
+
+    def infinity(lens_values: NDArray[np.float64], ray_values: NDArray[np.float64]) -> jax.Array:
+        spot = spot_at_inverse_depth(Lens(*lens_values), Ray(*ray_values), 0.0)
+        return spot["uv".index(laser.axis)]
+
+    by_lens, by_ray = jax.grad(infinity, argnums=(0, 1))(fit.values[lens], fit.values[ray])
+    vanishing = np.zeros(len(fit.values))
+    vanishing[lens], vanishing[ray] = by_lens, by_ray
+    return Derived(
+        laser_id=laser.id,
+        f_b_px_mm=float(fit.values[0]) * baseline,
+        f_b_sd=_sd(fit, product),
+        infinity_px=float(infinity(fit.values[lens], fit.values[ray])),
+        infinity_sd=_sd(fit, vanishing),
+    )
+
+
+def _sd(fit: Fit, gradient: NDArray[np.float64]) -> float:
+    return float(np.sqrt(gradient @ fit.covariance @ gradient))
+
+
+def _too_few_standoffs(fit: Fit, limits: Acceptance) -> list[str]:
+    seen: dict[str, set[float]] = defaultdict(set)
+    for s in fit.used:
+        seen[s.laser_id].add(s.standoff_mm)
+    return [
+        f"laser {i} was seen at {len(seen[i])} standoffs, expected at least {limits.min_standoffs}"
+        for i in fit.rig.laser_ids
+        if len(seen[i]) < limits.min_standoffs
+    ]
+
+
+def _warnings(fit: Fit) -> list[str]:
+    sensor = [(p, by) for p, by in zip(fit.table.parameters, determined_by(fit), strict=True) if p.prior.sd]
+    joint = [p.name for p, by in sensor if by == "joint" and p.kind == "sensor"]
+    prior = [p.name for p, by in sensor if by == "prior" and p.kind == "sensor"]
+    warnings = []
+    if "f_px" in joint + prior:
+        warnings.append(
+            "the data cannot give the focal length f_px alone: only its products with the baselines are"
+            " determined, see `derived`. The value and sd of f_px rest on the rig file's priors."
+        )
+    if others := [name for name in joint if name != "f_px"]:
+        warnings.append(f"determined only together with other parameters' priors: {', '.join(others)}")
+    if others := [name for name in prior if name != "f_px"]:
+        warnings.append(f"not determined by the data, the rig file's value stands: {', '.join(others)}")
+    if fit.noise_scale > 1:
+        warnings.append(
+            f"residuals are {fit.noise_scale:.2f} times larger than the stated noise of the spots"
+            f" (chi2 {fit.chi2:.1f} for {fit.degrees_of_freedom:.1f} degrees of freedom);"
+            " every sd was enlarged to match"
+        )
+    return warnings

@@ -1,0 +1,151 @@
+"""From a fit to the calibration YAML on disk."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString
+
+from workbench.calibration.assess import Acceptance, Assessment, determined_by, judge
+from workbench.calibration.fit import Fit
+from workbench.calibration.sensor import Sensor
+from workbench.model.calibration import (
+    Calibration,
+    FitSummary,
+    LaserRanger,
+    LaserRay,
+    Matrix,
+    Noise,
+    Parameters,
+    Provenance,
+    ReferencePlane,
+    Validity,
+)
+from workbench.session.files import write_atomically
+
+LINE_WIDTH = 110
+
+
+def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Calibration, Assessment]:
+    """The calibration that a fit amounts to, and the verdict on it."""
+    values = dict(zip((p.name for p in fit.table.parameters), fit.values.tolist(), strict=True))
+    provisional = _calibration(fit, values, provenance, Assessment("accepted", (), ()), 0.0)
+    worst = _worst_relative_sd(Sensor(provisional))
+    assessment = judge(fit, limits, worst)
+    return _calibration(fit, values, provenance, assessment, worst), assessment
+
+
+def write_calibration(path: Path, calibration: Calibration) -> None:
+    """Write the YAML; an existing file is replaced whole or not at all.
+
+    Raises:
+        BadInputError: the folder cannot be written.
+    """
+    write_atomically(path, render(calibration).encode())
+
+
+def render(calibration: Calibration) -> str:
+    """The YAML text, in the subset that OpenCV, ROS, yaml-cpp and PyYAML read alike."""
+    yaml = YAML()
+    yaml.version = (1, 2)
+    yaml.width = LINE_WIDTH
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    stream = io.StringIO()
+    yaml.dump(_plain(calibration.model_dump()), stream)
+    return stream.getvalue()
+
+
+def _plain(value: Any) -> Any:
+    """Strings quoted (OpenCV refuses a plain one that begins with a digit), lists of numbers on one line."""
+    if isinstance(value, dict):
+        return CommentedMap({key: _plain(item) for key, item in value.items()})
+    if isinstance(value, tuple | list):
+        items = CommentedSeq([_plain(item) for item in value])
+        if not any(isinstance(item, dict) for item in value):
+            items.fa.set_flow_style()
+        return items
+    if isinstance(value, str):
+        return DoubleQuotedScalarString(value)
+    return value
+
+
+def _calibration(
+    fit: Fit, values: dict[str, float], provenance: Provenance, assessment: Assessment, worst: float
+) -> Calibration:
+    f, cx, cy = values["f_px"], values["cx_px"], values["cy_px"]
+    camera = fit.rig.camera
+    standoffs = [s.standoff_mm for s in fit.used]
+    return Calibration(
+        image_width=camera.width_px,
+        image_height=camera.height_px,
+        camera_name=fit.rig.rig,
+        camera_matrix=Matrix(rows=3, cols=3, data=(f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0)),
+        distortion_model="plumb_bob",
+        distortion_coefficients=Matrix(
+            rows=1, cols=5, data=tuple(values[name] for name in ("k1", "k2", "p1", "p2", "k3"))
+        ),
+        rectification_matrix=Matrix(rows=3, cols=3, data=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)),
+        projection_matrix=Matrix(rows=3, cols=4, data=(f, 0.0, cx, 0.0, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0)),
+        laser_ranger=LaserRanger(
+            format=1,
+            reference_plane=ReferencePlane(offset_mm=values["offset_mm"]),
+            lasers=tuple(
+                LaserRay(
+                    id=laser.id,
+                    axis=laser.axis,
+                    origin_mm=(values[f"{laser.id}.x_mm"], values[f"{laser.id}.y_mm"], 0.0),
+                    direction=(values[f"{laser.id}.tx"], values[f"{laser.id}.ty"], 1.0),
+                )
+                for laser in fit.rig.lasers
+            ),
+            noise=Noise(
+                spot_sd_px=fit.rig.noise.spot_sd_px * fit.noise_scale,
+                speckle_sd_px=fit.rig.noise.speckle_sd_px * fit.noise_scale,
+            ),
+            parameters=_parameters(fit),
+            validity=Validity(standoff_mm=(min(standoffs), max(standoffs)), max_relative_range_sd=worst),
+            fit=FitSummary(
+                rms_px=fit.rms_px,
+                observations=len(fit.used),
+                rejected=len(fit.rejected),
+                noise_scale=fit.noise_scale,
+                verdict=assessment.verdict,
+                warnings=assessment.warnings,
+            ),
+            provenance=provenance,
+        ),
+    )
+
+
+def _parameters(fit: Fit) -> Parameters:
+    sensor = fit.sensor
+    table = fit.table.parameters[sensor]
+    covariance = fit.covariance[sensor, sensor]
+    symmetric = (covariance + covariance.T) / 2
+    return Parameters(
+        names=tuple(p.name for p in table),
+        units=tuple(p.unit for p in table),
+        values=tuple(fit.values[sensor].tolist()),
+        sd=tuple(fit.sd[sensor].tolist()),
+        prior_sd=tuple(p.prior.sd for p in table),
+        data_share=tuple(fit.data_share[sensor].tolist()),
+        determined_by=determined_by(fit)[sensor],
+        covariance=Matrix(rows=len(table), cols=len(table), data=tuple(symmetric.ravel().tolist())),
+    )
+
+
+def _worst_relative_sd(sensor: Sensor) -> float:
+    """Largest relative standard deviation of a range between the nearest and the farthest standoff."""
+    nearest, farthest = sensor.calibration.laser_ranger.validity.standoff_mm
+    grid = np.geomspace(nearest, farthest, 30)
+    relative = [
+        float(sensor.relative_range_sd(i, visible).max())
+        for i in sensor.ids
+        if len(visible := grid[sensor.in_frame(i, grid)])
+    ]
+    return max(relative, default=float("inf"))

@@ -1,0 +1,96 @@
+"""The parameters of a calibration: one description each, used by the fit, the report and the YAML."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import radians
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.model.rig import Prior, Rig
+
+LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
+REFERENCE = ("offset_mm", "ruler_scale")
+RAY = ("x_mm", "y_mm", "tx", "ty")
+PLACEMENT = ("error_mm", "slope_x", "slope_y")
+
+Kind = Literal["sensor", "placement"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number to be estimated, with what is known of it before the data (Gaussian, 1 sigma)."""
+
+    name: str
+    unit: str
+    prior: Prior
+    kind: Kind
+    """`sensor` parameters are the calibration; `placement` errors belong to one placing of the target."""
+
+
+def sensor_parameters(rig: Rig) -> tuple[Parameter, ...]:
+    """The parameters of the sensor and its ruler, in the order lens, reference, rays of each laser."""
+    lens = [_sensor(name, getattr(rig.camera, name)) for name in LENS]
+    reference = [_sensor(name, getattr(rig.bench, name)) for name in REFERENCE]
+    rays = [_sensor(f"{laser.id}.{name}", getattr(laser, name)) for laser in rig.lasers for name in RAY]
+    return (*lens, *reference, *rays)
+
+
+def placement_parameters(rig: Rig, placements: Sequence[str]) -> tuple[Parameter, ...]:
+    """Nuisance parameters: how far each placing of the target was off and how it was tilted."""
+    position = Prior(value=0.0, sd=rig.bench.placement_sd_mm)
+    # The tangent of a tilt of a few degrees is the tilt to 0.1 %: its prior may be Gaussian too.
+    tilt = Prior(value=0.0, sd=radians(rig.bench.tilt_sd_deg))
+    priors = dict(zip(PLACEMENT, (position, tilt, tilt), strict=True))
+    return tuple(
+        Parameter(f"{key}.{name}", unit_of(name), priors[name], "placement")
+        for key in placements
+        for name in PLACEMENT
+    )
+
+
+def unit_of(name: str) -> str:
+    """Unit by the suffix of a parameter's name; slopes and distortion coefficients have none ("1")."""
+    if name.endswith("_px"):
+        return "px"
+    if name.endswith("_mm"):
+        return "mm"
+    return "1"
+
+
+@dataclass(frozen=True)
+class ParameterTable:
+    """All parameters of one fit. A parameter whose prior sd is 0 is a constant: not free.
+
+    The free ones are solved for in units of their prior sd, counted from the prior mean: the prior is then
+    the unit Gaussian and the problem is as well scaled as the rig file is honest.
+    """
+
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def prior_mean(self) -> NDArray[np.float64]:
+        """Prior means of all parameters, (P,), each in its unit."""
+        return np.array([p.prior.value for p in self.parameters])
+
+    @property
+    def prior_sd(self) -> NDArray[np.float64]:
+        """Prior standard deviations of all parameters, (P,), each in its unit."""
+        return np.array([p.prior.sd for p in self.parameters])
+
+    @property
+    def free(self) -> NDArray[np.intp]:
+        """Indices of the free parameters."""
+        return np.flatnonzero(self.prior_sd > 0)
+
+    @property
+    def is_sensor(self) -> NDArray[np.bool_]:
+        """Which of all parameters belong to the sensor, (P,)."""
+        return np.array([p.kind == "sensor" for p in self.parameters])
+
+
+def _sensor(name: str, prior: Prior) -> Parameter:
+    return Parameter(name, unit_of(name), prior, "sensor")

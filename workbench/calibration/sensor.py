@@ -1,0 +1,142 @@
+"""A calibrated sensor: the numbers of a calibration, ready to turn spots into ranges and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from workbench.calibration.parameters import LENS, RAY
+from workbench.model.calibration import Calibration
+from workbench.optics.lens import Lens, radial_slope
+from workbench.optics.rays import Ray, spot_at_inverse_depth
+from workbench.optics.triangulate import Sighted, estimate_depth
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Ranges from the reference plane of n spots, mm; not finite where a spot admits none."""
+
+    range_mm: FloatArray
+    """(n,)"""
+    spot_sd_mm: FloatArray
+    """(n,) 1 sigma from the spots alone, independent between spots."""
+    by_parameter: FloatArray
+    """(n, P) derivatives of the ranges by the parameters of the calibration, in the order of its names."""
+    covariance_mm2: FloatArray
+    """(n, n) of everything: spots and calibration. Ranges from one calibration share its error."""
+    misfit_sd: FloatArray
+    """(n,) distance of each spot from its laser's line, in standard deviations of the spot."""
+
+    @property
+    def sigma_mm(self) -> FloatArray:
+        """(n,) 1 sigma of each range."""
+        return np.sqrt(np.diag(self.covariance_mm2))
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A calibration as arrays."""
+
+    calibration: Calibration
+
+    @cached_property
+    def ids(self) -> tuple[str, ...]:
+        """Laser ids in the order of the file."""
+        return tuple(laser.id for laser in self.calibration.laser_ranger.lasers)
+
+    @cached_property
+    def _geometry(self) -> dict[str, float]:
+        return self.calibration.geometry()
+
+    @cached_property
+    def _lens(self) -> FloatArray:
+        return np.array([self._geometry[name] for name in LENS])
+
+    @cached_property
+    def _rays(self) -> FloatArray:
+        """(lasers, 4)."""
+        return np.array([[self._geometry[f"{i}.{name}"] for name in RAY] for i in self.ids])
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.calibration.laser_ranger.parameters.names)}
+
+    @property
+    def offset_mm(self) -> float:
+        """Distance of the pinhole behind the reference plane."""
+        return self._geometry["offset_mm"]
+
+    def spot_px(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
+        """(n, 2) where the laser's spot appears at ranges (n,); infinity allowed."""
+        inverse_depth = 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
+        return np.asarray(_spots(self._lens, self._rays[self.ids.index(laser_id)], inverse_depth))
+
+    def ranges(self, laser_ids: Sequence[str], position_px: FloatArray, sd_px: FloatArray) -> Ranges:
+        """Ranges of n spots with known lasers.
+
+        Args:
+            laser_ids: which laser made each spot, n of them.
+            position_px: (n, 2) u, v; NaN where a coordinate was not measured.
+            sd_px: (n, 2) 1 sigma of the spot's own noise; NaN where not known: the calibration's is used.
+                The speckle's is added here.
+        """
+        noise = self.calibration.laser_ranger.noise
+        laser = [self.ids.index(i) for i in laser_ids]
+        measured = np.isfinite(position_px)
+        own_sd = np.where(np.isfinite(sd_px), sd_px, noise.spot_sd_px)
+        sd = np.where(measured, np.hypot(own_sd, noise.speckle_sd_px), np.inf)
+        found = _depths(self._lens, self._rays[laser], np.where(measured, position_px, 0.0), sd)
+        w, misfit, spot_sd, by_lens, by_ray = (np.asarray(part) for part in found)
+        with np.errstate(divide="ignore"):
+            range_mm = np.where(w > 0, 1.0 / w, np.inf) - self.offset_mm
+        gradient = self._gradient(laser_ids, by_lens, by_ray)
+        covariance = gradient @ self.calibration.laser_ranger.parameters.covariance_array @ gradient.T
+        return Ranges(range_mm, spot_sd, gradient, covariance + np.diag(spot_sd**2), misfit)
+
+    def relative_range_sd(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
+        """(n,) 1 sigma of a single range over the range, for spots of the calibration's typical noise."""
+        n = len(range_mm)
+        typical = np.full((n, 2), np.nan)
+        ranges = self.ranges([laser_id] * n, self.spot_px(laser_id, range_mm), typical)
+        return np.asarray(ranges.sigma_mm / range_mm)
+
+    def in_frame(self, laser_id: str, range_mm: FloatArray) -> NDArray[np.bool_]:
+        """(n,) whether the laser's spot lies in the image, where the lens model does not fold over."""
+        u, v = self.spot_px(laser_id, range_mm).T
+        x, y, tx, ty = self._rays[self.ids.index(laser_id)]
+        w = 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
+        unfolded = np.asarray(radial_slope(Lens(*self._lens), tx + x * w, ty + y * w)) > 0
+        width, height = self.calibration.image_width, self.calibration.image_height
+        inside = (u > -0.5) & (u < width - 0.5) & (v > -0.5) & (v < height - 0.5) & unfolded
+        return np.asarray(inside, bool)
+
+    def _gradient(self, laser_ids: Sequence[str], by_lens: FloatArray, by_ray: FloatArray) -> FloatArray:
+        """(n, P) derivatives of the range from those of the depth; those by other lasers' rays are 0."""
+        gradient = np.zeros((len(laser_ids), len(self._columns)))
+        gradient[:, [self._columns[name] for name in LENS]] = by_lens
+        gradient[:, self._columns["offset_mm"]] = -1.0
+        for row, laser_id in enumerate(laser_ids):
+            gradient[row, [self._columns[f"{laser_id}.{name}"] for name in RAY]] = by_ray[row]
+        return gradient
+
+
+@jax.jit
+def _spots(lens: Array, ray: Array, inverse_depth: Array) -> Array:
+    return jnp.stack(spot_at_inverse_depth(Lens(*lens), Ray(*ray), inverse_depth), axis=1)
+
+
+@jax.jit
+def _depths(lens: Array, rays: Array, position_px: Array, sd_px: Array) -> tuple[Array, ...]:
+    def one(ray: Array, position: Array, sd: Array) -> tuple[Array, ...]:
+        return tuple(estimate_depth(Lens(*lens), Ray(*ray), Sighted(*position, *sd)))
+
+    return jax.vmap(one)(rays, position_px, sd_px)

@@ -1,0 +1,202 @@
+"""The calibration YAML, format 1: what a ranger needs, and everything that tells how far to trust it.
+
+ROS's camera_info keys stand at the top, everything of ours under `laser_ranger`. docs/calibration-format.md
+describes it for people who write another reader.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from workbench.model.rig import Name, NonNegativeFloat, PositiveFloat
+from workbench.model.yamlfile import FileModel, load_yaml_model
+
+DeterminedBy = Literal["data", "joint", "prior"]
+Vector3 = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+AGREEMENT = 1e-9
+"""Relative difference that two copies of one number in the file may have."""
+
+
+class Matrix(FileModel):
+    """A matrix as OpenCV and ROS write it, row by row."""
+
+    rows: Annotated[int, Field(gt=0)]
+    cols: Annotated[int, Field(gt=0)]
+    dt: Literal["d"] = "d"
+    data: tuple[float, ...]
+
+    @model_validator(mode="after")
+    def _is_full(self) -> Matrix:
+        if len(self.data) != self.rows * self.cols:
+            raise ValueError(f"expected {self.rows} x {self.cols} numbers, got {len(self.data)}")
+        return self
+
+
+class ReferencePlane(FileModel):
+    """Where ranges are counted from."""
+
+    offset_mm: float
+    """The pinhole lies this far behind the plane: z = range + offset."""
+
+
+class LaserRay(FileModel):
+    """A beam: the points origin + z direction, camera frame, z in mm."""
+
+    id: Name
+    axis: Literal["u", "v"]
+    origin_mm: Vector3
+    direction: Vector3
+
+
+class Noise(FileModel):
+    """What a ranger adds to a spot's stated deviation, pixels, 1 sigma."""
+
+    spot_sd_px: PositiveFloat
+    """For a spot whose own deviation is not known."""
+    speckle_sd_px: NonNegativeFloat
+    """In every spot, however often a target that stands still is read."""
+
+
+class Parameters(FileModel):
+    """All parameters of the sensor with their posterior; lists in the order of `names`, 1 sigma."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: tuple[float, ...]
+    sd: tuple[NonNegativeFloat, ...]
+    prior_sd: tuple[NonNegativeFloat, ...]
+    data_share: tuple[Annotated[float, Field(ge=0, le=1)], ...]
+    determined_by: tuple[DeterminedBy, ...]
+    covariance: Matrix
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Parameters:
+        count = len(self.names)
+        for key in ("units", "values", "sd", "prior_sd", "data_share", "determined_by"):
+            if (length := len(getattr(self, key))) != count:
+                raise ValueError(f"{key}: expected one for each of {count} names, got {length}")
+        if (self.covariance.rows, self.covariance.cols) != (count, count):
+            raise ValueError(f"covariance: expected {count} x {count}")
+        _check_covariance(self.covariance_array)
+        return self
+
+    @property
+    def covariance_array(self) -> NDArray[np.float64]:
+        """(P, P)."""
+        return np.array(self.covariance.data).reshape(self.covariance.rows, self.covariance.cols)
+
+
+class Validity(FileModel):
+    """Where the calibration was measured, and what it promises there."""
+
+    standoff_mm: Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
+    max_relative_range_sd: NonNegativeFloat
+    """Largest standard deviation of a range, over the range, of any laser within `standoff_mm`."""
+
+
+class FitSummary(FileModel):
+    """How the fit went."""
+
+    rms_px: NonNegativeFloat
+    observations: int
+    rejected: int
+    noise_scale: Annotated[float, Field(ge=1)]
+    verdict: Literal["accepted", "refused"]
+    warnings: tuple[str, ...] = ()
+
+
+class Provenance(FileModel):
+    """Where the calibration comes from."""
+
+    session: str
+    captures_sha256: str
+    rig: str
+    serial: str
+    command: str
+    version: str
+    operator: str
+    created: str
+
+
+class LaserRanger(FileModel):
+    """Everything beyond the camera."""
+
+    format: Literal[1]
+    reference_plane: ReferencePlane
+    lasers: Annotated[tuple[LaserRay, ...], Field(min_length=1)]
+    noise: Noise
+    parameters: Parameters
+    validity: Validity
+    fit: FitSummary
+    provenance: Provenance
+
+
+class Calibration(FileModel):
+    """A calibration file."""
+
+    image_width: Annotated[int, Field(gt=0)]
+    image_height: Annotated[int, Field(gt=0)]
+    camera_name: str
+    camera_matrix: Matrix
+    distortion_model: Literal["plumb_bob"]
+    distortion_coefficients: Matrix
+    rectification_matrix: Matrix
+    projection_matrix: Matrix
+    laser_ranger: LaserRanger
+
+    @model_validator(mode="after")
+    def _says_one_thing(self) -> Calibration:
+        parameters = self.laser_ranger.parameters
+        stated = dict(zip(parameters.names, parameters.values, strict=True))
+        for name, value in self.geometry().items():
+            if name not in stated:
+                raise ValueError(f"laser_ranger.parameters.names: expected {name} among them")
+            if abs(stated[name] - value) > AGREEMENT * max(1.0, abs(value)):
+                raise ValueError(
+                    f"{name} is {value!r} in the camera's or laser's own key and {stated[name]!r} in"
+                    " laser_ranger.parameters.values; expected the same number"
+                )
+        return self
+
+    def geometry(self) -> dict[str, float]:
+        """Every number that a range depends on, by the name of its parameter."""
+        k, d = self.camera_matrix.data, self.distortion_coefficients.data
+        if len(k) != 9 or len(d) != 5:
+            raise ValueError("expected a camera_matrix of 3 x 3 and 5 distortion_coefficients")
+        if k[0] != k[4]:
+            raise ValueError(f"camera_matrix: expected square pixels (fx = fy), got {k[0]!r} and {k[4]!r}")
+        lens = dict(zip(("f_px", "cx_px", "cy_px"), (k[0], k[2], k[5]), strict=True))
+        distortion = dict(zip(("k1", "k2", "p1", "p2", "k3"), d, strict=True))
+        rays = {
+            f"{laser.id}.{name}": value
+            for laser in self.laser_ranger.lasers
+            for name, value in zip(
+                ("x_mm", "y_mm", "tx", "ty"), (*laser.origin_mm[:2], *laser.direction[:2]), strict=True
+            )
+        }
+        return lens | distortion | {"offset_mm": self.laser_ranger.reference_plane.offset_mm} | rays
+
+
+def load_calibration(path: Path) -> Calibration:
+    """Read a calibration file.
+
+    Raises:
+        BadInputError: see `load_yaml_model`.
+    """
+    return load_yaml_model(path, Calibration)
+
+
+def _check_covariance(covariance: NDArray[np.float64]) -> None:
+    if not np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0):
+        raise ValueError("covariance: expected a symmetric matrix")
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    safe = np.where(scale > 0, scale, 1.0)
+    smallest = float(np.linalg.eigvalsh(covariance / np.outer(safe, safe))[0])
+    # Rounding leaves a singular direction at +- some 1e-15 of the largest; anything below is a wrong matrix.
+    if smallest < -1e-9:
+        raise ValueError(f"covariance: expected no negative eigenvalue, got correlation's {smallest:.3g}")

@@ -1,0 +1,158 @@
+"""captures.csv: the door for anyone's data, one row a capture. The format is in docs/captures-format.md."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from math import isfinite, nan
+from pathlib import Path
+
+from workbench.model.errors import BadInputError
+
+ALL_LASERS = "all"
+REQUIRED = ("laser_id", "standoff_mm", "repeat")
+IMAGES = ("on", "off")
+POSITION = ("u_px", "v_px")
+OPTIONAL = ("scene", "standoff_sd_mm", "u_sd_px", "v_sd_px", "tilt_deg")
+COLUMNS = (*REQUIRED, *IMAGES, *POSITION, *OPTIONAL)
+
+
+@dataclass(frozen=True)
+class CaptureRow:
+    """One row. NaN where a number was left empty; `on` is None for a row that gives the position itself."""
+
+    row: int
+    """Counted as a spreadsheet does: the header is row 1."""
+    laser_id: str
+    standoff_mm: float
+    repeat: int
+    on: Path | None
+    off: Path | None
+    u_px: float
+    v_px: float
+    scene: str
+    """Empty when not given."""
+    standoff_sd_mm: float
+    u_sd_px: float
+    v_sd_px: float
+    tilt_deg: float
+
+
+def load_captures(path: Path) -> tuple[CaptureRow, ...]:
+    """Read a captures file; image paths come back relative to the current folder.
+
+    Raises:
+        BadInputError: missing, no such columns, no rows, or a wrong value; every wrong value is listed with
+            its row and column, what was expected and what came.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            _check_header(path, reader.fieldnames or [])
+            rows, problems = [], []
+            for number, cells in enumerate(reader, start=2):
+                try:
+                    rows.append(_Parser(path, number, cells).row())
+                except BadInputError as error:
+                    problems.append(str(error))
+    except OSError as error:
+        raise BadInputError(f"{path}: expected a captures file: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise BadInputError(f"{path}: expected a CSV file in UTF-8: {error}") from None
+    if problems:
+        raise BadInputError("\n".join(problems))
+    if not rows:
+        raise BadInputError(f"{path}: expected at least one row below the header, got none")
+    return tuple(rows)
+
+
+def _check_header(path: Path, names: object) -> None:
+    present = list(names) if isinstance(names, list) else []
+    where = f"{path}: row 1"
+    if missing := [name for name in REQUIRED if name not in present]:
+        needed = ", ".join(REQUIRED)
+        raise BadInputError(f"{where}: expected the columns {needed}; missing: {', '.join(missing)}")
+    if unknown := [str(name) for name in present if name not in COLUMNS]:
+        raise BadInputError(f"{where}: expected columns among {', '.join(COLUMNS)}; got {', '.join(unknown)}")
+    if len(set(present)) != len(present):
+        raise BadInputError(f"{where}: expected every column once, got {', '.join(present)}")
+    if "on" not in present and not set(POSITION) & set(present):
+        raise BadInputError(f"{where}: expected either the column on (images) or u_px and v_px (positions)")
+
+
+class _Parser:
+    """One row's cells to a `CaptureRow`."""
+
+    def __init__(self, path: Path, number: int, cells: dict[str, str | None]) -> None:
+        self._path, self._number = path, number
+        if None in cells or None in cells.values():
+            raise self._error("row", "as many values as the header has columns", "another number")
+        self._cells = {name: (value or "").strip() for name, value in cells.items()}
+
+    def row(self) -> CaptureRow:
+        laser_id = self._cells["laser_id"]
+        if not laser_id:
+            raise self._error("laser_id", "a laser's id or 'all'", "nothing")
+        on, off = self._image("on"), self._image("off")
+        u, v = self._number_in("u_px"), self._number_in("v_px")
+        measured = isfinite(u) or isfinite(v)
+        if (on is not None) == measured:
+            came = "both" if measured else "neither"
+            raise self._error("on", "either an image, or a position in u_px or v_px", came)
+        if measured and laser_id == ALL_LASERS:
+            raise self._error("laser_id", "one laser's id where a position is given", "all")
+        return CaptureRow(
+            row=self._number,
+            laser_id=laser_id,
+            standoff_mm=self._number_in("standoff_mm", above=0.0),
+            repeat=self._repeat(),
+            on=on,
+            off=off,
+            u_px=u,
+            v_px=v,
+            scene=self._cells.get("scene", ""),
+            standoff_sd_mm=self._number_in("standoff_sd_mm", at_least=0.0),
+            u_sd_px=self._number_in("u_sd_px", above=0.0),
+            v_sd_px=self._number_in("v_sd_px", above=0.0),
+            tilt_deg=self._number_in("tilt_deg", above=-90.0, below=90.0),
+        )
+
+    def _image(self, column: str) -> Path | None:
+        name = self._cells.get(column, "")
+        return self._path.parent / name if name else None
+
+    def _repeat(self) -> int:
+        text = self._cells["repeat"]
+        if not text.isdecimal():
+            raise self._error("repeat", "a whole number from 0", text or "nothing")
+        return int(text)
+
+    def _number_in(
+        self,
+        column: str,
+        *,
+        above: float | None = None,
+        at_least: float | None = None,
+        below: float | None = None,
+    ) -> float:
+        text = self._cells.get(column, "")
+        if not text:
+            return nan
+        try:
+            value = float(text)
+        except ValueError:
+            raise self._error(column, "a number", text) from None
+        if not isfinite(value):
+            raise self._error(column, "a finite number", text)
+        if above is not None and value <= above:
+            raise self._error(column, f"a number above {above:g}", text)
+        if at_least is not None and value < at_least:
+            raise self._error(column, f"a number of at least {at_least:g}", text)
+        if below is not None and value >= below:
+            raise self._error(column, f"a number below {below:g}", text)
+        return value
+
+    def _error(self, column: str, expected: str, came: str) -> BadInputError:
+        return BadInputError(
+            f"{self._path}: row {self._number}, column {column}: expected {expected}, got {came}"
+        )

@@ -1,0 +1,49 @@
+"""Pinhole and Brown-Conrady lens, in OpenCV's convention (`plumb_bob`: k1 k2 p1 p2 k3)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+
+class Lens(NamedTuple):
+    """Intrinsic parameters. f, cx, cy in pixels (square pixels), the others without unit."""
+
+    f_px: ArrayLike
+    cx_px: ArrayLike
+    cy_px: ArrayLike
+    k1: ArrayLike = 0.0
+    k2: ArrayLike = 0.0
+    p1: ArrayLike = 0.0
+    p2: ArrayLike = 0.0
+    k3: ArrayLike = 0.0
+
+
+def distort(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+    """Distorted normalised coordinates of the undistorted (x, y); shapes broadcast.
+
+    Source: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37 (1971), with
+    OpenCV's order of coefficients.
+    """
+    x, y = jnp.asarray(x), jnp.asarray(y)
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3))
+    x_distorted = x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x)
+    y_distorted = y * radial + lens.p1 * (r2 + 2.0 * y * y) + 2.0 * lens.p2 * x * y
+    return x_distorted, y_distorted
+
+
+def project(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+    """Pixel position (u, v) of the undistorted normalised coordinates x = X/Z, y = Y/Z."""
+    x_distorted, y_distorted = distort(lens, x, y)
+    f_px = jnp.asarray(lens.f_px)
+    return jnp.asarray(lens.cx_px) + f_px * x_distorted, jnp.asarray(lens.cy_px) + f_px * y_distorted
+
+
+def radial_slope(lens: Lens, x: ArrayLike, y: ArrayLike) -> Array:
+    """d(distorted radius) / d(radius) at (x, y): where it is not positive the lens model folds over."""
+    r2 = jnp.asarray(x) ** 2 + jnp.asarray(y) ** 2
+    return 1.0 + r2 * (3.0 * lens.k1 + r2 * (5.0 * lens.k2 + r2 * 7.0 * lens.k3))

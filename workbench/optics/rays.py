@@ -1,0 +1,50 @@
+"""Laser rays, and where they meet a plane. Camera frame: x right, y down, z forward, millimetres."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from workbench.optics.lens import Lens, project
+
+
+class Ray(NamedTuple):
+    """The points (x + tx z, y + ty z, z) of a laser beam: origin (x, y, 0) mm, direction (tx, ty, 1)."""
+
+    x_mm: ArrayLike
+    y_mm: ArrayLike
+    tx: ArrayLike
+    ty: ArrayLike
+
+
+class Plane(NamedTuple):
+    """The points with z = z0 + slope_x x + slope_y y; a slope is the tangent of the tilt."""
+
+    z0_mm: ArrayLike
+    slope_x: ArrayLike = 0.0
+    slope_y: ArrayLike = 0.0
+
+
+def depth_on_plane(ray: Ray, plane: Plane) -> Array:
+    """Depth z in mm at which the ray meets the plane; shapes broadcast."""
+    at_origin = plane.z0_mm + plane.slope_x * ray.x_mm + plane.slope_y * ray.y_mm
+    return jnp.asarray(at_origin / (1.0 - plane.slope_x * ray.tx - plane.slope_y * ray.ty))
+
+
+def spot_at_inverse_depth(lens: Lens, ray: Ray, inverse_depth_per_mm: ArrayLike) -> tuple[Array, Array]:
+    """Pixel position (u, v) of the ray's point at depth z = 1 / inverse_depth; 0 is the point at infinity.
+
+    In inverse depth the undistorted image point moves along a straight line at constant speed, which is why
+    the ranger solves for it rather than for z.
+    """
+    x = ray.tx + ray.x_mm * jnp.asarray(inverse_depth_per_mm)
+    y = ray.ty + ray.y_mm * jnp.asarray(inverse_depth_per_mm)
+    return project(lens, x, y)
+
+
+def spot_on_plane(lens: Lens, ray: Ray, plane: Plane) -> tuple[Array, Array]:
+    """Pixel position (u, v) of the laser's spot on the plane."""
+    return spot_at_inverse_depth(lens, ray, 1.0 / depth_on_plane(ray, plane))

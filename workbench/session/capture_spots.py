@@ -1,0 +1,28 @@
+"""The spots of one row of a captures file that names images."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from workbench.model.captures import CaptureRow
+from workbench.model.errors import BadInputError
+from workbench.session.frames import read_image
+from workbench.spots import Finding, Scanline, find_spots
+
+
+def find_row_spots(
+    row: CaptureRow, size_px: tuple[int, int], scanlines: Sequence[Scanline], expected: int
+) -> Finding:
+    """Read the row's images and find the spots in them.
+
+    Raises:
+        BadInputError: an image is missing, truncated or of another size, or the pair does not match.
+    """
+    if row.on is None:
+        raise ValueError(f"row {row.row} gives a position, not images")
+    on = read_image(row.on, size_px)
+    off = None if row.off is None else read_image(row.off, size_px)
+    try:
+        return find_spots(on, off, scanlines=scanlines, expected=expected)
+    except BadInputError as error:
+        raise BadInputError(f"row {row.row}: {row.on} and {row.off}: {error}") from None

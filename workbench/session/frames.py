@@ -1,0 +1,88 @@
+"""The frame store: lossless PNG, on disk before anything refers to it; and reading anybody's images."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.model.errors import BadInputError, StoppedError
+from workbench.model.event import FrameRef
+from workbench.session.files import write_atomically
+
+Image = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class FrameStore:
+    """The `frames/` folder of one session."""
+
+    session_dir: Path
+
+    def save(self, key: str, which: str, image: Image, time_ns: int) -> FrameRef:
+        """Store one frame and return how to find it; it is on disk when this returns.
+
+        Args:
+            key: the capture's key; its slashes become folders.
+            which: `on` or `off`.
+            image: (height, width), uint8 or uint16.
+            time_ns: wall clock at exposure.
+
+        Raises:
+            StoppedError: the disk is full or cannot be written.
+        """
+        ok, png = cv2.imencode(".png", image)
+        if not ok:
+            raise ValueError(f"cannot encode an image of shape {image.shape} and type {image.dtype}")
+        content = png.tobytes()
+        relative = Path("frames") / f"{key}-{which}.png"
+        path = self.session_dir / relative
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(path, content)
+        except OSError as error:
+            raise StoppedError(f"{path}: the frame cannot be stored: {error.strerror}") from error
+        return FrameRef(path=str(relative), sha256=hashlib.sha256(content).hexdigest(), time_ns=time_ns)
+
+
+def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
+    """A grey image, (height, width), uint8 or uint16; colour is converted to grey.
+
+    Args:
+        path: any format that OpenCV reads.
+        size_px: (width, height) that it must have.
+
+    Raises:
+        BadInputError: missing, not an image, truncated, or of another size.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BadInputError(f"{path}: expected an image: {error.strerror}") from None
+    _check_whole(path, content)
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE)
+    if image is None:
+        raise BadInputError(f"{path}: expected an image, OpenCV cannot decode it; is it truncated?")
+    if image.dtype not in (np.uint8, np.uint16):
+        raise BadInputError(f"{path}: expected 8 or 16 bits a pixel, got {image.dtype}")
+    if size_px is not None and (image.shape[1], image.shape[0]) != size_px:
+        raise BadInputError(
+            f"{path}: expected an image of {size_px[0]} x {size_px[1]} pixels,"
+            f" got {image.shape[1]} x {image.shape[0]}; is it from another camera or mode?"
+        )
+    return (
+        image.astype(np.uint8, copy=False) if image.dtype == np.uint8 else image.astype(np.uint16, copy=False)
+    )
+
+
+def _check_whole(path: Path, content: bytes) -> None:
+    """Decoders fill what is missing of a truncated file with grey: look for the end ourselves."""
+    if not content:
+        raise BadInputError(f"{path}: expected an image, the file is empty")
+    png, jpeg = content.startswith(b"\x89PNG"), content.startswith(b"\xff\xd8")
+    if (png and b"IEND" not in content[-16:]) or (jpeg and b"\xff\xd9" not in content[-1024:]):
+        raise BadInputError(f"{path}: the image is truncated: its end is missing after {len(content)} bytes")
