@@ -9,23 +9,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.devices.protocols import Frame
+from workbench.devices.protocols import Frame, Image
 from workbench.emulator.keyed import generator
 from workbench.emulator.scene import Scene
 from workbench.emulator.sensor import Sensor
 from workbench.emulator.spec import EmulatorSpec
+from workbench.emulator.spot import Spot
 
 
 @dataclass(frozen=True)
 class Exposure:
     """What one frame was exposed to."""
 
-    lit: tuple[str, ...]
+    spots: tuple[Spot, ...]
+    lit: bool
     key: str
     number: int
     """Counts the frames of one capture key from 0."""
     exposure_s: float
-    f_scale: float
+    gain: float
 
 
 class EmulatedCamera:
@@ -60,10 +62,11 @@ class EmulatedCamera:
 
     def read(self) -> Frame:
         """The next frame of the stream, as old as the latency makes it."""
-        exposure = self._next()
-        chance = generator(self._spec.seed, "stream", exposure.key, exposure.number).random(2)
-        if chance[0] < self._spec.camera.dropped:
-            return self.read()
+        while True:
+            exposure = self._next()
+            chance = generator(self._spec.seed, "stream", exposure.key, exposure.number).random(2)
+            if chance[0] >= self._spec.camera.dropped:
+                break
         if self._last is None or chance[1] >= self._spec.camera.repeated:
             self._last = self._develop(exposure)
         return self._last
@@ -94,19 +97,17 @@ class EmulatedCamera:
         warm = self._spec.warm_up
         f_scale = 1 + warm.f_relative * float(np.exp(-self._frames / warm.time_constant_frames))
         exposure_s = self.meter() if self.exposure_s is None else self.exposure_s
-        exposure = Exposure(lit, self._key, self._number, exposure_s, f_scale)
+        spots = tuple(spot for name in lit for spot in self._scene.spots(name, f_scale))
+        exposure = Exposure(spots, bool(lit), self._key, self._number, exposure_s, self.gain)
         self._frames += 1
         self._number += 1
         return exposure
 
     def _develop(self, exposure: Exposure) -> Frame:
         rng = generator(self._spec.seed, "frame", exposure.key, exposure.number)
-        spots = [spot for name in exposure.lit for spot in self._scene.spots(name, exposure.f_scale)]
         ambient = self._ambient(exposure, float(rng.random()))
-        image = self._sensor.expose(spots, exposure.exposure_s, self.gain, ambient, rng)
-        if self._spec.camera.mirrored:
-            image = np.ascontiguousarray(image[:, ::-1])
-        return Frame(image, time.time_ns())
+        image = self._sensor.expose(exposure.spots, exposure.exposure_s, exposure.gain, ambient, rng)
+        return Frame(_mirrored(image) if self._spec.camera.mirrored else image, time.time_ns())
 
     def _ambient(self, exposure: Exposure, phase: float) -> float:
         """Ambient light of one exposure: lamps at twice the mains frequency, averaged over it."""
@@ -114,3 +115,8 @@ class EmulatedCamera:
         cycles = 2 * spec.mains_hz * exposure.exposure_s
         flicker = 1 + spec.flicker_depth * float(np.sinc(cycles)) * float(np.cos(2 * np.pi * phase))
         return flicker * (1 if exposure.lit else 1 + spec.off_jump)
+
+
+def _mirrored(image: Image) -> Image:
+    """Left and right exchanged."""
+    return image[:, ::-1].copy()

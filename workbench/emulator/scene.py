@@ -9,7 +9,7 @@ from workbench.emulator.beam import Beam
 from workbench.emulator.lens import Lens
 from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
 from workbench.emulator.spot import ImageFormat, Spot, SpotPainter
-from workbench.emulator.surfaces import Cylinder, Plane, Polynomial, Surface
+from workbench.emulator.surfaces import Cylinder, Plane, Polynomial, Surface, wall_in_mirror
 from workbench.emulator.truth import PlacementError, Truth, draw_placement_error, write_truth
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
@@ -22,7 +22,7 @@ from workbench.model.target import (
 )
 
 F_STEP = 1e-6
-"""Relative: spots are painted anew when the focal length has drifted by this (3e-4 px at the image's edge)."""
+"""Relative: spots are painted anew when the focal length has drifted by this (3e-4 px at the edge)."""
 
 
 class Scene:
@@ -33,7 +33,7 @@ class Scene:
         self._image = ImageFormat(rig.camera.width_px, rig.camera.height_px)
         self._beams = {name: Beam(ray, spec.beam) for name, ray in truth.lasers.items()}
         self._errors: dict[str, PlacementError] = {}
-        self._surfaces: tuple[tuple[Surface, float], ...] = ()
+        self._surfaces: list[tuple[Surface, float]] = []
         self._key = ""
         self._f_step = 0
         self._spots: dict[str, list[Spot]] = {}
@@ -83,23 +83,44 @@ class Scene:
 
 def _surfaces(
     target: TargetShape, z_mm: float, error: PlacementError, finish: SurfaceSpec
-) -> tuple[tuple[Surface, float], ...]:
+) -> list[tuple[Surface, float]]:
     """The target's surfaces, each with the share of light that reaches it and comes back."""
     if isinstance(target, FlatTarget):
-        return ((_plane(target, z_mm, error, finish.albedo), 1.0),)
+        return _flat(target, z_mm, error, finish)
     if isinstance(target, CylinderTarget):
         radius = target.diameter_mm / 2
-        return ((Cylinder(target.shift_mm, z_mm + radius, radius, finish.albedo), 1.0),)
+        return [(Cylinder(target.shift_mm, z_mm + radius, radius, finish.albedo), 1.0)]
     if isinstance(target, PolynomialTarget):
-        return ((Polynomial(z_mm, target.coefficients, target.shift_mm, finish.albedo), 1.0),)
-    return ()
+        return [(Polynomial(z_mm, target.coefficients, target.shift_mm, finish.albedo), 1.0)]
+    return []
 
 
-def _plane(target: FlatTarget, z_mm: float, error: PlacementError, albedo: float) -> Plane:
+def _flat(
+    target: FlatTarget, z_mm: float, error: PlacementError, finish: SurfaceSpec
+) -> list[tuple[Surface, float]]:
     yaw, pitch = target.yaw_deg + error.yaw_deg, target.pitch_deg + error.pitch_deg
     if max(abs(yaw), abs(pitch)) >= 90:
         raise BadInputError(
             f"flat target: expected a turn of less than 90 deg (tilt of the placement included),"
             f" got yaw {yaw:.3g} and pitch {pitch:.3g}"
         )
-    return Plane(z_mm, math.tan(math.radians(yaw)), math.tan(math.radians(pitch)), albedo)
+    albedos = {
+        "matt": finish.albedo,
+        "absorbent": finish.absorbent_albedo,
+        "mirror": finish.mirror_albedo,
+    }
+    face = Plane(
+        z_mm,
+        math.tan(math.radians(yaw)),
+        math.tan(math.radians(pitch)),
+        albedos[target.finish],
+        half_width_mm=(target.width_mm or math.inf) / 2,
+        half_height_mm=(target.height_mm or math.inf) / 2,
+        centre_x_mm=target.shift_mm,
+    )
+    surfaces: list[tuple[Surface, float]] = [(face, 1.0)]
+    if target.finish == "mirror":
+        wall = wall_in_mirror(face, -finish.wall_behind_mm, finish.albedo)
+        if wall is not None:
+            surfaces.append((wall, finish.mirror_reflectance**2))
+    return surfaces

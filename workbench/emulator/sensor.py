@@ -1,10 +1,9 @@
-"""From electrons to numbers: shot and read noise, hot pixels, ambient light, gain, saturation, quantisation."""
+"""From electrons to numbers: noise, hot pixels, ambient light, gain, saturation, quantisation."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
@@ -25,7 +24,6 @@ class Sensor:
         self._full_scale = 2**bits - 1
         self._ambient = _ambient_map(spec.ambient, image)
         self._hot = _hot_map(spec, image)
-        self._type = cv2.CV_8U if bits == 8 else cv2.CV_16U
         self._brightest_ambient = float(self._ambient.max())
 
     def expose(
@@ -57,11 +55,9 @@ class Sensor:
     def _digitise(self, electrons: Map, gain: float) -> Image:
         electrons *= np.float32(gain * self._full_scale / self._spec.full_well_e)
         electrons += np.float32(self._spec.black_level * self._full_scale)
-        if self._type == cv2.CV_16U:
-            np.minimum(electrons, np.float32(self._full_scale), out=electrons)
-        # OpenCV's conversion rounds to nearest and saturates.
-        image: Image = cv2.add(electrons, 0.0, dtype=self._type)
-        return image
+        np.rint(electrons, out=electrons)
+        np.clip(electrons, 0, self._full_scale, out=electrons)
+        return electrons.astype(np.uint8) if self._full_scale < 256 else electrons.astype(np.uint16)
 
 
 def _window(image: Map, spot: Spot) -> Map:

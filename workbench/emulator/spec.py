@@ -81,9 +81,9 @@ class StreamSpec(FileModel):
     """The image arrives with left and right exchanged."""
     latency_frames: Count = 0
     """Frames between a laser command and the first one that shows it."""
-    dropped: Fraction = 0.0
+    dropped: Annotated[float, Field(ge=0, le=0.9)] = 0.0
     """Share of frames that are lost on their way."""
-    repeated: Fraction = 0.0
+    repeated: Annotated[float, Field(ge=0, le=0.9)] = 0.0
     """Share of frames in whose place the one before arrives again."""
 
 
@@ -137,8 +137,8 @@ class TruthSpec(FileModel):
     k3: float | None = None
     offset_mm: float | None = None
     ruler_scale: float | None = None
-    lasers: dict[str, LaserTruth] = {}
-    placements: dict[str, PlacementTruth] = {}
+    lasers: dict[str, LaserTruth] = Field(default_factory=dict)
+    placements: dict[str, PlacementTruth] = Field(default_factory=dict)
 
 
 class ControllerSpec(FileModel):

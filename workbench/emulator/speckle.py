@@ -18,7 +18,7 @@ def subsamples(grain_px: float) -> int:
 def speckle_field(
     shape: tuple[int, int], step_px: float, grain_px: float, contrast: float, rng: Generator
 ) -> NDArray[np.float64]:
-    """Relative intensity of a speckle pattern: mean 1, standard deviation `contrast`, sampled every `step_px`.
+    """Relative intensity of a speckle pattern, every `step_px`: mean 1, standard deviation `contrast`.
 
     A circular pupil of diameter 1 / (lambda N) in spatial frequency passes random, independent amplitudes;
     the squared modulus of their transform has the negative exponential statistics of fully developed speckle

@@ -1,11 +1,12 @@
 """The image of one beam on one surface, in electrons per second and pixel, before any noise.
 
-Radiometry. A surface patch under irradiance E (W/mm^2 of surface) has the radiance L = albedo E / pi in every
-direction (Lambert). A pixel whose lines of sight cover d(x, y) in the plane z = 1, at angle alpha off the axis,
-sees the solid angle cos^3(alpha) d(x, y); the pupil of area A shows it A cos(alpha). So the pixel takes in
-L A cos^4(alpha) d(x, y). Obliquity of the surface to the camera is not a factor of its own: a pixel sees a
-longer patch of a tilted surface, but the patch is foreshortened as much. Integrated over the whole spot this is
-P albedo A cos(alpha) cos(theta) / (pi r^2), theta between the line of sight and the normal, r the distance.
+Radiometry. A surface patch under irradiance E (W/mm^2 of surface) has the radiance L = albedo E / pi in
+every direction (Lambert). A pixel whose lines of sight cover d(x, y) in the plane z = 1, at angle alpha off
+the axis, sees the solid angle cos^3(alpha) d(x, y); the pupil of area A shows it A cos(alpha). So the pixel
+takes in L A cos^4(alpha) d(x, y). Obliquity of the surface to the camera is not a factor of its own: a pixel
+sees a longer patch of a tilted surface, but the patch is foreshortened as much. Integrated over the whole
+spot this is P albedo A cos(alpha) cos(theta) / (pi r^2), theta between the line of sight and the normal, r
+the distance.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ from workbench.emulator.surfaces import Surface
 
 Array = NDArray[np.float64]
 OUTLINE_RADII = 3.0
-"""A window ends where the beam is down to exp(-18) of its peak, and five standard deviations of blur beyond."""
+"""A window ends where the beam is down to exp(-18) of its peak, and five sigma of blur beyond."""
 LARGEST_WINDOW = 1_500_000
-"""Samples: a spot smeared across the whole image by grazing incidence is sampled more coarsely than a small one."""
+"""Samples: a spot smeared across the whole image by grazing incidence is sampled more coarsely."""
 
 
 @dataclass(frozen=True)
@@ -109,13 +110,13 @@ class SpotPainter:
         offsets = (np.arange(n) + 0.5) / n - 0.5
         u = (np.arange(left, left + width)[:, None] + offsets).ravel()
         v = (np.arange(top, top + height)[:, None] + offsets).ravel()
-        uu, vv = np.meshgrid(u, v)
-        sight = self._lens.back_project(uu.ravel(), vv.ravel())
-        direction = np.column_stack([sight.x, sight.y, np.ones(len(sight.x))])
+        around_u, around_v = np.arange(left - 2.0, left + width + 2), np.arange(top - 2.0, top + height + 2)
+        sight = self._lens.back_project_grid(around_u, around_v, u, v)
+        direction = np.column_stack([sight.x.ravel(), sight.y.ravel(), np.ones(sight.x.size)])
         depth = surface.depth(np.zeros(3), direction)
         power = np.zeros(len(depth))
-        met = np.isfinite(depth) & np.isfinite(sight.area)
+        met = np.isfinite(depth)
         points = depth[met, None] * direction[met]
         cos2 = 1 / np.einsum("ij,ij->i", direction[met], direction[met])
-        power[met] = beam.irradiance(points, surface.normal(points)) * cos2**2 * sight.area[met]
+        power[met] = beam.irradiance(points, surface.normal(points)) * cos2**2 * sight.area.ravel()[met]
         return power.reshape(height * n, width * n)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+NODES = 2049
 FARTHEST_INVERSE = 1e-6
 """1/mm: what lies a kilometre away is not there."""
 
@@ -16,8 +17,9 @@ FARTHEST_INVERSE = 1e-6
 class Surface(Protocol):
     """Something opaque in front of the sensor."""
 
-    albedo: float
-    """Diffuse reflectance."""
+    @property
+    def albedo(self) -> float:
+        """Diffuse reflectance."""
 
     def depth(self, origin: Array, direction: Array) -> Array:
         """First t > 0 at which origin + t direction meets the surface, NaN where it does not.
@@ -59,6 +61,46 @@ class Plane:
 
 
 @dataclass(frozen=True)
+class SeenInMirror:
+    """A surface's image in a plane mirror: behind it, where the beam would go on through the mirror."""
+
+    image: Plane
+    mirror: Plane
+
+    @property
+    def albedo(self) -> float:
+        """See `Surface`."""
+        return self.image.albedo
+
+    def depth(self, origin: Array, direction: Array) -> Array:
+        """See `Surface`; rays that pass the mirror by see nothing in it."""
+        through = np.isfinite(self.mirror.depth(origin, direction))
+        return np.where(through, self.image.depth(origin, direction), np.nan)
+
+    def normal(self, points: Array) -> Array:
+        """See `Surface`."""
+        return self.image.normal(points)
+
+
+def wall_in_mirror(mirror: Plane, wall_z_mm: float, albedo: float) -> SeenInMirror | None:
+    """Image of the wall z = `wall_z_mm` (behind the sensor) in `mirror`; None if that looks elsewhere.
+
+    A mirror turned by 45 degrees throws the beam to the side: no wall behind the sensor is seen in it.
+    """
+    normal = np.array([-mirror.slope_x, -mirror.slope_y, 1.0]) / np.hypot(
+        np.hypot(mirror.slope_x, mirror.slope_y), 1
+    )
+    distance = (wall_z_mm - mirror.z0_mm) * normal[2]
+    point = np.array([0.0, 0.0, wall_z_mm]) - 2 * distance * normal
+    turned = np.array([0.0, 0.0, 1.0]) - 2 * normal[2] * normal
+    if turned[2] >= -1e-3:
+        return None
+    slope_x, slope_y = float(-turned[0] / turned[2]), float(-turned[1] / turned[2])
+    z0 = float(point[2] - slope_x * point[0] - slope_y * point[1])
+    return SeenInMirror(Plane(z0, slope_x, slope_y, albedo), mirror)
+
+
+@dataclass(frozen=True)
 class Cylinder:
     """Vertical cylinder, its axis through (axis_x, axis_z)."""
 
@@ -95,6 +137,25 @@ class Polynomial:
     def depth(self, origin: Array, direction: Array) -> Array:
         """See `Surface`.
 
+        Rays of one origin meet a surface that is the same at every height at a depth that depends on their
+        first component alone: many of them are interpolated between `NODES`, a few hundredths of a pixel
+        apart, of which each is solved.
+        """
+        if origin.ndim > 1 or len(direction) <= NODES:
+            return self._first_crossing(origin, direction)
+        x = np.linspace(direction[:, 0].min(), direction[:, 0].max(), NODES)
+        nodes = np.column_stack([x, np.zeros(NODES), np.ones(NODES)])
+        return np.interp(direction[:, 0], x, self._first_crossing(origin, nodes))
+
+    def normal(self, points: Array) -> Array:
+        """See `Surface`."""
+        slope = np.polynomial.Polynomial([0.0, *self.coefficients]).deriv()(points[:, 0] - self.shift_mm)
+        out = np.stack([slope, np.zeros_like(slope), -np.ones_like(slope)], axis=1)
+        return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
+
+    def _first_crossing(self, origin: Array, direction: Array) -> Array:
+        """`depth` of each ray for itself.
+
         Every crossing is an eigenvalue of a companion matrix, so that the first one is the first. The unknown
         is 1/t: the leading coefficient is then the gap at the ray's origin, which does not vanish, and a
         degree lost along a ray of constant x shows as 1/t = 0 instead of a division by it.
@@ -108,12 +169,6 @@ class Polynomial:
         real = np.abs(inverse.imag) <= 1e-7 * np.abs(inverse)
         first = np.where(real, inverse.real, -np.inf).max(axis=1)
         return np.where(first > FARTHEST_INVERSE, 1 / np.maximum(first, FARTHEST_INVERSE), np.nan)
-
-    def normal(self, points: Array) -> Array:
-        """See `Surface`."""
-        slope = np.polynomial.Polynomial([0.0, *self.coefficients]).deriv()(points[:, 0] - self.shift_mm)
-        out = np.stack([slope, np.zeros_like(slope), -np.ones_like(slope)], axis=1)
-        return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
 
     def _along(self, origin: Array, direction: Array) -> Array:
         """Coefficients (n, degree + 1) of surface minus ray in powers of t."""

@@ -145,14 +145,14 @@ def _draw_lens(camera: CameraSpec, spec: EmulatorSpec, focal: dict[str, float]) 
 
 
 def _corner_radius(camera: CameraSpec, focal: dict[str, float]) -> float:
-    """Distorted radius of the farthest image corner, in focal lengths."""
-    du = max(focal["cx_px"], camera.width_px - 1 - focal["cx_px"]) + 0.5
-    dv = max(focal["cy_px"], camera.height_px - 1 - focal["cy_px"]) + 0.5
+    """Distorted radius of the farthest image corner and a few pixels more, in focal lengths."""
+    du = max(focal["cx_px"], camera.width_px - 1 - focal["cx_px"]) + 3
+    dv = max(focal["cy_px"], camera.height_px - 1 - focal["cy_px"]) + 3
     return float(np.hypot(du, dv)) / focal["f_px"]
 
 
 def _reaches_corner(lens: dict[str, float], corner: float) -> bool:
-    """Whether the radial curve r (1 + k1 r^2 + k2 r^4 + k3 r^6) climbs, at a slope of 0.3 or more, to the corner."""
+    """Whether r (1 + k1 r^2 + k2 r^4 + k3 r^6) climbs, at a slope of 0.3 or more, to the corner."""
     r = np.linspace(0.0, 3.0 * corner, 3001)
     k1, k2, k3 = lens["k1"], lens["k2"], lens["k3"]
     slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6

@@ -17,6 +17,12 @@ class FlatTarget(FileModel):
     """About the vertical: positive moves the side at +x away from the sensor."""
     pitch_deg: float = 0.0
     """About the horizontal: positive moves the side at +y (below) away from the sensor."""
+    finish: Literal["matt", "absorbent", "mirror"] = "matt"
+    width_mm: Annotated[float, Field(gt=0)] | None = None
+    """Along the face; without one the target is wider than the field of view. A small one lets beams miss."""
+    height_mm: Annotated[float, Field(gt=0)] | None = None
+    shift_mm: float = 0.0
+    """x of the centre of a target of a stated width; the standoff is still that of the plane at x = 0."""
 
 
 class CylinderTarget(FileModel):
