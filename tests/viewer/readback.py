@@ -7,38 +7,44 @@ from typing import Any
 
 from rerun.chunk import RrdReader
 
+ROW_ID = "rerun.controls.RowId"
+Row = dict[str, Any]
+
 
 class Contents:
-    """The rows of a recording, by entity."""
+    """The rows of a recording by entity, such as `/spots/u_px/L1`."""
 
     def __init__(self, path: Path) -> None:
-        self._rows: dict[str, list[dict[str, Any]]] = {}
+        self._rows: dict[str, list[Row]] = {}
         for chunk in RrdReader(str(path)).stream():
-            rows = chunk.to_record_batch().to_pylist()
-            self._rows.setdefault(str(chunk.entity_path), []).extend(rows)
+            self._rows.setdefault(str(chunk.entity_path), []).extend(_rows(chunk.to_record_batch()))
 
     @property
     def entities(self) -> set[str]:
         return set(self._rows)
 
     def values(self, entity: str, component: str, timeline: str = "capture") -> list[tuple[Any, Any]]:
-        """(time, values) of every row that has the component, in the order of the timeline, then of logging."""
-        found = [
-            (row[timeline], row[component])
-            for row in sorted(self._rows[entity], key=_row_id)
-            if row.get(component) is not None
-        ]
-        return sorted(found, key=lambda row: row[0])
+        """(time, values) of every row that has the component, in the order of time, then of logging."""
+        rows = sorted(self._rows[entity], key=lambda row: row[ROW_ID])
+        found = [(row[timeline], row[component]) for row in rows if row.get(component) is not None]
+        return sorted(found, key=lambda pair: pair[0])
 
     def everything(self) -> dict[str, list[str]]:
-        """All rows without the ids that differ from one writing to the next."""
+        """All rows, without the ids that differ from one writing to the next."""
         return {entity: sorted(_comparable(row) for row in rows) for entity, rows in self._rows.items()}
 
 
-def _row_id(row: dict[str, Any]) -> Any:
-    return row["rerun.controls.RowId"]
+def _rows(batch: Any) -> list[Row]:
+    columns = {name: _column(name, batch.column(name)) for name in batch.schema.names}
+    return [{name: values[i] for name, values in columns.items()} for i in range(batch.num_rows)]
 
 
-def _comparable(row: dict[str, Any]) -> str:
-    known = {key: value for key, value in row.items() if key != "rerun.controls.RowId" and value is not None}
-    return repr(sorted(known.items()))
+def _column(name: str, column: Any) -> list[Any]:
+    if not name.endswith(":blob"):
+        return list(column.to_pylist())
+    # One Python integer for every byte of a picture takes seconds.
+    return [column[i].values.flatten().to_numpy().tobytes() for i in range(len(column))]
+
+
+def _comparable(row: Row) -> str:
+    return repr(sorted((name, value) for name, value in row.items() if name != ROW_ID and value is not None))

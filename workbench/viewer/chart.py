@@ -60,6 +60,11 @@ class Chart:
     """Series in the order of the legend, with their colours."""
 
     @property
+    def series(self) -> dict[str, at.Rgb]:
+        """Series with their colours; one that nobody gave a colour to is white."""
+        return {**self.colors, **{m.series: at.WHITE for m in self.marks if m.series not in self.colors}}
+
+    @property
     def standoffs(self) -> list[float]:
         """Standoffs with a mark, ascending."""
         return sorted({mark.standoff_mm for mark in self.marks})
@@ -81,7 +86,7 @@ class Chart:
 
     def place(self, mark: Mark) -> tuple[float, float]:
         """Where a mark is drawn."""
-        series = list(self.colors)
+        series = list(self.series)
         shift = (series.index(mark.series) - (len(series) - 1) / 2) * _DODGE
         return (self.x(mark.standoff_mm) + shift, self.y(mark.y))
 
@@ -94,7 +99,7 @@ def log_chart(stream: Stream, entity: str, chart: Chart, empty: str) -> None:
         stream.log(f"{entity}/note", note)
         return
     _log_axes(stream, entity, chart)
-    for position, series in enumerate(chart.colors):
+    for position, series in enumerate(chart.series):
         _log_series(stream, at.under(f"{entity}/series", series), chart, series, position)
     _log_outliers(stream, f"{entity}/outliers", chart)
 
@@ -116,7 +121,7 @@ def _log_axes(stream: Stream, entity: str, chart: Chart) -> None:
 
 
 def _log_series(stream: Stream, entity: str, chart: Chart, series: str, position: int) -> None:
-    color = chart.colors[series]
+    color = chart.series[series]
     marks = [mark for mark in chart.marks if mark.series == series]
     legend = (40.0 + 130.0 * position, _LEGEND_Y)
     labels = [series] + [""] * len(marks)

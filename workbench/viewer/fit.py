@@ -51,21 +51,15 @@ def residual_marks(fit: FitFinished, axis: Axis) -> list[Mark]:
 
 
 def _log_parameter(stream: Stream, one: ParameterRecord) -> None:
-    entity = at.under(at.FIT_PARAMETERS, one.name)
-    stream.log(
-        entity, rr.Measurements(values=[one.value], variances=[one.sd**2], units=one.unit, names=one.name)
+    value = rr.Measurements(values=[one.value], variances=[one.sd**2], units=one.unit, names=one.name)
+    belief = rr.AnyValues(
+        sd=one.sd,
+        prior_value=one.prior_value,
+        prior_sd=one.prior_sd,
+        data_share=one.data_share,
+        determined_by=one.determined_by,
     )
-    stream.log(
-        entity,
-        rr.AnyValues(
-            unit=one.unit,
-            sd=one.sd,
-            prior_value=one.prior_value,
-            prior_sd=one.prior_sd,
-            data_share=one.data_share,
-            determined_by=one.determined_by,
-        ),
-    )
+    stream.log(at.under(at.FIT_PARAMETERS, one.name), value, belief)
 
 
 def _log_residual(stream: Stream, one: ResidualRecord) -> None:

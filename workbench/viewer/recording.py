@@ -94,7 +94,7 @@ class _OpenRecording:
         self._geometry = Geometry.of_rig(rig)
         self._trial = Trial(stream, self._colors)
         self._placement: Placement | None = None
-        self._captures: dict[str, tuple[int, ev.CaptureTaken]] = {}
+        self._captures: dict[str, tuple[int, ev.CaptureTaken, Placement | None]] = {}
         self._capture = 0
         self._step = 0
 
@@ -156,18 +156,18 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.CaptureTaken, moment: Moment) -> None:
-        self._captures[event.key] = (moment.capture, event)
+        self._captures[event.key] = (moment.capture, event, self._placement)
         self.stream.at(Moment(moment.capture, moment.step, event.on.time_ns, event.standoff_mm))
         camera.log_frame(self.stream, self._read(event.on))
         steps.lane(self.stream, at.LANE_LASER, event.laser_id)
 
     @_log.register
     def _(self, event: ev.SpotsFound, moment: Moment) -> None:
-        number, capture = self._captures[event.key]
+        number, capture, placement = self._captures[event.key]
         self.stream.at(Moment(number, moment.step, capture.on.time_ns, capture.standoff_mm))
         camera.log_spots(self.stream, event.spots, self._colors)
-        if self._placement is not None:
-            scene.log_spots_on_target(self.stream, event.spots, self._placement, self._geometry, self._colors)
+        if placement is not None:
+            scene.log_spots_on_target(self.stream, event.spots, placement, self._geometry, self._colors)
         for failure in event.failures:
             steps.say(self.stream, f"Capture {event.key}: {failure}", steps.WARN)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from math import cos, pi, radians, sin, tan
 
@@ -83,10 +84,12 @@ def log_spots_on_target(
         return
     pixels = np.array([(spot.u_px, spot.v_px) for spot in spots])
     points = geometry.seen_on(placement.target, placement.standoff_mm, pixels)
-    for spot, point in zip(spots, points, strict=True):
-        laser = spot.laser_id or at.UNASSIGNED
-        dot = rr.Points3D([point], colors=colors.get(laser, at.WHITE), radii=_DOT)
-        stream.log(at.under(at.SPOTS_ON_TARGET, laser), dot)
+    by_laser: dict[str, list[int]] = defaultdict(list)
+    for i, spot in enumerate(spots):
+        by_laser[spot.laser_id or at.UNASSIGNED].append(i)
+    for laser, found in by_laser.items():
+        dots = rr.Points3D(points[found], colors=colors.get(laser, at.WHITE), radii=_DOT)
+        stream.log(at.under(at.SPOTS_ON_TARGET, laser), dots)
 
 
 def log_ranged(

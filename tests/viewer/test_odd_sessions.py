@@ -1,0 +1,158 @@
+"""Sessions that do not go as they should are recorded too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.viewer.readback import Contents
+from tests.viewer.session import a_fit, a_rig
+from workbench.model import event as ev
+from workbench.model.target import (
+    CylinderTarget,
+    FlatTarget,
+    NoTarget,
+    Placement,
+    PolynomialTarget,
+    TargetShape,
+)
+from workbench.viewer.recording import RecordingConsumer
+
+STARTED = ev.SessionStarted(session="odd", rig="made-up", procedures=("p",))
+
+
+def record(folder: Path, events: Sequence[ev.Event]) -> Contents:
+    with RecordingConsumer(folder, a_rig()) as consumer:
+        for n, event in enumerate(events):
+            consumer(ev.Record(n=n, time_ns=1_790_000_000_000_000_000 + n, event=event))
+    return Contents(folder / "recording.rrd")
+
+
+def a_capture(folder: Path, key: str, standoff_mm: float = 500.0) -> ev.CaptureTaken:
+    path = folder / f"{key}.png"
+    cv2.imwrite(str(path), np.full((480, 640), 7, dtype=np.uint8))
+    return ev.CaptureTaken(
+        key=key,
+        purpose="calibration",
+        laser_id="L1",
+        placement_key="p",
+        standoff_mm=standoff_mm,
+        repeat=0,
+        on=ev.FrameRef(path=path.name, sha256="", time_ns=1_790_000_000_000_000_000),
+    )
+
+
+def a_spot(laser: str | None, u_px: float) -> ev.SpotRecord:
+    return ev.SpotRecord(
+        laser_id=laser,
+        u_px=u_px,
+        v_px=240.0,
+        u_sd_px=0.1,
+        v_sd_px=0.1,
+        flux_dn=1.0,
+        width_px=1.0,
+        peak_dn=1.0,
+        flags=("clipped",),
+    )
+
+
+def test_capture_without_spots_says_why_and_clears_the_picture(tmp_path: Path) -> None:
+    events = [STARTED, a_capture(tmp_path, "a"), ev.SpotsFound(key="a", spots=(), failures=("L1: too dim",))]
+    contents = record(tmp_path, events)
+    assert contents.values("/bench/camera/spots", "Points2D:positions") == [(1, [])]
+    assert contents.values("/steps/log", "TextLog:text")[-1] == (1, ["Capture a: L1: too dim"])
+    assert contents.values("/steps/log", "TextLog:level")[-1] == (1, ["WARN"])
+
+
+def test_spots_without_a_laser_are_kept_together(tmp_path: Path) -> None:
+    spots = (a_spot(None, 100.0), a_spot(None, 300.0), a_spot("a laser / of another rig", 5.0))
+    contents = record(
+        tmp_path,
+        [
+            STARTED,
+            ev.TargetPlaced(placement=Placement(key="p", standoff_mm=500.0)),
+            a_capture(tmp_path, "a"),
+            ev.SpotsFound(key="a", spots=spots),
+        ],
+    )
+    assert contents.values("/spots/u_px/unassigned", "Scalars:scalars") == [(1, [100.0, 300.0])]
+    (labels,) = contents.values("/bench/camera/spots", "Points2D:labels")
+    assert labels[1][:2] == ["? (clipped)", "? (clipped)"]
+    (dots,) = contents.values("/bench/spots/unassigned", "Points3D:positions")
+    assert len(dots[1]) == 2
+
+
+def test_spots_found_late_belong_to_their_own_capture(tmp_path: Path) -> None:
+    late = ev.SpotsFound(key="a", spots=(a_spot("L1", 10.0),))
+    events = [STARTED, a_capture(tmp_path, "a"), a_capture(tmp_path, "b", 900.0), late]
+    contents = record(tmp_path, events)
+    assert contents.values("/spots/u_px/L1", "Scalars:scalars") == [(1, [10.0])]
+    assert contents.values("/spots/u_px/L1", "Scalars:scalars", "standoff_mm") == [(500, [10.0])]
+
+
+@pytest.mark.parametrize(
+    ("target", "strips"),
+    [
+        (FlatTarget(yaw_deg=10.0, pitch_deg=-5.0), 3),
+        (CylinderTarget(diameter_mm=120.0), 5),
+        (PolynomialTarget(coefficients=(0.1, 0.001)), 5),
+        (NoTarget(), 0),
+    ],
+)
+def test_every_target_is_drawn(tmp_path: Path, target: TargetShape, strips: int) -> None:
+    placed = ev.TargetPlaced(placement=Placement(key="p", standoff_mm=500.0, target=target))
+    contents = record(tmp_path, [STARTED, placed, a_capture(tmp_path, "a"),
+                                 ev.SpotsFound(key="a", spots=(a_spot("L1", 250.0),))])  # fmt: skip
+    ((_, outline),) = contents.values("/bench/target", "LineStrips3D:strips")
+    assert len(outline) == strips
+    nearest = min((point[2] for strip in outline for point in strip), default=None)
+    if isinstance(target, CylinderTarget):
+        assert nearest == pytest.approx(500.0)
+
+
+def test_refused_fit_of_one_axis_and_readings_without_range(tmp_path: Path) -> None:
+    whole = a_fit()
+    residuals = tuple(one.model_copy(update={"v_px": None, "v_sd_px": None}) for one in whole.residuals)
+    refused = whole.model_copy(
+        update={"verdict": "refused", "reasons": ("rms too large",), "warnings": (), "residuals": residuals}
+    )
+    reading = ev.ReadingTaken(
+        trial="t",
+        scene="far",
+        standoff_mm=4500.0,
+        reading=1,
+        status="no_points",
+        range_mm=None,
+        sigma_mm=None,
+        lasers=(),
+    )
+    events = [STARTED, refused, reading, ev.TrialFinished(trial="t", rows=())]
+    contents = record(tmp_path, [*events, ev.SessionFinished(exit_code=3, message="refused")])
+    assert contents.values("/fit/chart/v/note", "Points2D:labels")[-1][1] == ["v was not measured"]
+    assert "/fit/residuals/v_px/L1" not in contents.entities
+    log = dict(enumerate(contents.values("/steps/log", "TextLog:level")))
+    assert [level for _, (level,) in log.values()] == ["INFO", "ERROR", "WARN", "INFO", "ERROR"]
+    table = contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
+    assert "4500 mm, reading 1: no_points" in table
+
+
+def test_frames_survive_a_kill(tmp_path: Path) -> None:
+    """See `killed.py`: the process ends without closing anything."""
+    import subprocess
+    import sys
+
+    from workbench.viewer.window import viewer_environment, viewer_executable
+
+    subprocess.run([sys.executable, "-m", "tests.viewer.killed", str(tmp_path)], check=False, timeout=60)
+    whole = tmp_path / "whole.rrd"
+    command = [str(viewer_executable()), "rrd", "merge", str(tmp_path / "recording.rrd"), "-o", str(whole)]
+    environment = {**viewer_environment(), "HOME": str(tmp_path)}
+    subprocess.run(command, check=True, timeout=60, env=environment, capture_output=True)
+    frames = Contents(whole).values("/bench/camera/image", "EncodedImage:blob")
+    stored = [path.read_bytes() for path in sorted((tmp_path / "frames").glob("*-on.png"))]
+    assert len(stored) == 8
+    assert [png for _, png in frames] == stored
