@@ -46,12 +46,22 @@ class Viewer:
         return self.client.get_state()
 
     def problems(self) -> list[str]:
-        """Everything that the viewer and its views complain of."""
+        """Everything that the viewer and its views complain of, but for the missing graphics card."""
         logs = [
-            str(entry) for entry in self.client.get_logs() if "ERROR" in str(entry) or "WARN" in str(entry)
+            f"{entry.level} {entry.target}: {entry.message}"
+            for entry in self.client.get_logs()
+            if entry.level in {"WARN", "ERROR"} and "Software rasterizer" not in entry.message
         ]
-        reports = [f"{view.name}: {report}" for view in self.state().views for report in view.reports]
-        return logs + reports
+        return logs + [f"{view.name}: {report}" for view in self.state().views for report in view.reports]
+
+    def view_id(self, name: str) -> Any:
+        """Id of the view with a title."""
+        (found,) = [view.view_id for view in self.state().views if view.name == name]
+        return found
+
+    def go_to(self, timeline: str, sequence: int) -> None:
+        """Put the time cursor onto a place of a timeline that counts."""
+        self.client.set_time(timeline, sequence=sequence, play_state="paused")
 
     def show_tab(self, name: str) -> None:
         """Bring a tab of the layout to the front: a view in a hidden tab cannot be photographed."""
@@ -82,6 +92,10 @@ class Viewer:
             before = now
             time.sleep(0.3)
         raise AssertionError(f"the viewer's picture still changes after {SETTLE_SECONDS} s")
+
+    def glance(self, view_id: Any) -> Picture:
+        """A screenshot of one view as it is now; for views that a `shot` of the whole has seen at rest."""
+        return _decoded(self.client.take_screenshot(view_id))
 
 
 @contextmanager

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,6 +23,7 @@ from workbench.model.target import (
     TargetShape,
 )
 from workbench.viewer.recording import RecordingConsumer
+from workbench.viewer.window import viewer_environment, viewer_executable
 
 STARTED = ev.SessionStarted(session="odd", rig="made-up", procedures=("p",))
 
@@ -61,7 +64,11 @@ def a_spot(laser: str | None, u_px: float) -> ev.SpotRecord:
 
 
 def test_capture_without_spots_says_why_and_clears_the_picture(tmp_path: Path) -> None:
-    events = [STARTED, a_capture(tmp_path, "a"), ev.SpotsFound(key="a", spots=(), failures=("L1: too dim",))]
+    events: list[ev.Event] = [
+        STARTED,
+        a_capture(tmp_path, "a"),
+        ev.SpotsFound(key="a", spots=(), failures=("L1: too dim",)),
+    ]
     contents = record(tmp_path, events)
     assert contents.values("/bench/camera/spots", "Points2D:positions") == [(1, [])]
     assert contents.values("/steps/log", "TextLog:text")[-1] == (1, ["Capture a: L1: too dim"])
@@ -88,7 +95,7 @@ def test_spots_without_a_laser_are_kept_together(tmp_path: Path) -> None:
 
 def test_spots_found_late_belong_to_their_own_capture(tmp_path: Path) -> None:
     late = ev.SpotsFound(key="a", spots=(a_spot("L1", 10.0),))
-    events = [STARTED, a_capture(tmp_path, "a"), a_capture(tmp_path, "b", 900.0), late]
+    events: list[ev.Event] = [STARTED, a_capture(tmp_path, "a"), a_capture(tmp_path, "b", 900.0), late]
     contents = record(tmp_path, events)
     assert contents.values("/spots/u_px/L1", "Scalars:scalars") == [(1, [10.0])]
     assert contents.values("/spots/u_px/L1", "Scalars:scalars", "standoff_mm") == [(500, [10.0])]
@@ -130,23 +137,19 @@ def test_refused_fit_of_one_axis_and_readings_without_range(tmp_path: Path) -> N
         sigma_mm=None,
         lasers=(),
     )
-    events = [STARTED, refused, reading, ev.TrialFinished(trial="t", rows=())]
-    contents = record(tmp_path, [*events, ev.SessionFinished(exit_code=3, message="refused")])
+    finished = ev.SessionFinished(exit_code=3, message="refused")
+    table = ev.TrialFinished(trial="t", rows=())
+    contents = record(tmp_path, [STARTED, refused, reading, table, finished])
     assert contents.values("/fit/chart/v/note", "Points2D:labels")[-1][1] == ["v was not measured"]
     assert "/fit/residuals/v_px/L1" not in contents.entities
     log = dict(enumerate(contents.values("/steps/log", "TextLog:level")))
     assert [level for _, (level,) in log.values()] == ["INFO", "ERROR", "WARN", "INFO", "ERROR"]
-    table = contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
-    assert "4500 mm, reading 1: no_points" in table
+    text = contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
+    assert "4500 mm, reading 1: no_points" in text
 
 
 def test_frames_survive_a_kill(tmp_path: Path) -> None:
     """See `killed.py`: the process ends without closing anything."""
-    import subprocess
-    import sys
-
-    from workbench.viewer.window import viewer_environment, viewer_executable
-
     subprocess.run([sys.executable, "-m", "tests.viewer.killed", str(tmp_path)], check=False, timeout=60)
     whole = tmp_path / "whole.rrd"
     command = [str(viewer_executable()), "rrd", "merge", str(tmp_path / "recording.rrd"), "-o", str(whole)]

@@ -96,10 +96,9 @@ def log_ranged(
     stream: Stream, lasers: Sequence[LaserRange], geometry: Geometry, colors: Mapping[str, at.Rgb]
 ) -> None:
     """Points that the sensor has ranged, on their rays."""
-    points = [geometry.ray_at(one.laser_id, one.range_mm + geometry.offset_mm) for one in lasers]
-    dots = rr.Points3D(
-        points, colors=[colors[one.laser_id] for one in lasers], radii=_DOT if points else None
-    )
+    known = [one for one in lasers if one.laser_id in geometry.rays]
+    points = [geometry.ray_at(one.laser_id, one.range_mm + geometry.offset_mm) for one in known]
+    dots = rr.Points3D(points, colors=[colors[one.laser_id] for one in known], radii=_DOT if points else None)
     stream.log(at.RANGED_POINTS, dots)
 
 

@@ -62,9 +62,8 @@ def log_errors(stream: Stream, reading: ReadingTaken, colors: Mapping[str, at.Rg
     if reading.range_mm is not None:
         _log_error(stream, at.SENSOR, reading.range_mm - reading.standoff_mm, reading.sigma_mm, at.WHITE)
     for one in reading.lasers:
-        _log_error(
-            stream, one.laser_id, one.range_mm - reading.standoff_mm, one.sigma_mm, colors[one.laser_id]
-        )
+        color = colors.get(one.laser_id, at.WHITE)
+        _log_error(stream, one.laser_id, one.range_mm - reading.standoff_mm, one.sigma_mm, color)
 
 
 def _log_error(stream: Stream, who: str, error_mm: float, sigma_mm: float | None, color: at.Rgb) -> None:

@@ -1,0 +1,43 @@
+"""Starting the viewer for a person: on loopback, reporting to nobody, never on a file that is not there."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from workbench.model.errors import BadInputError
+from workbench.viewer import window
+
+
+def test_viewer_listens_on_loopback_only_and_reports_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[tuple[list[str], dict[str, str]]] = []
+
+    def run(command: list[str], *, env: dict[str, str], **_: Any) -> subprocess.CompletedProcess[bytes]:
+        started.append((command, env))
+        return subprocess.CompletedProcess(command, 3)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    recording = tmp_path / "recording.rrd"
+    recording.touch()
+    assert window.open_viewer(recording) == 3
+    ((command, env),) = started
+    assert Path(command[0]).name.startswith("rerun")
+    assert command[1:5] == ["--bind", "127.0.0.1", "--port", "0"]
+    assert command[-1] == str(recording)
+    assert env["CI"] == "1"
+
+
+def test_missing_recording_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=r"none\.rrd: no such recording"):
+        window.open_viewer(tmp_path / "none.rrd")
+
+
+def test_missing_viewer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(window, "find_spec", lambda _: None)
+    with pytest.raises(BadInputError, match="viewer is not installed"):
+        window.viewer_executable()
