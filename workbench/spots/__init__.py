@@ -1,7 +1,7 @@
 """From a pair of frames to laser spots with their uncertainty."""
 
 from workbench.spots.explain import explain
-from workbench.spots.finder import find_spots
+from workbench.spots.finder import SpotFinder, find_spots
 from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
 
-__all__ = ["Failure", "Finding", "Image", "Scanline", "Spot", "explain", "find_spots"]
+__all__ = ["Failure", "Finding", "Image", "Scanline", "Spot", "SpotFinder", "explain", "find_spots"]

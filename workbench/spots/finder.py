@@ -1,96 +1,148 @@
-"""From a pair of frames to spots."""
+"""From a pair of frames to spots: the public search."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
-from workbench.spots.detect import SCALES_PX, Floats32, level_and_sd, peaks, rough_width_px
-from workbench.spots.fit import Fitted, Noise, Windows, fit_spots
+from workbench.model.errors import BadInputError
+from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
 from workbench.spots.frames import check_pair, default_saturation_dn
-from workbench.spots.gaussian import Param
+from workbench.spots.measure import Trace, measure
+from workbench.spots.pair import Pair, Scene, look
+from workbench.spots.resolve import clusters, fitted_together, split, without_duplicates
+from workbench.spots.strip import Strip, check_line, distance_px, strip_of
 from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
 
-_MAX_CANDIDATES = 64
-_MIN_HALF_PX, _MAX_HALF_PX = 4, 14
-_MIN_WIDTH_PX = 0.4
-_FULL_WELL_ELECTRONS = 1e4
-_ACCEPT_SD = 5.0
+# A peak of the smoothed signal between this and the threshold is named: too dim to be told from noise.
+_DIM_SD: Final = 4.2
 
 
-def _distance_px(line: Scanline, u: float, v: float) -> float:
-    norm = float(np.hypot(line.du, line.dv))
-    return abs((u - line.u0_px) * line.dv - (v - line.v0_px) * line.du) / norm
+class SpotFinder:
+    """Finds spots in frames of one size; keeps what can be prepared once.
+
+    Args:
+        shape: Height and width of the frames.
+        scanlines: Where spots may lie; none means anywhere. Only their bands are read.
+        expected: Number of lasers lit. Fewer spots start a search for the reason.
+        saturation_dn: Value of a clipped pixel; None means the full scale of the depth (255; for uint16 the
+            10, 12 or 14 bit full scale if the brightest pixel has exactly that value, else 65535).
+
+    Raises:
+        BadInputError: a scanline without direction or width.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        scanlines: Sequence[Scanline] = (),
+        *,
+        expected: int | None = None,
+        saturation_dn: int | None = None,
+    ) -> None:
+        for line in scanlines:
+            check_line(line)
+        self._shape = shape
+        self._lines = tuple(scanlines)
+        self._expected = expected
+        self._saturation_dn = saturation_dn
+        self._everywhere = Strip(slice(0, shape[0]), slice(0, shape[1]), None)
+        self._strips = tuple(strip_of(line, shape) for line in scanlines) or (self._everywhere,)
+
+    def find(self, on: Image, off: Image | None = None) -> Finding:
+        """Spots of one capture.
+
+        Raises:
+            BadInputError: a frame is no grey uint8 or uint16 image, or has another size.
+        """
+        on, off = check_pair(on, off)
+        if on.shape != self._shape:
+            raise BadInputError(
+                f"frame 'on': expected shape {self._shape}, got {on.shape}; make a SpotFinder for this size"
+            )
+        clip = default_saturation_dn(on) if self._saturation_dn is None else self._saturation_dn
+        pair = Pair(on, off, float(clip))
+        scenes = [
+            look(pair, s) for s in self._strips if s.rows.stop > s.rows.start and s.cols.stop > s.cols.start
+        ]
+        traces = self._search(scenes)
+        spots = self._in_order([t.spot for t in traces if self._on_a_line(t.spot)])
+        return Finding(tuple(spots), self._failures(pair, scenes, traces, spots))
+
+    def _search(self, scenes: list[Scene]) -> list[Trace]:
+        traces: list[Trace] = []
+        for scale in (FINE_PX, COARSE_PX):
+            for scene in scenes:
+                found = measure(
+                    scene, _new_ones(find_peaks(scene.signal, scene.strip, scene.variance, scale), traces)
+                )
+                traces = without_duplicates(traces + found)
+            if len(traces) == self._expected:
+                break
+        if not traces:
+            return []
+        groups = [fitted_together(scenes[0], group) for group in clusters(traces)]
+        if self._expected is None or sum(map(len, groups)) < self._expected:
+            groups = [split(scenes[0], g[0]) if len(g) == 1 else g for g in groups]
+        return [trace for group in groups for trace in group]
+
+    def _on_a_line(self, spot: Spot) -> bool:
+        u, v = np.array(spot.u_px), np.array(spot.v_px)
+        return not self._lines or any(distance_px(li, u, v) <= li.half_width_px for li in self._lines)
+
+    def _in_order(self, spots: list[Spot]) -> list[Spot]:
+        du, dv = (self._lines[0].du, self._lines[0].dv) if self._lines else (1.0, 0.0)
+        return sorted(spots, key=lambda s: (s.u_px * du + s.v_px * dv, s.v_px))
+
+    def _failures(
+        self, pair: Pair, scenes: list[Scene], traces: list[Trace], spots: list[Spot]
+    ) -> tuple[Failure, ...]:
+        failures = [Failure.AMBIENT_CHANGED] if any(s.ambient_changed for s in scenes) else []
+        if len(spots) < len(traces):
+            failures.append(Failure.OFF_SCANLINE)
+        if not spots or (self._expected is not None and len(spots) < self._expected):
+            failures.append(Failure.TOO_FEW if spots else Failure.NO_SPOT)
+            failures += self._reasons(pair, scenes, spots)
+        if self._expected is not None and len(spots) > self._expected:
+            failures.append(Failure.TOO_MANY)
+        flags = set[Failure]().union(*(s.flags for s in spots))
+        failures += [f for f in Failure if f in flags]
+        return tuple(dict.fromkeys(failures))
+
+    def _reasons(self, pair: Pair, scenes: list[Scene], spots: list[Spot]) -> list[Failure]:
+        """Why spots are missing: too dim, or outside the band (then the whole frame is read)."""
+        reasons = []
+        for scene in scenes:
+            dim = find_peaks(scene.signal, scene.strip, scene.variance, threshold_sd=_DIM_SD)
+            near = np.array(
+                [
+                    [np.hypot(s.u_px - c, s.v_px - r) < 5 * s.width_px + 2 for s in spots]
+                    for r, c in zip(dim.rows, dim.cols, strict=True)
+                ],
+                bool,
+            )
+            if dim.rows.size and not near.reshape(dim.rows.size, -1).any(axis=1).all():
+                reasons.append(Failure.TOO_DIM)
+        if self._lines:
+            scene = look(pair, self._everywhere)
+            elsewhere = measure(scene, find_peaks(scene.signal, scene.strip, scene.variance))
+            if any(not self._on_a_line(t.spot) for t in elsewhere):
+                reasons.append(Failure.OFF_SCANLINE)
+        return reasons
 
 
-def _windows(
-    diff: Floats32, on: Image, centres: list[tuple[int, int]], half: int, saturation_dn: float
-) -> Windows:
-    span = np.arange(-half, half + 1)
-    rows = np.array([c[0] for c in centres])[:, None] + span
-    cols = np.array([c[1] for c in centres])[:, None] + span
-    height, width = diff.shape
-    inside = ((rows >= 0) & (rows < height))[:, :, None] & ((cols >= 0) & (cols < width))[:, None, :]
-    at = (np.clip(rows, 0, height - 1)[:, :, None], np.clip(cols, 0, width - 1)[:, None, :])
-    data = diff[at].astype(np.float64)
-    raw = on[at].astype(np.float64)
-    usable = inside & (raw < saturation_dn)
-    n = len(centres)
-    flat = (n, -1)
-    side = 2 * half + 1
-    return Windows(
-        data.reshape(flat), usable.reshape(flat), (side, side), (data + (saturation_dn - raw)).reshape(flat)
-    )
-
-
-def _fit_one(
-    diff: Floats32, on: Image, row: int, col: int, noise: Noise, sat: float
-) -> tuple[Fitted, int, int] | None:
-    half = 6
-    for _ in range(4):
-        win = _windows(diff, on, [(row, col)], half, sat)
-        usable = win.usable[0]
-        if usable.sum() < 8:
-            return None
-        border = float(np.median(win.data[0]))
-        width = rough_width_px(win.data[0], border)
-        height = max(float(win.data[0].max()) - border, 1e-6)
-        start = np.array([[border, height * 2 * np.pi * width**2, half, half, np.log(width), np.log(width)]])
-        fit = fit_spots(win, start, noise)
-        p = fit.params[0]
-        du, dv = p[Param.U] - half, p[Param.V] - half
-        wanted = int(np.clip(np.ceil(3 * np.exp(p[4:].max())) + 1, _MIN_HALF_PX, _MAX_HALF_PX))
-        origin = row - half, col - half
-        if max(abs(du), abs(dv)) <= 0.75 and wanted == half:
-            break
-        if max(abs(du), abs(dv)) > 2 * half:
-            return None
-        half, row, col = wanted, row + round(float(dv)), col + round(float(du))
-    return fit, *origin
-
-
-def _spot(fit: Fitted, row0: int, col0: int, shape: tuple[int, int], on: Image, sat: float) -> Spot | None:
-    p, cov = fit.params[0], fit.cov[0]
-    flux = p[Param.FLUX]
-    if not np.isfinite(p).all() or flux <= 0 or not fit.converged[0]:
-        return None
-    sd = np.sqrt(np.abs(np.diag(cov)))
-    width = float(np.exp(0.5 * (p[4] + p[5])))
-    u, v = float(p[2]) + col0, float(p[3]) + row0
-    if flux < _ACCEPT_SD * sd[Param.FLUX] or width < _MIN_WIDTH_PX:
-        return None
-    if not (-0.5 <= u <= shape[1] - 0.5 and -0.5 <= v <= shape[0] - 0.5):
-        return None
-    peak = float(flux * fit.basis[0, Param.FLUX].max())
-    flags = set()
-    reach = 2.0 * width
-    if min(u, v, shape[1] - 1 - u, shape[0] - 1 - v) < reach:
-        flags.add(Failure.AT_EDGE)
-    r, c = round(v), round(u)
-    if (on[max(r - 3, 0) : r + 4, max(c - 3, 0) : c + 4] >= sat).any():
-        flags.add(Failure.SATURATED)
-    return Spot(u, v, float(sd[2] / flux), float(sd[3] / flux), float(flux), width, peak, frozenset(flags))
+def _new_ones(peaks: Peaks, traces: list[Trace]) -> Peaks:
+    """Peaks that no measured spot explains."""
+    if not traces or peaks.rows.size == 0:
+        return peaks
+    u = np.array([t.spot.u_px for t in traces])
+    v = np.array([t.spot.v_px for t in traces])
+    reach = np.array([3.0 * t.reach_px + 2.0 * peaks.scale_px for t in traces])
+    apart = np.hypot(peaks.cols[:, None] - u, peaks.rows[:, None] - v)
+    new = (apart > reach).all(axis=1)
+    return Peaks(peaks.rows[new], peaks.cols[new], peaks.height_sd[new], peaks.height_dn[new], peaks.scale_px)
 
 
 def find_spots(
@@ -101,44 +153,19 @@ def find_spots(
     expected: int | None = None,
     saturation_dn: int | None = None,
 ) -> Finding:
-    """Find laser spots in a frame with the lasers on, or in the difference to one with the lasers off."""
-    on, off = check_pair(on, off)
-    sat = default_saturation_dn(on) if saturation_dn is None else saturation_dn
-    diff = on.astype(np.float32)
-    if off is not None:
-        diff -= off
-    level, sd = level_and_sd(diff, floor_sd=0.3)
-    noise = Noise(sd**2, sat / _FULL_WELL_ELECTRONS)
-    failures: list[Failure] = []
-    if off is not None and abs(level) > max(1.0, 0.5 * sd):
-        failures.append(Failure.AMBIENT_CHANGED)
-    spots: list[Spot] = []
-    for scale in SCALES_PX:
-        for row, col, _ in peaks(diff, scale)[:_MAX_CANDIDATES]:
-            if any(np.hypot(s.u_px - col, s.v_px - row) < 3 * s.width_px + 1 for s in spots):
-                continue
-            if scanlines and not any(_distance_px(li, col, row) <= li.half_width_px + 2 for li in scanlines):
-                continue
-            fitted = _fit_one(diff, on, row, col, noise, sat)
-            spot = fitted and _spot(*fitted, diff.shape, on, sat)
-            if not spot or any(np.hypot(s.u_px - spot.u_px, s.v_px - spot.v_px) < 1.0 for s in spots):
-                continue
-            if scanlines and not any(
-                _distance_px(li, spot.u_px, spot.v_px) <= li.half_width_px for li in scanlines
-            ):
-                failures.append(Failure.OFF_SCANLINE)
-                continue
-            spots.append(spot)
-    if not spots:
-        failures.append(Failure.NO_SPOT)
-    elif expected is not None and len(spots) != expected:
-        failures.append(Failure.TOO_FEW if len(spots) < expected else Failure.TOO_MANY)
-    for flag in (Failure.SATURATED, Failure.AT_EDGE, Failure.MERGED):
-        if any(flag in s.flags for s in spots):
-            failures.append(flag)
-    if scanlines:
-        line = scanlines[0]
-        spots.sort(key=lambda s: s.u_px * line.du + s.v_px * line.dv)
-    else:
-        spots.sort(key=lambda s: (s.u_px, s.v_px))
-    return Finding(tuple(spots), tuple(dict.fromkeys(failures)))
+    """Find laser spots in a frame with the lasers on, or in its difference to one with the lasers off.
+
+    For many frames of one size make a `SpotFinder` (which see for the arguments) and call `find`.
+
+    Raises:
+        BadInputError: a frame is no grey uint8 or uint16 image, or the two differ in size or depth; a scanline
+            without direction or width.
+    """
+    shape = np.shape(on)
+    finder = SpotFinder(
+        (shape[0], shape[1]) if len(shape) == 2 else (1, 1),
+        scanlines,
+        expected=expected,
+        saturation_dn=saturation_dn,
+    )
+    return finder.find(on, off)

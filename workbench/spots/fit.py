@@ -1,145 +1,147 @@
-"""Maximum-likelihood fit of many spots at once, by Fisher scoring with the variance that the model predicts."""
+"""Maximum-likelihood fit of many spots at once: Fisher scoring with the variance that the model predicts."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.spots.gaussian import Param, basis
+from workbench.spots.gaussian import BACKGROUND, FLUX, LN_SU, U, upright
+from workbench.spots.noise import Noise, photon_transfer_slope
 from workbench.spots.types import Bools, Floats
 
-_MAX_STEPS = 12
-_MAX_MOVE_PX = 1.0
+Basis = Callable[[Floats, tuple[int, int]], Floats]
+_MAX_STEPS = 15
+_MAX_MOVE = 1.0
 _MAX_STRETCH = 0.4
-_LN_WIDTH_RANGE = (np.log(0.2), np.log(12.0))
-# Where the steps stop: the rest of the way is this share of the standard deviation.
-_TOLERANCE_SD = 0.05
+_LN_WIDTH_RANGE = (float(np.log(0.15)), float(np.log(12.0)))
+# Where the steps stop: the last step was this share of the standard deviation, the next is far below.
+_TOLERANCE_SD = 0.1
 # A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would choose.
 _CLIP_MARGIN_SD = 2.0
-# The first photon-transfer guess weighs like this many pixels against the measured residuals.
-_PRIOR_PIXELS = 2.0
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Variance of a pixel as a straight line over its expected signal (photon transfer)."""
-
-    floor_dn2: float
-    """Variance without signal, DN^2."""
-    slope_dn: float
-    """Variance per signal, DN^2 / DN."""
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Windows:
-    """Equal windows cut out of the difference image, one spot each."""
+    """Equal windows of the difference image, one spot each."""
 
     data: Floats
     """(n, height * width), DN."""
-    usable: Bools
-    """(n, height * width), False where a pixel is clipped, hot or outside the image."""
     shape: tuple[int, int]
-    clip_dn: Floats
-    """(n, height * width): the difference at which the on-frame's pixel clips."""
+    usable: Bools | None = None
+    """(n, height * width), False where a pixel is clipped, hot or outside the image. None: all are usable."""
+    clip_dn: Floats | None = None
+    """(n, height * width), value at which the pixel clips. None: nothing is near to it."""
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """Result of a fit; the window's frame, see `Param`."""
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Result for n windows. `cov` is that of background, flux, and flux times each further parameter."""
 
     params: Floats
-    """(n, 6)."""
+    """(n, k)."""
     cov: Floats
-    """(n, 6, 6), of background, flux, flux times the others."""
+    """(n, k, k)."""
+    rows: Floats
+    """(n, k, pixels), the basis."""
     residual: Floats
     """(n, pixels), DN."""
     weight: Floats
     """(n, pixels), inverse variance, 0 where unused."""
-    basis: Floats
     converged: Bools
     """(n,)."""
     noise: Noise
 
+    @property
+    def signal(self) -> Floats:
+        """(n, pixels), expected value above the background, DN."""
+        signal: Floats = self.params[:, FLUX, None] * self.rows[:, FLUX]
+        return signal
 
-def _linearise(win: Windows, params: Floats, noise: Noise) -> tuple[Floats, Floats, Floats, Floats]:
-    """Basis, weights, residuals and information matrix at `params`."""
-    rows = basis(params, win.shape)
-    signal = np.maximum(params[:, Param.FLUX, None], 0.0) * rows[:, Param.FLUX]
-    variance = noise.floor_dn2 + noise.slope_dn * signal
-    background = params[:, Param.BACKGROUND, None]
-    usable = win.usable & (signal + background < win.clip_dn - _CLIP_MARGIN_SD * np.sqrt(variance))
-    weight = usable / variance
-    residual = win.data - background - params[:, Param.FLUX, None] * rows[:, Param.FLUX]
-    weighted = rows * weight[:, None]
-    information = weighted @ rows.transpose(0, 2, 1)
-    return rows, weight, residual, information
+    @property
+    def leverage(self) -> Floats:
+        """(n, pixels), the share of each pixel's variance that the fit absorbs."""
+        absorbed: Floats = ((self.cov @ self.rows) * self.rows).sum(axis=1) * self.weight
+        return absorbed
 
-
-def _regularised(information: Floats) -> Floats:
-    """The matrix with a ridge that only a singular one feels."""
-    diagonal = np.einsum("nii->ni", information)
-    ridge = 1e-9 * diagonal + 1e-12 * diagonal.max(axis=1, keepdims=True) + 1e-30
-    return information + ridge[:, :, None] * np.eye(information.shape[1])
+    @property
+    def sd_px(self) -> Floats:
+        """(n, 2), standard deviation of the position along u and v."""
+        variance = np.maximum(self.cov[:, (2, 3), (2, 3)], 0.0)
+        sd: Floats = np.sqrt(variance) / np.maximum(self.params[:, FLUX, None], 1e-12)
+        return sd
 
 
-def _step(params: Floats, delta: Floats) -> Floats:
-    """Parameters after a scoring step, kept from jumping out of the window."""
+def _weights(win: Windows, signal: Floats, background: Floats, noise: Noise) -> Floats:
+    """Inverse of the variance that the model predicts, 0 where a pixel is not to be used."""
+    variance = noise.floor_dn2 + noise.slope_dn * np.maximum(signal, 0.0)
+    if win.usable is None:
+        return 1.0 / variance
+    usable = win.usable
+    if win.clip_dn is not None:
+        usable = usable & (signal + background < win.clip_dn - _CLIP_MARGIN_SD * np.sqrt(variance))
+    weights: Floats = usable / variance
+    return weights
+
+
+def inverse(information: Floats) -> Floats:
+    """Inverse of (n, k, k) information matrices; a ridge that only a singular one feels keeps it finite."""
+    scale = 1.0 / np.sqrt(np.maximum(np.einsum("nii->ni", information), 1e-30))
+    outer = scale[:, :, None] * scale[:, None, :]
+    scaled = information * outer
+    scaled += 1e-10 * np.eye(information.shape[1])
+    inverted: Floats = np.linalg.inv(scaled) * outer
+    return inverted
+
+
+def _moved(params: Floats, delta: Floats) -> Floats:
+    """Parameters after a step, kept from jumping out of the window."""
     new = params.copy()
-    new[:, :2] += delta[:, :2]
-    flux = np.maximum(np.abs(params[:, Param.FLUX]), 1e-9)[:, None]
-    new[:, 2:4] += np.clip(delta[:, 2:4] / flux, -_MAX_MOVE_PX, _MAX_MOVE_PX)
-    stretched = new[:, 4:] + np.clip(delta[:, 4:] / flux, -_MAX_STRETCH, _MAX_STRETCH)
-    new[:, 4:] = np.clip(stretched, *_LN_WIDTH_RANGE)
+    new[:, :U] += delta[:, :U]
+    step = delta[:, U:] / np.maximum(np.abs(params[:, FLUX, None]), 1e-9)
+    new[:, U:LN_SU] += np.clip(step[:, :2], -_MAX_MOVE, _MAX_MOVE)
+    new[:, LN_SU:] += np.clip(step[:, 2:], -_MAX_STRETCH, _MAX_STRETCH)
+    np.clip(new[:, LN_SU : LN_SU + 2], *_LN_WIDTH_RANGE, out=new[:, LN_SU : LN_SU + 2])
     return new
 
 
-def _score(win: Windows, params: Floats, noise: Noise) -> Fitted:
-    """Scoring steps until the steps are far below the standard deviation, or `_MAX_STEPS`."""
-    converged = np.zeros(len(params), bool)
+def score(win: Windows, start: Floats, noise: Noise, basis: Basis) -> Fit:
+    """Scoring steps from `start` (n, k) until they are far below the standard deviation."""
+    params = start
     for _ in range(_MAX_STEPS):
-        rows, weight, residual, information = _linearise(win, params, noise)
-        cov = np.linalg.inv(_regularised(information))
-        gradient = (rows @ (weight * residual)[:, :, None])[:, :, 0]
-        delta = (cov @ gradient[:, :, None])[:, :, 0]
-        small = np.abs(delta) < _TOLERANCE_SD * np.sqrt(np.abs(np.einsum("nii->ni", cov)))
-        converged = small.all(axis=1)
-        params = np.where(np.isfinite(delta).all(axis=1, keepdims=True), _step(params, delta), params)
+        rows = basis(params, win.shape)
+        signal = params[:, FLUX, None] * rows[:, FLUX]
+        background = params[:, BACKGROUND, None]
+        weight = _weights(win, signal, background, noise)
+        residual = win.data - background - signal
+        weighted = rows * weight[:, None]
+        cov = inverse(weighted @ rows.transpose(0, 2, 1))
+        delta = (cov @ (weighted @ residual[:, :, None]))[:, :, 0]
+        spread = np.sqrt(np.maximum(np.einsum("nii->ni", cov), 0.0))
+        converged = (np.abs(delta) <= _TOLERANCE_SD * spread).all(axis=1)
+        params = _moved(params, delta)
         if converged.all():
             break
-    return Fitted(params, cov, residual, weight, rows, converged, noise)
+    return Fit(params, cov, rows, residual, weight, converged, noise)
 
 
-def photon_transfer_slope(fit: Fitted) -> float:
-    """Variance per signal (DN) measured from the residuals of all spots of the frame.
-
-    Each squared residual exceeds the floor by slope times signal, less what the fit has absorbed (its leverage).
-    Weighted moments give the slope; few informative pixels are weighed against the slope assumed so far, and the
-    factor n / (n - 2) makes the deviation honest on average when n pixels tell the slope (Student).
-    """
-    absorbed = np.einsum("nip,nij,njp->np", fit.basis, fit.cov, fit.basis, optimize=True) * fit.weight
-    kept = np.clip(1.0 - absorbed, 0.0, 1.0)
-    signal = np.maximum(fit.params[:, Param.FLUX, None], 0.0) * fit.basis[:, Param.FLUX]
-    leverage = signal * fit.weight**2
-    floor, slope = fit.noise.floor_dn2, fit.noise.slope_dn
-    told = float((leverage * signal * kept).sum())
-    excess = float((leverage * (fit.residual**2 - floor * kept)).sum())
-    if told <= 0.0:
-        return slope
-    measured = max(excess / told, 0.0)
-    pixels = told * max(measured, slope) ** 2
-    total = pixels + _PRIOR_PIXELS
-    return (pixels * measured + _PRIOR_PIXELS * slope) / max(total - 2.0, 0.5 * total)
+def measured_noise(fit: Fit) -> Noise:
+    """The noise of `fit` with its slope measured from the residuals."""
+    slope = photon_transfer_slope(
+        np.maximum(fit.signal, 0.0), fit.residual, fit.weight, fit.leverage, fit.noise
+    )
+    return Noise(fit.noise.floor_dn2, slope)
 
 
-def fit_spots(win: Windows, start: Floats, noise: Noise) -> Fitted:
-    """Fit one spot per window and measure the photon-transfer slope on the way.
+def fit_spots(win: Windows, start: Floats, noise: Noise, basis: Basis = upright) -> Fit:
+    """Fit one spot per window, and measure the photon-transfer slope on the way.
 
     Args:
         win: The windows.
-        start: (n, 6) first guesses, see `Param`.
-        noise: Floor (trusted) and slope (first guess).
+        start: (n, k) first guesses in the order of `gaussian`.
+        noise: Floor (trusted) and slope (a first guess).
+        basis: `upright` or `sheared`.
     """
-    first = _score(win, start, noise)
-    measured = Noise(noise.floor_dn2, photon_transfer_slope(first))
-    return _score(win, first.params, measured)
+    first = score(win, start, noise, basis)
+    return score(win, first.params, measured_noise(first), basis)

@@ -1,0 +1,86 @@
+"""The Fisher bound: how well any unbiased estimator can know the centre of a spot.
+
+Derivation: docs/spots.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import gammaln, ndtr, xlogy
+
+from workbench.spots.gaussian import FLUX, upright
+from workbench.spots.types import Floats
+
+# Above this many electrons a Poisson count is Gaussian to 1e-3 of its information.
+_MANY_ELECTRONS = 400.0
+_REACH_WIDTHS = 7.0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """What turns light into numbers; the numbers are whole."""
+
+    electrons_per_dn: float
+    read_sd_electrons: float
+    background_electrons: float
+
+
+def pixel_information(electrons: float, camera: Camera) -> float:
+    """Fisher information (1 / electrons^2) of one pixel's number about its mean number of electrons.
+
+    Exact for Poisson electrons, Gaussian read noise and rounding, averaged over the position of the mean between
+    two numbers; above 400 electrons the inverse of the variance.
+    """
+    step, read = camera.electrons_per_dn, camera.read_sd_electrons
+    if electrons > _MANY_ELECTRONS:
+        return 1.0 / (electrons + read**2 + step**2 / 12.0)
+    count = np.arange(0, int(electrons + 10.0 * np.sqrt(electrons) + 20.0))
+    mass = np.exp(xlogy(count, electrons) - electrons - gammaln(count + 1.0))
+    by_mean = np.concatenate([[0.0], mass[:-1]]) - mass
+    reach = 6.0 * np.sqrt(electrons + read**2) + step
+    told = []
+    for phase in np.linspace(0.0, 1.0, 5)[:-1]:
+        numbers = np.arange(np.floor((electrons - reach) / step), np.ceil((electrons + reach) / step)) + phase
+        edges = (np.append(numbers, numbers[-1] + 1.0) - 0.5) * step
+        share = np.diff(ndtr((edges[:, None] - count) / read), axis=0)
+        chance = share @ mass
+        seen = chance > 1e-12
+        told.append(float((((share @ by_mean)[seen]) ** 2 / chance[seen]).sum()))
+    return float(np.mean(told))
+
+
+def information_curve(camera: Camera, most_electrons: float) -> tuple[Floats, Floats]:
+    """Tabulated `pixel_information` over the mean, dense enough for linear interpolation."""
+    few = np.linspace(0.05, min(_MANY_ELECTRONS, most_electrons + 1.0), 60)
+    many = np.geomspace(_MANY_ELECTRONS * 1.0001, max(most_electrons, _MANY_ELECTRONS * 1.01), 60)
+    means = np.concatenate([few, many])
+    return means, np.array([pixel_information(float(m), camera) for m in means])
+
+
+def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera) -> Floats:
+    """(6, 6) information about background, flux, u, v, ln width along u and along v of a round spot.
+
+    Args:
+        electrons: Of the whole spot.
+        width_px: Standard deviation of its profile.
+        phase_px: Its centre from the centre of a pixel.
+        camera: Noise.
+    """
+    half = int(np.ceil(_REACH_WIDTHS * width_px)) + 2
+    params = np.array([[0.0, electrons, half + phase_px[0], half + phase_px[1], *[np.log(width_px)] * 2]])
+    rows = upright(params, (2 * half + 1, 2 * half + 1))[0]
+    mean = camera.background_electrons + electrons * rows[FLUX]
+    jacobian = rows.copy()
+    jacobian[2:] *= electrons
+    means, told = information_curve(camera, float(mean.max()))
+    matrix: Floats = (jacobian * np.interp(mean, means, told)) @ jacobian.T
+    return matrix
+
+
+def position_bound_px(electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera) -> Floats:
+    """(2,) lowest standard deviation of u and v that an unbiased estimator can reach, nothing else being known."""
+    cov = np.linalg.inv(fisher_matrix(electrons, width_px, phase_px, camera))
+    bound: Floats = np.sqrt(np.diag(cov)[2:4])
+    return bound

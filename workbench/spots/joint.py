@@ -1,0 +1,116 @@
+"""Several spots in one window, fitted together: overlapping neighbours, and a blob that is really two."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.spots.fit import Windows, inverse
+from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, V, upright
+from workbench.spots.noise import Noise, photon_transfer_slope
+from workbench.spots.types import Floats
+
+_MAX_STEPS = 30
+_MAX_MOVE_PX = 0.7
+_MAX_STRETCH = 0.3
+_LN_WIDTH_RANGE = (float(np.log(0.3)), float(np.log(12.0)))
+_TOLERANCE_SD = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """Spots of one window that share their widths: lasers of one kind on one target."""
+
+    params: Floats
+    """(k, 6) in the order of `gaussian`; background and widths are the same in all rows."""
+    sd: Floats
+    """(k, 3): of flux, u, v."""
+    chi2: float
+    """Sum of squared residuals over the variance of the fit that the evidence is asked of."""
+    weight: Floats
+    """(pixels,)."""
+    slope_dn: float
+    """Photon-transfer slope that the residuals tell."""
+    converged: bool
+
+
+def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None = None) -> Joint:
+    """Fit k spots in a single window (n = 1).
+
+    Args:
+        win: The window.
+        start: (k, 6) first guesses.
+        noise: Of the window.
+        weight: (pixels,) fixed weights; None: those that the model predicts.
+    """
+    params = start.copy()
+    converged = False
+    for _ in range(_MAX_STEPS):
+        rows = upright(params, win.shape)
+        signal = (params[:, FLUX, None] * rows[:, FLUX]).sum(axis=0)
+        used = _weights(win, signal, noise) if weight is None else weight
+        residual = win.data[0] - params[0, 0] - signal
+        jacobian = _jacobian(params, rows)
+        weighted = jacobian * used
+        cov = inverse((weighted @ jacobian.T)[None])[0]
+        delta = cov @ (weighted @ residual)
+        converged = bool((np.abs(delta) <= _TOLERANCE_SD * np.sqrt(np.maximum(np.diag(cov), 0.0))).all())
+        params = _moved(params, delta)
+        if converged:
+            break
+    sd = np.sqrt(np.maximum(np.diag(cov)[3:], 0.0)).reshape(-1, 3)
+    leverage = ((cov @ jacobian) * weighted).sum(axis=0)
+    slope = photon_transfer_slope(np.maximum(signal, 0.0), residual, used, leverage, noise)
+    return Joint(params, sd, float(used @ residual**2), used, slope, converged)
+
+
+def _weights(win: Windows, signal: Floats, noise: Noise) -> Floats:
+    weights: Floats = 1.0 / (noise.floor_dn2[0] + noise.slope_dn * np.maximum(signal, 0.0))
+    return weights if win.usable is None else weights * win.usable[0]
+
+
+def _jacobian(params: Floats, rows: Floats) -> Floats:
+    """(3 + 3 k, pixels): by background, both widths, then flux, u and v of each spot."""
+    flux = params[:, FLUX, None]
+    shared = [
+        np.ones(rows.shape[2]),
+        (flux * rows[:, LN_SU]).sum(axis=0),
+        (flux * rows[:, LN_SV]).sum(axis=0),
+    ]
+    own = np.stack([rows[:, FLUX], flux * rows[:, U], flux * rows[:, V]], axis=1)
+    return np.concatenate([np.stack(shared), own.reshape(-1, rows.shape[2])])
+
+
+def _moved(params: Floats, delta: Floats) -> Floats:
+    new = params.copy()
+    new[:, 0] += delta[0]
+    stretched = params[0, LN_SU:SHEAR] + np.clip(delta[1:3], -_MAX_STRETCH, _MAX_STRETCH)
+    new[:, LN_SU:SHEAR] = np.clip(stretched, *_LN_WIDTH_RANGE)
+    own = delta[3:].reshape(-1, 3)
+    new[:, FLUX] = np.maximum(params[:, FLUX] + own[:, 0], 0.1 * np.abs(params[:, FLUX]))
+    new[:, U:LN_SU] += np.clip(own[:, 1:], -_MAX_MOVE_PX, _MAX_MOVE_PX)
+    return new
+
+
+def halves(params: Floats) -> Floats:
+    """(2, 6) first guess for two spots from the sheared fit (7,) of their sum: apart along its long axis."""
+    su, sv = np.exp(params[LN_SU:SHEAR])
+    shear = params[SHEAR]
+    spread, axes = np.linalg.eigh([[su**2 + (shear * sv) ** 2, shear * sv**2], [shear * sv**2, sv**2]])
+    apart = np.sqrt(max(spread[1] - spread[0], 0.15 * spread[1]))
+    start = np.stack([params[:SHEAR], params[:SHEAR]])
+    start[:, FLUX] *= 0.5
+    start[:, LN_SU:] = 0.5 * np.log(max(spread[0], 0.1))
+    start[0, U:LN_SU] -= apart * axes[:, 1]
+    start[1, U:LN_SU] += apart * axes[:, 1]
+    return start
+
+
+def evidence(one: float, two: float, pixels: int, parameters: int) -> float:
+    """F statistic for three more parameters (a second spot) that lower chi2 from `one` to `two`.
+
+    Dividing by what the larger model leaves unexplained keeps speckle from passing as a second spot.
+    """
+    left = two / max(pixels - parameters, 1)
+    return (one - two) / 3.0 / max(left, 1e-12)

@@ -1,0 +1,79 @@
+"""Noise measured from the frame itself: the floor from its background, the slope from the residuals of the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.spots.types import Floats
+
+_SAMPLES = 2048
+_CLIP_SD = 4.0
+# Variance that rounding to whole numbers alone leaves in a frame.
+ROUNDING_DN2 = 1.0 / 12.0
+# The slope assumed so far weighs like this many pixels against the measured residuals.
+_PRIOR_PIXELS = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Variance of a pixel as a straight line over its expected signal (photon transfer)."""
+
+    floor_dn2: Floats
+    """(n, 1), one for each window: variance without signal, DN^2."""
+    slope_dn: float
+    """Variance per signal, DN^2 / DN."""
+
+
+def level_and_variance(values: NDArray[np.float32]) -> tuple[float, float]:
+    """Robust mean and variance of pixels among which a few are spots.
+
+    Quantiles first, then mean and variance of what lies within 4 sd of them: the former resist the spots, the
+    latter are efficient and free of the rounding to whole numbers.
+    """
+    flat = values.reshape(-1)
+    sample = np.sort(flat[:: max(1, flat.size // _SAMPLES)])
+    n = sample.size
+    middle = float(sample[n // 2])
+    # Half the distance between the quantiles of +-1 sd; the lower half alone when spots fill the upper one.
+    lower = middle - float(sample[int(0.1587 * n)])
+    reach = _CLIP_SD * max(min(lower, 0.5 * (float(sample[int(0.8413 * n)]) - middle + lower)), 0.5)
+    first, last = np.searchsorted(sample, (middle - reach, middle + reach))
+    kept = sample[first:last] - np.float32(middle)
+    if kept.size == 0:
+        return middle, ROUNDING_DN2
+    mean = float(kept.sum()) / kept.size
+    return middle + mean, max(float(kept @ kept) / kept.size - mean**2, ROUNDING_DN2)
+
+
+def photon_transfer_slope(
+    signal: Floats, residual: Floats, weight: Floats, leverage: Floats, noise: Noise
+) -> float:
+    """Variance per signal (DN) measured from the residuals of all spots of a frame.
+
+    On average a squared residual is its variance less the share that the fit has absorbed (its leverage), so
+    what exceeds the floor is slope times signal. Weighted moments give the slope. The factor n / (n - 2) makes
+    the stated deviation right on average when only n pixels tell the slope (as in Student's distribution).
+
+    Args:
+        signal: (n, pixels) expected signal, DN.
+        residual: (n, pixels), DN.
+        weight: (n, pixels) inverse variance, 0 where unused.
+        leverage: (n, pixels), 0 .. 1.
+        noise: Floor, and the slope assumed so far.
+    """
+    kept = np.clip(1.0 - leverage, 0.0, 1.0)
+    excess = residual**2 - noise.floor_dn2 * kept
+    slope = noise.slope_dn
+    for _ in range(3):
+        sharp = (weight > 0) * signal / (noise.floor_dn2 + slope * signal) ** 2
+        told = float((sharp * signal * kept).sum())
+        if told <= 0.0:
+            return noise.slope_dn
+        measured = max(float((sharp * excess).sum()) / told, 0.0)
+        pixels = told * slope**2
+        share = _PRIOR_PIXELS / (pixels + _PRIOR_PIXELS)
+        slope = noise.slope_dn**share * max(measured, 0.02 * noise.slope_dn) ** (1.0 - share)
+    return slope * (1.0 + 2.0 / max(pixels - 2.0, 2.0))

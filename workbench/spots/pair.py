@@ -1,0 +1,113 @@
+"""A pair of frames as one signal: the difference, freed from a change of the ambient light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.spots.fit import Windows
+from workbench.spots.noise import level_and_variance
+from workbench.spots.strip import Strip
+from workbench.spots.types import Floats, Image
+
+Floats32 = NDArray[np.float32]
+Ints = NDArray[np.intp]
+# A change of the level below one DN or a quarter of the noise moves no spot: the fit has a background of its own.
+_LEVEL_CHANGE_DN = 1.0
+_LEVEL_CHANGE_SD = 0.25
+_MIN_OFF_SPREAD_DN = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Frames with the lasers on and off; `signal = on - off_share * off - level`."""
+
+    on: Image
+    off: Image | None
+    clip_dn: float
+    """Value of a clipped pixel."""
+    off_share: float = 1.0
+    level_dn: float = 0.0
+
+    def signal(self, strip: Strip) -> Floats32:
+        """The signal in a strip, DN."""
+        on = self.on[strip.at]
+        if self.off is None:
+            return on.astype(np.float32) - np.float32(self.level_dn)
+        if self.off_share == 1.0 and self.level_dn == 0.0:
+            return np.asarray(cv2.subtract(on, self.off[strip.at], dtype=cv2.CV_32F), np.float32)
+        out = cv2.addWeighted(on, 1.0, self.off[strip.at], -self.off_share, -self.level_dn, dtype=cv2.CV_32F)
+        return np.asarray(out, np.float32)
+
+    def cut(self, rows: Ints, cols: Ints, half: int) -> Windows:
+        """Square windows of 2 half + 1 pixels around pixels (n,); what lies outside the image is not usable."""
+        span = np.arange(-half, half + 1)
+        height, width = self.on.shape
+        v, u = rows[:, None] + span, cols[:, None] + span
+        usable = None
+        if v[:, 0].min() < 0 or u[:, 0].min() < 0 or v[:, -1].max() >= height or u[:, -1].max() >= width:
+            inside = ((v >= 0) & (v < height))[:, :, None] & ((u >= 0) & (u < width))[:, None, :]
+            usable = inside.reshape(len(rows), -1)
+            v, u = np.clip(v, 0, height - 1), np.clip(u, 0, width - 1)
+        at = (v[:, :, None] * width + u[:, None, :]).reshape(len(rows), -1)
+        raw = self.on.reshape(-1).take(at)
+        data = raw - self.level_dn
+        if self.off is not None:
+            data -= self.off_share * self.off.reshape(-1).take(at)
+        shape = (span.size, span.size)
+        if raw.max() < self.clip_dn:
+            return Windows(data, shape, usable)
+        unclipped = raw < self.clip_dn
+        usable = unclipped if usable is None else usable & unclipped
+        return Windows(data, shape, usable, data + (self.clip_dn - raw))
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A strip of a pair, with its level taken off and its noise measured."""
+
+    pair: Pair
+    strip: Strip
+    signal: Floats32
+    """The strip's signal, DN; zero where no spot is."""
+    variance: float
+    """Of a pixel without a spot, DN^2."""
+    ambient_changed: bool
+
+
+def look(pair: Pair, strip: Strip) -> Scene:
+    """Measure level and noise of a strip.
+
+    When the ambient light changed, the off-frame is scaled to the on-frame by a straight line through the pixels
+    of the strip, so that bright and dark parts of the scene vanish alike.
+    """
+    signal = pair.signal(strip)
+    level, variance = level_and_variance(signal)
+    limit = max(_LEVEL_CHANGE_DN, _LEVEL_CHANGE_SD * variance**0.5)
+    if pair.off is not None and abs(level) <= limit:
+        return Scene(pair, strip, signal, variance, ambient_changed=False)
+    if pair.off is not None:
+        share = _share_of_off(pair.on[strip.at].astype(np.float64), pair.off[strip.at].astype(np.float64))
+        pair = replace(pair, off_share=share)
+        level, variance = level_and_variance(pair.signal(strip))
+    pair = replace(pair, level_dn=level)
+    return Scene(pair, strip, pair.signal(strip), variance, ambient_changed=pair.off is not None)
+
+
+def _share_of_off(on: Floats, off: Floats) -> float:
+    """Slope of on over off, spots left out as outliers; 1 where the off-frame is too even to tell."""
+    share = 1.0
+    for _ in range(3):
+        rest = on - share * off
+        middle = float(np.median(rest))
+        spread = 1.4826 * float(np.median(np.abs(rest - middle))) + 0.5
+        kept = np.abs(rest - middle) < 4.0 * spread
+        centred = off[kept] - off[kept].mean()
+        total = float(centred @ centred)
+        if total < _MIN_OFF_SPREAD_DN**2 * kept.sum():
+            return 1.0
+        share = float(centred @ on[kept]) / total
+    return share if 0.2 < share < 5.0 else 1.0

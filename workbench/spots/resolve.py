@@ -1,0 +1,139 @@
+"""Spots that overlap: duplicates dropped, neighbours fitted together, a blob of two split where the data allow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.spots.fit import Windows, fit_spots
+from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, U, V, principal_widths_px, sheared
+from workbench.spots.joint import Joint, evidence, fit_joint, halves
+from workbench.spots.measure import Trace, half_for, spot_flags
+from workbench.spots.noise import Noise
+from workbench.spots.pair import Scene
+from workbench.spots.types import Failure, Floats, Spot
+
+# F statistic that a second spot must reach: with some hundred pixels, chance gives this once in 1e9.
+_EVIDENCE = 15.0
+# Nearer than this, in widths, two spots move each other's centre.
+_OVERLAP_WIDTHS = 5.0
+_SAME_WIDTHS = 0.6
+_MIN_APART_WIDTHS = 1.0
+_MIN_SHARE = 0.08
+_MIN_FLUX_SD = 5.0
+_ELONGATED = 1.12
+_MAX_HALF_PX = 30
+
+
+def _apart_px(one: Trace, other: Trace) -> float:
+    return float(np.hypot(*(one.params[U:LN_SU] - other.params[U:LN_SU])))
+
+
+def without_duplicates(traces: list[Trace]) -> list[Trace]:
+    """Peaks whose fits ended on the same spot count once."""
+    kept: list[Trace] = []
+    for trace in sorted(traces, key=lambda t: -t.spot.flux_dn):
+        if all(_apart_px(trace, k) > max(_SAME_WIDTHS * min(trace.reach_px, k.reach_px), 0.5) for k in kept):
+            kept.append(trace)
+    return kept
+
+
+def clusters(traces: list[Trace]) -> list[list[Trace]]:
+    """Groups of spots that overlap, the strongest first in each."""
+    groups: list[list[Trace]] = []
+    for trace in traces:
+        near = [
+            g
+            for g in groups
+            if any(_apart_px(trace, t) < _OVERLAP_WIDTHS * max(trace.reach_px, t.reach_px) for t in g)
+        ]
+        groups = [g for g in groups if all(g is not n for n in near)]
+        groups.append([*(t for g in near for t in g), trace])
+    return [sorted(g, key=lambda t: -t.spot.flux_dn) for g in groups]
+
+
+def _window(scene: Scene, points: Floats, reach_px: float) -> tuple[Windows, int, int]:
+    """A window around all points (k, 2), and its first row and column."""
+    u, v = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    half = min(half_for(reach_px) + int(np.ceil(0.5 * np.ptp(points, axis=0).max())), _MAX_HALF_PX)
+    row, col = round(float(v)), round(float(u))
+    return scene.pair.cut(np.array([row]), np.array([col]), half), row - half, col - half
+
+
+def _is_better(one: Joint, two: Joint, noise: Noise, win: Windows) -> bool:
+    """Whether the data ask for the last spot of `two`; `one` was fitted with the weights of `two`."""
+    flux = two.params[:, FLUX]
+    reach = float(np.exp(two.params[0, LN_SU:SHEAR].max()))
+    points = two.params[:, U:LN_SU]
+    apart = min(float(np.hypot(*(points[-1] - p))) for p in points[:-1])
+    inside = bool((points >= 0).all() and (points < np.array(win.shape[::-1])).all())
+    pixels = int((two.weight > 0).sum())
+    return (
+        two.converged
+        and inside
+        and apart > _MIN_APART_WIDTHS * reach
+        and float(flux.min()) > _MIN_SHARE * float(flux.max())
+        and bool((flux > _MIN_FLUX_SD * two.sd[:, 0]).all())
+        and evidence(one.chi2, two.chi2, pixels, 3 + 3 * len(flux)) > _EVIDENCE
+    )
+
+
+def _as_traces(scene: Scene, joint: Joint, row0: int, col0: int) -> list[Trace]:
+    traces = []
+    for params, sd in zip(joint.params, joint.sd, strict=True):
+        su, sv = (float(s) for s in np.exp(params[LN_SU:SHEAR]))
+        u, v, flux = float(params[U]) + col0, float(params[V]) + row0, float(params[FLUX])
+        flags = spot_flags(scene, u, v, su, sv)
+        apart = min(float(np.hypot(*(params - p)[U:LN_SU])) for p in joint.params if p is not params)
+        if apart < _OVERLAP_WIDTHS * max(su, sv):
+            flags |= {Failure.MERGED}
+        width = float(np.sqrt(su * sv))
+        peak = flux / (2.0 * np.pi * (width**2 + 1.0 / 12.0))
+        absolute = params.copy()
+        absolute[U], absolute[V] = u, v
+        traces.append(
+            Trace(Spot(u, v, float(sd[1]), float(sd[2]), flux, width, peak, flags), absolute, joint.slope_dn)
+        )
+    return traces
+
+
+def fitted_together(scene: Scene, group: list[Trace]) -> list[Trace]:
+    """A cluster fitted jointly, the strongest first; members that the data do not ask for are dropped."""
+    if len(group) == 1:
+        return group
+    points = np.array([t.params[U:LN_SU] for t in group])
+    win, row0, col0 = _window(scene, points, max(t.reach_px for t in group))
+    starts = np.array([t.params[:SHEAR] for t in group]) - (0, 0, col0, row0, 0, 0)
+    noise = Noise(np.full((1, 1), scene.variance), min(t.slope_dn for t in group))
+    best, chosen = fit_joint(win, starts[:1], noise), starts[:1]
+    for start in starts[1:]:
+        tried = np.vstack([chosen, start])
+        more = fit_joint(win, tried, noise)
+        if _is_better(fit_joint(win, best.params, noise, more.weight), more, noise, win):
+            best, chosen = more, more.params
+    if len(best.params) == 1:
+        return group[:1]
+    return _as_traces(scene, fit_joint(win, best.params, Noise(noise.floor_dn2, best.slope_dn)), row0, col0)
+
+
+def split(scene: Scene, trace: Trace) -> list[Trace]:
+    """A spot as two if it is elongated and two explain it far better; flagged merged if only the former."""
+    win, row0, col0 = _window(scene, trace.params[None, U:LN_SU], 1.3 * trace.reach_px)
+    start = np.zeros((1, 7))
+    start[0, : trace.params.size] = trace.params - (0, 0, col0, row0, 0, 0, 0)[: trace.params.size]
+    noise = Noise(np.full((1, 1), scene.variance), trace.slope_dn)
+    whole = fit_spots(win, start, noise, sheared)
+    long, short = principal_widths_px(*whole.params[0, LN_SU:])
+    if not whole.converged[0] or long < _ELONGATED * short:
+        return [trace]
+    two = fit_joint(win, halves(whole.params[0]), noise)
+    two = fit_joint(win, two.params, Noise(noise.floor_dn2, two.slope_dn))
+    one = _chi2(whole.residual[0], two.weight)
+    if not _is_better(replace(two, chi2=one), two, noise, win):
+        return [trace]
+    return _as_traces(scene, two, row0, col0)
+
+
+def _chi2(residual: Floats, weight: Floats) -> float:
+    return float(weight @ residual**2)

@@ -1,0 +1,72 @@
+"""The part of an image that a scanline allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.model.errors import BadInputError
+from workbench.spots.types import Bools, Floats, Scanline
+
+# Smoothing at the strip's rim needs some rows beyond it.
+_RIM_PX = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    """A rectangle of the image, and which of its pixels lie within the scanline's half-width."""
+
+    rows: slice
+    cols: slice
+    mask: Bools | None
+    """None where every pixel may hold a spot."""
+
+    @property
+    def at(self) -> tuple[slice, slice]:
+        """Index of the rectangle in the image."""
+        return self.rows, self.cols
+
+
+def distance_px(line: Scanline, u_px: Floats, v_px: Floats) -> Floats:
+    """Distance of points from the line."""
+    across = (u_px - line.u0_px) * line.dv - (v_px - line.v0_px) * line.du
+    distance: Floats = np.abs(across) / np.hypot(line.du, line.dv)
+    return distance
+
+
+def check_line(line: Scanline) -> None:
+    """Refuse a line without direction or with a value that is no number.
+
+    Raises:
+        BadInputError: says what was expected, what came and what to do.
+    """
+    values = (line.u0_px, line.v0_px, line.du, line.dv, line.half_width_px)
+    if not np.isfinite(values).all() or line.half_width_px <= 0 or (line.du == 0 and line.dv == 0):
+        raise BadInputError(
+            f"scanline: expected finite numbers, a direction other than (0, 0) and a half-width above 0, got {line}; "
+            "give for example Scanline(0, 240, 1, 0, 3) for row 240"
+        )
+
+
+def strip_of(line: Scanline, shape: tuple[int, int]) -> Strip:
+    """Smallest rectangle of an image of `shape` that holds the scanline's band and a rim.
+
+    A band that misses the image leaves an empty strip.
+    """
+    height, width = shape
+    reach = line.half_width_px + _RIM_PX
+    if abs(line.du) >= abs(line.dv):
+        ends = line.v0_px + (np.array([0.0, width - 1.0]) - line.u0_px) * line.dv / line.du
+        rows, cols = _span(ends, reach * np.hypot(1.0, line.dv / line.du), height), slice(0, width)
+    else:
+        ends = line.u0_px + (np.array([0.0, height - 1.0]) - line.v0_px) * line.du / line.dv
+        rows, cols = slice(0, height), _span(ends, reach * np.hypot(1.0, line.du / line.dv), width)
+    v, u = np.mgrid[rows, cols].astype(np.float64)
+    return Strip(rows, cols, distance_px(line, u, v) <= line.half_width_px + 1.0)
+
+
+def _span(ends: Floats, reach: float, size: int) -> slice:
+    first = int(np.clip(np.floor(ends.min() - reach), 0, size))
+    last = int(np.clip(np.ceil(ends.max() + reach) + 1, first, size))
+    return slice(first, last)
