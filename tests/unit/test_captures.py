@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+from math import isnan
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from workbench.model.captures import load_captures
+from workbench.model.errors import BadInputError
+
+HEADER = "laser_id,standoff_mm,repeat,u_px,v_px"
+
+
+def load(tmp_path: Path, text: str) -> object:
+    path = tmp_path / "c.csv"
+    path.write_text(text)
+    return load_captures(path)
+
+
+def test_positions(tmp_path: Path) -> None:
+    path = tmp_path / "c.csv"
+    path.write_text(f"\ufeff{HEADER}\n1,200,0,,42\nL2,300.5,1,17.25,\n", encoding="utf-8")
+    first, second = load_captures(path)
+    assert (first.row, first.laser_id, first.standoff_mm, first.v_px) == (2, "1", 200.0, 42.0)
+    assert isnan(first.u_px)
+    assert (second.row, second.repeat, second.u_px) == (3, 1, 17.25)
+    assert isnan(second.v_px)
+
+
+def test_images_are_relative_to_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "c.csv"
+    path.write_text("laser_id,standoff_mm,repeat,on,off,scene\nall,,0,a/on.png,,s1\n")
+    (row,) = load_captures(path)
+    assert (row.on, row.off, row.scene) == (tmp_path / "a/on.png", None, "s1")
+    assert isnan(row.standoff_mm)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ["row 1", "missing: laser_id, standoff_mm, repeat"]),
+        ("laser_id,standoff_mm,u_px\n", ["row 1", "missing: repeat"]),
+        (f"{HEADER},colour\n", ["row 1", "got colour"]),
+        (f"{HEADER},u_px\n", ["row 1", "every column once"]),
+        ("laser_id,standoff_mm,repeat\n", ["row 1", "on", "u_px"]),
+        (f"{HEADER}\n", ["at least one row"]),
+        (f"{HEADER}\n1,5OO,0,,42\n", ["row 2, column standoff_mm", "expected a number", "got 5OO"]),
+        (f"{HEADER}\n1,200,0,,42\n1,-3,0,,42\n", ["row 3, column standoff_mm", "above 0", "got -3"]),
+        (f"{HEADER}\n1,200,0,,inf\n", ["row 2, column v_px", "finite"]),
+        (f"{HEADER}\n1,200,x,,42\n", ["row 2, column repeat", "whole number", "got x"]),
+        (f"{HEADER}\n,200,0,,42\n", ["row 2, column laser_id"]),
+        (f"{HEADER}\n1,200,0,,\n", ["row 2, column on", "neither"]),
+        (f"{HEADER}\nall,200,0,,42\n", ["row 2, column laser_id", "one laser"]),
+        (f"{HEADER}\n1,200,0\n", ["row 2", "as many values"]),
+        (f"{HEADER}\n1,200,0,,42,9\n", ["row 2", "as many values"]),
+        (f"{HEADER},u_sd_px\n1,200,0,1,42,0\n", ["row 2, column u_sd_px", "above 0"]),
+        (f"{HEADER},tilt_deg\n1,200,0,1,42,90\n", ["row 2, column tilt_deg", "below 90"]),
+    ],
+)
+def test_errors_name_row_and_column(tmp_path: Path, text: str, words: list[str]) -> None:
+    with pytest.raises(BadInputError) as caught:
+        load(tmp_path, text)
+    for word in [*words, "c.csv"]:
+        assert word in str(caught.value)
+
+
+def test_every_wrong_row_is_listed(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError) as caught:
+        load(tmp_path, f"{HEADER}\n1,a,0,,42\n1,200,0,,42\n1,200,b,,42\n")
+    assert ["row 2" in line or "row 4" in line for line in str(caught.value).splitlines()] == [True, True]
+
+
+def test_no_file(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="nowhere.csv"):
+        load_captures(tmp_path / "nowhere.csv")
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(body=st.binary(max_size=200))
+def test_any_bytes_are_read_or_refused_by_name(tmp_path: Path, body: bytes) -> None:
+    path = tmp_path / "c.csv"
+    path.write_bytes(HEADER.encode() + b"\n" + body)
+    try:
+        rows = load_captures(path)
+    except BadInputError as error:
+        assert "c.csv" in str(error)
+    else:
+        assert rows

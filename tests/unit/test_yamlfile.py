@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from workbench.model.errors import BadInputError
+from workbench.model.procedure import load_procedure
+from workbench.model.rig import load_rig
+
+RIG = """\
+format: 1
+rig: r
+camera:
+  width_px: 640
+  height_px: 480
+  f_px: {value: 500.0, sd: 25.0}
+  cx_px: {value: 319.5, sd: 40.0}
+  cy_px: {value: 239.5, sd: 40.0}
+lasers:
+  - id: 1
+    axis: u
+    x_mm: {value: 30.0, sd: 0.2}
+    y_mm: {value: 0.0, sd: 0.2}
+"""
+
+
+def rig_error(tmp_path: Path, old: str, new: str) -> str:
+    path = tmp_path / "rig.yaml"
+    text = RIG.replace(old, new)
+    assert text != RIG
+    path.write_text(text)
+    with pytest.raises(BadInputError) as caught:
+        load_rig(path)
+    return str(caught.value).replace(str(path), "rig.yaml")
+
+
+def test_a_rig_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(RIG)
+    rig = load_rig(path)
+    assert rig.laser_ids == ("1",)  # an id is a name, whatever YAML thinks of it
+    assert rig.camera.f_px.value == 500.0
+    assert rig.bench.offset_mm.sd == 0.0  # not stated: known exactly
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ("sd: 25.0", "sd: -1", 6, ["camera.f_px.sd", "greater than or equal to 0", "got -1"]),
+        ("sd: 25.0", "sd: wide", 6, ["camera.f_px.sd", "valid number", "got 'wide'"]),
+        ("  height_px: 480\n", "  height_px: 480\n  hue: 1\n", 6, ["camera.hue", "not permitted"]),
+        ("  width_px: 640\n", "", 3, ["camera.width_px", "required"]),
+        ("axis: u", "axis: x", 11, ["lasers[0].axis", "'u' or 'v'", "got 'x'"]),
+        ("x_mm: {value: 30.0", "x_mm: {value: 0.0", 10, ["lasers[0]", "needs a baseline"]),
+        ("format: 1", "format: 2", 1, ["format", "got 2"]),
+        ("rig: r", "rig: [", 4, ["not valid YAML"]),
+        ("value: 500.0", "value: .nan", 6, ["camera.f_px.value", "finite"]),
+    ],
+)
+def test_errors_name_file_line_key_expected_and_came(
+    tmp_path: Path, old: str, new: str, line: int, words: list[str]
+) -> None:
+    message = rig_error(tmp_path, old, new)
+    first = message.splitlines()[0]
+    assert first.startswith(f"rig.yaml:{line}: ")
+    for word in words:
+        assert word in first
+
+
+def test_every_problem_is_listed(tmp_path: Path) -> None:
+    message = rig_error(tmp_path, "sd: 40.0", "sd: -40.0")
+    assert [line.split(": ")[0] for line in message.splitlines()] == ["rig.yaml:7", "rig.yaml:8"]
+
+
+def test_two_lasers_with_one_id(tmp_path: Path) -> None:
+    laser = RIG[RIG.index("  - id: 1") :]
+    assert "must differ" in rig_error(tmp_path, laser, laser + laser)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"\xff\xfe\x00", b"- 1\n- 2\n", b"a: 1\na: 2\n"])
+def test_what_is_no_rig_at_all(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "rig.yaml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BadInputError, match=r"rig\.yaml"):
+        load_rig(path)
+
+
+def test_tags_that_build_objects_stay_text(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text("!!python/object/apply:os.system ['touch " + str(tmp_path / "owned") + "']\n")
+    with pytest.raises(BadInputError):
+        load_rig(path)
+    assert not (tmp_path / "owned").exists()
+
+
+def test_procedure_errors(tmp_path: Path) -> None:
+    path = tmp_path / "p.yaml"
+    path.write_text(
+        "format: 1\nprocedure: p\ntitle: t\nsteps:\n  - step: capture_grid\n    standoffs_mm: [500, 500]\n"
+        "    repeats: 10\n  - step: dance\n"
+    )
+    with pytest.raises(BadInputError) as caught:
+        load_procedure(path)
+    lines = str(caught.value).splitlines()
+    assert "p.yaml:5: steps[0]" in lines[0]
+    assert "must differ" in lines[0]
+    assert "p.yaml:8: steps[1]" in lines[1]
+    assert "'message'" in lines[1]
+    assert "dance" in lines[1]

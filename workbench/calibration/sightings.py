@@ -1,0 +1,89 @@
+"""From captures to sightings: which spot of which laser, at which standoff, and what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isnan
+
+from workbench.calibration.observations import Rejected, Sighting
+from workbench.model.captures import ALL_LASERS, CaptureRow
+from workbench.model.rig import LaserSpec, Rig
+from workbench.session.capture_spots import find_row_spots
+from workbench.spots import Failure, Finding, Scanline, explain
+
+UNUSABLE = (Failure.AT_EDGE, Failure.MERGED)
+"""A spot cut by the border or grown together with another has a centre that is not the laser's."""
+PRIOR_REACH_SD = 4.0
+BEAM_HALF_WIDTH_PX = 8.0
+
+
+def sight_rows(rig: Rig, rows: Sequence[CaptureRow]) -> tuple[list[Sighting], list[Rejected]]:
+    """The sightings in a captures file, and the rows that show none, each with its reason.
+
+    Raises:
+        BadInputError: an image cannot be used.
+    """
+    found = [_sight_row(rig, row) for row in rows]
+    sightings = [f for f in found if isinstance(f, Sighting)]
+    return sightings, [f for f in found if isinstance(f, Rejected)]
+
+
+def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | Rejected:
+    """The one spot of a capture that fired one laser, put into `sighting`, or why there is none."""
+    source = sighting.source
+    where = f"laser {laser.id} at {sighting.standoff_mm:g} mm"
+    if len(finding.spots) != 1:
+        causes = "; ".join(f"{failure}: {explain(failure)}" for failure in finding.failures)
+        return Rejected(source, f"{where}: expected one spot, got {len(finding.spots)}. {causes}")
+    spot = finding.spots[0]
+    if bad := [flag for flag in UNUSABLE if flag in spot.flags]:
+        return Rejected(source, f"{where}: {bad[0]}: {explain(bad[0])}")
+    return replace(sighting, u_px=spot.u_px, v_px=spot.v_px, u_sd_px=spot.u_sd_px, v_sd_px=spot.v_sd_px)
+
+
+def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
+    """Where the rig file lets the laser's spots lie: along the projection of its baseline."""
+    camera = rig.camera
+    x, y = laser.x_mm.value, laser.y_mm.value
+    du, dv = x / (x**2 + y**2) ** 0.5, y / (x**2 + y**2) ** 0.5
+    # Spread across the line: principal point and pointing, both in the direction (-dv, du).
+    across = [
+        camera.cx_px.sd * dv,
+        camera.cy_px.sd * du,
+        camera.f_px.value * laser.tx.sd * dv,
+        camera.f_px.value * laser.ty.sd * du,
+    ]
+    reach = PRIOR_REACH_SD * sum(part**2 for part in across) ** 0.5
+    u = camera.cx_px.value + camera.f_px.value * laser.tx.value
+    v = camera.cy_px.value + camera.f_px.value * laser.ty.value
+    return Scanline(u, v, du, dv, BEAM_HALF_WIDTH_PX + reach)
+
+
+def _sight_row(rig: Rig, row: CaptureRow) -> Sighting | Rejected:
+    source = f"row {row.row}"
+    if row.laser_id == ALL_LASERS:
+        return Rejected(source, "a calibration needs captures of one laser at a time, got all")
+    if isnan(row.standoff_mm):
+        return Rejected(source, "standoff_mm is empty: a calibration needs known standoffs")
+    if row.laser_id not in rig.laser_ids:
+        known = ", ".join(rig.laser_ids)
+        return Rejected(source, f"laser_id: expected one of {known} (rig {rig.rig}), got {row.laser_id}")
+    sighting = Sighting(
+        source=source,
+        laser_id=row.laser_id,
+        placement=row.scene or f"{row.standoff_mm:g} mm",
+        standoff_mm=row.standoff_mm,
+        repeat=row.repeat,
+        u_px=row.u_px,
+        v_px=row.v_px,
+        u_sd_px=row.u_sd_px,
+        v_sd_px=row.v_sd_px,
+        standoff_sd_mm=row.standoff_sd_mm,
+        yaw_deg=0.0 if isnan(row.tilt_deg) else row.tilt_deg,
+    )
+    if row.on is None:
+        return sighting
+    laser = rig.lasers[rig.laser_ids.index(row.laser_id)]
+    size = rig.camera.width_px, rig.camera.height_px
+    return sight(find_row_spots(row, size, [prior_scanline(rig, laser)], 1), laser, sighting)

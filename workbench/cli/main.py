@@ -1,0 +1,90 @@
+"""The command line. Heavy libraries are imported inside the commands, so that `--help` answers at once."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from workbench.model.errors import StoppedError, WorkbenchError
+
+app = typer.Typer(
+    help="Calibration and lab-measurement workbench for laser-spot range sensors.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+INTERNAL_ERROR = 1
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
+
+
+@app.command()
+def run(
+    procedures: Annotated[list[Path], typer.Argument(help="Procedure files, run in this order.")],
+    rig: Annotated[Path, typer.Option(help="Rig file.")],
+    sessions: Annotated[Path, typer.Option(help="Folder for the new session.")] = Path("sessions"),
+) -> None:
+    """Run procedures on a rig, in one session."""
+    from workbench.cli.run import run_procedures
+
+    run_procedures(procedures, rig, sessions)
+
+
+@app.command()
+def fit(
+    captures: Annotated[Path, typer.Argument(help="Captures file (CSV).")],
+    rig: Annotated[Path, typer.Option(help="Rig file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Calibration file to write (YAML).")],
+    json: Json = False,
+) -> None:
+    """Calibrate from a captures file: images or pixel positions at known standoffs."""
+    from workbench.cli.fit import fit_captures
+
+    fit_captures(captures, rig, output, json)
+
+
+@app.command(name="range")
+def range_(
+    captures: Annotated[Path, typer.Argument(help="Captures file (CSV).")],
+    calibration: Annotated[Path, typer.Option(help="Calibration file (YAML).")],
+    json: Json = False,
+) -> None:
+    """Range the scenes of a captures file with a calibration."""
+    from workbench.cli.range import range_captures
+
+    range_captures(captures, calibration, json)
+
+
+@app.command()
+def view(
+    session: Annotated[Path, typer.Argument(help="Session folder.")],
+) -> None:
+    """Open a session's recording in the Rerun viewer."""
+    from workbench.cli.view import view_session
+
+    raise typer.Exit(view_session(session))
+
+
+def main() -> None:
+    """Entry point: every expected failure becomes a message and its exit code."""
+    try:
+        app()
+    except WorkbenchError as error:
+        _say(f"error: {error}")
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        _say("stopped")
+        sys.exit(StoppedError.exit_code)
+    except Exception:
+        traceback.print_exc()
+        _say("internal error: this is a defect of the workbench, please report it with the lines above")
+        sys.exit(INTERNAL_ERROR)
+
+
+def _say(message: str) -> None:
+    typer.echo(message, err=True)

@@ -1,0 +1,117 @@
+"""The procedure file: typed steps that a technician can read and edit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from workbench.model.rig import PositiveFloat
+from workbench.model.yamlfile import FileModel, load_yaml_model
+
+Standoffs = Annotated[tuple[PositiveFloat, ...], Field(min_length=1)]
+
+
+class MessageStep(FileModel):
+    """Tell the technician something."""
+
+    step: Literal["message"]
+    text: str
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return self.text
+
+
+class CaptureGridStep(FileModel):
+    """Fire each laser alone at each standoff, `repeats` pairs of frames each."""
+
+    step: Literal["capture_grid"]
+    standoffs_mm: Standoffs
+    repeats: Annotated[int, Field(ge=1)]
+
+    @model_validator(mode="after")
+    def _standoffs_differ(self) -> CaptureGridStep:
+        if len(set(self.standoffs_mm)) != len(self.standoffs_mm):
+            raise ValueError("standoffs_mm must differ: more pairs at one standoff are more `repeats`")
+        return self
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return f"Capture at {len(self.standoffs_mm)} standoffs, {self.repeats} pairs a laser"
+
+
+class FitStep(FileModel):
+    """Fit the calibration to the captures so far."""
+
+    step: Literal["fit"]
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return "Fit the calibration"
+
+
+class CheckStep(FileModel):
+    """Hold the fit against limits; the session ends with exit code 3 where one fails."""
+
+    step: Literal["check"]
+    max_rms_px: PositiveFloat
+    max_relative_range_sd: PositiveFloat
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return "Check the calibration"
+
+
+class ExportStep(FileModel):
+    """Write the calibration to the session folder."""
+
+    step: Literal["export"]
+    file: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+\.ya?ml$")] = "calibration.yaml"
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return f"Export {self.file}"
+
+
+class AccuracyTrialStep(FileModel):
+    """Range a flat at standoffs that the fit did not see."""
+
+    step: Literal["accuracy_trial"]
+    standoffs_mm: Standoffs
+    readings: Annotated[int, Field(ge=1)]
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return f"Accuracy at {len(self.standoffs_mm)} standoffs, {self.readings} readings each"
+
+
+Step = Annotated[
+    MessageStep | CaptureGridStep | FitStep | CheckStep | ExportStep | AccuracyTrialStep,
+    Field(discriminator="step"),
+]
+
+
+class Procedure(FileModel):
+    """A procedure file, format 1."""
+
+    format: Literal[1]
+    procedure: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+    title: str
+    steps: Annotated[tuple[Step, ...], Field(min_length=1)]
+
+
+def load_procedure(path: Path) -> Procedure:
+    """Read a procedure file.
+
+    Raises:
+        BadInputError: see `load_yaml_model`.
+    """
+    return load_yaml_model(path, Procedure)

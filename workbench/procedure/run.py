@@ -1,0 +1,113 @@
+"""Running procedures: one session, one bench, one recording."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from workbench.devices.registry import open_bench
+from workbench.model import event as ev
+from workbench.model.calibration import Provenance
+from workbench.model.errors import WorkbenchError
+from workbench.model.procedure import Procedure, load_procedure
+from workbench.model.rig import Rig, load_rig
+from workbench.procedure.context import Context
+from workbench.procedure.steps import run_step, shots
+from workbench.session.journal import Journal
+from workbench.session.manifest import create_session, workbench_version
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is about to run, read and checked before anything is switched on."""
+
+    rig: Rig
+    rig_path: Path
+    procedures: tuple[Procedure, ...]
+    procedure_paths: tuple[Path, ...]
+
+    @classmethod
+    def load(cls, rig_path: Path, procedure_paths: Sequence[Path]) -> Plan:
+        """Read the files.
+
+        Raises:
+            BadInputError: one of them is wrong.
+        """
+        return cls(
+            rig=load_rig(rig_path),
+            rig_path=rig_path,
+            procedures=tuple(load_procedure(path) for path in procedure_paths),
+            procedure_paths=tuple(procedure_paths),
+        )
+
+    def new_session(self, sessions: Path) -> Path:
+        """A folder name that sorts by time and says what was run; with a number where it is taken."""
+        stamp = time.strftime("%Y%m%d-%H%M%S", time.localtime())
+        base = sessions / f"{stamp}-{self.procedures[0].procedure}"
+        taken = (base.with_name(f"{base.name}-{n}") for n in range(2, 1000))
+        return base if not base.exists() else next(path for path in taken if not path.exists())
+
+
+def run(
+    plan: Plan, session_dir: Path, consumers: Sequence[ev.Consumer], *, operator: str, command: str
+) -> None:
+    """Run every procedure of the plan, in order, in one new session.
+
+    Whatever ends the session early is journalled as its end before it goes on to the caller; frames and
+    records up to there are on disk.
+
+    Raises:
+        WorkbenchError: its exit code says what went wrong.
+    """
+    created = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())
+    create_session(
+        session_dir, plan.rig, plan.rig_path, plan.procedure_paths, operator=operator, created=created
+    )
+    provenance = Provenance(
+        session=session_dir.name,
+        captures_sha256="",
+        rig=plan.rig.rig,
+        serial=plan.rig.serial,
+        command=command,
+        version=workbench_version(),
+        operator=operator,
+        created=created,
+    )
+    with ExitStack() as stack:
+        journal = stack.enter_context(Journal(session_dir))
+        bench = stack.enter_context(open_bench(plan.rig, session_dir))
+        context = Context(session_dir, plan.rig, bench, journal, consumers, provenance)
+        try:
+            _run_all(plan, context)
+        except BaseException as error:
+            code = error.exit_code if isinstance(error, WorkbenchError) else 1
+            what = str(error) or type(error).__name__
+            context.emit(ev.SessionFinished(exit_code=code, message=what))
+            raise
+        context.emit(ev.SessionFinished(exit_code=0, message="done"))
+
+
+def _run_all(plan: Plan, context: Context) -> None:
+    names = tuple(p.procedure for p in plan.procedures)
+    context.emit(ev.SessionStarted(session=context.session_dir.name, rig=plan.rig.rig, procedures=names))
+    for procedure in plan.procedures:
+        context.emit(
+            ev.ProcedureStarted(
+                procedure=procedure.procedure, title=procedure.title, steps=len(procedure.steps)
+            )
+        )
+        for index, step in enumerate(procedure.steps, start=1):
+            context.emit(
+                ev.StepStarted(
+                    procedure=procedure.procedure,
+                    index=index,
+                    step=step.step,
+                    title=step.title,
+                    shots=shots(step, plan.rig),
+                )
+            )
+            outcome = run_step(step, context, f"{procedure.procedure}.{index}")
+            context.emit(ev.StepFinished(procedure=procedure.procedure, index=index, outcome=outcome))

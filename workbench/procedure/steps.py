@@ -1,0 +1,182 @@
+"""What each kind of step does.
+
+A step takes the context and its own part of the procedure file, and returns one line on how it went; it
+raises where the procedure cannot go on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from functools import singledispatch
+
+from workbench.calibration.assess import Acceptance
+from workbench.calibration.export import calibrate, write_calibration
+from workbench.calibration.fit import Fit, fit
+from workbench.calibration.observations import Rejected, Sighting
+from workbench.calibration.records import fit_finished
+from workbench.calibration.sightings import prior_scanline, sight
+from workbench.model import event as ev
+from workbench.model import procedure as pr
+from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.model.rig import Rig
+from workbench.model.target import Placement
+from workbench.procedure.context import Context
+from workbench.ranging.acquire import acquire
+from workbench.ranging.ranger import Ranger
+from workbench.session.capture_table import write_capture_table
+from workbench.spots import Finding
+from workbench.trials.accuracy import accuracy_row
+
+CALIBRATION_TABLE = "captures.csv"
+TRIAL_TABLE = "trial-captures.csv"
+
+
+@singledispatch
+def shots(step: object, rig: Rig) -> int:
+    """How many captures a step will take: 0 but for steps that say otherwise.
+
+    An accuracy trial may take more, where the lasers have to be fired one by one.
+    """
+    return 0
+
+
+@shots.register
+def _(step: pr.CaptureGridStep, rig: Rig) -> int:
+    return len(step.standoffs_mm) * step.repeats * len(rig.lasers)
+
+
+@shots.register
+def _(step: pr.AccuracyTrialStep, rig: Rig) -> int:
+    return len(step.standoffs_mm) * step.readings
+
+
+@singledispatch
+def run_step(step: object, context: Context, name: str) -> str:
+    """Run one step; `name` is unique in the session and begins the keys of its captures."""
+    raise TypeError(f"no way to run a step of type {type(step).__name__}")
+
+
+@run_step.register
+def _(step: pr.MessageStep, context: Context, name: str) -> str:
+    return "shown"
+
+
+@run_step.register
+def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
+    for standoff_mm in step.standoffs_mm:
+        placement = context.place(Placement(key=f"{name}/{standoff_mm:g}mm", standoff_mm=standoff_mm))
+        for laser in context.rig.lasers:
+            scanline = prior_scanline(context.rig, laser)
+            for repeat in range(step.repeats):
+                key = f"{placement.key}/{laser.id}/{repeat:02d}"
+                context.capture(key, [laser.id], placement, repeat, [scanline])
+    return f"{shots(step, context.rig)} pairs"
+
+
+@run_step.register
+def _(step: pr.FitStep, context: Context, name: str) -> str:
+    captures = [c for c in context.captures if c.purpose == "calibration"]
+    if not captures:
+        raise BadInputError(f"step {name}: nothing to fit; expected a capture_grid step before it")
+    sha256 = write_capture_table(context.session_dir / CALIBRATION_TABLE, captures)
+    context.provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
+    found = [_sight(context, capture) for capture in captures]
+    sightings = [f for f in found if isinstance(f, Sighting)]
+    context.fit = fit(context.rig, sightings, [f for f in found if isinstance(f, Rejected)])
+    _, assessment = calibrate(context.fit, Acceptance(), context.provenance)
+    context.emit(fit_finished(context.fit, assessment))
+    return (
+        f"rms {context.fit.rms_px:.3f} px over {len(sightings)} spots, {len(context.fit.rejected)} rejected"
+    )
+
+
+@run_step.register
+def _(step: pr.CheckStep, context: Context, name: str) -> str:
+    limits = Acceptance(max_rms_px=step.max_rms_px, max_relative_range_sd=step.max_relative_range_sd)
+    calibration, assessment = calibrate(_fitted(context, name), limits, context.provenance)
+    if assessment.verdict == "refused":
+        raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
+    worst = calibration.laser_ranger.validity.max_relative_range_sd
+    return f"accepted, ranges to {100 * worst:.2f} % (1 sigma) or better"
+
+
+@run_step.register
+def _(step: pr.ExportStep, context: Context, name: str) -> str:
+    calibration, assessment = calibrate(_fitted(context, name), Acceptance(), context.provenance)
+    if assessment.verdict == "refused":
+        raise LimitFailedError("the calibration is not exported: " + "; ".join(assessment.reasons))
+    path = context.session_dir / step.file
+    write_calibration(path, calibration)
+    context.calibration = calibration
+    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    context.emit(ev.CalibrationExported(path=step.file, sha256=sha256))
+    return str(path)
+
+
+@run_step.register
+def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
+    if context.calibration is None:
+        raise BadInputError(
+            f"step {name}: no calibration to range with; run a procedure with an export step before it,"
+            " in the same call"
+        )
+    ranger = Ranger(context.calibration)
+    rows = []
+    for standoff_mm in step.standoffs_mm:
+        placement = context.place(Placement(key=f"{name}/{standoff_mm:g}mm", standoff_mm=standoff_mm))
+        readings = []
+        for number in range(step.readings):
+            scene = f"{placement.key}/{number:02d}"
+            reading = acquire(ranger, scene, _shooter(context, ranger, placement, scene, number))
+            readings.append(reading)
+            context.emit(
+                ev.ReadingTaken(
+                    trial=name,
+                    scene=scene,
+                    standoff_mm=placement.standoff_mm,
+                    reading=number,
+                    status=reading.status,
+                    range_mm=reading.flat_mm,
+                    sigma_mm=reading.flat_sigma_mm,
+                    lasers=reading.lasers,
+                )
+            )
+        rows.append(accuracy_row(placement.standoff_mm, readings, context.rig.bench))
+    trial = [c for c in context.captures if c.purpose == "trial"]
+    write_capture_table(context.session_dir / TRIAL_TABLE, trial)
+    context.emit(ev.TrialFinished(trial=name, rows=tuple(rows)))
+    return f"{sum(row.readings for row in rows)} readings"
+
+
+def _fitted(context: Context, name: str) -> Fit:
+    if context.fit is None:
+        raise BadInputError(f"step {name}: nothing is fitted; expected a fit step before it")
+    return context.fit
+
+
+def _shooter(
+    context: Context, ranger: Ranger, placement: Placement, scene: str, number: int
+) -> Callable[[tuple[str, ...]], Finding]:
+    def shoot(ids: tuple[str, ...]) -> Finding:
+        alone = len(ids) == 1
+        key = f"{scene}/{ids[0] if alone else 'all'}"
+        scanlines = [ranger.scanlines[ranger.sensor.ids.index(i)] for i in ids]
+        shown = f"{scene}/alone" if alone else scene
+        return context.capture(key, ids, placement, number, scanlines, scene=shown)
+
+    return shoot
+
+
+def _sight(context: Context, capture: ev.CaptureTaken) -> Sighting | Rejected:
+    laser = context.rig.lasers[context.rig.laser_ids.index(capture.laser_id)]
+    sighting = Sighting(
+        source=capture.on.path,
+        laser_id=capture.laser_id,
+        placement=capture.placement_key,
+        standoff_mm=capture.standoff_mm,
+        repeat=capture.repeat,
+        u_px=float("nan"),
+        v_px=float("nan"),
+    )
+    return sight(context.findings[capture.key], laser, sighting)

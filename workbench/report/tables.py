@@ -1,0 +1,110 @@
+"""Tables for people, at most 80 columns wide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import floor, log10
+
+from rich.table import Table
+
+from workbench.calibration.assess import Derived
+from workbench.model.event import ParameterRecord, TrialRow
+from workbench.ranging.ranger import Reading
+
+DETERMINED_BY_WORDS = {"data": "data", "joint": "jointly", "prior": "prior"}
+
+
+def parameter_table(parameters: Iterable[ParameterRecord]) -> Table:
+    """Fitted parameters; constants are left out."""
+    table = Table(title="Parameters (sd: 1 sigma)", title_justify="left")
+    table.add_column("parameter")
+    for column in ("value", "sd", "prior sd", "from data"):
+        table.add_column(column, justify="right")
+    table.add_column("determined by")
+    for p in parameters:
+        if p.prior_sd > 0:
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            table.add_row(
+                p.name,
+                f"{significant(p.value, p.sd)}{unit}",
+                f"{p.sd:.2g}",
+                f"{p.prior_sd:g}",
+                f"{100 * p.data_share:.0f} %",
+                DETERMINED_BY_WORDS[p.determined_by],
+            )
+    table.caption = "jointly: the data tie it to other parameters, whose priors do the rest"
+    table.caption_justify = "left"
+    return table
+
+
+def derived_table(derived: Iterable[Derived]) -> Table:
+    """What each laser's data determine whatever the priors say."""
+    table = Table(title="Determined by the data (sd: 1 sigma)", title_justify="left")
+    table.add_column("laser")
+    for column in ("f x baseline (px mm)", "sd", "spot at infinity (px)", "sd"):
+        table.add_column(column, justify="right")
+    for d in derived:
+        table.add_row(
+            d.laser_id,
+            significant(d.f_b_px_mm, d.f_b_sd),
+            f"{d.f_b_sd:.3g}",
+            significant(d.infinity_px, d.infinity_sd),
+            f"{d.infinity_sd:.2g}",
+        )
+    return table
+
+
+def reading_table(readings: Iterable[Reading]) -> Table:
+    """The ranger's readings, a line a scene."""
+    table = Table(title="Ranges (mm, 1 sigma)", title_justify="left")
+    table.add_column("scene")
+    table.add_column("status")
+    table.add_column("closest", justify="right")
+    table.add_column("lasers")
+    for r in readings:
+        closest = "-" if r.closest_mm is None or r.sigma_mm is None else _with_sd(r.closest_mm, r.sigma_mm)
+        lasers = "  ".join(f"{laser.laser_id} {laser.range_mm:.1f}" for laser in r.lasers)
+        table.add_row(r.scene, r.status, closest, lasers)
+    return table
+
+
+def trial_table(rows: Sequence[TrialRow]) -> Table:
+    """An accuracy trial: errors are measured - true."""
+    table = Table(title="Accuracy (mm; error = measured - true)", title_justify="left")
+    for column in ("true", "mean", "max", "min", "sd", "stated", "ruler", "mean %"):
+        table.add_column(column, justify="right")
+    for row in rows:
+        relative = None if row.mean_error_mm is None else 100 * row.mean_error_mm / row.standoff_mm
+        table.add_row(
+            f"{row.standoff_mm:g}",
+            _signed(row.mean_error_mm),
+            _signed(row.max_error_mm),
+            _signed(row.min_error_mm),
+            _plain(row.sd_mm),
+            _plain(row.range_sd_mm),
+            _plain(row.reference_sd_mm),
+            _signed(relative),
+        )
+    table.caption = "stated: 1 sigma of a reading by calibration and spots; ruler: 1 sigma of the true range"
+    table.caption_justify = "left"
+    return table
+
+
+def significant(value: float, sd: float) -> str:
+    """`value` with the digits that its standard deviation leaves meaningful: two of the sd."""
+    if sd <= 0:
+        return f"{value:g}"
+    digits = max(0, 1 - floor(log10(sd)))
+    return f"{value:.{digits}f}"
+
+
+def _with_sd(value: float, sd: float) -> str:
+    return f"{significant(value, sd)} +- {sd:.2g}"
+
+
+def _signed(value: float | None) -> str:
+    return "-" if value is None else f"{value:+.2f}"
+
+
+def _plain(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
