@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gammaln, ndtr, xlogy
 
-from workbench.spots.gaussian import FLUX, upright
+from workbench.spots.gaussian import FLUX, Upright
 from workbench.spots.types import Floats
 
 # Above this many electrons a Poisson count is Gaussian to 1e-3 of its information.
@@ -70,7 +70,7 @@ def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, floa
     """
     half = int(np.ceil(_REACH_WIDTHS * width_px)) + 2
     params = np.array([[0.0, electrons, half + phase_px[0], half + phase_px[1], *[np.log(width_px)] * 2]])
-    rows = upright(params, (2 * half + 1, 2 * half + 1))[0]
+    rows = Upright(params, (2 * half + 1, 2 * half + 1)).rows()[0]
     mean = camera.background_electrons + electrons * rows[FLUX]
     jacobian = rows.copy()
     jacobian[2:] *= electrons
@@ -79,7 +79,9 @@ def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, floa
     return matrix
 
 
-def position_bound_px(electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera) -> Floats:
+def position_bound_px(
+    electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera
+) -> Floats:
     """(2,) lowest standard deviation of u and v that an unbiased estimator can reach, nothing else being known."""
     cov = np.linalg.inv(fisher_matrix(electrons, width_px, phase_px, camera))
     bound: Floats = np.sqrt(np.diag(cov)[2:4])

@@ -4,35 +4,46 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from workbench.spots.gaussian import BACKGROUND, FLUX, LN_SU, U, upright
+from workbench.spots.gaussian import BACKGROUND, FLUX, Design, U, Upright
 from workbench.spots.noise import Noise, photon_transfer_slope
 from workbench.spots.types import Bools, Floats
 
-Basis = Callable[[Floats, tuple[int, int]], Floats]
-_MAX_STEPS = 15
-_MAX_MOVE = 1.0
-_MAX_STRETCH = 0.4
-_LN_WIDTH_RANGE = (float(np.log(0.15)), float(np.log(12.0)))
-# Where the steps stop: the last step was this share of the standard deviation, the next is far below.
-_TOLERANCE_SD = 0.1
+Model = Callable[[Floats, tuple[int, int]], Design]
+_MAX_STEPS: Final = 15
+_MAX_STEP: Final = np.array([np.inf, np.inf, 1.0, 1.0, 0.4, 0.4, 0.4])
+_LOWEST: Final = np.array([-np.inf, -np.inf, -np.inf, -np.inf, np.log(0.15), np.log(0.15), -3.0])
+_HIGHEST: Final = np.array([np.inf, np.inf, np.inf, np.inf, np.log(12.0), np.log(12.0), 3.0])
+# Where the steps stop: one this small in standard deviations leaves far less to the next.
+_TOLERANCE_SD: Final = 0.1
 # A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would choose.
-_CLIP_MARGIN_SD = 2.0
+_CLIP_MARGIN_SD: Final = 2.0
+_RIDGE: Final = [np.eye(k) * 1e-10 + 1.0 for k in range(8)]
 
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Equal windows of the difference image, one spot each."""
+    """Equal windows of the signal, one spot each, all arrays (n, height, width)."""
 
     data: Floats
-    """(n, height * width), DN."""
-    shape: tuple[int, int]
+    """DN."""
     usable: Bools | None = None
-    """(n, height * width), False where a pixel is clipped, hot or outside the image. None: all are usable."""
+    """False where a pixel is clipped, hot or outside the image. None: all are usable."""
     clip_dn: Floats | None = None
-    """(n, height * width), value at which the pixel clips. None: nothing is near to it."""
+    """Value at which the pixel clips. None: nothing is near to it."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width."""
+        return self.data.shape[1], self.data.shape[2]
+
+    def only(self, index: slice) -> Windows:
+        """Some of the windows."""
+        usable = None if self.usable is None else self.usable[index]
+        return Windows(self.data[index], usable, None if self.clip_dn is None else self.clip_dn[index])
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,27 +54,16 @@ class Fit:
     """(n, k)."""
     cov: Floats
     """(n, k, k)."""
-    rows: Floats
-    """(n, k, pixels), the basis."""
+    design: Design
+    signal: Floats
+    """(n, height, width), expected value above the background, DN."""
     residual: Floats
-    """(n, pixels), DN."""
+    """(n, height, width), DN."""
     weight: Floats
-    """(n, pixels), inverse variance, 0 where unused."""
+    """(n, height, width), inverse variance, 0 where unused."""
     converged: Bools
     """(n,)."""
     noise: Noise
-
-    @property
-    def signal(self) -> Floats:
-        """(n, pixels), expected value above the background, DN."""
-        signal: Floats = self.params[:, FLUX, None] * self.rows[:, FLUX]
-        return signal
-
-    @property
-    def leverage(self) -> Floats:
-        """(n, pixels), the share of each pixel's variance that the fit absorbs."""
-        absorbed: Floats = ((self.cov @ self.rows) * self.rows).sum(axis=1) * self.weight
-        return absorbed
 
     @property
     def sd_px(self) -> Floats:
@@ -75,73 +75,81 @@ class Fit:
 
 def _weights(win: Windows, signal: Floats, background: Floats, noise: Noise) -> Floats:
     """Inverse of the variance that the model predicts, 0 where a pixel is not to be used."""
-    variance = noise.floor_dn2 + noise.slope_dn * np.maximum(signal, 0.0)
+    variance = np.maximum(signal, 0.0)
+    variance *= noise.slope_dn
+    variance += noise.floor_dn2
     if win.usable is None:
-        return 1.0 / variance
+        weights: Floats = np.reciprocal(variance, out=variance)
+        return weights
     usable = win.usable
     if win.clip_dn is not None:
         usable = usable & (signal + background < win.clip_dn - _CLIP_MARGIN_SD * np.sqrt(variance))
-    weights: Floats = usable / variance
+    weights = usable / variance
     return weights
 
 
 def inverse(information: Floats) -> Floats:
     """Inverse of (n, k, k) information matrices; a ridge that only a singular one feels keeps it finite."""
-    scale = 1.0 / np.sqrt(np.maximum(np.einsum("nii->ni", information), 1e-30))
-    outer = scale[:, :, None] * scale[:, None, :]
-    scaled = information * outer
-    scaled += 1e-10 * np.eye(information.shape[1])
-    inverted: Floats = np.linalg.inv(scaled) * outer
+    ridged = information * _RIDGE[information.shape[1]] if information.shape[1] < 8 else information
+    ridged += _EYES[information.shape[1]]
+    inverted: Floats = np.linalg.inv(ridged)
     return inverted
+
+
+_EYES: Final = [np.eye(k) * 1e-12 for k in range(40)]
 
 
 def _moved(params: Floats, delta: Floats) -> Floats:
     """Parameters after a step, kept from jumping out of the window."""
-    new = params.copy()
-    new[:, :U] += delta[:, :U]
-    step = delta[:, U:] / np.maximum(np.abs(params[:, FLUX, None]), 1e-9)
-    new[:, U:LN_SU] += np.clip(step[:, :2], -_MAX_MOVE, _MAX_MOVE)
-    new[:, LN_SU:] += np.clip(step[:, 2:], -_MAX_STRETCH, _MAX_STRETCH)
-    np.clip(new[:, LN_SU : LN_SU + 2], *_LN_WIDTH_RANGE, out=new[:, LN_SU : LN_SU + 2])
-    return new
+    k = params.shape[1]
+    step = delta.copy()
+    step[:, U:] /= np.maximum(np.abs(params[:, FLUX:U]), 1e-9)
+    np.minimum(step, _MAX_STEP[:k], out=step)
+    np.maximum(step, -_MAX_STEP[:k], out=step)
+    step += params
+    np.minimum(step, _HIGHEST[:k], out=step)
+    np.maximum(step, _LOWEST[:k], out=step)
+    return step
 
 
-def score(win: Windows, start: Floats, noise: Noise, basis: Basis) -> Fit:
-    """Scoring steps from `start` (n, k) until they are far below the standard deviation."""
-    params = start
-    for _ in range(_MAX_STEPS):
-        rows = basis(params, win.shape)
-        signal = params[:, FLUX, None] * rows[:, FLUX]
-        background = params[:, BACKGROUND, None]
-        weight = _weights(win, signal, background, noise)
-        residual = win.data - background - signal
-        weighted = rows * weight[:, None]
-        cov = inverse(weighted @ rows.transpose(0, 2, 1))
-        delta = (cov @ (weighted @ residual[:, :, None]))[:, :, 0]
-        spread = np.sqrt(np.maximum(np.einsum("nii->ni", cov), 0.0))
-        converged = (np.abs(delta) <= _TOLERANCE_SD * spread).all(axis=1)
-        params = _moved(params, delta)
-        if converged.all():
-            break
-    return Fit(params, cov, rows, residual, weight, converged, noise)
+def _at(win: Windows, params: Floats, noise: Noise, model: Model) -> tuple[Design, Floats, Floats, Floats]:
+    """The model at `params`: derivatives, expected signal, residual, weights."""
+    design = model(params, win.shape)
+    signal = params[:, FLUX, None, None] * design.unit
+    background = params[:, BACKGROUND, None, None]
+    residual = win.data - signal
+    residual -= background
+    return design, signal, residual, _weights(win, signal, background, noise)
 
 
-def measured_noise(fit: Fit) -> Noise:
-    """The noise of `fit` with its slope measured from the residuals."""
-    slope = photon_transfer_slope(
-        np.maximum(fit.signal, 0.0), fit.residual, fit.weight, fit.leverage, fit.noise
-    )
-    return Noise(fit.noise.floor_dn2, slope)
+def _solve(design: Design, residual: Floats, weight: Floats) -> tuple[Floats, Floats, Bools]:
+    """Covariance, step, and whether the step is negligible."""
+    cov = inverse(design.information(weight))
+    delta = (cov @ design.gradient(weight * residual)[:, :, None])[:, :, 0]
+    variance = cov.diagonal(0, 1, 2) * _TOLERANCE_SD**2
+    return cov, delta, np.logical_and.reduce(delta * delta <= variance, 1)
 
 
-def fit_spots(win: Windows, start: Floats, noise: Noise, basis: Basis = upright) -> Fit:
-    """Fit one spot per window, and measure the photon-transfer slope on the way.
+def fit_spots(win: Windows, start: Floats, noise: Noise, model: Model = Upright) -> Fit:
+    """Fit one spot per window; the photon-transfer slope is measured from the residuals on the way.
 
     Args:
         win: The windows.
         start: (n, k) first guesses in the order of `gaussian`.
         noise: Floor (trusted) and slope (a first guess).
-        basis: `upright` or `sheared`.
+        model: `Upright` or `Sheared`.
     """
-    first = score(win, start, noise, basis)
-    return score(win, first.params, measured_noise(first), basis)
+    params, guess, measured = start, noise, False
+    for _ in range(_MAX_STEPS):
+        design, signal, residual, weight = _at(win, params, noise, model)
+        cov, delta, converged = _solve(design, residual, weight)
+        if converged.all() and not measured:
+            leverage = design.leverage(cov)
+            noise = Noise(guess.floor_dn2, photon_transfer_slope(signal, residual, weight, leverage, guess))
+            weight = _weights(win, signal, params[:, BACKGROUND, None, None], noise)
+            cov, delta, converged = _solve(design, residual, weight)
+            measured = True
+        params = _moved(params, delta)
+        if measured and converged.all():
+            break
+    return Fit(params, cov, design, signal, residual, weight, converged, noise)

@@ -10,7 +10,7 @@ from workbench.model.errors import BadInputError
 from workbench.spots.types import Image
 
 _DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16))
-_FULL_SCALES_IN_16_BITS = tuple(2**bits - 1 for bits in (10, 12, 14))
+_FULL_SCALES_IN_16_BITS = tuple(2**bits - 1 for bits in (10, 12, 14, 16))
 
 
 def check_frame(frame: object, name: str) -> Image:
@@ -53,10 +53,9 @@ def check_pair(on: object, off: object | None) -> tuple[Image, Image | None]:
 def default_saturation_dn(on: Image) -> int:
     """Value at which a pixel counts as clipped: the full scale of the depth.
 
-    A camera of 10, 12 or 14 bits delivers uint16; its full scale is recognised when the frame's highest value
-    is exactly that.
+    A camera of 10, 12 or 14 bits delivers uint16; the smallest full scale that holds the brightest pixel is taken.
     """
     if on.dtype == np.uint8:
         return 255
-    highest = int(on.max())
-    return highest if highest in _FULL_SCALES_IN_16_BITS else 65535
+    brightest = int(on.max())
+    return next(full_scale for full_scale in _FULL_SCALES_IN_16_BITS if full_scale >= brightest)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.spots.fit import Windows, inverse
-from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, V, upright
+from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, Upright, V, principal_axes
 from workbench.spots.noise import Noise, photon_transfer_slope
 from workbench.spots.types import Floats
 
@@ -46,11 +46,12 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
     """
     params = start.copy()
     converged = False
+    data = win.data.ravel()
     for _ in range(_MAX_STEPS):
-        rows = upright(params, win.shape)
+        rows = Upright(params, win.shape).rows()
         signal = (params[:, FLUX, None] * rows[:, FLUX]).sum(axis=0)
         used = _weights(win, signal, noise) if weight is None else weight
-        residual = win.data[0] - params[0, 0] - signal
+        residual = data - params[0, 0] - signal
         jacobian = _jacobian(params, rows)
         weighted = jacobian * used
         cov = inverse((weighted @ jacobian.T)[None])[0]
@@ -60,14 +61,16 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
         if converged:
             break
     sd = np.sqrt(np.maximum(np.diag(cov)[3:], 0.0)).reshape(-1, 3)
-    leverage = ((cov @ jacobian) * weighted).sum(axis=0)
-    slope = photon_transfer_slope(np.maximum(signal, 0.0), residual, used, leverage, noise)
+    leverage = ((cov @ jacobian) * jacobian).sum(axis=0)
+    slope = photon_transfer_slope(
+        signal, residual, used, leverage, Noise(noise.floor_dn2.ravel(), noise.slope_dn)
+    )
     return Joint(params, sd, float(used @ residual**2), used, slope, converged)
 
 
 def _weights(win: Windows, signal: Floats, noise: Noise) -> Floats:
-    weights: Floats = 1.0 / (noise.floor_dn2[0] + noise.slope_dn * np.maximum(signal, 0.0))
-    return weights if win.usable is None else weights * win.usable[0]
+    weights: Floats = 1.0 / (noise.floor_dn2.ravel() + noise.slope_dn * np.maximum(signal, 0.0))
+    return weights if win.usable is None else weights * win.usable.ravel()
 
 
 def _jacobian(params: Floats, rows: Floats) -> Floats:
@@ -95,13 +98,11 @@ def _moved(params: Floats, delta: Floats) -> Floats:
 
 def halves(params: Floats) -> Floats:
     """(2, 6) first guess for two spots from the sheared fit (7,) of their sum: apart along its long axis."""
-    su, sv = np.exp(params[LN_SU:SHEAR])
-    shear = params[SHEAR]
-    spread, axes = np.linalg.eigh([[su**2 + (shear * sv) ** 2, shear * sv**2], [shear * sv**2, sv**2]])
-    apart = np.sqrt(max(spread[1] - spread[0], 0.15 * spread[1]))
+    widths, axes = principal_axes(params)
+    apart = max(np.sqrt(widths[1] ** 2 - widths[0] ** 2), 0.4 * widths[1])
     start = np.stack([params[:SHEAR], params[:SHEAR]])
     start[:, FLUX] *= 0.5
-    start[:, LN_SU:] = 0.5 * np.log(max(spread[0], 0.1))
+    start[:, LN_SU:] = np.log(widths[0])
     start[0, U:LN_SU] -= apart * axes[:, 1]
     start[1, U:LN_SU] += apart * axes[:, 1]
     return start

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from workbench.spots.types import Floats
 
-_SAMPLES = 2048
+_SAMPLES = 1200
 _CLIP_SD = 4.0
 # Variance that rounding to whole numbers alone leaves in a frame.
 ROUNDING_DN2 = 1.0 / 12.0
+_SLOPE_ROUNDS = 3
 # The slope assumed so far weighs like this many pixels against the measured residuals.
-_PRIOR_PIXELS = 0.5
+_PRIOR_PIXELS = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,7 @@ class Noise:
     """Variance of a pixel as a straight line over its expected signal (photon transfer)."""
 
     floor_dn2: Floats
-    """(n, 1), one for each window: variance without signal, DN^2."""
+    """(n, 1, 1), one for each window: variance without signal, DN^2."""
     slope_dn: float
     """Variance per signal, DN^2 / DN."""
 
@@ -58,22 +59,30 @@ def photon_transfer_slope(
     the stated deviation right on average when only n pixels tell the slope (as in Student's distribution).
 
     Args:
-        signal: (n, pixels) expected signal, DN.
-        residual: (n, pixels), DN.
-        weight: (n, pixels) inverse variance, 0 where unused.
-        leverage: (n, pixels), 0 .. 1.
+        signal: (n, height, width) expected signal, DN.
+        residual: (n, height, width), DN.
+        weight: (n, height, width) inverse variance, 0 where unused.
+        leverage: (n, height, width) variance of the fitted value, DN^2.
         noise: Floor, and the slope assumed so far.
     """
-    kept = np.clip(1.0 - leverage, 0.0, 1.0)
-    excess = residual**2 - noise.floor_dn2 * kept
-    slope = noise.slope_dn
-    for _ in range(3):
-        sharp = (weight > 0) * signal / (noise.floor_dn2 + slope * signal) ** 2
-        told = float((sharp * signal * kept).sum())
+    signal = np.maximum(signal, 0.0)
+    kept = np.maximum(1.0 - leverage * weight, 0.0)
+    kept *= signal
+    excess = residual * residual
+    excess *= signal
+    excess -= noise.floor_dn2 * kept
+    kept *= signal
+    slope, pixels = noise.slope_dn, 0.0
+    square = weight * weight
+    for _ in range(_SLOPE_ROUNDS):
+        told = float(np.vdot(square, kept))
         if told <= 0.0:
             return noise.slope_dn
-        measured = max(float((sharp * excess).sum()) / told, 0.0)
+        measured = float(np.vdot(square, excess)) / told
         pixels = told * slope**2
         share = _PRIOR_PIXELS / (pixels + _PRIOR_PIXELS)
         slope = noise.slope_dn**share * max(measured, 0.02 * noise.slope_dn) ** (1.0 - share)
+        square = noise.floor_dn2 + slope * signal
+        square *= square
+        np.divide(weight > 0, square, out=square)
     return slope * (1.0 + 2.0 / max(pixels - 2.0, 2.0))

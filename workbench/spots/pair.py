@@ -48,21 +48,20 @@ class Pair:
         height, width = self.on.shape
         v, u = rows[:, None] + span, cols[:, None] + span
         usable = None
-        if v[:, 0].min() < 0 or u[:, 0].min() < 0 or v[:, -1].max() >= height or u[:, -1].max() >= width:
-            inside = ((v >= 0) & (v < height))[:, :, None] & ((u >= 0) & (u < width))[:, None, :]
-            usable = inside.reshape(len(rows), -1)
+        if v.min() < 0 or u.min() < 0 or v.max() >= height or u.max() >= width:
+            usable = ((v >= 0) & (v < height))[:, :, None] & ((u >= 0) & (u < width))[:, None, :]
             v, u = np.clip(v, 0, height - 1), np.clip(u, 0, width - 1)
-        at = (v[:, :, None] * width + u[:, None, :]).reshape(len(rows), -1)
+        at = (v * width)[:, :, None] + u[:, None, :]
         raw = self.on.reshape(-1).take(at)
-        data = raw - self.level_dn
+        data = raw.astype(np.float64)
         if self.off is not None:
             data -= self.off_share * self.off.reshape(-1).take(at)
-        shape = (span.size, span.size)
+        if self.level_dn:
+            data -= self.level_dn
         if raw.max() < self.clip_dn:
-            return Windows(data, shape, usable)
+            return Windows(data, usable)
         unclipped = raw < self.clip_dn
-        usable = unclipped if usable is None else usable & unclipped
-        return Windows(data, shape, usable, data + (self.clip_dn - raw))
+        return Windows(data, unclipped if usable is None else usable & unclipped, data + (self.clip_dn - raw))
 
 
 @dataclass(frozen=True, slots=True)

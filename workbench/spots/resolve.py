@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.spots.fit import Windows, fit_spots
-from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, U, V, principal_widths_px, sheared
+from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, Sheared, U, V, principal_axes
 from workbench.spots.joint import Joint, evidence, fit_joint, halves
 from workbench.spots.measure import Trace, half_for, spot_flags
 from workbench.spots.noise import Noise
@@ -105,7 +105,7 @@ def fitted_together(scene: Scene, group: list[Trace]) -> list[Trace]:
     points = np.array([t.params[U:LN_SU] for t in group])
     win, row0, col0 = _window(scene, points, max(t.reach_px for t in group))
     starts = np.array([t.params[:SHEAR] for t in group]) - (0, 0, col0, row0, 0, 0)
-    noise = Noise(np.full((1, 1), scene.variance), min(t.slope_dn for t in group))
+    noise = Noise(np.full((1, 1, 1), scene.variance), min(t.slope_dn for t in group))
     best, chosen = fit_joint(win, starts[:1], noise), starts[:1]
     for start in starts[1:]:
         tried = np.vstack([chosen, start])
@@ -122,18 +122,14 @@ def split(scene: Scene, trace: Trace) -> list[Trace]:
     win, row0, col0 = _window(scene, trace.params[None, U:LN_SU], 1.3 * trace.reach_px)
     start = np.zeros((1, 7))
     start[0, : trace.params.size] = trace.params - (0, 0, col0, row0, 0, 0, 0)[: trace.params.size]
-    noise = Noise(np.full((1, 1), scene.variance), trace.slope_dn)
-    whole = fit_spots(win, start, noise, sheared)
-    long, short = principal_widths_px(*whole.params[0, LN_SU:])
+    noise = Noise(np.full((1, 1, 1), scene.variance), trace.slope_dn)
+    whole = fit_spots(win, start, noise, Sheared)
+    short, long = principal_axes(whole.params[0])[0]
     if not whole.converged[0] or long < _ELONGATED * short:
         return [trace]
     two = fit_joint(win, halves(whole.params[0]), noise)
     two = fit_joint(win, two.params, Noise(noise.floor_dn2, two.slope_dn))
-    one = _chi2(whole.residual[0], two.weight)
+    one = float(two.weight @ whole.residual.ravel() ** 2)
     if not _is_better(replace(two, chi2=one), two, noise, win):
         return [trace]
     return _as_traces(scene, two, row0, col0)
-
-
-def _chi2(residual: Floats, weight: Floats) -> float:
-    return float(weight @ residual**2)
