@@ -86,11 +86,31 @@ def test_spots_without_a_laser_are_kept_together(tmp_path: Path) -> None:
             ev.SpotsFound(key="a", spots=spots),
         ],
     )
-    assert contents.values("/spots/u_px/unassigned", "Scalars:scalars") == [(1, [100.0, 300.0])]
+    assert contents.values("/spots/unassigned/u_px", "Scalars:scalars") == [(1, [100.0, 300.0])]
     (labels,) = contents.values("/bench/camera/spots", "Points2D:labels")
     assert labels[1][:2] == ["? (clipped)", "? (clipped)"]
     (dots,) = contents.values("/bench/spots/unassigned", "Points3D:positions")
     assert len(dots[1]) == 2
+
+
+def test_reading_names_the_spots_of_its_picture(tmp_path: Path) -> None:
+    spots = ev.SpotsFound(key="a", spots=(a_spot(None, 100.0), a_spot(None, 300.0)))
+    unseen = ev.LaserRange(laser_id="L3", range_mm=499.0, sigma_mm=1.0, u_px=None, v_px=None)
+    seen = unseen.model_copy(update={"laser_id": "L2", "u_px": 300.0, "v_px": 240.0})
+    reading = ev.ReadingTaken(
+        trial="t",
+        scene="s",
+        standoff_mm=500.0,
+        reading=1,
+        status="not_enough_points",
+        range_mm=None,
+        sigma_mm=None,
+        lasers=(unseen, seen),
+    )
+    contents = record(tmp_path, [STARTED, a_capture(tmp_path, "a"), spots, reading])
+    labels = contents.values("/bench/camera/spots", "Points2D:labels", "time")
+    assert [label for _, label in labels] == [["? (clipped)", "? (clipped)"], ["L2"]]
+    assert labels[0][0] == labels[1][0]
 
 
 def test_spots_found_late_belong_to_their_own_capture(tmp_path: Path) -> None:
@@ -138,7 +158,8 @@ def test_refused_fit_of_one_axis_and_readings_without_range(tmp_path: Path) -> N
         lasers=(),
     )
     finished = ev.SessionFinished(exit_code=3, message="refused")
-    table = ev.TrialFinished(trial="t", rows=())
+    row = ev.TrialRow(standoff_mm=4500.0, readings=0, missing=1, reference_sd_mm=2.0)
+    table = ev.TrialFinished(trial="t", rows=(row,))
     contents = record(tmp_path, [STARTED, refused, reading, table, finished])
     assert contents.values("/fit/chart/v/note", "Points2D:labels")[-1][1] == ["v was not measured"]
     assert "/fit/residuals/v_px/L1" not in contents.entities
@@ -146,6 +167,7 @@ def test_refused_fit_of_one_axis_and_readings_without_range(tmp_path: Path) -> N
     assert [level for _, (level,) in log.values()] == ["INFO", "ERROR", "WARN", "INFO", "ERROR"]
     text = contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
     assert "4500 mm, reading 1: no_points" in text
+    assert "| 4500 | 0 | 1 | - | - | - | - | - | 2.00 |" in text
 
 
 def test_frames_survive_a_kill(tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def test_every_mark_lies_on_the_plot(marks: list[Mark]) -> None:
     ("y", "sd", "outlier"), [(0.31, 0.1, True), (-0.31, 0.1, True), (0.29, 0.1, False), (9.0, None, False)]
 )
 def test_outliers_are_beyond_three_sigma(y: float, sd: float | None, outlier: bool) -> None:
-    assert Mark("L1", 500.0, y, sd).is_outlier is outlier
+    assert Mark("L1", 500.0, y, 0.01, expected_sd=sd).is_outlier is outlier
 
 
 @pytest.mark.parametrize(
@@ -60,6 +60,7 @@ def test_outliers_are_beyond_three_sigma(y: float, sd: float | None, outlier: bo
         (358.21, 2.14, "358.2 ± 2.1"),
         (0.00112, 0.0008, "0.00112 ± 0.00080"),
         (-60.0, 0.0, "-60 (fixed)"),
+        (-0.001, 0.5, "0.00 ± 0.50"),
     ],
 )
 def test_values_are_written_to_the_second_digit_of_their_sd(value: float, sd: float, text: str) -> None:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
 
-from workbench.model.event import SpotRecord
+from workbench.model.event import LaserRange, SpotRecord
 from workbench.viewer import entities as at
 from workbench.viewer.stream import Stream
 
@@ -40,28 +41,60 @@ def log_frame(stream: Stream, png: bytes) -> None:
 
 def log_spots(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> None:
     """The spots of one capture: drawn into the picture, and as numbers for curves and for a later fit."""
-    stream.log(at.SPOTS_IN_IMAGE, _dots(spots, colors))
-    stream.log(at.RINGS_IN_IMAGE, _rings(spots, colors))
-    by_laser: dict[str, list[SpotRecord]] = defaultdict(list)
+    _draw(stream, [Marked(spot.laser_id, spot.u_px, spot.v_px, _label(spot)) for spot in spots], colors)
+    by_laser: dict[str | None, list[SpotRecord]] = defaultdict(list)
     for spot in spots:
-        by_laser[spot.laser_id or at.UNASSIGNED].append(spot)
+        by_laser[spot.laser_id].append(spot)
     for laser, found in by_laser.items():
         for quantity in QUANTITIES:
             values = [getattr(spot, quantity) for spot in found]
-            stream.log(at.under(at.SPOTS, quantity, laser), rr.Scalars(values))
+            stream.log(_curve(quantity, laser), rr.Scalars(values))
 
 
-def _dots(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
+def log_assigned(stream: Stream, lasers: Sequence[LaserRange], colors: Mapping[str, at.Rgb]) -> None:
+    """The picture's spots again, now that a reading has told whose they are."""
+    placed = [
+        Marked(one.laser_id, one.u_px, one.v_px, one.laser_id)
+        for one in lasers
+        if one.u_px is not None and one.v_px is not None
+    ]
+    if placed:
+        _draw(stream, placed, colors)
+
+
+@dataclass(frozen=True)
+class Marked:
+    """A spot as it is drawn."""
+
+    laser_id: str | None
+    u_px: float
+    v_px: float
+    label: str
+
+
+def _curve(quantity: str, laser: str | None) -> str:
+    """Spots of no laser stay out of the curves: from capture to capture they are in no order."""
+    if laser is None:
+        return at.under(at.SPOTS, at.UNASSIGNED, quantity)
+    return at.under(at.SPOTS, quantity, laser)
+
+
+def _draw(stream: Stream, spots: Sequence[Marked], colors: Mapping[str, at.Rgb]) -> None:
+    stream.log(at.SPOTS_IN_IMAGE, _dots(spots, colors))
+    stream.log(at.RINGS_IN_IMAGE, _rings(spots, colors))
+
+
+def _dots(spots: Sequence[Marked], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
     return rr.Points2D(
         [(spot.u_px + RERUN_PIXEL_CENTRE, spot.v_px + RERUN_PIXEL_CENTRE) for spot in spots],
         colors=[_color(spot, colors) for spot in spots],
-        labels=[_label(spot) for spot in spots],
+        labels=[spot.label for spot in spots],
         show_labels=True,
         radii=_DOT if spots else None,
     )
 
 
-def _rings(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.LineStrips2D:
+def _rings(spots: Sequence[Marked], colors: Mapping[str, at.Rgb]) -> rr.LineStrips2D:
     """A ring about each spot: a dot large enough to be seen would cover the very light that it marks."""
     turn = np.linspace(0.0, 2 * np.pi, _RING_CORNERS + 1)
     ring = _RING_PX * np.column_stack([np.cos(turn), np.sin(turn)]) + RERUN_PIXEL_CENTRE
@@ -72,7 +105,7 @@ def _rings(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.Line
     )
 
 
-def _color(spot: SpotRecord, colors: Mapping[str, at.Rgb]) -> at.Rgb:
+def _color(spot: Marked, colors: Mapping[str, at.Rgb]) -> at.Rgb:
     return colors.get(spot.laser_id or at.UNASSIGNED, at.WHITE)
 
 

@@ -21,7 +21,7 @@ BOUNDS_X, BOUNDS_Y = (-110.0, 1040.0), (-60.0, 490.0)
 OUTLIER_SIGMA = 3.0
 _DODGE = 7.0
 """Sideways shift from one series to the next, so that their bars do not cover each other."""
-_MIN_TICK_DISTANCE = 80.0
+_MIN_TICK_DISTANCE = 86.0
 _LABEL_RISE = 17.0
 """The viewer hangs a label below its point; raised by this, it stands beside a line of the grid."""
 _LEGEND_Y = -42.0
@@ -43,11 +43,19 @@ class Mark:
     standoff_mm: float
     y: float
     sd: float | None
+    """Drawn as a bar."""
+    expected_sd: float | None = None
+    """Of y itself, with everything that moves it, by which outliers are told; None where it is not known."""
+
+    @property
+    def sigmas(self) -> float:
+        """Distance from zero in standard deviations, 0 where they are not known."""
+        return abs(self.y) / self.expected_sd if self.expected_sd else 0.0
 
     @property
     def is_outlier(self) -> bool:
         """Farther from zero than its standard deviation explains."""
-        return self.sd is not None and self.sd > 0 and abs(self.y) > OUTLIER_SIGMA * self.sd
+        return self.sigmas > OUTLIER_SIGMA
 
 
 @dataclass(frozen=True)
@@ -143,10 +151,16 @@ def _log_outliers(stream: Stream, entity: str, chart: Chart) -> None:
     marks = [mark for mark in chart.marks if mark.is_outlier]
     if not marks:
         return
-    labels = [f"{m.series} at {m.standoff_mm:g} mm: {abs(m.y) / (m.sd or 1.0):.1f} sigma" for m in marks]
+    worst = {mark.standoff_mm: mark for mark in sorted(marks, key=lambda mark: mark.sigmas)}
+    # One label a standoff: with more of them none can be read.
+    labels = [_outlier(mark) if mark is worst[mark.standoff_mm] else "" for mark in marks]
     places = [chart.place(mark) for mark in marks]
-    rings = rr.Points2D(places, colors=at.RED, radii=_RING, labels=labels, draw_order=-5.0)
+    rings = rr.Points2D(places, colors=at.RED, radii=_RING, labels=labels, show_labels=True, draw_order=-5.0)
     stream.log(entity, rings)
+
+
+def _outlier(mark: Mark) -> str:
+    return f"{mark.series} at {mark.standoff_mm:g} mm: {mark.sigmas:.1f} sigma"
 
 
 def y_ticks(limit: float) -> list[float]:

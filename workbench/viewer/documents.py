@@ -39,20 +39,24 @@ def parameter_table(parameters: Sequence[ParameterRecord]) -> str:
 
 def trial_table(trial: TrialFinished, readings: Sequence[ReadingTaken]) -> str:
     """The table of an accuracy trial, and the readings that gave no range."""
-    head = ("true mm", "n", "mean error", "max", "min", "sd", "stated sd", "sd of the true range")
+    head = ("true mm", "n", "missing", "mean error", "max", "min", "sd", "stated sd", "sd of the true range")
     rows = [_trial_row(row) for row in trial.rows]
     parts = [f"# Trial {trial.trial}", "Errors are measured - true, in mm.", _table(head, rows)]
     return "\n\n".join([*parts, *_without_range(readings)])
 
 
 def _trial_row(row: TrialRow) -> tuple[str, ...]:
-    signed = (row.mean_error_mm, row.max_error_mm, row.min_error_mm)
     return (
         f"{row.standoff_mm:g}",
         str(row.readings),
-        *(f"{value:+.2f}" for value in signed),
-        *(f"{value:.2f}" for value in (row.sd_mm, row.range_sd_mm, row.reference_sd_mm)),
+        str(row.missing),
+        *(_number(value, "+.2f") for value in (row.mean_error_mm, row.max_error_mm, row.min_error_mm)),
+        *(_number(value, ".2f") for value in (row.sd_mm, row.range_sd_mm, row.reference_sd_mm)),
     )
+
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
 
 
 def _without_range(readings: Iterable[ReadingTaken]) -> list[str]:
@@ -69,7 +73,8 @@ def plus_minus(value: float, sd: float) -> str:
     if sd <= 0:
         return f"{value:g} (fixed)"
     digits = max(0, 1 - floor(log10(sd)))
-    return f"{value:.{digits}f} ± {sd:.{digits}f}"
+    # Adding zero turns a rounded -0.0 into 0.0.
+    return f"{round(value, digits) + 0.0:.{digits}f} ± {sd:.{digits}f}"
 
 
 def _bullets(title: str, lines: Iterable[str]) -> str:

@@ -46,7 +46,7 @@ def residual_marks(fit: FitFinished, axis: Axis) -> list[Mark]:
     for one in fit.residuals:
         value, sd = (one.u_px, one.u_sd_px) if axis == "u" else (one.v_px, one.v_sd_px)
         if value is not None:
-            marks.append(Mark(one.laser_id, one.standoff_mm, value, sd))
+            marks.append(Mark(one.laser_id, one.standoff_mm, value, sd, expected_sd=sd))
     return marks
 
 

@@ -95,6 +95,7 @@ class _OpenRecording:
         self._trial = Trial(stream, self._colors)
         self._placement: Placement | None = None
         self._captures: dict[str, tuple[int, ev.CaptureTaken, Placement | None]] = {}
+        self._exposure = Moment(0, 0, 0)
         self._capture = 0
         self._step = 0
 
@@ -157,7 +158,8 @@ class _OpenRecording:
     @_log.register
     def _(self, event: ev.CaptureTaken, moment: Moment) -> None:
         self._captures[event.key] = (moment.capture, event, self._placement)
-        self.stream.at(Moment(moment.capture, moment.step, event.on.time_ns, event.standoff_mm))
+        self._exposure = Moment(moment.capture, moment.step, event.on.time_ns, event.standoff_mm)
+        self.stream.at(self._exposure)
         camera.log_frame(self.stream, self._read(event.on))
         steps.lane(self.stream, at.LANE_LASER, event.laser_id)
 
@@ -191,6 +193,8 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.ReadingTaken, moment: Moment) -> None:
+        self.stream.at(self._exposure)
+        camera.log_assigned(self.stream, event.lasers, self._colors)
         self.stream.at(Moment(moment.capture, moment.step, moment.time_ns, event.standoff_mm))
         self._trial.take(event)
         scene.log_ranged(self.stream, event.lasers, self._geometry, self._colors)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import hypot
 
 import rerun as rr
 
@@ -40,8 +41,8 @@ class Trial:
         log_errors(self.stream, reading, self.colors)
 
     def finish(self, trial: TrialFinished) -> None:
-        """Log the table, and the chart of all readings."""
-        self._log_chart()
+        """Log the table, and the chart of all readings with its outliers."""
+        self._log_chart({row.standoff_mm: row.reference_sd_mm for row in trial.rows})
         self._document(documents.trial_table(trial, self.readings))
 
     def stop(self) -> None:
@@ -49,9 +50,10 @@ class Trial:
         if self.readings:
             self._log_chart()
 
-    def _log_chart(self) -> None:
+    def _log_chart(self, reference_sd_mm: Mapping[float, float] | None = None) -> None:
         colors = {**self.colors, at.SENSOR: at.WHITE}
-        log_chart(self.stream, at.TRIAL_CHART, Chart("%", error_marks(self.readings), colors), "no trial yet")
+        marks = error_marks(self.readings, reference_sd_mm or {})
+        log_chart(self.stream, at.TRIAL_CHART, Chart("%", marks, colors), "no trial yet")
 
     def _document(self, text: str) -> None:
         self.stream.log(at.TRIAL_SUMMARY, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
@@ -72,15 +74,28 @@ def _log_error(stream: Stream, who: str, error_mm: float, sigma_mm: float | None
     stream.log(at.under(at.TRIAL_ERRORS, who), error)
 
 
-def error_marks(readings: Sequence[ReadingTaken]) -> list[Mark]:
-    """Relative errors of all readings and of their lasers, in percent of the true range."""
-    marks = []
-    for reading in readings:
-        true_mm = reading.standoff_mm
-        ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in reading.lasers]
-        if reading.range_mm is not None and reading.sigma_mm is not None:
-            ranges.append((at.SENSOR, reading.range_mm, reading.sigma_mm))
-        marks += [
-            Mark(who, true_mm, PERCENT * (r / true_mm - 1), PERCENT * sd / true_mm) for who, r, sd in ranges
-        ]
-    return marks
+def error_marks(readings: Sequence[ReadingTaken], reference_sd_mm: Mapping[float, float]) -> list[Mark]:
+    """Relative errors of all readings and of their lasers, in percent of the true range.
+
+    `reference_sd_mm` says for each standoff how well its true range is known. That is part of the error but
+    not of what the sensor states, so only where it is known can an error be called too large.
+    """
+    return [mark for reading in readings for mark in _marks_of(reading, reference_sd_mm)]
+
+
+def _marks_of(reading: ReadingTaken, reference_sd_mm: Mapping[float, float]) -> list[Mark]:
+    true_mm = reading.standoff_mm
+    reference = reference_sd_mm.get(true_mm)
+    ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in reading.lasers]
+    if reading.range_mm is not None and reading.sigma_mm is not None:
+        ranges.append((at.SENSOR, reading.range_mm, reading.sigma_mm))
+    return [
+        Mark(
+            series=who,
+            standoff_mm=true_mm,
+            y=PERCENT * (range_mm / true_mm - 1),
+            sd=PERCENT * sigma_mm / true_mm,
+            expected_sd=None if reference is None else PERCENT * hypot(sigma_mm, reference) / true_mm,
+        )
+        for who, range_mm, sigma_mm in ranges
+    ]
