@@ -109,7 +109,7 @@ def test_reading_names_the_spots_of_its_picture(tmp_path: Path) -> None:
     )
     contents = record(tmp_path, [STARTED, a_capture(tmp_path, "a"), spots, reading])
     labels = contents.values("/bench/camera/spots", "Points2D:labels", "time")
-    assert [label for _, label in labels] == [["? (clipped)", "? (clipped)"], ["L2"]]
+    assert [label for _, label in labels] == [["? (clipped)", "? (clipped)"], ["? (clipped)", "L2 (clipped)"]]
     assert labels[0][0] == labels[1][0]
 
 

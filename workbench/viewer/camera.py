@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 import rerun as rr
@@ -24,6 +24,7 @@ _DOT = rr.Radius.ui_points(1.0)
 _RING = rr.Radius.ui_points(1.0)
 _RING_PX = 9.0
 _RING_CORNERS = 36
+_SAME_PX = 0.01
 
 
 def log_series_styles(stream: Stream, colors: Mapping[str, at.Rgb]) -> None:
@@ -41,7 +42,7 @@ def log_frame(stream: Stream, png: bytes) -> None:
 
 def log_spots(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> None:
     """The spots of one capture: drawn into the picture, and as numbers for curves and for a later fit."""
-    _draw(stream, [Marked(spot.laser_id, spot.u_px, spot.v_px, _label(spot)) for spot in spots], colors)
+    _draw(stream, spots, colors)
     by_laser: dict[str | None, list[SpotRecord]] = defaultdict(list)
     for spot in spots:
         by_laser[spot.laser_id].append(spot)
@@ -51,25 +52,22 @@ def log_spots(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, 
             stream.log(_curve(quantity, laser), rr.Scalars(values))
 
 
-def log_assigned(stream: Stream, lasers: Sequence[LaserRange], colors: Mapping[str, at.Rgb]) -> None:
-    """The picture's spots again, now that a reading has told whose they are."""
-    placed = [
-        Marked(one.laser_id, one.u_px, one.v_px, one.laser_id)
-        for one in lasers
-        if one.u_px is not None and one.v_px is not None
-    ]
-    if placed:
-        _draw(stream, placed, colors)
+def log_assigned(
+    stream: Stream, spots: Sequence[SpotRecord], lasers: Sequence[LaserRange], colors: Mapping[str, at.Rgb]
+) -> None:
+    """The picture's spots again, now that a reading has told whose they are; a stray one stays nameless."""
+    named = [spot.model_copy(update={"laser_id": _owner(spot, lasers)}) for spot in spots]
+    _draw(stream, named, colors)
 
 
-@dataclass(frozen=True)
-class Marked:
-    """A spot as it is drawn."""
-
-    laser_id: str | None
-    u_px: float
-    v_px: float
-    label: str
+def _owner(spot: SpotRecord, lasers: Sequence[LaserRange]) -> str | None:
+    """The laser that was ranged by this very spot."""
+    for one in lasers:
+        if one.u_px is None or one.v_px is None:
+            continue
+        if hypot(one.u_px - spot.u_px, one.v_px - spot.v_px) < _SAME_PX:
+            return one.laser_id
+    return spot.laser_id
 
 
 def _curve(quantity: str, laser: str | None) -> str:
@@ -79,22 +77,22 @@ def _curve(quantity: str, laser: str | None) -> str:
     return at.under(at.SPOTS, quantity, laser)
 
 
-def _draw(stream: Stream, spots: Sequence[Marked], colors: Mapping[str, at.Rgb]) -> None:
+def _draw(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> None:
     stream.log(at.SPOTS_IN_IMAGE, _dots(spots, colors))
     stream.log(at.RINGS_IN_IMAGE, _rings(spots, colors))
 
 
-def _dots(spots: Sequence[Marked], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
+def _dots(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
     return rr.Points2D(
         [(spot.u_px + RERUN_PIXEL_CENTRE, spot.v_px + RERUN_PIXEL_CENTRE) for spot in spots],
         colors=[_color(spot, colors) for spot in spots],
-        labels=[spot.label for spot in spots],
+        labels=[_label(spot) for spot in spots],
         show_labels=True,
         radii=_DOT if spots else None,
     )
 
 
-def _rings(spots: Sequence[Marked], colors: Mapping[str, at.Rgb]) -> rr.LineStrips2D:
+def _rings(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.LineStrips2D:
     """A ring about each spot: a dot large enough to be seen would cover the very light that it marks."""
     turn = np.linspace(0.0, 2 * np.pi, _RING_CORNERS + 1)
     ring = _RING_PX * np.column_stack([np.cos(turn), np.sin(turn)]) + RERUN_PIXEL_CENTRE
@@ -105,7 +103,7 @@ def _rings(spots: Sequence[Marked], colors: Mapping[str, at.Rgb]) -> rr.LineStri
     )
 
 
-def _color(spot: Marked, colors: Mapping[str, at.Rgb]) -> at.Rgb:
+def _color(spot: SpotRecord, colors: Mapping[str, at.Rgb]) -> at.Rgb:
     return colors.get(spot.laser_id or at.UNASSIGNED, at.WHITE)
 
 

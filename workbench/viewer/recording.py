@@ -96,6 +96,7 @@ class _OpenRecording:
         self._placement: Placement | None = None
         self._captures: dict[str, tuple[int, ev.CaptureTaken, Placement | None]] = {}
         self._exposure = Moment(0, 0, 0)
+        self._spots: tuple[ev.SpotRecord, ...] = ()
         self._capture = 0
         self._step = 0
 
@@ -167,6 +168,7 @@ class _OpenRecording:
     def _(self, event: ev.SpotsFound, moment: Moment) -> None:
         number, capture, placement = self._captures[event.key]
         self.stream.at(Moment(number, moment.step, capture.on.time_ns, capture.standoff_mm))
+        self._spots = event.spots
         camera.log_spots(self.stream, event.spots, self._colors)
         if placement is not None:
             scene.log_spots_on_target(self.stream, event.spots, placement, self._geometry, self._colors)
@@ -194,7 +196,7 @@ class _OpenRecording:
     @_log.register
     def _(self, event: ev.ReadingTaken, moment: Moment) -> None:
         self.stream.at(self._exposure)
-        camera.log_assigned(self.stream, event.lasers, self._colors)
+        camera.log_assigned(self.stream, self._spots, event.lasers, self._colors)
         self.stream.at(Moment(moment.capture, moment.step, moment.time_ns, event.standoff_mm))
         self._trial.take(event)
         scene.log_ranged(self.stream, event.lasers, self._geometry, self._colors)
