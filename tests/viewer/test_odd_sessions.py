@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -45,7 +46,11 @@ def a_capture(folder: Path, key: str, standoff_mm: float = 500.0) -> ev.CaptureT
         placement_key="p",
         standoff_mm=standoff_mm,
         repeat=0,
-        on=ev.FrameRef(path=path.name, sha256="", time_ns=1_790_000_000_000_000_000),
+        on=ev.FrameRef(
+            path=path.name,
+            sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+            time_ns=1_790_000_000_000_000_000,
+        ),
     )
 
 

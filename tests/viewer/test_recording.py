@@ -178,6 +178,15 @@ def test_missing_frame_is_named_and_the_old_recording_stays(recorded: Recorded, 
     assert list(tmp_path.iterdir()) == [out]
 
 
+def test_changed_frame_is_named(recorded: Recorded, tmp_path: Path) -> None:
+    first = next(r.event for r in recorded.records if isinstance(r.event, ev.CaptureTaken)).on
+    damaged = tmp_path / first.path
+    damaged.parent.mkdir()
+    damaged.write_bytes((recorded.folder / first.path).read_bytes()[:-100])
+    with pytest.raises(BadInputError, match=r"frames/c0001-on\.png: expected the frame that was captured"):
+        rebuild(tmp_path, recorded.rig, recorded.records, tmp_path / "again.rrd")
+
+
 def test_first_record_must_name_the_session(recorded: Recorded, tmp_path: Path) -> None:
     with (
         RecordingConsumer(tmp_path, recorded.rig) as consumer,

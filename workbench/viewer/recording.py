@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import singledispatchmethod
+from hashlib import sha256
 from pathlib import Path
 from types import TracebackType
 
@@ -33,7 +34,7 @@ class RecordingConsumer:
     is in the file, only the footer is missing (`rerun rrd merge` adds it).
 
     Raises:
-        BadInputError: a record names a frame that is not in the session folder.
+        BadInputError: a frame that a record names is missing in the session folder, or has changed.
     """
 
     def __init__(self, session_dir: Path, rig: Rig, out: Path | None = None) -> None:
@@ -71,7 +72,7 @@ def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path
     """Make the recording again from the records of a session; `out` is replaced only by a complete one.
 
     Raises:
-        BadInputError: a record names a frame that is not in the session folder.
+        BadInputError: a frame that a record names is missing in the session folder, or has changed.
     """
     partial = out.with_name(out.name + ".partial")
     try:
@@ -219,9 +220,16 @@ class _OpenRecording:
     def _read(self, frame: ev.FrameRef) -> bytes:
         path = self._session_dir / frame.path
         try:
-            return path.read_bytes()
+            png = path.read_bytes()
         except OSError as error:
             raise BadInputError(
                 f"{path}: expected the frame that the journal names, cannot read it ({error.strerror}); "
                 "restore it from a copy of the session folder"
             ) from None
+        # The viewer would show a damaged picture, or none, without a word.
+        if sha256(png).hexdigest() != frame.sha256:
+            raise BadInputError(
+                f"{path}: expected the frame that was captured (sha256 {frame.sha256[:12]}...), "
+                "the file has changed since; restore it from a copy of the session folder"
+            )
+        return png
