@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import termios
 import time
 from collections.abc import Iterator, Sequence
 
@@ -14,7 +15,8 @@ from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, Rig
 REPLY_S = 0.5
 """A controller answers within milliseconds; after this it is not going to."""
 LONGEST_REPLY = 200
-LINE_FAILURES = (serial.SerialException, OSError)
+LINE_FAILURES = (serial.SerialException, OSError, termios.error)
+"""A line that hangs up shows as any of these, depending on the call under way."""
 
 
 class SerialLaserBank:

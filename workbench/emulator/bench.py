@@ -28,6 +28,9 @@ class EmulatedBench(Bench):
     controller: Controller
     server: PtyServer
 
+    def __enter__(self) -> EmulatedBench:
+        return self
+
     def close(self) -> None:
         """As every bench, then hang up the controller's line."""
         try:

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 
-from workbench.emulator.spec import ControllerSpec
+from workbench.emulator.spec import ControllerSpec, Fault
 
 LONGEST_LEASE_MS = 60_000
 LONGEST_LINE = 64
@@ -29,7 +29,7 @@ class Controller:
         self._mask = 0
         self._ends = 0.0
         self._line = bytearray()
-        self.fault = spec.fault
+        self.fault: Fault = spec.fault
         """May be set while the controller runs: a part that breaks."""
         self.interlock_closed = spec.interlock_closed
 

@@ -10,7 +10,7 @@ from workbench.emulator.lens import Lens
 from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
 from workbench.emulator.spot import ImageFormat, Spot, SpotPainter
 from workbench.emulator.surfaces import Cylinder, Plane, Polynomial, Surface, wall_in_mirror
-from workbench.emulator.truth import PlacementError, Truth, draw_placement_error, write_truth
+from workbench.emulator.truth import PlacementError, Truth, TruthFile, draw_placement_error
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.model.target import (
@@ -29,17 +29,16 @@ class Scene:
     """The target bench: puts targets where they are asked for, with the errors of the hidden truth."""
 
     def __init__(self, rig: Rig, spec: EmulatorSpec, truth: Truth, truth_file: Path) -> None:
-        self._rig, self._spec, self._truth, self._file = rig, spec, truth, truth_file
+        self._rig, self._spec, self._truth = rig, spec, truth
+        self._file = TruthFile(truth_file, spec, truth)
         self._image = ImageFormat(rig.camera.width_px, rig.camera.height_px)
         self._beams = {name: Beam(ray, spec.beam) for name, ray in truth.lasers.items()}
-        self._errors: dict[str, PlacementError] = {}
         self._surfaces: list[tuple[Surface, float]] = []
         self._key = ""
         self._f_step = 0
         self._spots: dict[str, list[Spot]] = {}
         self.moves = 0
         """Counts placements."""
-        write_truth(self._file, spec, truth, self._errors)
 
     @property
     def laser_ids(self) -> tuple[str, ...]:
@@ -58,8 +57,7 @@ class Scene:
         self._key = placement.key
         self._spots = {}
         self.moves += 1
-        self._errors[placement.key] = error
-        write_truth(self._file, self._spec, self._truth, self._errors)
+        self._file.add(placement.key, error)
         return placement
 
     def spots(self, laser_id: str, f_scale: float = 1.0) -> list[Spot]:

@@ -12,6 +12,8 @@ from workbench.model.yamlfile import FileModel
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=0)]
+Fault = Literal["none", "ignores_off", "hides_stuck_beam", "garbles", "silent", "stutters"]
+"""Of the laser controller: `docs/emulator.md` tells what each does."""
 
 
 class BeamSpec(FileModel):
@@ -144,7 +146,7 @@ class TruthSpec(FileModel):
 class ControllerSpec(FileModel):
     """Laser controller, and the fault that it has."""
 
-    fault: Literal["none", "ignores_off", "hides_stuck_beam", "garbles", "silent", "stutters"] = "none"
+    fault: Fault = "none"
     interlock_closed: bool = True
 
 

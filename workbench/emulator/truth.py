@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import asdict, dataclass
 from io import StringIO
@@ -110,19 +111,40 @@ def truth_path(session_dir: Path) -> Path:
     return session_dir.with_name(session_dir.name + ".truth.yaml")
 
 
-def write_truth(path: Path, spec: EmulatorSpec, truth: Truth, placements: dict[str, PlacementError]) -> None:
-    """Write the truth, and the placements' errors so far, in one step (write, sync, rename)."""
-    document = {
-        "seed": spec.seed,
-        **asdict(truth),
-        "placements": {key: asdict(error) for key, error in placements.items()},
-    }
-    text = StringIO()
-    YAML(typ="safe", pure=True).dump(document, text)
-    path.parent.mkdir(parents=True, exist_ok=True)
+class TruthFile:
+    """The truth on disk: one YAML document, to which every placement adds a line with its errors.
+
+    Opening a session again keeps the placements that its file knows, if the truth is the same.
+    """
+
+    def __init__(self, path: Path, spec: EmulatorSpec, truth: Truth) -> None:
+        self._path = path
+        text = StringIO()
+        YAML(typ="safe", pure=True).dump({"seed": spec.seed, **asdict(truth)}, text)
+        head = text.getvalue() + "placements:\n"
+        before = path.read_text(encoding="utf-8") if path.exists() else ""
+        # A line that a stop has torn ends without a newline.
+        lines = before[len(head) :].splitlines(keepends=True) if before.startswith(head) else []
+        lines = [line for line in lines if line.endswith("\n")]
+        self._known = {json.loads(line.split(": {")[0].strip()) for line in lines}
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _replace(path, head + "".join(lines))
+
+    def add(self, key: str, error: PlacementError) -> None:
+        """Note a placement, once for each key."""
+        if key in self._known:
+            return
+        self._known.add(key)
+        values = ", ".join(f"{name}: {value!r}" for name, value in asdict(error).items())
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(f"  {json.dumps(key)}: {{{values}}}\n")
+
+
+def _replace(path: Path, text: str) -> None:
+    """Write, sync, rename: the file is the old or the new one, never half of either."""
     part = path.with_name(path.name + ".part")
     with part.open("w", encoding="utf-8") as file:
-        file.write(text.getvalue())
+        file.write(text)
         file.flush()
         os.fsync(file.fileno())
     part.replace(path)

@@ -1,0 +1,230 @@
+"""The driver over a real serial line (a pseudo-terminal) to the emulated controller, well and broken."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import pytest
+
+from workbench.devices.protocols import LaserBank
+from workbench.devices.serial_lasers import SerialLaserBank
+from workbench.emulator.controller import IDENTITY, Controller
+from workbench.emulator.pty import PtyServer
+from workbench.emulator.spec import ControllerSpec, Fault
+from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError
+
+IDS = ("L1", "L2", "L3", "L4")
+
+
+@dataclass
+class Wired:
+    """A controller, its line, and every byte that went to it."""
+
+    controller: Controller
+    server: PtyServer = field(init=False)
+    heard: bytearray = field(default_factory=bytearray)
+    recoveries: int = 0
+    """After how many requests from here the controller is well again; 0: never."""
+
+    def receive(self, data: bytes) -> bytes:
+        self.heard.extend(data)
+        reply = self.controller.receive(data)
+        if self.recoveries:
+            self.recoveries -= 1
+            if not self.recoveries:
+                self.controller.fault = "none"
+        return reply
+
+
+@pytest.fixture
+def wired() -> Iterator[Wired]:
+    wired = Wired(Controller(IDS, ControllerSpec()))
+    wired.server = PtyServer(wired.receive)
+    yield wired
+    wired.server.close()
+
+
+@pytest.fixture
+def bank(wired: Wired) -> Iterator[SerialLaserBank]:
+    bank = SerialLaserBank(wired.server.port, IDS)
+    yield bank
+    wired.controller.fault = "none"
+    bank.close()
+
+
+@pytest.fixture
+def answering() -> Iterator[Callable[[Callable[[bytes], bytes]], str]]:
+    """A port where anything at all answers."""
+    servers = []
+
+    def serve(receive: Callable[[bytes], bytes]) -> str:
+        servers.append(PtyServer(receive))
+        return servers[-1].port
+
+    yield serve
+    for server in servers:
+        server.close()
+
+
+def test_off_at_connect(wired: Wired) -> None:
+    wired.controller.receive(b"MASK 15 60000\n")
+    with_lasers: LaserBank = SerialLaserBank(wired.server.port, IDS)
+    assert wired.controller.lit() == ()
+    with_lasers.close()
+
+
+def test_it_knows_whom_it_talks_to(bank: SerialLaserBank) -> None:
+    assert bank.identity == IDENTITY
+
+
+@pytest.mark.parametrize("ids", [["L1"], ["L4", "L2"], list(IDS), ["L3", "L3"]])
+def test_lit_inside_the_block_and_off_after(wired: Wired, bank: SerialLaserBank, ids: list[str]) -> None:
+    with bank.lit(ids, for_s=5.0):
+        assert set(wired.controller.lit()) == set(ids)
+    assert wired.controller.lit() == ()
+
+
+def test_off_is_asked_for_and_asked_about(wired: Wired, bank: SerialLaserBank) -> None:
+    wired.heard.clear()
+    with bank.lit(["L2"], for_s=0.1234):
+        pass
+    assert bytes(wired.heard) == b"MASK 2 124\n!STATE? 2\n"
+
+
+def test_off_after_an_error_in_the_block(wired: Wired, bank: SerialLaserBank) -> None:
+    with pytest.raises(ZeroDivisionError), bank.lit(["L1"], for_s=5.0):
+        raise ZeroDivisionError
+    assert wired.controller.lit() == ()
+
+
+def test_the_lease_ends_inside_a_block_that_lingers(wired: Wired, bank: SerialLaserBank) -> None:
+    with bank.lit(["L1"], for_s=0.001):
+        deadline = time.monotonic() + 5
+        while wired.controller.lit() and time.monotonic() < deadline:
+            time.sleep(0.001)
+        assert wired.controller.lit() == ()
+
+
+@pytest.mark.parametrize("ids", [[], ["L9"], ["L1", "all"]])
+def test_lasers_that_are_not_there(wired: Wired, bank: SerialLaserBank, ids: list[str]) -> None:
+    with pytest.raises(BadInputError, match="expected some of L1, L2, L3, L4"), bank.lit(ids, for_s=1.0):
+        pytest.fail("nothing was lit")
+
+
+@pytest.mark.parametrize("for_s", [0.0, -1.0, 61.0])
+def test_a_lease_that_the_controller_refuses(wired: Wired, bank: SerialLaserBank, for_s: float) -> None:
+    with pytest.raises(RigNotReadyError, match="ERR 2"), bank.lit(["L1"], for_s=for_s):
+        pytest.fail("nothing was lit")
+    assert wired.controller.lit() == ()
+
+
+def test_open_interlock(wired: Wired, bank: SerialLaserBank) -> None:
+    wired.controller.interlock_closed = False
+    with pytest.raises(RigNotReadyError, match="interlock open"), bank.lit(["L1"], for_s=1.0):
+        pytest.fail("nothing was lit")
+
+
+def test_a_controller_that_says_ok_but_stays_on(wired: Wired, bank: SerialLaserBank) -> None:
+    with pytest.raises(LaserOffNotConfirmedError, match="may be on"), bank.lit(["L1"], for_s=5.0):
+        wired.controller.fault = "ignores_off"
+    assert wired.heard.count(b"!") == 3  # connect, exit, and once more
+
+
+def test_a_stuck_controller_is_not_connected_to(wired: Wired) -> None:
+    wired.controller.receive(b"ON 1 60000\n")
+    wired.controller.fault = "ignores_off"
+    with pytest.raises(LaserOffNotConfirmedError):
+        SerialLaserBank(wired.server.port, IDS)
+    wired.controller.fault = "none"
+    SerialLaserBank(wired.server.port, IDS).close()  # the port was released
+
+
+@pytest.mark.parametrize("fault", ["garbles", "silent", "stutters"])
+def test_a_controller_that_falls_ill_while_lit(wired: Wired, fault: Fault) -> None:
+    bank = SerialLaserBank(wired.server.port, IDS)
+    with pytest.raises(LaserOffNotConfirmedError, match="expected 'OK OFF'"), bank.lit(["L1"], for_s=5.0):
+        wired.controller.fault = fault
+    assert wired.controller.lit() == ()  # it did hear
+
+
+def test_one_lost_reply_is_forgiven_when_off_is_confirmed(wired: Wired, bank: SerialLaserBank) -> None:
+    with bank.lit(["L1"], for_s=5.0):
+        wired.recoveries = 1
+        wired.controller.fault = "garbles"
+    assert wired.recoveries == 0
+    assert wired.controller.lit() == ()
+
+
+@pytest.mark.parametrize("reply", [b"", b"OK\n", b"\xff\xfe\x00\n", b"OK *ID", b"OK *IDNAH\n", b"x" * 500])
+def test_somebody_else_answers(answering: Callable[[Callable[[bytes], bytes]], str], reply: bytes) -> None:
+    port = answering(lambda data: reply)
+    with pytest.raises(RigNotReadyError, match=r"asked '\*IDN\?', expected 'OK \*IDN', got"):
+        SerialLaserBank(port, IDS, boot_s=0.0)
+
+
+def test_a_controller_still_booting_is_waited_for(
+    answering: Callable[[Callable[[bytes], bytes]], str],
+) -> None:
+    controller = Controller(IDS, ControllerSpec())
+    requests = []
+
+    def boot(data: bytes) -> bytes:
+        requests.append(data)
+        return controller.receive(data) if len(requests) > 3 else b"\x00boot\n"
+
+    SerialLaserBank(answering(boot), IDS, boot_s=5.0).close()
+    assert len(requests) > 4
+
+
+def test_the_answer_to_an_earlier_question_confirms_nothing(
+    answering: Callable[[Callable[[bytes], bytes]], str],
+) -> None:
+    """From some moment on every STATE? is answered with what was true before."""
+    controller = Controller(IDS, ControllerSpec())
+    old = b"OK STATE 1 0 0\n"
+
+    def stale(data: bytes) -> bytes:
+        reply = controller.receive(data)
+        return old if data.startswith(b"STATE?") else reply
+
+    bank = SerialLaserBank(answering(stale), IDS)  # its first question is number 1
+    with pytest.raises(LaserOffNotConfirmedError, match="expected 'OK STATE 3'"), bank.lit(["L1"], for_s=1.0):
+        pass
+
+
+def test_disconnect_in_mid_lease(wired: Wired) -> None:
+    bank = SerialLaserBank(wired.server.port, IDS)
+    with pytest.raises(LaserOffNotConfirmedError, match="dead line"), bank.lit(["L1"], for_s=5.0):
+        wired.server.close()
+    with pytest.raises(LaserOffNotConfirmedError):
+        bank.close()
+    bank.close()  # the second time there is nothing left to close
+
+
+def test_disconnect_before_lighting(wired: Wired) -> None:
+    bank = SerialLaserBank(wired.server.port, IDS)
+    wired.server.close()
+    with pytest.raises(LaserOffNotConfirmedError) as caught, bank.lit(["L1"], for_s=5.0):
+        pytest.fail("nothing was lit")
+    assert isinstance(caught.value.__context__, RigNotReadyError)
+    with pytest.raises(LaserOffNotConfirmedError):
+        bank.close()
+
+
+def test_no_such_port() -> None:
+    with pytest.raises(RigNotReadyError, match="expected a serial port at /dev/not-there"):
+        SerialLaserBank("/dev/not-there", IDS)
+
+
+def test_a_port_has_one_holder(wired: Wired, bank: SerialLaserBank) -> None:
+    with pytest.raises(RigNotReadyError, match="no other program holds"):
+        SerialLaserBank(wired.server.port, IDS)
+
+
+def test_close_puts_off(wired: Wired) -> None:
+    bank = SerialLaserBank(wired.server.port, IDS)
+    wired.controller.receive(b"ON 1 60000\n")
+    bank.close()
+    assert wired.controller.lit() == ()
