@@ -19,13 +19,13 @@ from workbench.viewer.entities import laser_colors
 VIEWS_OF_TAB = {
     "Live": {PICTURE_VIEW, "Standoff [mm]", "Spot position u [px]", "Peak brightness [DN]", "Steps", "Log"},
     "Fit": {
-        "Residual u against standoff, bars 1 sigma",
-        "Residual v against standoff, bars 1 sigma",
+        "Residual u against standoff [mm], bars 1 sigma",
+        "Residual v against standoff [mm], bars 1 sigma",
         "Verdict",
         "Parameters",
     },
     "Trial": {
-        "Error of every reading against true range, bars stated 1 sigma",
+        "Error of every reading against true range [mm], bars stated 1 sigma",
         "Error of the sensor [mm] as the trial went",
         "Table",
     },

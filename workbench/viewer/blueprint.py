@@ -47,8 +47,8 @@ def _live(rig: Rig) -> rrb.Container:
 
 def _fit() -> rrb.Container:
     charts = rrb.Vertical(
-        _chart(f"{at.FIT_CHART}/u", "Residual u against standoff, bars 1 sigma"),
-        _chart(f"{at.FIT_CHART}/v", "Residual v against standoff, bars 1 sigma"),
+        _chart(f"{at.FIT_CHART}/u", "Residual u against standoff [mm], bars 1 sigma"),
+        _chart(f"{at.FIT_CHART}/v", "Residual v against standoff [mm], bars 1 sigma"),
     )
     words = rrb.Vertical(
         rrb.TextDocumentView(origin=at.FIT_SUMMARY, name="Verdict"),
@@ -60,7 +60,7 @@ def _fit() -> rrb.Container:
 
 def _trial() -> rrb.Container:
     curves = rrb.Vertical(
-        _chart(at.TRIAL_CHART, "Error of every reading against true range, bars stated 1 sigma"),
+        _chart(at.TRIAL_CHART, "Error of every reading against true range [mm], bars stated 1 sigma"),
         rrb.TimeSeriesView(
             origin=f"{at.TRIAL_ERRORS}/{at.SENSOR}", name="Error of the sensor [mm] as the trial went"
         ),

@@ -21,7 +21,7 @@ BOUNDS_X, BOUNDS_Y = (-110.0, 1040.0), (-60.0, 490.0)
 OUTLIER_SIGMA = 3.0
 _DODGE = 7.0
 """Sideways shift from one series to the next, so that their bars do not cover each other."""
-_MIN_TICK_DISTANCE = 86.0
+_MIN_TICK_DISTANCE = 55.0
 _LABEL_RISE = 17.0
 """The viewer hangs a label below its point; raised by this, it stands beside a line of the grid."""
 _LEGEND_Y = -42.0
@@ -123,7 +123,7 @@ def _log_axes(stream: Stream, entity: str, chart: Chart) -> None:
         (x, HEIGHT + 10.0) for x, _ in columns
     ]
     texts = [f"{value:+.3g} {chart.unit}" if value else "0" for value in values]
-    texts += [f"{standoff:g} mm" for _, standoff in columns]
+    texts += [f"{standoff:g}" for _, standoff in columns]
     labels = rr.Points2D(places, labels=texts, colors=at.GREY, radii=_NONE, show_labels=True)
     stream.log(f"{entity}/ticks", labels)
 
