@@ -15,7 +15,7 @@ _CLIP_SD = 4.0
 ROUNDING_DN2 = 1.0 / 12.0
 _SLOPE_ROUNDS = 3
 # The slope assumed so far weighs like this many pixels against the measured residuals.
-_PRIOR_PIXELS = 1.0
+_PRIOR_PIXELS = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +55,10 @@ def photon_transfer_slope(
     """Variance per signal (DN) measured from the residuals of all spots of a frame.
 
     On average a squared residual is its variance less the share that the fit has absorbed (its leverage), so
-    what exceeds the floor is slope times signal. Weighted moments give the slope. The factor n / (n - 2) makes
-    the stated deviation right on average when only n pixels tell the slope (as in Student's distribution).
+    what exceeds the floor is slope times signal. Weighted moments give the slope; the logarithm of the slope
+    assumed so far weighs in like a quarter of a pixel. Where only n pixels tell the slope, its inverse scatters
+    upwards and a deviation stated with it would be too small on average (Student's distribution, factor
+    n / (n - 2)); as the assumed slope keeps the measured one from vanishing, n / (n - 2) at n + 4 is enough.
 
     Args:
         signal: (n, height, width) expected signal, DN.
@@ -85,4 +87,4 @@ def photon_transfer_slope(
         square = noise.floor_dn2 + slope * signal
         square *= square
         np.divide(weight > 0, square, out=square)
-    return slope * (1.0 + 2.0 / max(pixels - 2.0, 2.0))
+    return slope * (1.0 + 2.0 / max(pixels + 2.0, 8.0))

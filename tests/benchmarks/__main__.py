@@ -1,0 +1,32 @@
+"""`make bench`: print the three tables and keep them in docs/benchmarks under today's date."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import platform
+from pathlib import Path
+
+# One core, as stated in the tables; read when the numerical libraries load.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+from tests.benchmarks import accuracy, detection, speed
+
+RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
+
+
+def main() -> None:
+    """Run, print, write."""
+    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    with (RESULTS / f"{today}-spots.txt").open("w") as file:
+        for part in ([f"Spots, {today}, Python {platform.python_version()}"], speed.lines(), detection.lines(), accuracy.lines()):
+            for line in part:
+                print(line, flush=True)
+                file.write(line + "\n")
+            file.write("\n")
+
+
+if __name__ == "__main__":
+    main()
