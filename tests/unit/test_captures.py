@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 from math import isnan
 from pathlib import Path
 
@@ -73,7 +74,7 @@ def test_every_wrong_row_is_listed(tmp_path: Path) -> None:
 
 
 def test_no_file(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match="nowhere.csv"):
+    with pytest.raises(BadInputError, match=r"nowhere\.csv"):
         load_captures(tmp_path / "nowhere.csv")
 
 
@@ -82,9 +83,5 @@ def test_no_file(tmp_path: Path) -> None:
 def test_any_bytes_are_read_or_refused_by_name(tmp_path: Path, body: bytes) -> None:
     path = tmp_path / "c.csv"
     path.write_bytes(HEADER.encode() + b"\n" + body)
-    try:
-        rows = load_captures(path)
-    except BadInputError as error:
-        assert "c.csv" in str(error)
-    else:
-        assert rows
+    with contextlib.suppress(BadInputError):
+        assert load_captures(path)

@@ -50,9 +50,10 @@ def test_radial_slope_is_the_derivative_of_the_radius() -> None:
 def test_a_ray_meets_the_plane_where_the_equations_say() -> None:
     plane = Plane(700.0, 0.3, -0.1)
     z = float(depth_on_plane(RAY, plane))
-    # The same by Cramer's rule on the four linear equations of ray and plane.
-    system = np.array([[1, 0, -RAY.tx], [0, 1, -RAY.ty], [-plane.slope_x, -plane.slope_y, 1]], float)
-    point = np.linalg.solve(system, [RAY.x_mm, RAY.y_mm, plane.z0_mm])
+    # The same as three linear equations: two of the ray, one of the plane.
+    x, y, tx, ty = np.array(RAY, float)
+    system = np.array([[1.0, 0.0, -tx], [0.0, 1.0, -ty], [-0.3, 0.1, 1.0]])
+    point = np.linalg.solve(system, np.array([x, y, 700.0]))
     assert z == pytest.approx(point[2], rel=1e-13)
     pixels = np.array(spot_on_plane(LENS, RAY, plane))
     np.testing.assert_allclose(pixels, opencv_pixels(LENS, point[None])[0], atol=1e-9)

@@ -4,35 +4,21 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from workbench.calibration.fit import Fit
 from workbench.calibration.parameters import LENS, RAY, REFERENCE
+from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import DeterminedBy
-from workbench.model.rig import PositiveFloat
-from workbench.model.yamlfile import FileModel
 from workbench.optics.lens import Lens
 from workbench.optics.rays import Ray, spot_at_inverse_depth
 
 DATA_SHARE_DETERMINED = 0.9
 PRIOR_UNMOVED = 0.9
 """A posterior sd above this part of the prior's: neither data nor other priors told anything."""
-FEWEST_STANDOFFS = 3
-"""Two fix a laser's line; the third is the first that can contradict."""
-
-
-class Acceptance(FileModel):
-    """Limits that a calibration must keep to be exported."""
-
-    max_rms_px: PositiveFloat = 1.0
-    max_relative_range_sd: PositiveFloat = 0.05
-    """1 sigma over the range, for any laser between the nearest and the farthest standoff."""
-    min_standoffs: Annotated[int, Field(ge=FEWEST_STANDOFFS)] = FEWEST_STANDOFFS
-    """For each laser."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +139,7 @@ def _warnings(fit: Fit) -> list[str]:
     if "f_px" in joint + prior:
         warnings.append(
             "the data cannot give the focal length f_px alone: only its products with the baselines are"
-            " determined, see `derived`. The value and sd of f_px rest on the rig file's priors."
+            " determined. The value and sd of f_px rest on the rig file's priors."
         )
     if others := [name for name in joint if name != "f_px"]:
         warnings.append(f"determined only together with other parameters' priors: {', '.join(others)}")

@@ -14,12 +14,13 @@ from typing import Any
 
 from rich.console import Console
 
-from workbench.calibration.assess import Acceptance, Assessment, derive
+from workbench.calibration.assess import Assessment, derive
 from workbench.calibration.export import calibrate, write_calibration
 from workbench.calibration.fit import Fit
 from workbench.calibration.fit import fit as fit_sightings
 from workbench.calibration.records import parameter_records
 from workbench.calibration.sightings import sight_rows
+from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
 from workbench.model.captures import load_captures
 from workbench.model.errors import LimitFailedError

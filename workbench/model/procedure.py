@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from workbench.model.acceptance import Acceptance
 from workbench.model.rig import PositiveFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
@@ -45,27 +46,15 @@ class CaptureGridStep(FileModel):
 
 
 class FitStep(FileModel):
-    """Fit the calibration to the captures so far."""
+    """Fit the calibration to the captures so far; the session ends with exit code 3 where a limit fails."""
 
     step: Literal["fit"]
+    limits: Acceptance = Acceptance()
 
     @property
     def title(self) -> str:
         """For the progress line."""
         return "Fit the calibration"
-
-
-class CheckStep(FileModel):
-    """Hold the fit against limits; the session ends with exit code 3 where one fails."""
-
-    step: Literal["check"]
-    max_rms_px: PositiveFloat
-    max_relative_range_sd: PositiveFloat
-
-    @property
-    def title(self) -> str:
-        """For the progress line."""
-        return "Check the calibration"
 
 
 class ExportStep(FileModel):
@@ -94,7 +83,7 @@ class AccuracyTrialStep(FileModel):
 
 
 Step = Annotated[
-    MessageStep | CaptureGridStep | FitStep | CheckStep | ExportStep | AccuracyTrialStep,
+    MessageStep | CaptureGridStep | FitStep | ExportStep | AccuracyTrialStep,
     Field(discriminator="step"),
 ]
 

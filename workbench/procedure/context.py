@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from workbench.calibration.fit import Fit
 from workbench.devices.protocols import Bench
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration, Provenance
@@ -34,7 +33,8 @@ class Context:
     captures: list[ev.CaptureTaken] = field(default_factory=list)
     findings: dict[str, Finding] = field(default_factory=dict)
     """By the capture's key."""
-    fit: Fit | None = None
+    accepted: Calibration | None = None
+    """What the last fit amounts to."""
     calibration: Calibration | None = None
     """The exported one: what a trial ranges with."""
 

@@ -10,9 +10,8 @@ import hashlib
 from collections.abc import Callable
 from functools import singledispatch
 
-from workbench.calibration.assess import Acceptance
 from workbench.calibration.export import calibrate, write_calibration
-from workbench.calibration.fit import Fit, fit
+from workbench.calibration.fit import fit
 from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.records import fit_finished
 from workbench.calibration.sightings import prior_scanline, sight
@@ -80,10 +79,9 @@ def _(step: pr.FitStep, context: Context, name: str) -> str:
     if not captures:
         raise BadInputError(f"step {name}: nothing to fit; expected a capture_grid step before it")
     sha256 = write_capture_table(context.session_dir / CALIBRATION_TABLE, captures)
-    context.provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
     found = [_sight(context, capture) for capture in captures]
     sightings = [f for f in found if isinstance(f, Sighting)]
-    context.fit = fit(context.rig, sightings, [f for f in found if isinstance(f, Rejected)])
+    fitted = fit(context.rig, sightings, [f for f in found if isinstance(f, Rejected)])
     _, assessment = calibrate(context.fit, Acceptance(), context.provenance)
     context.emit(fit_finished(context.fit, assessment))
     return (
@@ -147,12 +145,6 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
     write_capture_table(context.session_dir / TRIAL_TABLE, trial)
     context.emit(ev.TrialFinished(trial=name, rows=tuple(rows)))
     return f"{sum(row.readings for row in rows)} readings"
-
-
-def _fitted(context: Context, name: str) -> Fit:
-    if context.fit is None:
-        raise BadInputError(f"step {name}: nothing is fitted; expected a fit step before it")
-    return context.fit
 
 
 def _shooter(

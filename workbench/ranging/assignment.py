@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from workbench.calibration.sensor import Sensor
 
 FloatArray = NDArray[np.float64]
-CLEARLY_BETTER = 3.0
+CLEARLY_BETTER = 2.0
 """The best assignment is believed when the spread of the next best is this many times larger."""
 MOST_LASERS = 6
 

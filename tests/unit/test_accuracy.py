@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from workbench.model.rig import BenchSpec, Prior
+from workbench.ranging.ranger import Reading
+from workbench.trials.accuracy import accuracy_row
+
+BENCH = BenchSpec(ruler_scale=Prior(value=0.0, sd=0.001), placement_sd_mm=0.3)
+EMPTY = Reading("s", "no_points", None, None, (), None, None)
+
+
+def readings(*ranges_mm: float, sigma_mm: float = 0.4) -> list[Reading]:
+    return [replace(EMPTY, status="done", flat_mm=r, flat_sigma_mm=sigma_mm) for r in ranges_mm]
+
+
+def test_errors_are_measured_minus_true() -> None:
+    row = accuracy_row(400.0, readings(401.0, 399.5, 402.0), BENCH)
+    assert (row.mean_error_mm, row.max_error_mm, row.min_error_mm) == pytest.approx((2.5 / 3, 2.0, -0.5))
+    assert row.sd_mm == pytest.approx(np.std([1.0, -0.5, 2.0], ddof=1))
+    assert row.range_sd_mm == pytest.approx(0.4)
+    assert row.reference_sd_mm == pytest.approx(0.5)  # 0.3 of the placement, 0.4 of the ruler
+    assert (row.readings, row.missing) == (3, 0)
+
+
+def test_readings_without_a_range_are_counted_not_averaged() -> None:
+    row = accuracy_row(400.0, [*readings(401.0), EMPTY], BENCH)
+    assert (row.readings, row.missing, row.mean_error_mm, row.sd_mm) == (1, 1, 1.0, None)
+
+
+def test_no_reading_at_all() -> None:
+    row = accuracy_row(400.0, [EMPTY, EMPTY], BENCH)
+    assert (row.readings, row.missing, row.mean_error_mm, row.range_sd_mm) == (0, 2, None, None)

@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from workbench.calibration.observations import Sighting, group
+from workbench.model.rig import NoiseSpec
+
+NOISE = NoiseSpec(spot_sd_px=0.1, speckle_sd_px=0.04)
+
+
+def sightings(us: list[float], sds: list[float]) -> list[Sighting]:
+    return [
+        Sighting(f"row {i}", "1", "p", 500.0, i, u, 10.0, sd, sd)
+        for i, (u, sd) in enumerate(zip(us, sds, strict=True))
+    ]
+
+
+def test_the_mean_is_weighted_and_keeps_the_shared_error() -> None:
+    cells, rejected = group(sightings([100.0, 101.0], [0.5, 1.0]), ["1"], NOISE)
+    # Weights 4 and 1: mean (400 + 101) / 5, variance 1 / 5; the speckle does not average out.
+    np.testing.assert_allclose(cells.position_px, [[100.2, 10.0]])
+    np.testing.assert_allclose(cells.sd_px**2, [[0.2 + 0.04**2] * 2])
+    assert rejected == []
+
+
+def test_a_deviation_not_stated_is_the_rig_s() -> None:
+    cells, _ = group([replace(sightings([7.0], [1.0])[0], u_sd_px=np.nan)], ["1"], NOISE)
+    np.testing.assert_allclose(cells.sd_px[0], [np.hypot(0.1, 0.04), np.hypot(1.0, 0.04)])
+
+
+def test_cells_by_laser_and_placement() -> None:
+    rows = [
+        Sighting(f"row {i}", laser, place, float(place), 0, 1.0, 2.0)
+        for i, (laser, place) in enumerate([("a", "500"), ("b", "500"), ("b", "700")])
+    ]
+    cells, _ = group(rows, ["b", "a"], NOISE)
+    assert cells.laser.tolist() == [1, 0, 0]
+    assert cells.placement.tolist() == [0, 0, 1]
+    assert [p.standoff_mm for p in cells.placements] == [500.0, 700.0]
+
+
+def test_a_repeat_far_from_its_fellows_is_rejected_by_name() -> None:
+    cells, rejected = group(sightings([100.0, 100.1, 99.9, 100.05, 103.0], [0.1] * 5), ["1"], NOISE)
+    assert [r.source for r in rejected] == ["row 4"]
+    assert "2.95 px" in rejected[0].reason
+    assert len(cells.members[0]) == 4
+
+
+@pytest.mark.parametrize("us", [[100.0, 100.1, 103.0], [100.0, 100.1, 99.9, 100.5]])
+def test_repeats_that_may_be_noise_stay(us: list[float]) -> None:
+    cells, rejected = group(sightings(us, [0.1] * len(us)), ["1"], NOISE)
+    assert rejected == []
+    assert len(cells.members[0]) == len(us)
+
+
+def test_a_coordinate_never_measured_stays_unknown() -> None:
+    rows = [replace(s, u_px=np.nan) for s in sightings([1.0] * 5, [0.1] * 5)]
+    cells, rejected = group(rows, ["1"], NOISE)
+    assert np.isnan(cells.position_px[0, 0])
+    assert cells.position_px[0, 1] == pytest.approx(10.0)
+    assert rejected == []
