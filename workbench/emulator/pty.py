@@ -17,6 +17,7 @@ class PtyServer:
         self._receive = receive
         self._ours, self._theirs = os.openpty()
         tty.setraw(self._theirs)
+        os.set_blocking(self._ours, False)
         self.port = os.ttyname(self._theirs)
         """Device path for the other side."""
         self._wake, self._waker = os.pipe()
@@ -39,5 +40,6 @@ class PtyServer:
             if self._wake in ready:
                 return
             answer = self._receive(os.read(self._ours, 4096))
-            if answer:
+            # What nobody reads is lost, as on a real line; it must not hold the thread up.
+            with contextlib.suppress(BlockingIOError):
                 os.write(self._ours, answer)

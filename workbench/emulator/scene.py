@@ -21,8 +21,8 @@ from workbench.model.target import (
     TargetShape,
 )
 
-F_STEP = 1e-6
-"""Relative: spots are painted anew when the focal length has drifted by this (3e-4 px at the edge)."""
+F_STEP = 4e-6
+"""Relative: spots are painted anew when the focal length has drifted by this (1e-3 px at the edge)."""
 
 
 class Scene:

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from workbench.devices.protocols import Image
 from workbench.emulator.keyed import generator
-from workbench.emulator.spec import AmbientSpec, EmulatorSpec
+from workbench.emulator.spec import EmulatorSpec
 from workbench.emulator.spot import ImageFormat, Spot
 
 Map = NDArray[np.float32]
+CLUTTER_THINGS = 40
 
 
 class Sensor:
@@ -22,7 +23,7 @@ class Sensor:
     def __init__(self, spec: EmulatorSpec, image: ImageFormat, bits: int) -> None:
         self._spec = spec.sensor
         self._full_scale = 2**bits - 1
-        self._ambient = _ambient_map(spec.ambient, image)
+        self._ambient = _ambient_map(spec, image)
         self._hot = _hot_map(spec, image)
         self._brightest_ambient = float(self._ambient.max())
 
@@ -65,10 +66,17 @@ def _window(image: Map, spot: Spot) -> Map:
     return image[spot.top : spot.top + height, spot.left : spot.left + width]
 
 
-def _ambient_map(spec: AmbientSpec, image: ImageFormat) -> Map:
-    u = (np.arange(image.width) / max(image.width - 1, 1) - 0.5) * spec.gradient_u
-    v = (np.arange(image.height) / max(image.height - 1, 1) - 0.5) * spec.gradient_v
-    return (spec.level_e_per_s * (1 + u[None, :] + v[:, None])).astype(np.float32)
+def _ambient_map(spec: EmulatorSpec, image: ImageFormat) -> Map:
+    ambient = spec.ambient
+    u = (np.arange(image.width) / max(image.width - 1, 1) - 0.5) * ambient.gradient_u
+    v = (np.arange(image.height) / max(image.height - 1, 1) - 0.5) * ambient.gradient_v
+    light = 1 + u[None, :] + v[:, None]
+    rng = generator(spec.seed, "clutter")
+    for left, right, top, bottom, tone in rng.random((CLUTTER_THINGS, 5)):
+        columns = slice(*sorted((int(left * image.width), int(right * image.width))))
+        rows = slice(*sorted((int(top * image.height), int(bottom * image.height))))
+        light[rows, columns] *= 1 + ambient.clutter * (2 * tone - 1)
+    return (ambient.level_e_per_s * light).astype(np.float32)
 
 
 def _hot_map(spec: EmulatorSpec, image: ImageFormat) -> Map:

@@ -62,6 +62,8 @@ class AmbientSpec(FileModel):
     """Relative change over the image's full width."""
     gradient_v: Annotated[float, Field(ge=-1, le=1)] = 0.1
     """Relative change over the image's full height."""
+    clutter: Fraction = 0.0
+    """Things in the room: 40 rectangles, each brighter or darker than what is behind it by at most this."""
     flicker_depth: Fraction = 0.1
     mains_hz: PositiveFloat = 60.0
     """Light flickers at twice this."""

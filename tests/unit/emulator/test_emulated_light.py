@@ -126,6 +126,19 @@ def test_ambient_light_has_the_stated_gradient() -> None:
     assert (electrons[-1].mean() - electrons[0].mean()) / level == pytest.approx(-0.2, abs=0.01)
 
 
+def test_clutter_stands_still_and_has_edges() -> None:
+    def room(seed: int, clutter: float, frame: int = 0) -> NDArray[np.float64]:
+        ambient = {"level_e_per_s": 1e6, "gradient_u": 0.0, "gradient_v": 0.0, "clutter": clutter}
+        rig = ideal_rig(seed=seed, camera={"bits": 16}, ambient=ambient)
+        return sensor_of(rig).expose((), 0.01, 1.0, 1.0, generator(seed, "f", frame)).astype(float)
+
+    even, cluttered = room(1, 0.0), room(1, 0.5)
+    assert cluttered.std() > 5 * even.std()
+    assert np.abs(np.diff(cluttered, axis=1)).max() > 0.1 * cluttered.mean()
+    assert np.corrcoef(cluttered.ravel(), room(1, 0.5, frame=1).ravel())[0, 1] > 0.9
+    assert np.corrcoef(cluttered.ravel(), room(2, 0.5).ravel())[0, 1] < 0.7
+
+
 @pytest.mark.parametrize("grain", [0.1733, 0.5, 2.0])
 def test_speckle_has_the_correlation_of_a_round_pupil(grain: float) -> None:
     """Mean 1, contrast 1, covariance (2 J1(x) / x)^2 with x = pi r / (lambda N)."""

@@ -17,6 +17,7 @@ from workbench.emulator import EmulatedBench, open_bench
 from workbench.emulator.spot import Spot
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import FlatTarget, Placement
+from workbench.model.yamlfile import load_yaml
 
 THESIS = load_rig(Path(__file__).parents[3] / "rigs" / "thesis-emulated.yaml")
 
@@ -222,3 +223,40 @@ def test_a_stuck_beam_shows_in_a_dark_frame(tmp_path: Path) -> None:
             pass
         assert brightness(bench.camera.grab().image) > 0
         bench.controller.fault = "none"
+
+
+@pytest.mark.parametrize("seed", [2001, 4, 12])
+def test_a_whole_bench_shows_its_truth(tmp_path: Path, seed: int) -> None:
+    """Centroids of on - off, laser by laser, against the written truth through a textbook lens."""
+    misses = []
+    with open_bench(thesis_rig(seed=seed), tmp_path / "s") as bench:
+        for standoff in (300.0, 800.0, 2500.0):
+            put(bench, standoff, f"P{standoff}")
+            truth = load_yaml(tmp_path / "s.truth.yaml")
+            for name in bench.lasers.ids:
+                bench.mark(f"{standoff} {name}")
+                with bench.lasers.lit([name], for_s=5.0):
+                    on = bench.camera.grab().image.astype(np.float64)
+                off = bench.camera.grab().image.astype(np.float64)
+                u, v = _predicted(truth, name, standoff, f"P{standoff}")
+                left, top = round(u) - 8, round(v) - 8
+                window = np.maximum((on - off)[top : top + 17, left : left + 17] - 6.0, 0)
+                centre, _ = moments(Spot(left, top, window.astype(np.float32)))
+                misses.append(centre - [u, v])
+    # Speckle's 0.04 px, and what a thresholded centroid adds.
+    assert np.sqrt(np.mean(np.square(misses))) < 0.08
+    assert np.abs(np.mean(misses, axis=0)).max() < 0.04
+
+
+def _predicted(truth: Any, name: str, standoff: float, key: str) -> tuple[float, float]:
+    laser, placed = truth["lasers"][name], truth["placements"][key]
+    z0 = standoff * (1 + truth["ruler_scale"]) + placed["error_mm"] + truth["offset_mm"]
+    slope = np.tan(np.radians([placed["yaw_deg"], placed["pitch_deg"]]))
+    start, direction = np.array([laser["x_mm"], laser["y_mm"]]), np.array([laser["tx"], laser["ty"]])
+    z = (z0 + slope @ start) / (1 - slope @ direction)
+    x, y = (start + z * direction) / z
+    radial = 1 + truth["k1"] * (x * x + y * y) + truth["k2"] * (x * x + y * y) ** 2
+    return (
+        float(truth["cx_px"] + truth["f_px"] * x * radial),
+        float(truth["cy_px"] + truth["f_px"] * y * radial),
+    )
