@@ -129,7 +129,7 @@ def test_open_interlock(wired: Wired, bank: SerialLaserBank) -> None:
 def test_a_controller_that_says_ok_but_stays_on(wired: Wired, bank: SerialLaserBank) -> None:
     with pytest.raises(LaserOffNotConfirmedError, match="may be on"), bank.lit(["L1"], for_s=5.0):
         wired.controller.fault = "ignores_off"
-    assert wired.heard.count(b"!") == 3  # connect, exit, and once more
+    assert wired.heard.count(b"!") == 4  # connect and its verification, exit, and once more
 
 
 def test_a_stuck_controller_is_not_connected_to(wired: Wired) -> None:
@@ -157,11 +157,16 @@ def test_one_lost_reply_is_forgiven_when_off_is_confirmed(wired: Wired, bank: Se
     assert wired.controller.lit() == ()
 
 
-@pytest.mark.parametrize("reply", [b"", b"OK\n", b"\xff\xfe\x00\n", b"OK *ID", b"OK *IDNAH\n", b"x" * 500])
+@pytest.mark.parametrize("reply", [b"", b"OK\n", b"\xff\xfe\x00\n", b"OK OF", b"OK OFFER\n", b"x" * 500])
 def test_somebody_else_answers(answering: Callable[[Callable[[bytes], bytes]], str], reply: bytes) -> None:
     port = answering(lambda data: reply)
-    with pytest.raises(RigNotReadyError, match=r"asked '\*IDN\?', expected 'OK \*IDN', got"):
+    with pytest.raises(RigNotReadyError, match="asked '!', expected 'OK OFF', got"):
         SerialLaserBank(port, IDS, boot_s=0.0)
+
+
+def test_somebody_who_says_ok_to_anything(answering: Callable[[Callable[[bytes], bytes]], str]) -> None:
+    with pytest.raises(RigNotReadyError, match=r"asked '\*IDN\?', expected 'OK \*IDN', got 'OK OFF"):
+        SerialLaserBank(answering(lambda data: b"OK OFF\n"), IDS, boot_s=0.0)
 
 
 def test_a_controller_still_booting_is_waited_for(

@@ -96,6 +96,8 @@ class SerialLaserBank:
         deadline = time.monotonic() + boot_s
         while True:
             try:
+                # Off comes first: whoever answers, and whatever a program before this one left lit.
+                self._request("!", "OFF")
                 return self._request("*IDN?", "*IDN")
             except RigNotReadyError:
                 if time.monotonic() >= deadline:
