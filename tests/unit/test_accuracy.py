@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from workbench.model.rig import BenchSpec, Prior
 from workbench.ranging.ranger import Reading
-from workbench.trials.accuracy import accuracy_row
+from workbench.trials.accuracy import accuracy_csv, accuracy_row
 
 BENCH = BenchSpec(ruler_scale=Prior(value=0.0, sd=0.001), placement_sd_mm=0.3)
 EMPTY = Reading("s", "no_points", None, None, (), None, None)
@@ -34,3 +36,11 @@ def test_readings_without_a_range_are_counted_not_averaged() -> None:
 def test_no_reading_at_all() -> None:
     row = accuracy_row(400.0, [EMPTY, EMPTY], BENCH)
     assert (row.readings, row.missing, row.mean_error_mm, row.range_sd_mm) == (0, 2, None, None)
+
+
+def test_the_table_as_csv() -> None:
+    rows = [accuracy_row(400.0, readings(401.1, 399.3), BENCH), accuracy_row(500.0, [EMPTY], BENCH)]
+    table = pd.read_csv(io.StringIO(accuracy_csv(rows)))
+    assert table["mean_error_mm"][0] == pytest.approx(rows[0].mean_error_mm, rel=1e-14)
+    assert table["missing"].tolist() == [0, 1]
+    assert np.isnan(table["mean_error_mm"][1])

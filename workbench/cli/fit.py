@@ -25,7 +25,7 @@ from workbench.model.calibration import Provenance
 from workbench.model.captures import load_captures
 from workbench.model.errors import LimitFailedError
 from workbench.model.rig import Rig, load_rig
-from workbench.report.tables import derived_table, parameter_table
+from workbench.report.tables import derived_table, parameter_table, rejected_lines
 from workbench.session.manifest import workbench_version
 
 
@@ -88,8 +88,8 @@ def _print_tables(fitted: Fit, assessment: Assessment) -> None:
     console.print(parameter_table(parameter_records(fitted)))
     console.print(derived_table(derive(fitted)))
     console.print(f"residual rms {fitted.rms_px:.2f} px over {len(fitted.used)} observations")
-    for rejected in fitted.rejected:
-        console.print(f"not used: {rejected.source}: {rejected.reason}", highlight=False)
+    for line in rejected_lines(fitted.rejected):
+        console.print(f"not used: {line}", highlight=False)
     for warning in assessment.warnings:
         console.print(f"note: {warning}", highlight=False)
     console.print(f"verdict: {assessment.verdict}")

@@ -10,7 +10,9 @@ from pathlib import Path
 from types import FrameType, TracebackType
 
 from rich.console import Console
+from rich.padding import Padding
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
@@ -68,7 +70,7 @@ class Terminal:
             case ev.ProcedureStarted() as e:
                 self._console.print(f"[bold]{e.title}[/bold] ({e.procedure}, {e.steps} steps)")
             case ev.StepStarted() as e:
-                self._console.print(f"  {e.index}. {e.title}", highlight=False)
+                self._console.print(Padding(Text(f"{e.index}. {e.title}"), (0, 0, 0, 2)))
                 if e.shots:
                     self._task = self._progress.add_task("     capturing", total=e.shots)
             case ev.TargetPlaced(placement=placement) if self._task is not None:
@@ -88,7 +90,7 @@ class Terminal:
         if self._task is not None:
             self._progress.remove_task(self._task)
             self._task = None
-        self._console.print(f"     {outcome}", highlight=False, soft_wrap=True)
+        self._console.print(Padding(Text(outcome), (0, 0, 0, 5)))
 
 
 class Guarded:
@@ -104,6 +106,8 @@ class Guarded:
             return
         try:
             self._consumer(record)
+        except StoppedError:
+            raise  # a signal that came while the consumer was at work
         except Exception as error:
             self._consumer = None
             self._console.print(

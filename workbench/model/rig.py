@@ -90,13 +90,6 @@ class NoiseSpec(FileModel):
     """Shared by all repeats of one laser at one placement: the speckle pattern stands still."""
 
 
-class LaserController(FileModel):
-    """How the laser controller is reached."""
-
-    port: str
-    baud: Annotated[int, Field(gt=0)] = 115200
-
-
 class Rig(FileModel):
     """A rig file, format 1."""
 
@@ -109,7 +102,6 @@ class Rig(FileModel):
     lasers: Annotated[tuple[LaserSpec, ...], Field(min_length=1)]
     bench: BenchSpec = BenchSpec()
     noise: NoiseSpec = NoiseSpec()
-    controller: LaserController | None = None
     emulator: dict[str, Any] | None = None
     """Read by the emulated bench alone, which validates it."""
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.devices.registry import open_bench
 from workbench.model import event as ev
 from workbench.model.calibration import Provenance
-from workbench.model.errors import WorkbenchError
+from workbench.model.errors import BadInputError, StoppedError, WorkbenchError
 from workbench.model.procedure import Procedure, load_procedure
 from workbench.model.rig import Rig, load_rig
 from workbench.procedure.context import Context
@@ -36,12 +36,14 @@ class Plan:
         Raises:
             BadInputError: one of them is wrong.
         """
-        return cls(
-            rig=load_rig(rig_path),
-            rig_path=rig_path,
-            procedures=tuple(load_procedure(path) for path in procedure_paths),
-            procedure_paths=tuple(procedure_paths),
-        )
+        procedures = tuple(load_procedure(path) for path in procedure_paths)
+        names = [p.procedure for p in procedures]
+        for path, name in zip(procedure_paths, names, strict=True):
+            if names.count(name) > 1:
+                raise BadInputError(
+                    f"{path}: procedure: expected a name that no other procedure of this call has, got {name}"
+                )
+        return cls(load_rig(rig_path), rig_path, procedures, tuple(procedure_paths))
 
     def new_session(self, sessions: Path) -> Path:
         """A folder name that sorts by time and says what was run; with a number where it is taken."""
@@ -83,11 +85,19 @@ def run(
         try:
             _run_all(plan, context)
         except BaseException as error:
-            code = error.exit_code if isinstance(error, WorkbenchError) else 1
-            what = str(error) or type(error).__name__
-            context.emit(ev.SessionFinished(exit_code=code, message=what))
+            # A journal that cannot be written any more must not hide why the session ended.
+            with suppress(StoppedError):
+                context.emit(_ending(error))
             raise
         context.emit(ev.SessionFinished(exit_code=0, message="done"))
+
+
+def _ending(error: BaseException) -> ev.SessionFinished:
+    if isinstance(error, WorkbenchError):
+        return ev.SessionFinished(exit_code=error.exit_code, message=str(error))
+    if isinstance(error, KeyboardInterrupt):
+        return ev.SessionFinished(exit_code=StoppedError.exit_code, message="stopped at the keyboard")
+    return ev.SessionFinished(exit_code=1, message=f"internal error: {error!r}")
 
 
 def _run_all(plan: Plan, context: Context) -> None:

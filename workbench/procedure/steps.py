@@ -24,8 +24,9 @@ from workbench.procedure.context import Context
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
 from workbench.session.capture_table import write_capture_table
+from workbench.session.files import write_atomically
 from workbench.spots import Finding
-from workbench.trials.accuracy import accuracy_row
+from workbench.trials.accuracy import accuracy_csv, accuracy_row
 
 CALIBRATION_TABLE = "captures.csv"
 TRIAL_TABLE = "trial-captures.csv"
@@ -64,7 +65,7 @@ def _(step: pr.MessageStep, context: Context, name: str) -> str:
 @run_step.register
 def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
     for standoff_mm in step.standoffs_mm:
-        placement = context.place(Placement(key=f"{name}/{standoff_mm:g}mm", standoff_mm=standoff_mm))
+        placement = context.place(_placement(name, standoff_mm))
         for laser in context.rig.lasers:
             scanline = prior_scanline(context.rig, laser)
             for repeat in range(step.repeats):
@@ -82,34 +83,29 @@ def _(step: pr.FitStep, context: Context, name: str) -> str:
     found = [_sight(context, capture) for capture in captures]
     sightings = [f for f in found if isinstance(f, Sighting)]
     fitted = fit(context.rig, sightings, [f for f in found if isinstance(f, Rejected)])
-    _, assessment = calibrate(context.fit, Acceptance(), context.provenance)
-    context.emit(fit_finished(context.fit, assessment))
+    provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
+    calibration, assessment = calibrate(fitted, step.limits, provenance)
+    context.emit(fit_finished(fitted, assessment))
+    if assessment.verdict == "refused":
+        raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
+    context.accepted = calibration
+    worst = calibration.laser_ranger.validity.max_relative_range_sd
     return (
-        f"rms {context.fit.rms_px:.3f} px over {len(sightings)} spots, {len(context.fit.rejected)} rejected"
+        f"accepted: rms {fitted.rms_px:.3f} px over {len(sightings)} spots, {len(fitted.rejected)} not used;"
+        f" ranges to {100 * worst:.2g} % (1 sigma) or better"
     )
 
 
 @run_step.register
-def _(step: pr.CheckStep, context: Context, name: str) -> str:
-    limits = Acceptance(max_rms_px=step.max_rms_px, max_relative_range_sd=step.max_relative_range_sd)
-    calibration, assessment = calibrate(_fitted(context, name), limits, context.provenance)
-    if assessment.verdict == "refused":
-        raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
-    worst = calibration.laser_ranger.validity.max_relative_range_sd
-    return f"accepted, ranges to {100 * worst:.2f} % (1 sigma) or better"
-
-
-@run_step.register
 def _(step: pr.ExportStep, context: Context, name: str) -> str:
-    calibration, assessment = calibrate(_fitted(context, name), Acceptance(), context.provenance)
-    if assessment.verdict == "refused":
-        raise LimitFailedError("the calibration is not exported: " + "; ".join(assessment.reasons))
+    if context.accepted is None:
+        raise BadInputError(f"step {name}: nothing to export; expected a fit step before it")
     path = context.session_dir / step.file
-    write_calibration(path, calibration)
-    context.calibration = calibration
+    write_calibration(path, context.accepted)
+    context.calibration = context.accepted
     sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
     context.emit(ev.CalibrationExported(path=step.file, sha256=sha256))
-    return str(path)
+    return f"{step.file} written"
 
 
 @run_step.register
@@ -122,7 +118,7 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
     ranger = Ranger(context.calibration)
     rows = []
     for standoff_mm in step.standoffs_mm:
-        placement = context.place(Placement(key=f"{name}/{standoff_mm:g}mm", standoff_mm=standoff_mm))
+        placement = context.place(_placement(name, standoff_mm))
         readings = []
         for number in range(step.readings):
             scene = f"{placement.key}/{number:02d}"
@@ -143,8 +139,15 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
         rows.append(accuracy_row(placement.standoff_mm, readings, context.rig.bench))
     trial = [c for c in context.captures if c.purpose == "trial"]
     write_capture_table(context.session_dir / TRIAL_TABLE, trial)
+    table = f"{name}.csv"
+    write_atomically(context.session_dir / table, accuracy_csv(rows).encode())
     context.emit(ev.TrialFinished(trial=name, rows=tuple(rows)))
-    return f"{sum(row.readings for row in rows)} readings"
+    return f"{sum(row.readings for row in rows)} readings, table in {table}"
+
+
+def _placement(name: str, standoff_mm: float) -> Placement:
+    # 12 digits: keys name files, so standoffs that differ must have keys that differ.
+    return Placement(key=f"{name}/{standoff_mm:.12g}mm", standoff_mm=standoff_mm)
 
 
 def _shooter(

@@ -8,6 +8,7 @@ from math import floor, log10
 from rich.table import Table
 
 from workbench.calibration.assess import Derived
+from workbench.calibration.observations import Rejected
 from workbench.model.event import ParameterRecord, TrialRow
 from workbench.ranging.ranger import Reading
 
@@ -54,6 +55,14 @@ def derived_table(derived: Iterable[Derived]) -> Table:
     return table
 
 
+def rejected_lines(rejected: Iterable[Rejected]) -> list[str]:
+    """What a fit left out, one line for each reason."""
+    sources: dict[str, list[str]] = {}
+    for r in rejected:
+        sources.setdefault(r.reason, []).append(r.source)
+    return [f"{_and_more(names)}: {reason}" for reason, names in sources.items()]
+
+
 def reading_table(readings: Iterable[Reading]) -> Table:
     """The ranger's readings, a line a scene."""
     table = Table(title="Ranges (mm, 1 sigma)", title_justify="left")
@@ -96,6 +105,10 @@ def significant(value: float, sd: float) -> str:
         return f"{value:g}"
     digits = max(0, 1 - floor(log10(sd)))
     return f"{value:.{digits}f}"
+
+
+def _and_more(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
 
 
 def _with_sd(value: float, sd: float) -> str:

@@ -27,7 +27,7 @@ def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
         off = "" if capture.off is None else capture.off.path
         scene = capture.scene or capture.placement_key
         writer.writerow(
-            (capture.laser_id, f"{capture.standoff_mm:g}", capture.repeat, capture.on.path, off, scene)
+            (capture.laser_id, repr(capture.standoff_mm), capture.repeat, capture.on.path, off, scene)
         )
     content = stream.getvalue().encode()
     write_atomically(path, content)

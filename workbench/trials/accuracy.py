@@ -6,10 +6,16 @@ from collections.abc import Sequence
 from math import hypot
 
 import numpy as np
+import pandas as pd
 
 from workbench.model.event import TrialRow
 from workbench.model.rig import BenchSpec
 from workbench.ranging.ranger import Reading
+
+
+def accuracy_csv(rows: Sequence[TrialRow]) -> str:
+    """The trial's table as CSV, a line a standoff, columns as in `TrialRow`."""
+    return pd.DataFrame([row.model_dump() for row in rows]).to_csv(index=False, lineterminator="\n")
 
 
 def accuracy_row(standoff_mm: float, readings: Sequence[Reading], bench: BenchSpec) -> TrialRow:

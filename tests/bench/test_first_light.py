@@ -1,0 +1,196 @@
+"""The demo, from the files that a newcomer runs it with to a calibration that a ranger uses."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml as pyyaml
+
+from tests.viewer.harness import distinct_colors, headless_viewer
+from tests.viewer.readback import Contents
+from workbench.calibration.sensor import Sensor
+from workbench.model.calibration import load_calibration
+from workbench.model.event import CaptureTaken, ReadingTaken, SessionFinished, StepStarted, TrialFinished
+from workbench.model.rig import load_rig
+from workbench.session.journal import read_journal
+from workbench.viewer.recording import rebuild
+
+ROOT = Path(__file__).parents[2]
+SCRIPT = Path(sys.executable).with_name("workbench")
+SEEDS = (2001, 7, 42)
+
+
+def workbench(*arguments: object, code: int = 0) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"COLUMNS": "80"}
+    done = subprocess.run(
+        [SCRIPT, *map(str, arguments)], capture_output=True, text=True, env=environment, cwd=ROOT
+    )
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    return done
+
+
+@dataclass(frozen=True)
+class Demo:
+    seed: int
+    folder: Path
+    rig: Path
+    terminal: str
+
+    @cached_property
+    def truth(self) -> dict[str, Any]:
+        """What the emulator hides from everything but the tests."""
+        path = self.folder.with_name(self.folder.name + ".truth.yaml")
+        truth: dict[str, Any] = pyyaml.safe_load(path.read_text())
+        return truth
+
+
+@pytest.fixture(scope="module", params=SEEDS)
+def demo(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Demo:
+    folder = tmp_path_factory.mktemp("demo")
+    rig = folder / "rig.yaml"
+    text = (ROOT / "rigs/thesis-emulated.yaml").read_text()
+    assert "seed: 2001" in text
+    rig.write_text(text.replace("seed: 2001", f"seed: {request.param}"))
+    procedures = [ROOT / "procedures/calibrate-flat.yaml", ROOT / "procedures/accuracy-flat.yaml"]
+    done = workbench("run", *procedures, "--rig", rig, "--sessions", folder / "sessions")
+    assert done.stdout == ""
+    (session,) = [p for p in (folder / "sessions").iterdir() if p.is_dir()]
+    return Demo(request.param, session, rig, done.stderr)
+
+
+def test_the_session_folder_holds_everything(demo: Demo) -> None:
+    names = {p.name for p in demo.folder.iterdir()}
+    assert names == {
+        "session.yaml",
+        "journal.jsonl",
+        "frames",
+        "captures.csv",
+        "calibration.yaml",
+        "trial-captures.csv",
+        "accuracy-flat.1.csv",
+        "recording.rrd",
+    }
+    manifest = pyyaml.safe_load((demo.folder / "session.yaml").read_text())
+    assert manifest["rig"]["text"] == demo.rig.read_text()
+    assert manifest["versions"]["rerun-sdk"] == "0.41.0"
+
+
+def test_every_laser_alone_ten_pairs_at_eight_standoffs_or_more(demo: Demo) -> None:
+    shots = [r.event for r in read_journal(demo.folder) if isinstance(r.event, CaptureTaken)]
+    calibration = [s for s in shots if s.purpose == "calibration"]
+    standoffs = {s.standoff_mm for s in calibration}
+    assert len(standoffs) >= 8
+    assert (min(standoffs), max(standoffs)) == (125.0, 4500.0)
+    assert len(calibration) == len(standoffs) * 4 * 10
+    assert {s.laser_id for s in calibration} == {"L1", "L2", "L3", "L4"}
+    assert all((demo.folder / f.path).is_file() for s in shots for f in (s.on, s.off) if f is not None)
+    assert not standoffs & {s.standoff_mm for s in shots if s.purpose == "trial"}
+
+
+def test_held_ranges_are_true_to_one_per_cent_up_to_two_metres(demo: Demo) -> None:
+    """Against the truth: where the target really stood, counted from the true reference plane."""
+    readings = [r.event for r in read_journal(demo.folder) if isinstance(r.event, ReadingTaken)]
+    assert len(readings) == 55
+    for reading in readings:
+        placement = demo.truth["placements"][reading.scene.rsplit("/", 1)[0]]
+        true_mm = reading.standoff_mm * (1 + demo.truth["ruler_scale"]) + placement["error_mm"]
+        assert reading.status == "done"
+        assert reading.range_mm is not None
+        assert reading.sigma_mm is not None
+        if true_mm < 2000:
+            assert abs(reading.range_mm - true_mm) < 0.01 * true_mm
+        assert abs(reading.range_mm - true_mm) < 5 * reading.sigma_mm
+
+
+def test_the_truth_lies_where_the_calibration_says(demo: Demo) -> None:
+    parameters = load_calibration(demo.folder / "calibration.yaml").laser_ranger.parameters
+    truth = {k: v for k, v in demo.truth.items() if isinstance(v, float)}
+    for laser_id, ray in demo.truth["lasers"].items():
+        truth |= {f"{laser_id}.{name}": value for name, value in ray.items()}
+    error = np.array(parameters.values) - np.array([truth[name] for name in parameters.names])
+    free = np.array(parameters.prior_sd) > 0
+    covariance = parameters.covariance_array[np.ix_(free, free)]
+    distance2 = float(error[free] @ np.linalg.solve(covariance, error[free]))
+    # Chi-square with one degree of freedom a parameter: mean n, variance 2 n.
+    n = int(free.sum())
+    assert distance2 < n + 4 * np.sqrt(2 * n)
+    assert (error[~free] == 0).all()
+
+
+def test_the_terminal_shows_steps_and_the_trial_in_80_columns(demo: Demo) -> None:
+    assert max(len(line) for line in demo.terminal.splitlines() if "sessions/" not in line) <= 80
+    for word in (
+        "Capture at 11 standoffs",
+        "accepted: rms",
+        "Accuracy",
+        "mean",
+        "max",
+        "min",
+        "sd",
+        "stated",
+    ):
+        assert word in demo.terminal
+    (trial,) = [r.event for r in read_journal(demo.folder) if isinstance(r.event, TrialFinished)]
+    for row in trial.rows:
+        assert f"{row.standoff_mm:g}" in demo.terminal
+        assert f"{row.mean_error_mm:+.2f}" in demo.terminal
+
+
+def test_fit_and_range_on_the_session_s_images_give_the_session_s_results(demo: Demo, tmp_path: Path) -> None:
+    output = tmp_path / "again.yaml"
+    workbench("fit", demo.folder / "captures.csv", "--rig", demo.rig, "-o", output)
+    again, first = load_calibration(output), load_calibration(demo.folder / "calibration.yaml")
+    assert again.laser_ranger.parameters == first.laser_ranger.parameters
+    assert again.laser_ranger.provenance.captures_sha256 == first.laser_ranger.provenance.captures_sha256
+
+    done = workbench("range", demo.folder / "trial-captures.csv", "--calibration", output, "--json")
+    scenes = {scene["scene"]: scene for scene in map(json.loads, done.stdout.splitlines())}
+    readings = [r.event for r in read_journal(demo.folder) if isinstance(r.event, ReadingTaken)]
+    compared = 0
+    for reading in readings:
+        alone = scenes.get(f"{reading.scene}/alone")
+        scene = alone or scenes[reading.scene]
+        assert scene["status"] == "done"
+        ours = {laser["id"]: laser["range_mm"] for laser in scene["lasers"]}
+        assert ours == {laser.laser_id: laser.range_mm for laser in reading.lasers}
+        compared += 1
+    assert compared == 55
+
+
+def test_the_recording_is_a_view_that_can_be_made_again(demo: Demo, tmp_path: Path) -> None:
+    again = tmp_path / "again.rrd"
+    rebuild(demo.folder, load_rig(demo.rig), read_journal(demo.folder), again)
+    first, second = Contents(demo.folder / "recording.rrd"), Contents(again)
+    assert first.everything() == second.everything()
+
+
+def test_the_recording_opens_in_the_real_viewer(demo: Demo, tmp_path: Path) -> None:
+    with headless_viewer(tmp_path, "1600x900") as viewer:
+        viewer.open(demo.folder / "recording.rrd")
+        for tab in ("Live", "Fit", "Trial", "3D"):
+            viewer.show_tab(tab)
+            assert viewer.problems() == []
+            assert distinct_colors(viewer.shot()) > 50
+
+
+def test_the_session_says_how_it_ended(demo: Demo) -> None:
+    records = list(read_journal(demo.folder))
+    assert records[-1].event == SessionFinished(exit_code=0, message="done")
+    assert [r.n for r in records] == list(range(len(records)))
+    steps = [r.event.step for r in records if isinstance(r.event, StepStarted)]
+    assert steps == ["message", "capture_grid", "fit", "export", "accuracy_trial"]
+
+
+def test_the_calibration_reaches_the_whole_frame(demo: Demo) -> None:
+    sensor = Sensor(load_calibration(demo.folder / "calibration.yaml"))
+    assert sensor.in_frame("L2", np.array([300.0, 4500.0])).all()

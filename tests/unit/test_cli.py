@@ -1,0 +1,213 @@
+"""The command line as a person or a script meets it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from workbench.cli.main import main
+from workbench.model.calibration import load_calibration
+
+ROOT = Path(__file__).parents[2]
+WEBCAM = ROOT / "data/webcam-laser-rows.csv"
+WEBCAM_RIG = ROOT / "rigs/webcam-laser.yaml"
+HEAVY = ("jax", "numpy", "scipy", "cv2", "pandas", "rerun", "optimistix", "serial", "pydantic", "ruamel")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Outcome]
+
+
+@pytest.fixture
+def workbench(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    def run(*arguments: object) -> Outcome:
+        monkeypatch.setattr(sys, "argv", ["workbench", *map(str, arguments)])
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = stop.code if isinstance(stop.code, int) else 0
+        captured = capsys.readouterr()
+        return Outcome(code, captured.out, captured.err)
+
+    return run
+
+
+def refused(outcome: Outcome, code: int, *words: object) -> None:
+    assert outcome.code == code
+    assert "Traceback" not in outcome.err
+    flat = " ".join(outcome.err.split())
+    for word in words:
+        assert str(word) in flat
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys, runpy\n"
+        "sys.argv = ['workbench', '--help']\n"
+        "from workbench.cli.main import main\n"
+        "try: main()\n"
+        f"finally: print([m for m in {HEAVY} if m in sys.modules], file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+    for command in ("run", "fit", "range", "view"):
+        assert command in done.stdout
+
+
+def test_the_command_is_installed() -> None:
+    script = Path(sys.executable).with_name("workbench")
+    done = subprocess.run([script, "--help"], capture_output=True, text=True, check=True)
+    assert "laser-spot range sensors" in done.stdout
+
+
+def test_fit_prints_one_object_and_writes_the_calibration(workbench: Run, tmp_path: Path) -> None:
+    output = tmp_path / "webcam.yaml"
+    outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", output, "--json")
+    assert outcome.code == 0
+    result = json.loads(outcome.out)
+    assert list(result) == [
+        "parameters",
+        "derived",
+        "rms_px",
+        "observations",
+        "rejected",
+        "warnings",
+        "verdict",
+        "reasons",
+    ]
+    assert set(result["parameters"][0]) >= {"name", "unit", "value", "sd", "prior_sd", "data_share"}
+    (derived,) = result["derived"]
+    assert set(derived) == {"laser", "f_b_px_mm", "f_b_sd", "infinity_px", "infinity_sd"}
+    assert derived["laser"] == "1"
+    assert (result["observations"], result["rejected"], result["verdict"]) == (9, [], "accepted")
+    assert "cannot give the focal length f_px alone" in " ".join(result["warnings"])
+    assert "cannot give the focal length f_px alone" in " ".join(outcome.err.split())
+    assert load_calibration(output).laser_ranger.provenance.command.startswith("workbench fit")
+
+
+def test_rejected_rows_are_listed_with_their_reasons(workbench: Run, tmp_path: Path) -> None:
+    captures = tmp_path / "c.csv"
+    captures.write_text(WEBCAM.read_text() + "1,,0,,150\n2,500,0,,140\n")
+    outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml", "--json")
+    rejected = json.loads(outcome.out)["rejected"]
+    assert [r["row"] for r in rejected] == [11, 12]
+    assert "standoff_mm is empty" in rejected[0]["reason"]
+    assert "expected one of 1 (rig webcam-laser), got 2" in rejected[1]["reason"]
+
+
+def test_a_fit_that_fails_a_limit_is_said_and_not_written(workbench: Run, tmp_path: Path) -> None:
+    captures = tmp_path / "c.csv"
+    captures.write_text("".join(WEBCAM.read_text().splitlines(keepends=True)[:3]))
+    output = tmp_path / "c.yaml"
+    output.write_text("as it was\n")
+    outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", output, "--json")
+    refused(outcome, 3, "seen at 2 standoffs, expected at least 3", "is not written")
+    assert json.loads(outcome.out)["verdict"] == "refused"
+    assert output.read_text() == "as it was\n"
+
+
+def test_range_from_the_yaml_alone(workbench: Run, tmp_path: Path) -> None:
+    calibration = tmp_path / "webcam.yaml"
+    workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", calibration)
+    outcome = workbench("range", WEBCAM, "--calibration", calibration, "--json")
+    assert outcome.code == 0
+    scenes = [json.loads(line) for line in outcome.out.splitlines()]
+    assert len(scenes) == 9
+    first = scenes[0]
+    assert list(first) == ["scene", "status", "closest_mm", "sigma_mm", "shape", "lasers"]
+    assert (first["scene"], first["status"], first["shape"]) == ("row 2", "done", {"kind": "unknown"})
+    (laser,) = first["lasers"]
+    assert laser == {
+        "id": "1",
+        "range_mm": first["closest_mm"],
+        "sigma_mm": first["sigma_mm"],
+        "u_px": None,
+        "v_px": 42.0,
+    }
+    # By hand: 32478 / (203.61 - 42), and r^2 / 32478 a pixel.
+    assert first["closest_mm"] == pytest.approx(32478 / (203.61 - 42), rel=1e-3)
+    assert "closest" in outcome.err
+
+
+def test_without_json_nothing_is_on_stdout(workbench: Run, tmp_path: Path) -> None:
+    outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
+    assert outcome.out == ""
+    assert max(len(line) for line in outcome.err.splitlines()) <= 80
+
+
+class TestBadInput:
+    """Exit code 2, the place, what was expected, and never a traceback."""
+
+    def test_usage(self, workbench: Run) -> None:
+        refused(workbench("fit", WEBCAM), 2, "--rig")
+        refused(workbench("dance"), 2, "dance")
+
+    def test_missing_files(self, workbench: Run, tmp_path: Path) -> None:
+        no = tmp_path / "no.yaml"
+        refused(workbench("fit", WEBCAM, "--rig", no, "-o", tmp_path / "c"), 2, no, "no such file")
+        fit = workbench("fit", no, "--rig", WEBCAM_RIG, "-o", tmp_path / "c")
+        refused(fit, 2, no, "No such file")
+        refused(workbench("range", WEBCAM, "--calibration", no), 2, no)
+        refused(workbench("run", no, "--rig", WEBCAM_RIG, "--sessions", tmp_path), 2, no)
+        refused(workbench("view", tmp_path), 2, "recording.rrd")
+        assert list(tmp_path.iterdir()) == []
+
+    def test_a_rig_without_a_driver(self, workbench: Run, tmp_path: Path) -> None:
+        procedure = ROOT / "procedures/calibrate-flat.yaml"
+        outcome = workbench("run", procedure, "--rig", WEBCAM_RIG, "--sessions", tmp_path)
+        refused(outcome, 2, "driver: expected an installed bench driver")
+
+    def test_one_procedure_twice(self, workbench: Run, tmp_path: Path) -> None:
+        procedure = ROOT / "procedures/calibrate-flat.yaml"
+        outcome = workbench("run", procedure, procedure, "--rig", WEBCAM_RIG, "--sessions", tmp_path)
+        refused(outcome, 2, "no other procedure of this call has, got calibrate-flat")
+        assert list(tmp_path.iterdir()) == []
+
+    def test_a_csv_error_names_row_and_column(self, workbench: Run, tmp_path: Path) -> None:
+        captures = tmp_path / "c.csv"
+        captures.write_text(WEBCAM.read_text().replace("1,400,0", "1,4oo,0"))
+        outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
+        refused(outcome, 2, f"{captures}: row 4, column standoff_mm: expected a number, got 4oo")
+
+    def test_an_output_folder_that_is_not_there(self, workbench: Run, tmp_path: Path) -> None:
+        outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "no/c.yaml")
+        refused(outcome, 2, "cannot be written")
+
+    @pytest.mark.parametrize("fault", ["missing", "truncated", "wrong size", "text"])
+    def test_an_image_that_cannot_be_used_is_named(self, workbench: Run, tmp_path: Path, fault: str) -> None:
+        image = np.random.default_rng(0).integers(0, 20, (480, 640), dtype=np.uint8)
+        content = cv2.imencode(".png", image if fault != "wrong size" else image[:100])[1].tobytes()
+        on = tmp_path / "on.png"
+        if fault == "truncated":
+            content = content[: len(content) // 2]
+        if fault == "text":
+            content = b"not a picture"
+        if fault != "missing":
+            on.write_bytes(content)
+        captures = tmp_path / "c.csv"
+        captures.write_text("laser_id,standoff_mm,repeat,on,off\n1,500,0,on.png,\n")
+        outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
+        refused(outcome, 2, on, "expected an image" if fault != "truncated" else "truncated")
+        assert not (tmp_path / "c.yaml").exists()
+
+    def test_captures_without_any_spot(self, workbench: Run, tmp_path: Path) -> None:
+        (tmp_path / "on.png").write_bytes(cv2.imencode(".png", np.full((480, 640), 9, np.uint8))[1].tobytes())
+        captures = tmp_path / "c.csv"
+        captures.write_text("laser_id,standoff_mm,repeat,on\n1,500,0,on.png\n")
+        outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
+        refused(outcome, 2, "no spot is left to fit")
