@@ -12,12 +12,14 @@ from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
 from workbench.spots.frames import check_pair, default_saturation_dn
 from workbench.spots.measure import Trace, measure
 from workbench.spots.pair import Pair, Scene, look
-from workbench.spots.resolve import clusters, fitted_together, split, without_duplicates
+from workbench.spots.resolve import clusters, fitted_together, grown, split, without_duplicates
 from workbench.spots.strip import Strip, check_line, distance_px, strip_of
 from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
 
 # A peak of the smoothed signal between this and the threshold is named: too dim to be told from noise.
 _DIM_SD: Final = 4.2
+# A spot whose peak is this many sd of a pixel is clear; one that is not has to give way when there are too many.
+_CLEAR_SD: Final = 5.0
 
 
 class SpotFinder:
@@ -86,7 +88,16 @@ class SpotFinder:
         groups = [fitted_together(scenes[0], group) for group in clusters(traces)]
         if self._expected is None or sum(map(len, groups)) < self._expected:
             groups = [split(scenes[0], g[0]) if len(g) == 1 else g for g in groups]
-        return [trace for group in groups for trace in group]
+            groups = [grown(scenes[0], group) for group in groups]
+        return self._as_many_as_lasers([trace for group in groups for trace in group], scenes)
+
+    def _as_many_as_lasers(self, traces: list[Trace], scenes: list[Scene]) -> list[Trace]:
+        """The traces without the dimmest, as long as there are more than lasers and no pixel of it stands out."""
+        if self._expected is None or len(traces) <= self._expected:
+            return traces
+        clear = _CLEAR_SD * min(scene.variance for scene in scenes) ** 0.5
+        ranked = sorted(traces, key=lambda t: -t.spot.peak_dn)
+        return [t for i, t in enumerate(ranked) if i < self._expected or t.spot.peak_dn > clear]
 
     def _on_a_line(self, spot: Spot) -> bool:
         u, v = np.array(spot.u_px), np.array(spot.v_px)

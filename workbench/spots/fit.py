@@ -13,12 +13,14 @@ from workbench.spots.noise import Noise, photon_transfer_slope
 from workbench.spots.types import Bools, Floats
 
 Model = Callable[[Floats, tuple[int, int]], Design]
-_MAX_STEPS: Final = 15
+_MAX_STEPS: Final = 20
 _MAX_STEP: Final = np.array([np.inf, np.inf, 1.0, 1.0, 0.4, 0.4, 0.4])
 _LOWEST: Final = np.array([-np.inf, -np.inf, -np.inf, -np.inf, np.log(0.15), np.log(0.15), -3.0])
 _HIGHEST: Final = np.array([np.inf, np.inf, np.inf, np.inf, np.log(12.0), np.log(12.0), 3.0])
 # Where the steps stop: one this small in standard deviations leaves far less to the next.
 _TOLERANCE_SD: Final = 0.1
+# After so many steps it is settled which pixels clip: a set that changes with every step never converges.
+_STEPS_TO_SETTLE: Final = 6
 # A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would choose.
 _CLIP_MARGIN_SD: Final = 2.0
 _RIDGE: Final = [np.eye(k) * 1e-10 + 1.0 for k in range(8)]
@@ -140,7 +142,7 @@ def fit_spots(win: Windows, start: Floats, noise: Noise, model: Model = Upright)
         model: `Upright` or `Sheared`.
     """
     params, guess, measured = start, noise, False
-    for _ in range(_MAX_STEPS):
+    for step in range(_MAX_STEPS):
         design, signal, residual, weight = _at(win, params, noise, model)
         cov, delta, converged = _solve(design, residual, weight)
         if converged.all() and not measured:
@@ -149,6 +151,8 @@ def fit_spots(win: Windows, start: Floats, noise: Noise, model: Model = Upright)
             weight = _weights(win, signal, params[:, BACKGROUND, None, None], noise)
             cov, delta, converged = _solve(design, residual, weight)
             measured = True
+        if step == _STEPS_TO_SETTLE and win.clip_dn is not None:
+            win = Windows(win.data, weight > 0)
         params = _moved(params, delta)
         if measured and converged.all():
             break

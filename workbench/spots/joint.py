@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from workbench.spots.fit import Windows, inverse
@@ -12,6 +13,7 @@ from workbench.spots.noise import Noise, photon_transfer_slope
 from workbench.spots.types import Floats
 
 _MAX_STEPS = 30
+_HIDDEN_SD = 5.0
 _MAX_MOVE_PX = 0.7
 _MAX_STRETCH = 0.3
 _LN_WIDTH_RANGE = (float(np.log(0.3)), float(np.log(12.0)))
@@ -28,10 +30,12 @@ class Joint:
     """(k, 3): of flux, u, v."""
     chi2: float
     """Sum of squared residuals over the variance of the fit that the evidence is asked of."""
+    residual: Floats
+    """(pixels,), DN."""
     weight: Floats
     """(pixels,)."""
-    slope_dn: float
-    """Photon-transfer slope that the residuals tell."""
+    noise: Noise
+    """With the photon-transfer slope that the residuals tell."""
     converged: bool
 
 
@@ -62,14 +66,13 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
             break
     sd = np.sqrt(np.maximum(np.diag(cov)[3:], 0.0)).reshape(-1, 3)
     leverage = ((cov @ jacobian) * jacobian).sum(axis=0)
-    slope = photon_transfer_slope(
-        signal, residual, used, leverage, Noise(noise.floor_dn2.ravel(), noise.slope_dn)
-    )
-    return Joint(params, sd, float(used @ residual**2), used, slope, converged)
+    images = (values.reshape(1, *win.shape) for values in (signal, residual, used, leverage))
+    measured = Noise(noise.floor_dn2, photon_transfer_slope(*images, noise))
+    return Joint(params, sd, float(used @ residual**2), residual, used, measured, converged)
 
 
 def _weights(win: Windows, signal: Floats, noise: Noise) -> Floats:
-    weights: Floats = 1.0 / (noise.floor_dn2.ravel() + noise.slope_dn * np.maximum(signal, 0.0))
+    weights: Floats = 1.0 / (noise.floor_dn2.ravel() + noise.slope_dn.ravel() * np.maximum(signal, 0.0))
     return weights if win.usable is None else weights * win.usable.ravel()
 
 
@@ -115,3 +118,23 @@ def evidence(one: float, two: float, pixels: int, parameters: int) -> float:
     """
     left = two / max(pixels - parameters, 1)
     return (one - two) / 3.0 / max(left, 1e-12)
+
+
+def hidden_spot(joint: Joint, win: Windows) -> Floats | None:
+    """(6,) first guess of a spot of the same widths that stands out of the residuals; None if there is none."""
+    su, sv = np.exp(joint.params[0, LN_SU:SHEAR])
+    weight = joint.weight.reshape(win.shape)
+    excess = weight * joint.residual.reshape(win.shape)
+    matched = cv2.GaussianBlur(excess, (0, 0), sigmaX=su, sigmaY=sv, borderType=cv2.BORDER_CONSTANT)
+    # The square of a Gaussian is a Gaussian narrower by sqrt(2), of the sum 1 / (4 pi su sv).
+    told = cv2.GaussianBlur(
+        weight, (0, 0), sigmaX=su / 2**0.5, sigmaY=sv / 2**0.5, borderType=cv2.BORDER_CONSTANT
+    )
+    told = np.maximum(told / (4.0 * np.pi * su * sv), 1e-12)
+    height = matched / np.sqrt(told)
+    row, col = np.unravel_index(int(height.argmax()), win.shape)
+    if height[row, col] < _HIDDEN_SD:
+        return None
+    hidden = joint.params[0].copy()
+    hidden[FLUX], hidden[U], hidden[V] = matched[row, col] / told[row, col], col, row
+    return hidden

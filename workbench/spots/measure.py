@@ -21,9 +21,10 @@ Ints = NDArray[np.intp]
 _HALVES_PX: Final = (5, 8, 13, 19)
 _REACH_WIDTHS: Final = 3.0
 # Narrower than any lens makes a spot: a hot pixel. (A pixel integrates; 0 is possible, 0.6 the least specified.)
-_MIN_WIDTH_PX: Final = 0.4
+_MIN_WIDTH_PX: Final = 0.5
 _MAX_WIDTH_PX: Final = 7.0
-_MIN_FLUX_SD: Final = 5.0
+_MIN_FLUX_SD: Final = 6.0
+_MIN_TOLD_SD: Final = 3.0
 _EDGE_WIDTHS: Final = 2.5
 _OFF_CENTRE_PX: Final = 1.5
 _OUTLIER_SD: Final = 6.0
@@ -65,7 +66,8 @@ _MOMENTS: Final = {half: _moment_matrix(half) for half in _HALVES_PX}
 
 def first_guess(win: Windows, peaks: Peaks, half: int) -> Floats:
     """(n, 6) start: width from the number of pixels above half the peak (2 pi ln 2 widths squared)."""
-    flat = win.data.reshape(len(win.data), -1)
+    data = win.data if win.usable is None else win.data * win.usable
+    flat = data.reshape(len(data), -1)
     start = np.zeros((len(flat), 6))
     if peaks.scale_px > FINE_PX:
         start[:, U:LN_SU] = half
@@ -97,18 +99,23 @@ def _without_outliers(win: Windows, fit: Fit) -> Windows | None:
     return Windows(win.data, ~few if win.usable is None else win.usable & ~few, win.clip_dn)
 
 
+def _rim_ratio(fit: Fit) -> Floats:
+    """(n,) mean square of the residuals at the window's rim over the predicted variance."""
+    excess = fit.residual * fit.residual
+    excess *= fit.weight
+    inner = np.add.reduce(excess[:, 1:-1, 1:-1], (1, 2))
+    ratio: Floats = (np.add.reduce(excess, (1, 2)) - inner) / (4 * (excess.shape[1] - 1))
+    return ratio
+
+
 def _local_floor(fit: Fit) -> Floats | None:
     """(n, 1, 1) floor of each window, raised where the window's rim is noisier than predicted; None if nowhere.
 
     Clutter and bright surroundings do that. The threshold is 5 sd of the estimate, so that an even scene keeps
     the strip's floor, which is known better.
     """
-    excess = fit.residual * fit.residual
-    excess *= fit.weight
-    rim = excess.sum(axis=(1, 2)) - excess[:, 1:-1, 1:-1].sum(axis=(1, 2))
-    count = 4 * (excess.shape[1] - 1)
-    ratio = rim / count
-    noisy = ratio > 1.0 + 5.0 * (2.0 / count) ** 0.5
+    ratio = _rim_ratio(fit)
+    noisy = ratio > 1.0 + 5.0 * (2.0 / (4 * (fit.residual.shape[1] - 1))) ** 0.5
     if not noisy.any():
         return None
     floor: Floats = fit.noise.floor_dn2 * np.where(noisy, ratio, 1.0)[:, None, None]
@@ -142,7 +149,7 @@ def _fit_tilted(win: Windows, fit: Fit, i: int) -> Fit | None:
     """Fit of spot `i` as an ellipse at any angle; None if that does not converge."""
     one = slice(i, i + 1)
     start = np.append(fit.params[one], [[0.0]], axis=1)
-    again = fit_spots(win.only(one), start, Noise(fit.noise.floor_dn2[one], fit.noise.slope_dn), Sheared)
+    again = fit_spots(win.only(one), start, Noise(fit.noise.floor_dn2[one], fit.noise.slope_dn[one]), Sheared)
     return again if again.converged[0] else None
 
 
@@ -162,11 +169,13 @@ def spot_flags(scene: Scene, u: float, v: float, su: float, sv: float) -> frozen
 def _are_spots(fit: Fit, params: Floats, shape: tuple[int, int]) -> Bools:
     """(n,) whether a fit ended on something that can be a spot inside the image."""
     # Of a spot whose place and shape were known: whether anything is there is not a question of its width.
-    told = np.einsum("nhw,nhw,nhw->n", fit.weight, fit.design.unit, fit.design.unit)
+    told = np.add.reduce(fit.weight * fit.design.unit**2, (1, 2)) / np.maximum(_rim_ratio(fit), 1.0)
     flux = params[:, FLUX]
     width = np.exp(0.5 * (params[:, 4] + params[:, 5]))
     u, v = params[:, U], params[:, V]
     ok = fit.converged & (flux > 0) & (flux * flux * told > _MIN_FLUX_SD**2)
+    # ... but a swelling of the background is not one: there flux and background cannot be told apart.
+    ok &= flux * flux > _MIN_TOLD_SD**2 * fit.cov[:, FLUX, FLUX]
     ok &= (width >= _MIN_WIDTH_PX) & (width <= _MAX_WIDTH_PX)
     ok &= (u >= -0.5) & (u <= shape[1] - 0.5) & (v >= -0.5) & (v <= shape[0] - 0.5)
     spots: Bools = ok
@@ -177,6 +186,7 @@ def _traces(scene: Scene, fit: Fit, params: Floats) -> list[Trace | None]:
     """What a fit found; None where it is no spot. `params` count from the image's first pixel."""
     peaks = fit.signal.max(axis=(1, 2)).tolist()
     sds = fit.sd_px.tolist()
+    slopes = fit.noise.slope_dn[:, 0, 0].tolist()
     widths = np.exp(params[:, LN_SU:SHEAR])
     means = np.sqrt(widths[:, 0] * widths[:, 1]).tolist()
     found: list[Trace | None] = []
@@ -187,19 +197,34 @@ def _traces(scene: Scene, fit: Fit, params: Floats) -> list[Trace | None]:
             continue
         flags = spot_flags(scene, u, v, *widths[i].tolist())
         spot = Spot(u, v, *sds[i], flux, means[i], peaks[i], flags)
-        found.append(Trace(spot, params[i], fit.noise.slope_dn))
+        found.append(Trace(spot, params[i], slopes[i]))
     return found
 
 
+def _apart(win: Windows, rows: Ints, cols: Ints, group: Ints, half: int) -> Windows:
+    """The windows of some peaks without the pixels that lie nearer to another peak."""
+    dv, du = rows - rows[group, None], cols - cols[group, None]
+    square = dv * dv + du * du
+    near = (square > 0) & (square <= (2 * half) ** 2)
+    if not near.any():
+        return win
+    usable = np.ones(win.data.shape, bool) if win.usable is None else win.usable.copy()
+    span = np.arange(-half, half + 1)
+    for i, k in zip(*np.nonzero(near), strict=True):
+        usable[i] &= 2 * (span[:, None] * dv[i, k] + span * du[i, k]) <= square[i, k]
+    return Windows(win.data, usable, win.clip_dn)
+
+
 def _fit_group(
-    scene: Scene, rows: Ints, cols: Ints, start: Floats, half: int
+    scene: Scene, rows: Ints, cols: Ints, group: Ints, start: Floats, half: int
 ) -> tuple[Floats, list[Trace | None]]:
     """Fit spots that share a size of window; `start` and the parameters count from the image's first pixel."""
-    win = scene.pair.cut(rows, cols, half)
-    origin = np.zeros((len(rows), 6))
-    origin[:, U] = cols - half
-    origin[:, V] = rows - half
-    noise = Noise(np.full((len(rows), 1, 1), scene.variance), scene.pair.clip_dn / _FULL_WELL_ELECTRONS)
+    win = _apart(scene.pair.cut(rows[group], cols[group], half), rows, cols, group, half)
+    origin = np.zeros((len(group), 6))
+    origin[:, U] = cols[group] - half
+    origin[:, V] = rows[group] - half
+    each = np.ones((len(group), 1, 1))
+    noise = Noise(scene.variance * each, scene.pair.clip_dn / _FULL_WELL_ELECTRONS * each)
     win, fit = _refined(win, fit_spots(win, start - origin, noise))
     params = fit.params + origin
     traces = _traces(scene, fit, params)
@@ -212,25 +237,25 @@ def _fit_group(
 
 def measure(scene: Scene, peaks: Peaks) -> list[Trace]:
     """Fit every peak and keep those that are spots."""
-    rows, cols = peaks.rows, peaks.cols
+    rows, cols = peaks.rows.copy(), peaks.cols.copy()
     if rows.size == 0:
         return []
     half = _HALVES_PX[0]
-    start = first_guess(scene.pair.cut(rows, cols, half), peaks, half)
+    todo = np.arange(rows.size)
+    start = first_guess(_apart(scene.pair.cut(rows, cols, half), rows, cols, todo, half), peaks, half)
     start[:, U] += cols - half
     start[:, V] += rows - half
     sizes = np.array([half_for(w) for w in np.exp(start[:, LN_SU]).tolist()])
     found: list[Trace | None] = [None] * rows.size
-    todo = np.arange(rows.size)
     for _ in range(3):
         again = []
         for half in sorted(set(sizes[todo].tolist())):
             group = todo[sizes[todo] == half]
-            params, traces = _fit_group(scene, rows[group], cols[group], start[group], half)
+            params, traces = _fit_group(scene, rows, cols, group, start[group], half)
             wanted = [half_for(w) for w in np.exp(params[:, LN_SU:SHEAR].max(axis=1)).tolist()]
             moved = np.maximum(np.abs(params[:, U] - cols[group]), np.abs(params[:, V] - rows[group]))
             for i, k in enumerate(group.tolist()):
-                found[k] = traces[i]
+                found[k] = traces[i] or found[k]
                 if traces[i] is not None and (wanted[i] > half or moved[i] > _OFF_CENTRE_PX):
                     again.append(k)
                     start[k] = params[i]

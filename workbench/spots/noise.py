@@ -14,6 +14,10 @@ _CLIP_SD = 4.0
 # Variance that rounding to whole numbers alone leaves in a frame.
 ROUNDING_DN2 = 1.0 / 12.0
 _SLOPE_ROUNDS = 3
+# Windows whose slope is more than this many times the median's are left to themselves.
+_ALIKE = 3.0
+# No camera's full well is this many times larger or smaller than assumed; a misfit can look as if it were.
+_SLOPE_SPAN = 30.0
 # The slope assumed so far weighs like this many pixels against the measured residuals.
 _PRIOR_PIXELS = 0.25
 
@@ -24,8 +28,8 @@ class Noise:
 
     floor_dn2: Floats
     """(n, 1, 1), one for each window: variance without signal, DN^2."""
-    slope_dn: float
-    """Variance per signal, DN^2 / DN."""
+    slope_dn: Floats
+    """(n, 1, 1): variance per signal, DN^2 / DN."""
 
 
 def level_and_variance(values: NDArray[np.float32]) -> tuple[float, float]:
@@ -51,8 +55,8 @@ def level_and_variance(values: NDArray[np.float32]) -> tuple[float, float]:
 
 def photon_transfer_slope(
     signal: Floats, residual: Floats, weight: Floats, leverage: Floats, noise: Noise
-) -> float:
-    """Variance per signal (DN) measured from the residuals of all spots of a frame.
+) -> Floats:
+    """(n, 1, 1) variance per signal (DN) measured from the residuals of all spots of a frame.
 
     On average a squared residual is its variance less the share that the fit has absorbed (its leverage), so
     what exceeds the floor is slope times signal. Weighted moments give the slope; the logarithm of the slope
@@ -74,17 +78,29 @@ def photon_transfer_slope(
     excess *= signal
     excess -= noise.floor_dn2 * kept
     kept *= signal
-    slope, pixels = noise.slope_dn, 0.0
-    square = weight * weight
+    slope, square = noise.slope_dn, weight * weight
     for _ in range(_SLOPE_ROUNDS):
-        told = float(np.vdot(square, kept))
-        if told <= 0.0:
-            return noise.slope_dn
-        measured = float(np.vdot(square, excess)) / told
-        pixels = told * slope**2
-        share = _PRIOR_PIXELS / (pixels + _PRIOR_PIXELS)
-        slope = noise.slope_dn**share * max(measured, 0.02 * noise.slope_dn) ** (1.0 - share)
+        told = np.add.reduce(square * kept, (1, 2))
+        excesses = np.add.reduce(square * excess, (1, 2))
+        slope = _agreed(told, excesses, slope, noise.slope_dn)
         square = noise.floor_dn2 + slope * signal
         square *= square
         np.divide(weight > 0, square, out=square)
-    return slope * (1.0 + 2.0 / max(pixels + 2.0, 8.0))
+    return slope
+
+
+def _agreed(told: Floats, excess: Floats, slope: Floats, assumed: Floats) -> Floats:
+    """(n, 1, 1) slope of each window: that of all windows which agree, its own where it is far above them.
+
+    A window that holds no spot, or two, looks as if its light were noisier; it must not speak for the others.
+    """
+    own = excess / np.maximum(told, 1e-30)
+    alike = own <= np.sort(own)[(len(own) - 1) // 2] * _ALIKE + 4.0 * np.sqrt(2.0 / np.maximum(told, 1e-30))
+    sums = np.where(alike, told @ alike, told), np.where(alike, excess @ alike, excess)
+    pixels = sums[0] * slope[:, 0, 0] ** 2
+    assumed = assumed[:, 0, 0]
+    measured = np.clip(sums[1] / np.maximum(sums[0], 1e-30), assumed / _SLOPE_SPAN, assumed * _SLOPE_SPAN)
+    share = _PRIOR_PIXELS / (pixels + _PRIOR_PIXELS)
+    agreed: Floats = assumed**share * measured ** (1.0 - share)
+    agreed *= 1.0 + 2.0 / np.maximum(pixels + 2.0, 8.0)
+    return agreed[:, None, None]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, Sheared, U, V, principal_axes
-from workbench.spots.joint import Joint, evidence, fit_joint, halves
+from workbench.spots.joint import Joint, evidence, fit_joint, halves, hidden_spot
 from workbench.spots.measure import Trace, half_for, spot_flags
 from workbench.spots.noise import Noise
 from workbench.spots.pair import Scene
@@ -17,13 +19,15 @@ from workbench.spots.types import Failure, Floats, Spot
 # F statistic that a second spot must reach: with some hundred pixels, chance gives this once in 1e9.
 _EVIDENCE = 15.0
 # Nearer than this, in widths, two spots move each other's centre.
-_OVERLAP_WIDTHS = 5.0
+_OVERLAP_WIDTHS = 4.0
+_TAIL_WIDTHS = 2.5
 _SAME_WIDTHS = 0.6
 _MIN_APART_WIDTHS = 1.0
 _MIN_SHARE = 0.08
 _MIN_FLUX_SD = 5.0
 _ELONGATED = 1.12
 _MAX_HALF_PX = 30
+_MAX_HIDDEN = 4
 
 
 def _apart_px(one: Trace, other: Trace) -> float:
@@ -39,15 +43,17 @@ def without_duplicates(traces: list[Trace]) -> list[Trace]:
     return kept
 
 
+def _disturbs(one: Trace, other: Trace) -> bool:
+    """Whether light of one spot falls into the window of the other."""
+    reach = max(one.reach_px, other.reach_px)
+    return _apart_px(one, other) < half_for(reach) + _TAIL_WIDTHS * reach
+
+
 def clusters(traces: list[Trace]) -> list[list[Trace]]:
-    """Groups of spots that overlap, the strongest first in each."""
+    """Groups of spots that disturb each other, the strongest first in each."""
     groups: list[list[Trace]] = []
     for trace in traces:
-        near = [
-            g
-            for g in groups
-            if any(_apart_px(trace, t) < _OVERLAP_WIDTHS * max(trace.reach_px, t.reach_px) for t in g)
-        ]
+        near = [g for g in groups if any(_disturbs(trace, t) for t in g)]
         groups = [g for g in groups if all(g is not n for n in near)]
         groups.append([*(t for g in near for t in g), trace])
     return [sorted(g, key=lambda t: -t.spot.flux_dn) for g in groups]
@@ -61,12 +67,17 @@ def _window(scene: Scene, points: Floats, reach_px: float) -> tuple[Windows, int
     return scene.pair.cut(np.array([row]), np.array([col]), half), row - half, col - half
 
 
-def _is_better(one: Joint, two: Joint, noise: Noise, win: Windows) -> bool:
+def _noise(scene: Scene, group: list[Trace]) -> Noise:
+    """To start from: of several measured slopes the lowest, for misfits only raise them."""
+    return Noise(np.full((1, 1, 1), scene.variance), np.full((1, 1, 1), min(t.slope_dn for t in group)))
+
+
+def _is_better(one: Joint, two: Joint, win: Windows) -> bool:
     """Whether the data ask for the last spot of `two`; `one` was fitted with the weights of `two`."""
     flux = two.params[:, FLUX]
     reach = float(np.exp(two.params[0, LN_SU:SHEAR].max()))
     points = two.params[:, U:LN_SU]
-    apart = min(float(np.hypot(*(points[-1] - p))) for p in points[:-1])
+    apart = min(float(np.hypot(*(p - q))) for p, q in combinations(points, 2))
     inside = bool((points >= 0).all() and (points < np.array(win.shape[::-1])).all())
     pixels = int((two.weight > 0).sum())
     return (
@@ -93,7 +104,11 @@ def _as_traces(scene: Scene, joint: Joint, row0: int, col0: int) -> list[Trace]:
         absolute = params.copy()
         absolute[U], absolute[V] = u, v
         traces.append(
-            Trace(Spot(u, v, float(sd[1]), float(sd[2]), flux, width, peak, flags), absolute, joint.slope_dn)
+            Trace(
+                Spot(u, v, float(sd[1]), float(sd[2]), flux, width, peak, flags),
+                absolute,
+                float(joint.noise.slope_dn[0, 0, 0]),
+            )
         )
     return traces
 
@@ -105,16 +120,52 @@ def fitted_together(scene: Scene, group: list[Trace]) -> list[Trace]:
     points = np.array([t.params[U:LN_SU] for t in group])
     win, row0, col0 = _window(scene, points, max(t.reach_px for t in group))
     starts = np.array([t.params[:SHEAR] for t in group]) - (0, 0, col0, row0, 0, 0)
-    noise = Noise(np.full((1, 1, 1), scene.variance), min(t.slope_dn for t in group))
+    noise = _noise(scene, group)
     best, chosen = fit_joint(win, starts[:1], noise), starts[:1]
     for start in starts[1:]:
         tried = np.vstack([chosen, start])
         more = fit_joint(win, tried, noise)
-        if _is_better(fit_joint(win, best.params, noise, more.weight), more, noise, win):
+        if _is_better(fit_joint(win, best.params, noise, more.weight), more, win):
             best, chosen = more, more.params
     if len(best.params) == 1:
         return group[:1]
-    return _as_traces(scene, fit_joint(win, best.params, Noise(noise.floor_dn2, best.slope_dn)), row0, col0)
+    return _as_traces(scene, fit_joint(win, best.params, best.noise), row0, col0)
+
+
+def grown(scene: Scene, group: list[Trace]) -> list[Trace]:
+    """A cluster with the neighbours that hide in its residuals, as long as the data ask for them."""
+    points = np.array([t.params[U:LN_SU] for t in group])
+    win, row0, col0 = _window(scene, points, max(t.reach_px for t in group))
+    start = np.array([t.params[:SHEAR] for t in group]) - (0, 0, col0, row0, 0, 0)
+    noise = _noise(scene, group)
+    best = fit_joint(win, start, noise)
+    while len(best.params) < len(group) + _MAX_HIDDEN:
+        better = next(
+            (m for p in _proposals(best, start, win) if (m := _asked_for(best, p, noise, win))), None
+        )
+        if better is None:
+            break
+        best = better
+    return group if len(best.params) == len(group) else _as_traces(scene, best, row0, col0)
+
+
+def _proposals(best: Joint, start: Floats, win: Windows) -> Iterator[Floats]:
+    """First guesses with one spot more: where the residuals rise, or two for a member that is wider than others."""
+    hidden = hidden_spot(best, win)
+    if hidden is not None:
+        yield np.vstack([best.params, hidden])
+    if len(best.params) == len(start):
+        narrowest = start[:, LN_SU:].min()
+        for i in np.flatnonzero(start[:, LN_SU:].max(axis=1) > narrowest + np.log(_ELONGATED)):
+            proposal = np.vstack([np.delete(best.params, i, axis=0), halves(np.append(start[i], 0.0))])
+            proposal[:, LN_SU:] = narrowest
+            yield proposal
+
+
+def _asked_for(best: Joint, proposal: Floats, noise: Noise, win: Windows) -> Joint | None:
+    """The fit from `proposal` if it explains the data far better than `best`."""
+    more = fit_joint(win, proposal, noise)
+    return more if _is_better(fit_joint(win, best.params, noise, more.weight), more, win) else None
 
 
 def split(scene: Scene, trace: Trace) -> list[Trace]:
@@ -122,14 +173,14 @@ def split(scene: Scene, trace: Trace) -> list[Trace]:
     win, row0, col0 = _window(scene, trace.params[None, U:LN_SU], 1.3 * trace.reach_px)
     start = np.zeros((1, 7))
     start[0, : trace.params.size] = trace.params - (0, 0, col0, row0, 0, 0, 0)[: trace.params.size]
-    noise = Noise(np.full((1, 1, 1), scene.variance), trace.slope_dn)
+    noise = _noise(scene, [trace])
     whole = fit_spots(win, start, noise, Sheared)
     short, long = principal_axes(whole.params[0])[0]
     if not whole.converged[0] or long < _ELONGATED * short:
         return [trace]
     two = fit_joint(win, halves(whole.params[0]), noise)
-    two = fit_joint(win, two.params, Noise(noise.floor_dn2, two.slope_dn))
+    two = fit_joint(win, two.params, two.noise)
     one = float(two.weight @ whole.residual.ravel() ** 2)
-    if not _is_better(replace(two, chi2=one), two, noise, win):
+    if not _is_better(replace(two, chi2=one), two, win):
         return [trace]
     return _as_traces(scene, two, row0, col0)
