@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from workbench.calibration.assess import Assessment, determined_by
 from workbench.calibration.fit import Fit
-from workbench.model.event import FitFinished, ParameterRecord, ResidualRecord
+from workbench.model.event import FitFinished, ParameterRecord, RejectedRecord, ResidualRecord
 
 
 def parameter_records(fit: Fit) -> tuple[ParameterRecord, ...]:
@@ -40,7 +40,7 @@ def fit_finished(fit: Fit, assessment: Assessment) -> FitFinished:
         residuals=_residuals(fit),
         rms_px=fit.rms_px,
         observations=len(fit.used),
-        rejected=len(fit.rejected),
+        rejected=tuple(RejectedRecord(source=r.source, reason=r.reason) for r in fit.rejected),
         verdict=assessment.verdict,
         reasons=assessment.reasons,
         warnings=assessment.warnings,

@@ -17,7 +17,7 @@ from rich.text import Text
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.procedure.run import Plan, run
-from workbench.report.tables import parameter_table, trial_table
+from workbench.report.tables import parameter_table, rejected_lines, trial_table
 from workbench.viewer.recording import RecordingConsumer
 
 
@@ -81,6 +81,8 @@ class Terminal:
                 self._end_step(e.outcome)
             case ev.FitFinished() as e:
                 self._console.print(parameter_table(e.parameters))
+                for line in rejected_lines(e.rejected):
+                    self._console.print(Padding(Text(f"not used: {line}"), (0, 0, 0, 5)))
             case ev.TrialFinished() as e:
                 self._console.print(trial_table(e.rows))
             case _:

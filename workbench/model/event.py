@@ -137,6 +137,14 @@ class ResidualRecord(FileModel):
     v_sd_px: float | None
 
 
+class RejectedRecord(FileModel):
+    """A capture or row that a fit left out."""
+
+    source: str
+    """`row 3` of a captures file, or the path of a frame."""
+    reason: str
+
+
 class FitFinished(FileModel):
     """A calibration has been fitted, accepted or not."""
 
@@ -145,7 +153,7 @@ class FitFinished(FileModel):
     residuals: tuple[ResidualRecord, ...]
     rms_px: float
     observations: int
-    rejected: int
+    rejected: tuple[RejectedRecord, ...]
     verdict: Literal["accepted", "refused"]
     reasons: tuple[str, ...]
     warnings: tuple[str, ...]

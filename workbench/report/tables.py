@@ -9,7 +9,7 @@ from rich.table import Table
 
 from workbench.calibration.assess import Derived
 from workbench.calibration.observations import Rejected
-from workbench.model.event import ParameterRecord, TrialRow
+from workbench.model.event import ParameterRecord, RejectedRecord, TrialRow
 from workbench.ranging.ranger import Reading
 
 DETERMINED_BY_WORDS = {"data": "data", "joint": "jointly", "prior": "prior"}
@@ -55,7 +55,7 @@ def derived_table(derived: Iterable[Derived]) -> Table:
     return table
 
 
-def rejected_lines(rejected: Iterable[Rejected]) -> list[str]:
+def rejected_lines(rejected: Iterable[Rejected | RejectedRecord]) -> list[str]:
     """What a fit left out, one line for each reason."""
     sources: dict[str, list[str]] = {}
     for r in rejected:
