@@ -15,7 +15,7 @@ def fit_summary(fit: FitFinished) -> str:
         _bullets("Why", fit.reasons),
         _bullets("Warnings", fit.warnings),
         f"**Residual** {fit.rms_px:.3f} px rms over {fit.observations} observations, "
-        f"{fit.rejected} rejected.",
+        f"{len(fit.rejected)} rejected.",
     ]
     return "\n\n".join(line for line in lines if line)
 
