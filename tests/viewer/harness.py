@@ -7,7 +7,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,14 @@ class Viewer:
 
     def open(self, recording: Path) -> None:
         """Load a recording and wait until it is the one on screen."""
-        self.client.open(str(recording))
+        self.client.open(str(recording.resolve()))
+        deadline = time.monotonic() + START_SECONDS
+        while time.monotonic() < deadline:
+            with suppress(ConnectionError):  # what it answers while nothing is on screen
+                self.client.get_blueprint()
+                return
+            time.sleep(0.1)
+        raise AssertionError(f"the viewer shows no recording after {START_SECONDS} s")
 
     def state(self) -> Any:
         """Recordings, timelines and views, with what the views report."""
