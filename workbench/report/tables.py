@@ -28,7 +28,7 @@ def parameter_table(parameters: Iterable[ParameterRecord]) -> Table:
             table.add_row(
                 p.name,
                 f"{significant(p.value, p.sd)}{unit}",
-                f"{p.sd:.2g}",
+                _two_digits(p.sd),
                 f"{p.prior_sd:g}",
                 f"{100 * p.data_share:.0f} %",
                 DETERMINED_BY_WORDS[p.determined_by],
@@ -50,7 +50,7 @@ def derived_table(derived: Iterable[Derived]) -> Table:
             significant(d.f_b_px_mm, d.f_b_sd),
             f"{d.f_b_sd:.3g}",
             significant(d.infinity_px, d.infinity_sd),
-            f"{d.infinity_sd:.2g}",
+            _two_digits(d.infinity_sd),
         )
     return table
 
@@ -112,7 +112,12 @@ def _and_more(names: list[str]) -> str:
 
 
 def _with_sd(value: float, sd: float) -> str:
-    return f"{significant(value, sd)} +- {sd:.2g}"
+    return f"{significant(value, sd)} +- {_two_digits(sd)}"
+
+
+def _two_digits(sd: float) -> str:
+    """Two significant digits, without an exponent for what a person would write out."""
+    return f"{float(f'{sd:.2g}'):g}"
 
 
 def _signed(value: float | None) -> str:
