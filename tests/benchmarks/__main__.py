@@ -21,7 +21,12 @@ def main() -> None:
     today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
     RESULTS.mkdir(parents=True, exist_ok=True)
     with (RESULTS / f"{today}-spots.txt").open("w") as file:
-        for part in ([f"Spots, {today}, Python {platform.python_version()}"], speed.lines(), detection.lines(), accuracy.lines()):
+        for part in (
+            [f"Spots, {today}, Python {platform.python_version()}"],
+            speed.lines(),
+            detection.lines(),
+            accuracy.lines(),
+        ):
             for line in part:
                 print(line, flush=True)
                 file.write(line + "\n")

@@ -60,7 +60,14 @@ def lasers(rng: np.random.Generator, ambient: Floats) -> tuple[Floats, list[Trut
     width = float(np.hypot(F_PX * (1.5 + 1.6e-3 * z_mm) / 4.0 / z_mm, BLUR_PX))
     light, truths = np.zeros(SHAPE), []
     # The exposure follows the brightest spot: automatic, up to twice too long.
-    most = rng.uniform(0.3, 2.0) * SENSOR.full_scale_dn * SENSOR.electrons_per_dn * 2.0 * np.pi * (width**2 + 0.1)
+    most = (
+        rng.uniform(0.3, 2.0)
+        * SENSOR.full_scale_dn
+        * SENSOR.electrons_per_dn
+        * 2.0
+        * np.pi
+        * (width**2 + 0.1)
+    )
     for baseline in BASELINES_MM:
         u = CENTRE_PX + F_PX * baseline / z_mm
         flux = min(FLUX_AT_1_M * rng.uniform(0.1, 1.0) * (1000.0 / z_mm) ** 2, most)
@@ -86,7 +93,9 @@ def nuisances(rng: np.random.Generator) -> tuple[Floats, Floats]:
         width = rng.uniform(0.7, 2.0)
         on += rng.uniform(2e3, 4e4) * spot(SHAPE, rng.uniform(0, SHAPE[1]), row, width, width)
     for frame, count in ((both, 20), (on, 2)):
-        frame[rng.integers(0, SHAPE[0], count), rng.integers(0, SHAPE[1], count)] += rng.uniform(500.0, 8000.0, count)
+        frame[rng.integers(0, SHAPE[0], count), rng.integers(0, SHAPE[1], count)] += rng.uniform(
+            500.0, 8000.0, count
+        )
     return on, both
 
 

@@ -1,0 +1,92 @@
+"""Bias, coverage and Fisher ratio on a small grid; `make bench` does the large one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.unit.spots.draw import Drawn, Sensor, draw
+from workbench.spots import Scanline, find_spots
+from workbench.spots.fisher import Camera, position_bound_px
+
+SENSOR = Sensor()
+COLUMNS = (25.0, 70.0, 115.0, 160.0)
+FRAMES = 40
+# Of n squared normal numbers the mean has sd sqrt(2 / n); the root half of that. Four sd: once in 16000.
+VALUES = 2 * FRAMES * len(COLUMNS)
+RMS_MARGIN = 4.0 * 0.5 * np.sqrt(2.0 / VALUES)
+
+
+def measured(width: float, electrons: float, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    errors, sds, phases = [], [], []
+    for _ in range(FRAMES):
+        drawn = [
+            Drawn(u + rng.uniform(-0.5, 0.5), 25 + rng.uniform(-0.5, 0.5), electrons, width, width)
+            for u in COLUMNS
+        ]
+        frame = draw(drawn, rng, (51, 186), SENSOR, 5.0)
+        spots = find_spots(frame, scanlines=[Scanline(0, 25, 1, 0, 3)], expected=4, saturation_dn=4095).spots
+        assert len(spots) == len(drawn)
+        for spot, true in zip(spots, drawn, strict=True):
+            errors.append((spot.u_px - true.u, spot.v_px - true.v))
+            sds.append((spot.u_sd_px, spot.v_sd_px))
+            phases.append((true.u % 1, true.v % 1))
+    return np.array(errors), np.array(sds), np.array(phases)
+
+
+@pytest.mark.parametrize(
+    ("width", "electrons", "seed"), [(0.6, 1e4, 1), (1.0, 1e3, 2), (1.5, 1e5, 3), (3.0, 1e4, 4)]
+)
+def test_centre_at_the_fisher_bound_with_an_honest_deviation(
+    width: float, electrons: float, seed: int
+) -> None:
+    errors, sds, phases = measured(width, electrons, seed)
+    camera = Camera(SENSOR.electrons_per_dn, SENSOR.read_sd, 5.0)
+    bounds = [position_bound_px(electrons, width, (u - 0.5, v - 0.5), camera) for u, v in phases[:8]]
+    ratio = np.sqrt((errors**2).mean() / np.mean(np.square(bounds)))
+    assert 1 - RMS_MARGIN < ratio < 1.15 + RMS_MARGIN
+    assert np.std(errors / sds) == pytest.approx(1.0, abs=0.05 + RMS_MARGIN)
+    wave = np.sin(2 * np.pi * phases).ravel()
+    assert abs((errors.ravel() * wave).mean() * 2) < 0.005 + 4 * errors.std() * np.sqrt(2 / VALUES)
+    assert abs(errors.mean()) < 4 * errors.std() / np.sqrt(VALUES)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.6, -0.8])
+def test_ellipses_are_measured_as_honestly(angle: float) -> None:
+    rng = np.random.default_rng(5)
+    z = []
+    for _ in range(60):
+        true = Drawn(30 + rng.uniform(-0.5, 0.5), 30 + rng.uniform(-0.5, 0.5), 3e4, 2.4, 1.2, angle)
+        (spot,) = find_spots(draw([true], rng, (61, 61), SENSOR, 5.0), expected=1, saturation_dn=4095).spots
+        z += [(spot.u_px - true.u) / spot.u_sd_px, (spot.v_px - true.v) / spot.v_sd_px]
+    # 120 values: the deviation of z has an sd of 1 / sqrt(240).
+    assert np.std(z) == pytest.approx(1.0, abs=0.05 + 4 / np.sqrt(240))
+
+
+def test_saturation_widens_the_deviation_and_is_told() -> None:
+    rng = np.random.default_rng(6)
+    low = Sensor(bits=10)
+    z, sds, bounds = [], [], []
+    for _ in range(40):
+        true = Drawn(30 + rng.uniform(-0.5, 0.5), 30 + rng.uniform(-0.5, 0.5), 2.5e5, 1.6, 1.6)
+        for sensor, store in ((low, sds), (Sensor(bits=14), bounds)):
+            frame = draw([true], np.random.default_rng(rng.integers(1 << 30)), (61, 61), sensor, 5.0)
+            finding = find_spots(frame, expected=1, saturation_dn=2**sensor.bits - 1)
+            (spot,) = finding.spots
+            store.append(spot.u_sd_px)
+            if sensor is low:
+                assert "saturated" in spot.flags
+                assert "saturated" in finding.failures
+                z.append((spot.u_px - true.u) / spot.u_sd_px)
+    assert np.mean(sds) > 1.2 * np.mean(bounds)
+    # 40 values: the deviation of z has an sd of 1 / sqrt(80).
+    assert np.std(z) < 1.0 + 0.05 + 4 / np.sqrt(80)
+
+
+def test_twelve_bits_in_sixteen_clip_at_their_own_full_scale() -> None:
+    frame = draw([Drawn(30, 30, 4e6, 1.6, 1.6)], np.random.default_rng(7), (61, 61))
+    (spot,) = find_spots(frame).spots
+    assert frame.dtype == np.uint16
+    assert "saturated" in spot.flags
+    assert spot.u_px == pytest.approx(30, abs=5 * spot.u_sd_px)

@@ -1,0 +1,172 @@
+"""Which spots are found, in which order, and what is said of those that are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.unit.spots.draw import Drawn, Sensor, draw
+from workbench.model.errors import BadInputError
+from workbench.spots import Failure, Scanline, SpotFinder, explain, find_spots
+from workbench.spots.thesis import thesis_centres
+
+ROW = [Scanline(0, 30, 1, 0, 3)]
+
+
+def rng(seed: int = 0) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        Scanline(0, 30, 1, 0, 2),
+        Scanline(0, 30, -1, 0, 2),
+        Scanline(30, 0, 0, 1, 2),
+        Scanline(0, 0, 1, 1, 2),
+        Scanline(0, 59, 2, -2, 2),
+        Scanline(0, 20, 3, 1, 2),
+    ],
+)
+def test_spots_on_a_line_come_in_its_order(line: Scanline) -> None:
+    centre = {
+        (1, 0): (30, 30),
+        (-1, 0): (30, 30),
+        (0, 1): (30, 30),
+        (1, 1): (30, 30),
+        (2, -2): (30, 29),
+        (3, 1): (30, 30),
+    }
+    middle = np.array(centre[line.du, line.dv], float)
+    along = np.array([line.du, line.dv]) / np.hypot(line.du, line.dv)
+    places = [middle + t * along for t in (-16.0, 0.3, 15.0)]
+    frame = draw([Drawn(*p) for p in places], rng(), (60, 60))
+    spots = find_spots(frame, scanlines=[line], expected=3).spots
+    np.testing.assert_allclose([(s.u_px, s.v_px) for s in spots], places, atol=0.1)
+
+
+def test_two_scanlines_at_once() -> None:
+    frame = draw([Drawn(15, 30), Drawn(45, 30), Drawn(30, 12)], rng(), (60, 60))
+    lines = [Scanline(0, 30, 1, 0, 2), Scanline(30, 0, 0, 1, 2)]
+    assert [round(s.u_px) for s in find_spots(frame, scanlines=lines, expected=3).spots] == [15, 30, 45]
+
+
+def test_a_change_of_ambient_light_is_told_and_compensated() -> None:
+    scene = np.where(np.arange(120) % 40 < 20, 300.0, 1500.0) * np.ones((60, 1))
+    true = [Drawn(20.3, 30.2), Drawn(62, 30.2), Drawn(101.4, 29.8)]
+    on, off = draw(true, rng(1), ambient=1.4 * scene), draw([], rng(2), ambient=scene)
+    finding = find_spots(on, off, scanlines=ROW, expected=3)
+    assert finding.failures == (Failure.AMBIENT_CHANGED,)
+    for spot, t in zip(finding.spots, true, strict=True):
+        assert spot.u_px == pytest.approx(t.u, abs=5 * spot.u_sd_px)
+
+
+def test_steady_light_is_no_change() -> None:
+    on, off = draw([Drawn(50, 30)], rng(1), ambient=200.0), draw([], rng(2), ambient=200.0)
+    assert find_spots(on, off, scanlines=ROW, expected=1).failures == ()
+
+
+def test_hot_pixels_and_reflections_are_no_spots() -> None:
+    frame = draw([Drawn(40, 30), Drawn(80, 14)], rng()).copy()
+    frame[30, 60] = frame[29, 90] = 3000
+    finding = find_spots(frame, scanlines=ROW)
+    assert [round(s.u_px) for s in finding.spots] == [40]
+
+
+def test_a_hot_pixel_inside_a_spot_does_not_move_it() -> None:
+    frame = draw([Drawn(40.2, 30, 5e4, 2.0, 2.0)], rng()).copy()
+    frame[31, 43] += 1500
+    (spot,) = find_spots(frame, scanlines=ROW).spots
+    assert spot.u_px == pytest.approx(40.2, abs=5 * spot.u_sd_px)
+
+
+@pytest.mark.parametrize("apart", [2.6, 3.5, 5.0, 8.0])
+def test_overlapping_spots_are_separated(apart: float) -> None:
+    true = [Drawn(50, 30, 4e4), Drawn(50 + apart, 30.2, 2e4)]
+    finding = find_spots(draw(true, rng(3), ambient=5.0), scanlines=ROW, expected=2)
+    assert len(finding.spots) == 2
+    for spot, t in zip(finding.spots, true, strict=True):
+        assert spot.u_px == pytest.approx(t.u, abs=5 * spot.u_sd_px)
+    assert (Failure.MERGED in finding.failures) == (apart < 4 * 1.3)
+
+
+def test_an_ellipse_is_not_split() -> None:
+    frame = draw([Drawn(50, 30, 4e4, 2.6, 1.3)], rng(4), ambient=5.0)
+    assert len(find_spots(frame, scanlines=ROW).spots) == 1
+
+
+NOISE = draw([], rng(8))
+PROVOKED = [
+    (Failure.NO_SPOT, NOISE, 1),
+    (Failure.TOO_FEW, draw([Drawn(40, 30)], rng(8)), 2),
+    (Failure.TOO_MANY, draw([Drawn(30, 30), Drawn(60, 30)], rng(8)), 1),
+    (Failure.TOO_DIM, draw([Drawn(60, 30, 190.0)], rng(11)), 1),
+    (Failure.SATURATED, draw([Drawn(60, 30, 4e6)], rng(8)), 1),
+    (Failure.OFF_SCANLINE, draw([Drawn(60, 12)], rng(8)), 1),
+    (Failure.MERGED, draw([Drawn(60, 30, 5e4), Drawn(63, 30, 5e4)], rng(8)), 2),
+    (Failure.AT_EDGE, draw([Drawn(1.0, 30)], rng(8)), 1),
+]
+
+
+@pytest.mark.parametrize(("failure", "frame", "expected"), PROVOKED, ids=[p[0].value for p in PROVOKED])
+def test_each_failure_is_named(failure: Failure, frame: np.ndarray, expected: int) -> None:
+    assert failure in find_spots(frame, scanlines=ROW, expected=expected).failures
+
+
+def test_every_failure_is_explained_with_cause_and_remedy() -> None:
+    for failure in Failure:
+        words = explain(failure)
+        assert "Cause: " in words
+        assert "Do: " in words
+
+
+def test_a_spot_at_the_edge_is_honest() -> None:
+    z = []
+    for seed in range(40):
+        (spot,) = find_spots(
+            draw([Drawn(0.4, 30, 3e4)], rng(seed), ambient=5.0), scanlines=ROW, expected=1
+        ).spots
+        assert Failure.AT_EDGE in spot.flags
+        z.append((spot.u_px - 0.4) / spot.u_sd_px)
+    assert np.std(z) == pytest.approx(1.0, abs=0.05 + 4 / np.sqrt(80))
+
+
+@pytest.mark.parametrize(
+    ("on", "off", "words"),
+    [
+        (np.zeros((4, 4, 3), np.uint8), None, "colour"),
+        (np.zeros((4, 4)), None, "float64"),
+        ([[1, 2]], None, "list"),
+        (np.zeros((0, 4), np.uint8), None, "no pixel"),
+        (np.zeros((4, 4), np.uint8), np.zeros((4, 5), np.uint8), "size and depth"),
+        (np.zeros((4, 4), np.uint8), np.zeros((4, 4), np.uint16), "size and depth"),
+    ],
+)
+def test_bad_input_is_refused_in_words(on: np.ndarray, off: np.ndarray | None, words: str) -> None:
+    with pytest.raises(BadInputError, match=words):
+        find_spots(on, off)
+
+
+@pytest.mark.parametrize(
+    "line", [Scanline(0, 0, 0, 0, 3), Scanline(0, 0, 1, 0, 0), Scanline(0, float("nan"), 1, 0, 3)]
+)
+def test_bad_scanlines_are_refused(line: Scanline) -> None:
+    with pytest.raises(BadInputError, match="scanline"):
+        find_spots(NOISE, scanlines=[line])
+
+
+def test_a_finder_refuses_another_size() -> None:
+    with pytest.raises(BadInputError, match="SpotFinder"):
+        SpotFinder((10, 10)).find(NOISE)
+
+
+def test_a_scanline_beside_the_image_holds_no_spot() -> None:
+    assert Failure.NO_SPOT in find_spots(NOISE, scanlines=[Scanline(0, 500, 1, 0, 3)]).failures
+
+
+def test_the_chain_of_the_thesis_finds_the_same_spots_less_exactly() -> None:
+    sensor = Sensor(electrons_per_dn=20.0, bits=8)
+    true = [Drawn(30.4, 30.2, 3e4), Drawn(80.1, 29.9, 3e4)]
+    on, off = draw(true, rng(1), sensor=sensor), draw([], rng(2), sensor=sensor)
+    centres = thesis_centres(on, off, scanlines=ROW, expected=2)
+    assert sorted(np.round(centres[:, 0])) == [30, 80]

@@ -1,0 +1,80 @@
+"""The chain of the thesis that this workbench grew from, kept for comparison: threshold, scanline, centroid.
+
+Deborah L. Tran, "Obstacle Detection for Robot Navigation Using Structured Light", MIT 2001, sections 3.4 and
+5.2.3. Its centre is biased wherever the threshold cuts a spot off, and it knows no standard deviation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from workbench.spots.frames import check_pair
+from workbench.spots.strip import check_line, distance_px
+from workbench.spots.types import Bools, Floats, Image, Scanline
+
+_FIRST_THRESHOLD_DN = 50.0
+_MIN_THRESHOLD_DN = 4.0
+_MAX_TRIES = 12
+
+
+def thesis_centres(
+    on: Image,
+    off: Image | None = None,
+    *,
+    scanlines: Sequence[Scanline] = (),
+    expected: int,
+    ambiguous_px: float = 0.0,
+) -> Floats:
+    """(k, 2) centroids (u, v) in pixels, brightest first; k may differ from `expected`.
+
+    Args:
+        on: Frame with the lasers on.
+        off: Frame with the lasers off; None where a filter keeps the ambient light out.
+        scanlines: Pixels further than the half-width from all of them are dropped; none keeps all.
+        expected: Number of lasers: the threshold is halved while nothing is seen, raised while too much is.
+        ambiguous_px: Pixels nearer than this to more than one scanline are dropped: nobody can say whose they are.
+
+    Raises:
+        BadInputError: as `find_spots`.
+    """
+    on, off = check_pair(on, off)
+    for line in scanlines:
+        check_line(line)
+    diff = on.astype(np.float64) if off is None else cv2.subtract(on, off).astype(np.float64)
+    diff *= _allowed(diff.shape, scanlines, ambiguous_px)
+    threshold, best = _FIRST_THRESHOLD_DN, np.zeros((0, 2))
+    for _ in range(_MAX_TRIES):
+        centres = _centroids(diff, threshold)
+        if len(centres):
+            best = centres
+        if len(centres) == expected or threshold < _MIN_THRESHOLD_DN:
+            break
+        threshold *= 1.3 if len(centres) > expected else 0.5
+    return best
+
+
+def _allowed(shape: tuple[int, ...], scanlines: Sequence[Scanline], ambiguous_px: float) -> Bools:
+    """Pixels on a scanline, and not near to two."""
+    if not scanlines:
+        return np.ones(shape, bool)
+    v, u = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
+    distances = np.stack([distance_px(line, u, v) for line in scanlines])
+    on_a_line: Bools = (distances <= np.array([li.half_width_px for li in scanlines])[:, None, None]).any(
+        axis=0
+    )
+    return on_a_line & ((distances < ambiguous_px).sum(axis=0) < 2)
+
+
+def _centroids(diff: Floats, threshold: float) -> Floats:
+    """Centres of mass of the connected pixels above the threshold, by falling mass."""
+    above = (diff > threshold).astype(np.uint8)
+    count, labels = cv2.connectedComponents(above)
+    kept = diff * above
+    v, u = np.mgrid[: diff.shape[0], : diff.shape[1]]
+    sums = [np.bincount(labels.ravel(), (kept * w).ravel(), count)[1:] for w in (1, u, v)]
+    order = np.argsort(-sums[0], kind="stable")
+    centres: Floats = np.stack([sums[1], sums[2]], axis=1)[order] / sums[0][order, None]
+    return centres
