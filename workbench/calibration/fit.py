@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 from jax import Array
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtrc
 
 from workbench.calibration.observations import Cells, PlacementInfo, Rejected, Sighting, group, positions
@@ -26,10 +26,9 @@ from workbench.calibration.parameters import (
     placement_parameters,
     sensor_parameters,
 )
+from workbench.calibration.prediction import predict_cell
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Prior, Rig
-from workbench.optics.lens import Lens
-from workbench.optics.rays import Plane, Ray, spot_on_plane
 
 FloatArray = NDArray[np.float64]
 SCATTER_SIGNIFICANCE = 0.01
@@ -98,7 +97,7 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
     """
     _check_lasers(rig, sightings)
     cells, strays = group(sightings, rig.laser_ids, rig.noise)
-    table = _table(rig, cells.placements)
+    table = table_of(rig, cells.placements)
     problem = _Problem.of(rig, table, cells)
     scale = 1.0
     for _ in range(10):
@@ -146,6 +145,14 @@ def data_share(jacobian: FloatArray, table: ParameterTable) -> FloatArray:
     variance = np.diag(np.linalg.inv(information + np.eye(len(information)) / FLAT_PRIOR_SD**2))
     share[sensor] = np.where(table.prior_sd[sensor] > 0, 1.0 / (1.0 + variance), 0.0)
     return share
+
+
+def scale_called_for(chi2: ArrayLike, freedom: ArrayLike) -> FloatArray:
+    """Factor on the stated pixel noise that residuals of this chi2 call for, 1 where they agree with it."""
+    chi2, freedom = np.asarray(chi2, float), np.asarray(freedom, float)
+    countable = np.where(freedom > 0, freedom, 1.0)
+    improbable = (freedom > 0) & (chdtrc(countable, chi2) < SCATTER_SIGNIFICANCE)
+    return np.where(improbable, np.maximum(1.0, np.sqrt(chi2 / countable)), 1.0)
 
 
 @dataclass(frozen=True)
@@ -199,7 +206,6 @@ class _Problem:
         count = int((self.inverse_sd > 0).sum())
         freedom = count - float(np.trace(information @ covariance))
         chi2 = float(residual @ residual) * scale**2
-        improbable = freedom > 0 and chdtrc(freedom, chi2) < SCATTER_SIGNIFICANCE
         pixels = -residual.reshape(-1, 2) / np.where(self.inverse_sd > 0, self.inverse_sd / scale, np.nan)
         return _Solution(
             y=np.asarray(y),
@@ -208,7 +214,7 @@ class _Problem:
             residual_px=pixels,
             chi2=chi2,
             degrees_of_freedom=freedom,
-            scale_called_for=max(1.0, (chi2 / freedom) ** 0.5) if improbable else 1.0,
+            scale_called_for=float(scale_called_for(chi2, freedom)),
             converged=bool(converged),
         )
 
@@ -254,18 +260,16 @@ def predict(values: Array, lasers: int, laser: Array, placement: Array, standoff
         placement: (N,) index of the placement.
         standoff_mm: standoffs of all placements by the ruler.
     """
-    lens_end, reference_end = len(LENS), len(LENS) + len(REFERENCE)
-    sensor_end = reference_end + len(RAY) * lasers
-    offset_mm, ruler_scale = values[lens_end:reference_end]
-    rays = values[reference_end:sensor_end].reshape(lasers, len(RAY))[laser]
-    errors = values[sensor_end:].reshape(-1, len(PLACEMENT))
-    z0_mm = standoff_mm * (1.0 + ruler_scale) + errors[:, 0] + offset_mm
-    plane = Plane(z0_mm[placement], errors[placement, 1], errors[placement, 2])
-    u, v = spot_on_plane(Lens(*values[:lens_end]), Ray(*rays.T), plane)
+    common = len(LENS) + len(REFERENCE)
+    sensor_end = common + len(RAY) * lasers
+    rays = values[common:sensor_end].reshape(lasers, len(RAY))[laser]
+    errors = values[sensor_end:].reshape(-1, len(PLACEMENT))[placement]
+    u, v = predict_cell((*values[:common], *rays.T, *errors.T), standoff_mm[placement])
     return jnp.stack([u, v], axis=1)
 
 
-def _table(rig: Rig, placements: Sequence[PlacementInfo]) -> ParameterTable:
+def table_of(rig: Rig, placements: Sequence[PlacementInfo]) -> ParameterTable:
+    """All parameters of a fit: the sensor's by the rig, then each placement's by rig and captures."""
     nuisances = placement_parameters(rig, [p.key for p in placements])
     told = {p.key: p for p in placements}
     return ParameterTable((*sensor_parameters(rig), *(_as_told(n, told) for n in nuisances)))
