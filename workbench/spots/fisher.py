@@ -6,6 +6,7 @@ Derivation: docs/spots.md.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.special import gammaln, ndtr, xlogy
@@ -33,9 +34,12 @@ def pixel_information(electrons: float, camera: Camera) -> float:
     Exact for Poisson electrons, Gaussian read noise and rounding, averaged over the position of the mean between
     two numbers; above 400 electrons the inverse of the variance.
     """
-    step, read = camera.electrons_per_dn, camera.read_sd_electrons
+    read = camera.read_sd_electrons
+    least = 1.0 / _variance(electrons, camera)
     if electrons > _MANY_ELECTRONS:
-        return 1.0 / (electrons + read**2 + step**2 / 12.0)
+        return least
+    # Rounding finer than the read noise or than single electrons takes nothing away.
+    step = max(camera.electrons_per_dn, 0.25 * read, 0.25)
     count = np.arange(0, int(electrons + 10.0 * np.sqrt(electrons) + 20.0))
     mass = np.exp(xlogy(count, electrons) - electrons - gammaln(count + 1.0))
     by_mean = np.concatenate([[0.0], mass[:-1]]) - mass
@@ -51,12 +55,17 @@ def pixel_information(electrons: float, camera: Camera) -> float:
     return float(np.mean(told))
 
 
-def information_curve(camera: Camera, most_electrons: float) -> tuple[Floats, Floats]:
-    """Tabulated `pixel_information` over the mean, dense enough for linear interpolation."""
-    few = np.linspace(0.05, min(_MANY_ELECTRONS, most_electrons + 1.0), 60)
-    many = np.geomspace(_MANY_ELECTRONS * 1.0001, max(most_electrons, _MANY_ELECTRONS * 1.01), 60)
-    means = np.concatenate([few, many])
-    return means, np.array([pixel_information(float(m), camera) for m in means])
+def _variance(electrons: float, camera: Camera) -> float:
+    """Of a pixel's number, electrons^2: shot, read, rounding."""
+    return electrons + camera.read_sd_electrons**2 + camera.electrons_per_dn**2 / 12.0
+
+
+@lru_cache(maxsize=16)
+def _excess_curve(camera: Camera) -> tuple[Floats, Floats]:
+    """How much more than the inverse variance a pixel tells, over the mean; 1 above `_MANY_ELECTRONS`."""
+    means = np.geomspace(0.05, _MANY_ELECTRONS, 24)
+    excess = np.array([pixel_information(float(m), camera) * _variance(float(m), camera) for m in means])
+    return means, np.append(excess[:-1], 1.0)
 
 
 def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera) -> Floats:
@@ -74,8 +83,9 @@ def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, floa
     mean = camera.background_electrons + electrons * rows[FLUX]
     jacobian = rows.copy()
     jacobian[2:] *= electrons
-    means, told = information_curve(camera, float(mean.max()))
-    matrix: Floats = (jacobian * np.interp(mean, means, told)) @ jacobian.T
+    means, excess = _excess_curve(camera)
+    variance = mean + camera.read_sd_electrons**2 + camera.electrons_per_dn**2 / 12.0
+    matrix: Floats = (jacobian * np.interp(mean, means, excess) / variance) @ jacobian.T
     return matrix
 
 

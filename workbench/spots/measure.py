@@ -122,15 +122,15 @@ def _local_floor(fit: Fit) -> Floats | None:
     return floor
 
 
-def _refined(win: Windows, fit: Fit) -> tuple[Windows, Fit]:
+def _refined(win: Windows, fit: Fit, guess: Noise) -> tuple[Windows, Fit]:
     """The fit again where its residuals ask for it: hot pixels, a noisier surrounding."""
     cleaned = _without_outliers(win, fit)
     if cleaned is not None:
         win = cleaned
-        fit = fit_spots(win, fit.params, fit.noise)
+        fit = fit_spots(win, fit.params, guess)
     floor = _local_floor(fit)
     if floor is not None:
-        fit = fit_spots(win, fit.params, Noise(floor, fit.noise.slope_dn))
+        fit = fit_spots(win, fit.params, Noise(floor, guess.slope_dn))
     return win, fit
 
 
@@ -145,11 +145,11 @@ def _tilted(fit: Fit) -> Bools:
     return tilted
 
 
-def _fit_tilted(win: Windows, fit: Fit, i: int) -> Fit | None:
+def _fit_tilted(win: Windows, fit: Fit, i: int, guess: Noise) -> Fit | None:
     """Fit of spot `i` as an ellipse at any angle; None if that does not converge."""
     one = slice(i, i + 1)
     start = np.append(fit.params[one], [[0.0]], axis=1)
-    again = fit_spots(win.only(one), start, Noise(fit.noise.floor_dn2[one], fit.noise.slope_dn[one]), Sheared)
+    again = fit_spots(win.only(one), start, Noise(fit.noise.floor_dn2[one], guess.slope_dn[one]), Sheared)
     return again if again.converged[0] else None
 
 
@@ -225,11 +225,11 @@ def _fit_group(
     origin[:, V] = rows[group] - half
     each = np.ones((len(group), 1, 1))
     noise = Noise(scene.variance * each, scene.pair.clip_dn / _FULL_WELL_ELECTRONS * each)
-    win, fit = _refined(win, fit_spots(win, start - origin, noise))
+    win, fit = _refined(win, fit_spots(win, start - origin, noise), noise)
     params = fit.params + origin
     traces = _traces(scene, fit, params)
     for i in np.flatnonzero(_tilted(fit)):
-        again = _fit_tilted(win, fit, int(i))
+        again = _fit_tilted(win, fit, int(i), noise)
         if again is not None:
             traces[i] = _traces(scene, again, again.params + np.append(origin[i], 0.0))[0]
     return params, traces

@@ -92,11 +92,12 @@ def _is_better(one: Joint, two: Joint, win: Windows) -> bool:
 
 def _as_traces(scene: Scene, joint: Joint, row0: int, col0: int) -> list[Trace]:
     traces = []
-    for params, sd in zip(joint.params, joint.sd, strict=True):
+    for i, (params, sd) in enumerate(zip(joint.params, joint.sd, strict=True)):
         su, sv = (float(s) for s in np.exp(params[LN_SU:SHEAR]))
         u, v, flux = float(params[U]) + col0, float(params[V]) + row0, float(params[FLUX])
         flags = spot_flags(scene, u, v, su, sv)
-        apart = min(float(np.hypot(*(params - p)[U:LN_SU])) for p in joint.params if p is not params)
+        others = np.delete(joint.params, i, axis=0)[:, U:LN_SU]
+        apart = float(np.hypot(*(others - params[U:LN_SU]).T).min())
         if apart < _OVERLAP_WIDTHS * max(su, sv):
             flags |= {Failure.MERGED}
         width = float(np.sqrt(su * sv))

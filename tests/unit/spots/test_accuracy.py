@@ -8,6 +8,7 @@ import pytest
 from tests.unit.spots.draw import Drawn, Sensor, draw
 from workbench.spots import Scanline, find_spots
 from workbench.spots.fisher import Camera, position_bound_px
+from workbench.spots.gaussian import Upright
 
 SENSOR = Sensor()
 COLUMNS = (25.0, 70.0, 115.0, 160.0)
@@ -64,24 +65,39 @@ def test_ellipses_are_measured_as_honestly(angle: float) -> None:
     assert np.std(z) == pytest.approx(1.0, abs=0.05 + 4 / np.sqrt(240))
 
 
-def test_saturation_widens_the_deviation_and_is_told() -> None:
+def test_saturation_widens_the_deviation_as_the_lost_pixels_demand() -> None:
     rng = np.random.default_rng(6)
-    low = Sensor(bits=10)
-    z, sds, bounds = [], [], []
+    low, high = Sensor(bits=10), Sensor(bits=16)
+    z, ratios, demanded = [], [], []
     for _ in range(40):
-        true = Drawn(30 + rng.uniform(-0.5, 0.5), 30 + rng.uniform(-0.5, 0.5), 2.5e5, 1.6, 1.6)
-        for sensor, store in ((low, sds), (Sensor(bits=14), bounds)):
-            frame = draw([true], np.random.default_rng(rng.integers(1 << 30)), (61, 61), sensor, 5.0)
+        true = Drawn(30 + rng.uniform(-0.5, 0.5), 30 + rng.uniform(-0.5, 0.5), 1e6, 1.6, 1.6)
+        seed = int(rng.integers(1 << 30))
+        sds = {}
+        for sensor in (low, high):
+            frame = draw([true], np.random.default_rng(seed), (61, 61), sensor, 5.0)
             finding = find_spots(frame, expected=1, saturation_dn=2**sensor.bits - 1)
             (spot,) = finding.spots
-            store.append(spot.u_sd_px)
+            sds[sensor.bits] = spot.u_sd_px
+            assert ("saturated" in spot.flags) == ("saturated" in finding.failures) == (sensor is low)
             if sensor is low:
-                assert "saturated" in spot.flags
-                assert "saturated" in finding.failures
                 z.append((spot.u_px - true.u) / spot.u_sd_px)
-    assert np.mean(sds) > 1.2 * np.mean(bounds)
+        ratios.append(sds[10] / sds[16])
+        demanded.append(lost_to_clipping(true, low))
+    # A window's slope is measured from some tens of pixels: a few per cent in the mean of 40 ratios.
+    assert np.mean(ratios) == pytest.approx(np.mean(demanded), rel=0.15)
+    assert np.mean(demanded) > 1.15
     # 40 values: the deviation of z has an sd of 1 / sqrt(80).
-    assert np.std(z) < 1.0 + 0.05 + 4 / np.sqrt(80)
+    assert np.std(z) == pytest.approx(1.0, abs=0.05 + 4 / np.sqrt(80))
+
+
+def lost_to_clipping(true: Drawn, sensor: Sensor) -> float:
+    """Bound of u without the pixels that clip, over the bound with all."""
+    rows = Upright(np.array([[0.0, 1.0, true.u, true.v, np.log(1.6), np.log(1.6)]]), (61, 61)).rows()[0]
+    mean = 5.0 + true.electrons * rows[1]
+    weight = 1.0 / (mean + sensor.read_sd**2 + sensor.electrons_per_dn**2 / 12)
+    whole = mean < (2**sensor.bits - 1 - sensor.black_dn) * sensor.electrons_per_dn
+    bounds = [np.linalg.inv((rows * (weight * kept)) @ rows.T)[2, 2] ** 0.5 for kept in (whole, 1.0)]
+    return float(bounds[0] / bounds[1])
 
 
 def test_twelve_bits_in_sixteen_clip_at_their_own_full_scale() -> None:
