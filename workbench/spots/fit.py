@@ -19,6 +19,8 @@ _LOWEST: Final = np.array([-np.inf, -np.inf, -np.inf, -np.inf, np.log(0.15), np.
 _HIGHEST: Final = np.array([np.inf, np.inf, np.inf, np.inf, np.log(12.0), np.log(12.0), 3.0])
 # Where the steps stop: one this small in standard deviations leaves far less to the next.
 _TOLERANCE_SD: Final = 0.1
+# One window that never converges must not keep the noise of the others from being measured.
+_STEPS_TO_MEASURE: Final = 8
 # After so many steps it is settled which pixels clip: a set that changes with every step never converges.
 _STEPS_TO_SETTLE: Final = 6
 # A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would choose.
@@ -145,7 +147,7 @@ def fit_spots(win: Windows, start: Floats, noise: Noise, model: Model = Upright)
     for step in range(_MAX_STEPS):
         design, signal, residual, weight = _at(win, params, noise, model)
         cov, delta, converged = _solve(design, residual, weight)
-        if converged.all() and not measured:
+        if not measured and (converged.all() or step == _STEPS_TO_MEASURE):
             leverage = design.leverage(cov)
             noise = Noise(guess.floor_dn2, photon_transfer_slope(signal, residual, weight, leverage, guess))
             weight = _weights(win, signal, params[:, BACKGROUND, None, None], noise)

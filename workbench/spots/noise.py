@@ -16,7 +16,7 @@ ROUNDING_DN2 = 1.0 / 12.0
 _SLOPE_ROUNDS = 3
 # Windows whose slope is more than this many times the median's are left to themselves.
 _ALIKE = 3.0
-# No camera's full well is this many times larger or smaller than assumed; a misfit can look as if it were.
+# Full wells of 3e5 and 300 electrons bound every camera; a misfit, or a few lucky pixels, can look beyond.
 _SLOPE_SPAN = 30.0
 # The slope assumed so far weighs like this many pixels against the measured residuals.
 _PRIOR_PIXELS = 0.25
