@@ -34,6 +34,13 @@ class Camera(Protocol):
             RigNotReadyError: the camera does not deliver.
         """
 
+    def grab_ambient(self) -> Frame:
+        """As `grab`, exposed for room light rather than for spots, which are some 1000 times brighter.
+
+        Raises:
+            RigNotReadyError: the camera does not deliver.
+        """
+
     def close(self) -> None:
         """Release the device."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from workbench.devices.protocols import Frame, Image
 from workbench.emulator.keyed import generator
 from workbench.emulator.scene import Scene
-from workbench.emulator.sensor import Sensor
+from workbench.emulator.sensor import Map, Sensor
 from workbench.emulator.spec import EmulatorSpec
 from workbench.emulator.spot import Spot
 
@@ -22,6 +22,8 @@ class Exposure:
     """What one frame was exposed to."""
 
     spots: tuple[Spot, ...]
+    picture: Map | None
+    """What room light shows, see `Scene.picture`."""
     lit: bool
     key: str
     number: int
@@ -48,6 +50,7 @@ class EmulatedCamera:
         self._frames = 0
         self._metered: tuple[int, float, float] | None = None
         self._last: Frame | None = None
+        self._for_room_light = False
         self._queue: deque[Exposure] = deque(self._expose(()) for _ in range(spec.camera.latency_frames))
 
     def mark(self, key: str) -> None:
@@ -59,6 +62,14 @@ class EmulatedCamera:
         for _ in range(self.discard_frames):
             self._next()
         return self.read()
+
+    def grab_ambient(self) -> Frame:
+        """As `grab`, metered for room light alone whatever `exposure_s` says."""
+        self._for_room_light = True
+        try:
+            return self.grab()
+        finally:
+            self._for_room_light = False
 
     def read(self) -> Frame:
         """The next frame of the stream, as old as the latency makes it."""
@@ -79,14 +90,21 @@ class EmulatedCamera:
         """
         if self._metered is None or self._metered[:2] != (self._scene.moves, self.gain):
             spots = [spot for name in self._scene.laser_ids for spot in self._scene.spots(name)]
-            spec = self._spec.camera
-            exposure = self._sensor.metered_exposure(spots, self.gain, spec.metered_peak)
-            exposure = min(max(exposure, spec.shortest_exposure_s), spec.longest_exposure_s)
-            self._metered = (self._scene.moves, self.gain, exposure)
+            self._metered = (self._scene.moves, self.gain, self._metered_for(spots))
         return self._metered[2]
 
     def close(self) -> None:
         """Nothing to release."""
+
+    def _metered_for(self, spots: Sequence[Spot]) -> float:
+        spec = self._spec.camera
+        exposure = self._sensor.metered_exposure(spots, self.gain, spec.metered_peak)
+        return min(max(exposure, spec.shortest_exposure_s), spec.longest_exposure_s)
+
+    def _exposure_s(self) -> float:
+        if self._for_room_light:
+            return self._metered_for(())
+        return self.meter() if self.exposure_s is None else self.exposure_s
 
     def _next(self) -> Exposure:
         """Expose a frame and take the oldest one that is on its way."""
@@ -96,9 +114,9 @@ class EmulatedCamera:
     def _expose(self, lit: tuple[str, ...]) -> Exposure:
         warm = self._spec.warm_up
         f_scale = 1 + warm.f_relative * float(np.exp(-self._frames / warm.time_constant_frames))
-        exposure_s = self.meter() if self.exposure_s is None else self.exposure_s
         spots = tuple(spot for name in lit for spot in self._scene.spots(name, f_scale))
-        exposure = Exposure(spots, bool(lit), self._key, self._number, exposure_s, self.gain)
+        picture = self._scene.picture(f_scale)
+        exposure = Exposure(spots, picture, bool(lit), self._key, self._number, self._exposure_s(), self.gain)
         self._frames += 1
         self._number += 1
         return exposure
@@ -106,7 +124,9 @@ class EmulatedCamera:
     def _develop(self, exposure: Exposure) -> Frame:
         rng = generator(self._spec.seed, "frame", exposure.key, exposure.number)
         ambient = self._ambient(exposure, float(rng.random()))
-        image = self._sensor.expose(exposure.spots, exposure.exposure_s, exposure.gain, ambient, rng)
+        image = self._sensor.expose(
+            exposure.spots, exposure.exposure_s, exposure.gain, ambient, rng, exposure.picture
+        )
         return Frame(_mirrored(image) if self._spec.camera.mirrored else image, time.time_ns())
 
     def _ambient(self, exposure: Exposure, phase: float) -> float:

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from pathlib import Path
 
 from workbench.emulator.beam import Beam
+from workbench.emulator.board import BoardSurface, Print, stand
 from workbench.emulator.lens import Lens
+from workbench.emulator.sensor import Map
 from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
 from workbench.emulator.spot import ImageFormat, Spot, SpotPainter
 from workbench.emulator.surfaces import Cylinder, Plane, Polynomial, Surface, wall_in_mirror
-from workbench.emulator.truth import PlacementError, Truth, TruthFile, draw_placement_error
+from workbench.emulator.truth import (
+    PlacementError,
+    Truth,
+    TruthFile,
+    draw_board_error,
+    draw_placement_error,
+)
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.model.target import (
+    BoardTarget,
     CylinderTarget,
     FlatTarget,
     Placement,
@@ -37,6 +47,7 @@ class Scene:
         self._key = ""
         self._f_step = 0
         self._spots: dict[str, list[Spot]] = {}
+        self._picture: Map | None = None
         self.moves = 0
         """Counts placements."""
 
@@ -49,29 +60,58 @@ class Scene:
         """Put the target there; the ruler shows what was asked for, the truth is something else.
 
         Raises:
-            BadInputError: a flat target is turned by 90 degrees or more.
+            BadInputError: a flat target or the board is turned by 90 degrees or more.
         """
         error = draw_placement_error(self._rig, self._spec, placement.key)
         z_mm = placement.standoff_mm * (1 + self._truth.ruler_scale) + error.error_mm + self._truth.offset_mm
-        self._surfaces = _surfaces(placement.target, z_mm, error, self._spec.surface)
+        if isinstance(placement.target, BoardTarget):
+            self._put_board(placement.target, z_mm, error, placement.key)
+        else:
+            self._surfaces = _surfaces(placement.target, z_mm, error, self._spec.surface)
+            self._file.add(placement.key, error)
         self._key = placement.key
-        self._spots = {}
+        self._spots, self._picture = {}, None
         self.moves += 1
-        self._file.add(placement.key, error)
         return placement
 
     def spots(self, laser_id: str, f_scale: float = 1.0) -> list[Spot]:
         """What one laser alone adds to the image (a mirror-like target shows two spots), at a drifted f."""
-        f_step = round((f_scale - 1) / F_STEP)
-        if f_step != self._f_step:
-            self._f_step, self._spots = f_step, {}
+        self._drift_to(f_scale)
         if laser_id not in self._spots:
             self._spots[laser_id] = self._paint(laser_id)
         return self._spots[laser_id]
 
+    def picture(self, f_scale: float = 1.0) -> Map | None:
+        """(height, width) what room light shows of a board, at a drifted f; None for all other targets."""
+        board = self._surfaces[0][0] if self._surfaces else None
+        if not isinstance(board, BoardSurface):
+            return None
+        self._drift_to(f_scale)
+        if self._picture is None:
+            self._picture = board.lit_by_room(self._lens(), self._image, self._spec.lens.blur_px)
+        return self._picture
+
+    def _drift_to(self, f_scale: float) -> None:
+        f_step = round((f_scale - 1) / F_STEP)
+        if f_step != self._f_step:
+            self._f_step, self._spots, self._picture = f_step, {}, None
+
+    def _lens(self) -> Lens:
+        return Lens(self._truth, 1 + self._f_step * F_STEP)
+
+    @cached_property
+    def _print(self) -> Print:
+        return Print(self._rig.board, self._spec.surface.ink_albedo / self._spec.surface.albedo)
+
+    def _put_board(self, target: BoardTarget, z_mm: float, error: PlacementError, key: str) -> None:
+        _check_turn("board", target.yaw_deg + error.yaw_deg, target.pitch_deg + error.pitch_deg)
+        aside = draw_board_error(self._truth, self._spec, key, z_mm)
+        board = stand(target, z_mm, error, aside, self._truth, self._print, self._spec.surface)
+        self._surfaces = [(board, 1.0)]
+        self._file.add(key, error, aside)
+
     def _paint(self, laser_id: str) -> list[Spot]:
-        lens = Lens(self._truth, 1 + self._f_step * F_STEP)
-        painter = SpotPainter(self._spec, lens, self._image, self._truth.f_px)
+        painter = SpotPainter(self._spec, self._lens(), self._image, self._truth.f_px)
         painted = [
             painter.paint(self._beams[laser_id], surface, gain, (self._key, laser_id, str(index)))
             for index, (surface, gain) in enumerate(self._surfaces)
@@ -93,15 +133,19 @@ def _surfaces(
     return []
 
 
+def _check_turn(what: str, yaw_deg: float, pitch_deg: float) -> None:
+    if max(abs(yaw_deg), abs(pitch_deg)) >= 90:
+        raise BadInputError(
+            f"{what} target: expected a turn of less than 90 deg (tilt of the placement included),"
+            f" got yaw {yaw_deg:.3g} and pitch {pitch_deg:.3g}"
+        )
+
+
 def _flat(
     target: FlatTarget, z_mm: float, error: PlacementError, finish: SurfaceSpec
 ) -> list[tuple[Surface, float]]:
     yaw, pitch = target.yaw_deg + error.yaw_deg, target.pitch_deg + error.pitch_deg
-    if max(abs(yaw), abs(pitch)) >= 90:
-        raise BadInputError(
-            f"flat target: expected a turn of less than 90 deg (tilt of the placement included),"
-            f" got yaw {yaw:.3g} and pitch {pitch:.3g}"
-        )
+    _check_turn("flat", yaw, pitch)
     albedos = {
         "matt": finish.albedo,
         "absorbent": finish.absorbent_albedo,

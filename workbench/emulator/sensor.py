@@ -28,14 +28,22 @@ class Sensor:
         self._brightest_ambient = float(self._ambient.max())
 
     def expose(
-        self, spots: Sequence[Spot], exposure_s: float, gain: float, ambient: float, rng: Generator
+        self,
+        spots: Sequence[Spot],
+        exposure_s: float,
+        gain: float,
+        ambient: float,
+        rng: Generator,
+        picture: Map | None = None,
     ) -> Image:
-        """One frame; `ambient` multiplies the ambient light.
+        """One frame; `ambient` multiplies the ambient light, and `picture` (height, width) does so by pixel.
 
         Shot noise is Poisson's where a spot shines and its Gaussian approximation elsewhere, where the read
         noise drowns the difference: both have the right mean and variance.
         """
         mean = self._ambient * np.float32(ambient * exposure_s)
+        if picture is not None:
+            mean *= picture
         mean += self._hot * np.float32(exposure_s)
         for spot in spots:
             _window(mean, spot)[:] += spot.rate * np.float32(exposure_s)

@@ -104,6 +104,8 @@ class SurfaceSpec(FileModel):
     albedo: Fraction = 0.8
     """Diffuse reflectance of paper."""
     absorbent_albedo: Fraction = 0.01
+    ink_albedo: Fraction = 0.04
+    """Of what is black on the printed board."""
     mirror_albedo: Fraction = 0.05
     """Diffuse reflectance that a mirror-like target keeps (dust, scratches)."""
     mirror_reflectance: Fraction = 0.8
@@ -141,6 +143,10 @@ class TruthSpec(FileModel):
     k3: float | None = None
     offset_mm: float | None = None
     ruler_scale: float | None = None
+    print_scale: float | None = None
+    bow_x_mm: float | None = None
+    bow_y_mm: float | None = None
+    bow_xy_mm: float | None = None
     lasers: dict[str, LaserTruth] = Field(default_factory=dict)
     placements: dict[str, PlacementTruth] = Field(default_factory=dict)
 

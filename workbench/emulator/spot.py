@@ -118,5 +118,6 @@ class SpotPainter:
         met = np.isfinite(depth)
         points = depth[met, None] * direction[met]
         cos2 = 1 / np.einsum("ij,ij->i", direction[met], direction[met])
-        power[met] = beam.irradiance(points, surface.normal(points)) * cos2**2 * sight.area.ravel()[met]
+        lit = beam.irradiance(points, surface.normal(points)) * surface.shade(points)
+        power[met] = lit * cos2**2 * sight.area.ravel()[met]
         return power.reshape(height * n, width * n)

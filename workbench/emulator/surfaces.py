@@ -30,9 +30,20 @@ class Surface(Protocol):
     def normal(self, points: Array) -> Array:
         """Unit normals (n, 3) towards the front at points (n, 3) on the surface."""
 
+    def shade(self, points: Array) -> Array | float:
+        """Diffuse reflectance at points (n, 3) on the surface over `albedo`."""
+
+
+class Plain:
+    """A surface of one colour."""
+
+    def shade(self, points: Array) -> float:
+        """See `Surface`."""
+        return 1.0
+
 
 @dataclass(frozen=True)
-class Plane:
+class Plane(Plain):
     """z = z0 + slope_x x + slope_y y, bounded at half sizes from (centre_x, 0) where they are finite."""
 
     z0_mm: float
@@ -61,7 +72,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class SeenInMirror:
+class SeenInMirror(Plain):
     """A surface's image in a plane mirror: behind it, where the beam would go on through the mirror."""
 
     image: Plane
@@ -101,7 +112,7 @@ def wall_in_mirror(mirror: Plane, wall_z_mm: float, albedo: float) -> SeenInMirr
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class Cylinder(Plain):
     """Vertical cylinder, its axis through (axis_x, axis_z)."""
 
     axis_x_mm: float
@@ -126,7 +137,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True)
-class Polynomial:
+class Polynomial(Plain):
     """z = z0 + sum of c[k] (x - shift)^(k + 1), the same at every height."""
 
     z0_mm: float

@@ -14,10 +14,14 @@ from ruamel.yaml import YAML
 
 from workbench.emulator.keyed import generator
 from workbench.emulator.spec import EmulatorSpec, LaserTruth, PlacementTruth
+from workbench.model.board import BOW
 from workbench.model.errors import BadInputError
 from workbench.model.rig import CameraSpec, Prior, Rig
 from workbench.model.yamlfile import FileModel
 
+BOARD_SHIFT_SD_MM = 2.0
+BOARD_ROLL_SD_DEG = 1.0
+"""How well a hand puts the blank band on the spots. 1 sigma."""
 LENS_NAMES = ("k1", "k2", "p1", "p2", "k3")
 
 
@@ -41,6 +45,15 @@ class PlacementError:
 
 
 @dataclass(frozen=True)
+class BoardError:
+    """Where the middle of the board's band stands, and how far the board is turned in its plane."""
+
+    x_mm: float
+    y_mm: float
+    roll_deg: float
+
+
+@dataclass(frozen=True)
 class Truth:
     """What the bench really is. Units and frames as in the rig file."""
 
@@ -55,6 +68,11 @@ class Truth:
     offset_mm: float
     ruler_scale: float
     lasers: dict[str, Ray]
+    print_scale: float = 0.0
+    bow_x_mm: float = 0.0
+    """This and the next two: sag of the board's paper, see `workbench.model.board.sag_mm`."""
+    bow_y_mm: float = 0.0
+    bow_xy_mm: float = 0.0
 
 
 def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
@@ -68,6 +86,7 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
     """
     pins = spec.truth
     camera = rig.camera
+    bow = Prior(value=0.0, sd=rig.bench.board_flatness_sd_mm)
     focal = {
         name: _value(spec.seed, name, getattr(camera, name), pins) for name in ("f_px", "cx_px", "cy_px")
     }
@@ -76,6 +95,8 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
         **_draw_lens(camera, spec, focal),
         offset_mm=_value(spec.seed, "offset_mm", rig.bench.offset_mm, pins),
         ruler_scale=_value(spec.seed, "ruler_scale", rig.bench.ruler_scale, pins),
+        print_scale=_value(spec.seed, "print_scale", rig.bench.print_scale, pins),
+        **{name: _value(spec.seed, name, bow, pins) for name in BOW},
         lasers={
             laser.id: Ray(
                 **{
@@ -106,6 +127,18 @@ def draw_placement_error(rig: Rig, spec: EmulatorSpec, key: str) -> PlacementErr
     )
 
 
+def draw_board_error(truth: Truth, spec: EmulatorSpec, key: str, z_mm: float) -> BoardError:
+    """Where a hand puts the board at depth `z_mm`: its band on the spots, by eye."""
+    spots = np.array([(r.x_mm + r.tx * z_mm, r.y_mm + r.ty * z_mm) for r in truth.lasers.values()])
+    x_mm, y_mm = spots.mean(axis=0)
+    right, down, roll = generator(spec.seed, "board", key).standard_normal(3)
+    return BoardError(
+        x_mm=float(x_mm + BOARD_SHIFT_SD_MM * right),
+        y_mm=float(y_mm + BOARD_SHIFT_SD_MM * down),
+        roll_deg=float(BOARD_ROLL_SD_DEG * roll),
+    )
+
+
 def truth_path(session_dir: Path) -> Path:
     """Where the truth lies: beside the session, not in it."""
     return session_dir.with_name(session_dir.name + ".truth.yaml")
@@ -130,12 +163,13 @@ class TruthFile:
         path.parent.mkdir(parents=True, exist_ok=True)
         _replace(path, head + "".join(lines))
 
-    def add(self, key: str, error: PlacementError) -> None:
+    def add(self, key: str, *errors: PlacementError | BoardError) -> None:
         """Note a placement, once for each key."""
         if key in self._known:
             return
         self._known.add(key)
-        values = ", ".join(f"{name}: {value!r}" for name, value in asdict(error).items())
+        items = [item for error in errors for item in asdict(error).items()]
+        values = ", ".join(f"{name}: {value!r}" for name, value in items)
         with self._path.open("a", encoding="utf-8") as file:
             file.write(f"  {json.dumps(key)}: {{{values}}}\n")
 

@@ -10,6 +10,8 @@ from pathlib import Path
 from workbench.model.errors import BadInputError
 
 ALL_LASERS = "all"
+BOARD = "board"
+"""In the place of a laser's id: a frame of the printed board in room light, no laser lit."""
 REQUIRED = ("laser_id", "standoff_mm", "repeat")
 IMAGES = ("on", "off")
 POSITION = ("u_px", "v_px")
@@ -99,8 +101,8 @@ class _Parser:
         if (on is not None) == measured:
             came = "both" if measured else "neither"
             raise self._error("on", "either an image, or a position in u_px or v_px", came)
-        if measured and laser_id == ALL_LASERS:
-            raise self._error("laser_id", "one laser's id where a position is given", "all")
+        if measured and laser_id in {ALL_LASERS, BOARD}:
+            raise self._error("laser_id", "one laser's id where a position is given", laser_id)
         return CaptureRow(
             row=self._number,
             laser_id=laser_id,

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from workbench.model.board import Board
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 PositiveFloat = Annotated[float, Field(gt=0)]
@@ -61,8 +62,10 @@ class LaserSpec(FileModel):
 
     @model_validator(mode="after")
     def _has_a_baseline(self) -> LaserSpec:
-        if self.id == "all":
-            raise ValueError("a laser may not be called 'all': captures.csv means every laser by it")
+        if self.id in {"all", "board"}:
+            raise ValueError(
+                f"a laser may not be called {self.id!r}: captures.csv means something else by it"
+            )
         along, name = (self.x_mm, "x_mm") if self.axis == "u" else (self.y_mm, "y_mm")
         if along.value == 0:
             raise ValueError(f"a laser on axis {self.axis} needs a baseline: {name} must not be 0")
@@ -79,6 +82,10 @@ class BenchSpec(FileModel):
     placement_sd_mm: NonNegativeFloat = 0.0
     tilt_sd_deg: NonNegativeFloat = 0.0
     """Tilt of a flat target about each of its two axes, anew at every placement."""
+    print_scale: Prior = Prior(value=0.0, sd=0.002)
+    """Relative error of the printed board: true length = printed length by the file x (1 + print_scale)."""
+    board_flatness_sd_mm: NonNegativeFloat = 0.1
+    """How far the board's paper may lie off its plane at 100 mm from its middle."""
 
 
 class NoiseSpec(FileModel):
@@ -101,6 +108,7 @@ class Rig(FileModel):
     camera: CameraSpec
     lasers: Annotated[tuple[LaserSpec, ...], Field(min_length=1)]
     bench: BenchSpec = BenchSpec()
+    board: Board = Board()
     noise: NoiseSpec = NoiseSpec()
     emulator: dict[str, Any] | None = None
     """Read by the emulated bench alone, which validates it."""

@@ -25,6 +25,18 @@ class FlatTarget(FileModel):
     """x of the centre of a target of a stated width; the standoff is still that of the plane at x = 0."""
 
 
+class BoardTarget(FileModel):
+    """The printed board of the rig file, its plane as that of a flat target, its band across the spots."""
+
+    shape: Literal["board"] = "board"
+    yaw_deg: float = 0.0
+    """About the vertical: positive moves the side at +x away from the sensor."""
+    pitch_deg: float = 0.0
+    """About the horizontal: positive moves the side at +y (below) away from the sensor."""
+    roll_deg: float = 0.0
+    """In its own plane; 90 puts the band upright, for lasers above and below the camera."""
+
+
 class CylinderTarget(FileModel):
     """A vertical cylinder whose nearest point lies at the standoff, its axis at x = `shift_mm`."""
 
@@ -48,7 +60,7 @@ class NoTarget(FileModel):
 
 
 TargetShape = Annotated[
-    FlatTarget | CylinderTarget | PolynomialTarget | NoTarget, Field(discriminator="shape")
+    FlatTarget | BoardTarget | CylinderTarget | PolynomialTarget | NoTarget, Field(discriminator="shape")
 ]
 
 

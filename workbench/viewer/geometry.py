@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from workbench.model.event import ParameterRecord
 from workbench.model.rig import Rig
-from workbench.model.target import FlatTarget
+from workbench.model.target import BoardTarget, FlatTarget
 
 Array = NDArray[np.float64]
 _LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
@@ -67,7 +67,7 @@ class Geometry:
         x, y, tx, ty = self.rays[laser]
         return (x + tx * z_mm, y + ty * z_mm, z_mm)
 
-    def seen_on(self, target: FlatTarget, standoff_mm: float, pixels: Array) -> Array:
+    def seen_on(self, target: FlatTarget | BoardTarget, standoff_mm: float, pixels: Array) -> Array:
         """Where the lines of sight of `pixels`, (N, 2), meet a flat target: (N, 3) mm."""
         slope_x, slope_y = tan(radians(target.yaw_deg)), tan(radians(target.pitch_deg))
         sight = self._directions(pixels)

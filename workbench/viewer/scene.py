@@ -12,6 +12,7 @@ import rerun as rr
 from workbench.model.event import LaserRange, SpotRecord
 from workbench.model.rig import CameraSpec
 from workbench.model.target import (
+    BoardTarget,
     CylinderTarget,
     FlatTarget,
     NoTarget,
@@ -80,7 +81,7 @@ def log_spots_on_target(
     colors: Mapping[str, at.Rgb],
 ) -> None:
     """Spots where the camera sees them on a flat target; off its ray, one shows the calibration's error."""
-    if not isinstance(placement.target, FlatTarget) or not spots:
+    if not isinstance(placement.target, FlatTarget | BoardTarget) or not spots:
         return
     pixels = np.array([(spot.u_px, spot.v_px) for spot in spots])
     points = geometry.seen_on(placement.target, placement.standoff_mm, pixels)
@@ -106,7 +107,7 @@ def _outline(placement: Placement, z_mm: float) -> list[list[Point]]:
     """Lines that draw the target whose standoff point lies at depth `z_mm`."""
     target = placement.target
     match target:
-        case FlatTarget():
+        case FlatTarget() | BoardTarget():
             return _flat(target, z_mm)
         case CylinderTarget():
             return _cylinder(target, z_mm)
@@ -116,7 +117,7 @@ def _outline(placement: Placement, z_mm: float) -> list[list[Point]]:
             return []
 
 
-def _flat(target: FlatTarget, z_mm: float) -> list[list[Point]]:
+def _flat(target: FlatTarget | BoardTarget, z_mm: float) -> list[list[Point]]:
     h = TARGET_HALF_MM
     slope_x, slope_y = tan(radians(target.yaw_deg)), tan(radians(target.pitch_deg))
     corners = [(-h, -h), (h, -h), (h, h), (-h, h), (-h, -h)]
