@@ -87,9 +87,11 @@ class World:
         pixel, _ = cv2.projectPoints(point, np.zeros(3), np.zeros(3), camera, lens)
         return np.asarray(pixel, np.float64).reshape(2)
 
-    def sightings(self, standoffs_mm: tuple[float, ...] = STANDOFFS_MM, repeats: int = 5) -> list[Sighting]:
+    def sightings(
+        self, standoffs_mm: tuple[float, ...] = STANDOFFS_MM, repeats: int = 5, session: int = 1
+    ) -> list[Sighting]:
         """A whole calibration: placement errors, tilts, speckle and noise drawn from the rig's tolerances."""
-        rng = np.random.default_rng([self.seed, 1])
+        rng = np.random.default_rng([self.seed, session])
         bench, noise = self.rig.bench, self.rig.noise
         found = []
         for standoff in standoffs_mm:

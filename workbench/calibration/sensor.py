@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import jax
@@ -47,6 +47,8 @@ class Sensor:
     """A calibration as arrays."""
 
     calibration: Calibration
+    moved: Mapping[str, float] = field(default_factory=dict)
+    """Parameters with another value than the calibration's, by name."""
 
     @cached_property
     def ids(self) -> tuple[str, ...]:
@@ -55,7 +57,7 @@ class Sensor:
 
     @cached_property
     def _geometry(self) -> dict[str, float]:
-        return self.calibration.geometry()
+        return self.calibration.geometry() | dict(self.moved)
 
     @cached_property
     def _lens(self) -> FloatArray:
@@ -79,6 +81,18 @@ class Sensor:
         """(n, 2) where the laser's spot appears at ranges (n,); infinity allowed."""
         inverse_depth = 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
         return np.asarray(_spots(self._lens, self._rays[self.ids.index(laser_id)], inverse_depth))
+
+    def spot_gradient(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
+        """(n, 2, P) derivatives of `spot_px` by the calibration's parameters, in the order of its names."""
+        ray = self._rays[self.ids.index(laser_id)]
+        by_lens, by_ray, by_offset = _spot_gradients(
+            self._lens, ray, self.offset_mm, np.asarray(range_mm, float)
+        )
+        gradient = np.zeros((len(range_mm), 2, len(self._columns)))
+        gradient[:, :, [self._columns[name] for name in LENS]] = by_lens
+        gradient[:, :, [self._columns[f"{laser_id}.{name}"] for name in RAY]] = by_ray
+        gradient[:, :, self._columns["offset_mm"]] = by_offset
+        return gradient
 
     def ranges(self, laser_ids: Sequence[str], position_px: FloatArray, sd_px: FloatArray) -> Ranges:
         """Ranges of n spots with known lasers.
@@ -132,6 +146,15 @@ class Sensor:
 @jax.jit
 def _spots(lens: Array, ray: Array, inverse_depth: Array) -> Array:
     return jnp.stack(spot_at_inverse_depth(Lens(*lens), Ray(*ray), inverse_depth), axis=1)
+
+
+@jax.jit
+def _spot_gradients(lens: Array, ray: Array, offset_mm: Array, range_mm: Array) -> tuple[Array, ...]:
+    def spots(lens: Array, ray: Array, offset_mm: Array) -> Array:
+        return jnp.asarray(_spots(lens, ray, 1.0 / (range_mm + offset_mm)))
+
+    derivatives: tuple[Array, ...] = jax.jacfwd(spots, argnums=(0, 1, 2))(lens, ray, offset_mm)
+    return derivatives
 
 
 @jax.jit
