@@ -4,11 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: help demo test lint lock clean
+.PHONY: help demo test lint bench lock clean
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
 	@echo "make test   lint, type check and test everything"
+	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
 	@echo "make lint   only the linters and the type checker"
 	@echo "make lock   renew requirements.lock from pyproject.toml"
 
@@ -30,6 +31,9 @@ lint: $(INSTALLED)
 
 test: lint
 	$(BIN)/python -m pytest
+
+bench: $(INSTALLED)
+	$(BIN)/python -m tests.benchmarks
 
 lock:
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --fork-strategy fewest \

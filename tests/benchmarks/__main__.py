@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
+import datetime as dt
 import os
 import platform
 from pathlib import Path
@@ -18,7 +18,7 @@ RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 
 def main() -> None:
     """Run, print, write."""
-    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
+    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
     RESULTS.mkdir(parents=True, exist_ok=True)
     with (RESULTS / f"{today}-spots.txt").open("w") as file:
         for part in (

@@ -49,8 +49,7 @@ def clutter(rng: np.random.Generator) -> Floats:
     for _ in range(int(rng.integers(0, 12))):
         u, v = int(rng.integers(0, SHAPE[1])), int(rng.integers(0, SHAPE[0]))
         scene[v : v + int(rng.integers(4, 50)), u : u + int(rng.integers(4, 120))] *= rng.uniform(0.3, 3.0)
-    blurred: Floats = cv2.GaussianBlur(scene, (0, 0), BLUR_PX)
-    return blurred
+    return np.asarray(cv2.GaussianBlur(scene, (0, 0), BLUR_PX), np.float64)
 
 
 def lasers(rng: np.random.Generator, ambient: Floats) -> tuple[Floats, list[Truth]]:

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 from numpy.typing import NDArray
-from photutils.centroids import centroid_2dg, centroid_quadratic
+from photutils.centroids import centroid_2dg, centroid_quadratic  # type: ignore[import-untyped]
 from skimage.filters import threshold_otsu
 from skimage.measure import label, regionprops
 
@@ -18,8 +18,8 @@ Centre = tuple[float, float]
 def cut_out(frame: NDArray[np.generic], centre: tuple[int, int], half: int) -> Floats:
     """The frame around (row, column), background (median of the frame) taken off."""
     row, col = centre
-    part = frame[row - half : row + half + 1, col - half : col + half + 1].astype(np.float64)
-    return part - float(np.median(frame))
+    part: Floats = frame[row - half : row + half + 1, col - half : col + half + 1].astype(np.float64)
+    return part - float(np.median(frame.astype(np.float64)))
 
 
 def thresholded_centroid(image: Floats) -> Centre:
@@ -31,7 +31,8 @@ def thresholded_centroid(image: Floats) -> Centre:
 
 def scikit_image(image: Floats) -> Centre:
     """Otsu's threshold, labels, weighted centroid of the brightest region."""
-    regions = regionprops(label(image > threshold_otsu(image)), intensity_image=image)
+    labels = label(image > threshold_otsu(image))  # type: ignore[no-untyped-call]
+    regions = regionprops(labels, intensity_image=image)  # type: ignore[no-untyped-call]
     best = max(regions, key=lambda r: float(r.image_intensity.sum()))
     v, u = best.centroid_weighted
     return float(u), float(v)

@@ -23,13 +23,14 @@ class Sensor:
     @property
     def full_scale_dn(self) -> int:
         """Highest number."""
-        return 2**self.bits - 1
+        return (1 << self.bits) - 1
 
     def expose(self, light: Floats, rng: np.random.Generator) -> NDArray[np.uint8] | NDArray[np.uint16]:
         """A frame of `light` (electrons expected in each pixel)."""
         electrons = rng.poisson(light) + rng.normal(0.0, self.read_sd_electrons, light.shape)
         numbers = np.rint(electrons / self.electrons_per_dn + self.black_dn)
-        return np.clip(numbers, 0, self.full_scale_dn).astype(np.uint8 if self.bits == 8 else np.uint16)
+        clipped = np.clip(numbers, 0, self.full_scale_dn)
+        return clipped.astype(np.uint8) if self.bits == 8 else clipped.astype(np.uint16)
 
 
 def axis_share(centre: float, sd: float, n: int) -> Floats:

@@ -59,7 +59,8 @@ def find_peaks(
         threshold_sd: In standard deviations of the smoothed noise.
     """
     size = 2 * round(2.5 * scale_px) + 1
-    image = cv2.GaussianBlur(signal, (size, size), scale_px, borderType=cv2.BORDER_REPLICATE)
+    blurred = cv2.GaussianBlur(signal, (size, size), scale_px, borderType=cv2.BORDER_REPLICATE)
+    image = np.asarray(blurred, np.float32)
     sd = smoothed_sd(variance, scale_px)
     top = image >= cv2.dilate(image, _NEIGHBOURS)
     top &= image > threshold_sd * sd

@@ -12,8 +12,8 @@ from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
 from workbench.spots.frames import check_pair, default_saturation_dn
 from workbench.spots.measure import Trace, measure
 from workbench.spots.pair import Pair, Scene, look
-from workbench.spots.resolve import clusters, fitted_together, grown, split, without_duplicates
-from workbench.spots.strip import Strip, check_line, distance_px, strip_of
+from workbench.spots.resolve import are_apart, clusters, fitted_together, grown, split, without_duplicates
+from workbench.spots.strip import Strip, check_line, is_on, strip_of
 from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
 
 # A peak of the smoothed signal between this and the threshold is named: too dim to be told from noise.
@@ -77,14 +77,12 @@ class SpotFinder:
         traces: list[Trace] = []
         for scale in (FINE_PX, COARSE_PX):
             for scene in scenes:
-                found = measure(
-                    scene, _new_ones(find_peaks(scene.signal, scene.strip, scene.variance, scale), traces)
-                )
-                traces = without_duplicates(traces + found)
+                peaks = find_peaks(scene.signal, scene.strip, scene.variance, scale)
+                traces = without_duplicates(traces + measure(scene, _new_ones(peaks, traces)))
             if len(traces) == self._expected:
                 break
-        if not traces:
-            return []
+        if not traces or (len(traces) == self._expected and are_apart(traces)):
+            return traces
         groups = [fitted_together(scenes[0], group) for group in clusters(traces)]
         if self._expected is None or sum(map(len, groups)) < self._expected:
             groups = [split(scenes[0], g[0]) if len(g) == 1 else g for g in groups]
@@ -100,8 +98,7 @@ class SpotFinder:
         return [t for i, t in enumerate(ranked) if i < self._expected or t.spot.peak_dn > clear]
 
     def _on_a_line(self, spot: Spot) -> bool:
-        u, v = np.array(spot.u_px), np.array(spot.v_px)
-        return not self._lines or any(distance_px(li, u, v) <= li.half_width_px for li in self._lines)
+        return not self._lines or any(is_on(line, spot.u_px, spot.v_px) for line in self._lines)
 
     def _in_order(self, spots: list[Spot]) -> list[Spot]:
         du, dv = (self._lines[0].du, self._lines[0].dv) if self._lines else (1.0, 0.0)

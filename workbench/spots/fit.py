@@ -8,17 +8,20 @@ from typing import Final
 
 import numpy as np
 
-from workbench.spots.gaussian import BACKGROUND, FLUX, Design, U, Upright
+from workbench.spots.gaussian import BACKGROUND, FLUX, LN_SU, Design, U, Upright
 from workbench.spots.noise import Noise, photon_transfer_slope
 from workbench.spots.types import Bools, Floats
 
 Model = Callable[[Floats, tuple[int, int]], Design]
 _MAX_STEPS: Final = 20
 _MAX_STEP: Final = np.array([np.inf, np.inf, 1.0, 1.0, 0.4, 0.4, 0.4])
-_LOWEST: Final = np.array([-np.inf, -np.inf, -np.inf, -np.inf, np.log(0.15), np.log(0.15), -3.0])
-_HIGHEST: Final = np.array([np.inf, np.inf, np.inf, np.inf, np.log(12.0), np.log(12.0), 3.0])
-# Where the steps stop: one this small in standard deviations leaves far less to the next.
-_TOLERANCE_SD: Final = 0.1
+_MIN_STEP: Final = -_MAX_STEP
+# Of both logarithms of the width, and of the shear.
+_LOWEST: Final = np.array([np.log(0.15), np.log(0.15), -3.0])
+_HIGHEST: Final = np.array([np.log(12.0), np.log(12.0), 3.0])
+# Where the steps stop. Scoring shrinks the error some tenfold a step near the end: one of 0.3 sd, which is still
+# taken, leaves a few hundredths.
+_TOLERANCE_SD: Final = 0.3
 # One window that never converges must not keep the noise of the others from being measured.
 _STEPS_TO_MEASURE: Final = 8
 # After so many steps it is settled which pixels clip: a set that changes with every step never converges.
@@ -79,16 +82,15 @@ class Fit:
 
 def _weights(win: Windows, signal: Floats, background: Floats, noise: Noise) -> Floats:
     """Inverse of the variance that the model predicts, 0 where a pixel is not to be used."""
-    variance = np.maximum(signal, 0.0)
+    variance: Floats = np.maximum(signal, 0.0)
     variance *= noise.slope_dn
     variance += noise.floor_dn2
-    if win.usable is None:
-        weights: Floats = np.reciprocal(variance, out=variance)
-        return weights
     usable = win.usable
-    if win.clip_dn is not None:
+    if usable is not None and win.clip_dn is not None:
         usable = usable & (signal + background < win.clip_dn - _CLIP_MARGIN_SD * np.sqrt(variance))
-    weights = usable / variance
+    weights: Floats = 1.0 / variance
+    if usable is not None:
+        weights *= usable
     return weights
 
 
@@ -109,10 +111,11 @@ def _moved(params: Floats, delta: Floats) -> Floats:
     step = delta.copy()
     step[:, U:] /= np.maximum(np.abs(params[:, FLUX:U]), 1e-9)
     np.minimum(step, _MAX_STEP[:k], out=step)
-    np.maximum(step, -_MAX_STEP[:k], out=step)
+    np.maximum(step, _MIN_STEP[:k], out=step)
     step += params
-    np.minimum(step, _HIGHEST[:k], out=step)
-    np.maximum(step, _LOWEST[:k], out=step)
+    widths = step[:, LN_SU:]
+    np.minimum(widths, _HIGHEST[: k - LN_SU], out=widths)
+    np.maximum(widths, _LOWEST[: k - LN_SU], out=widths)
     return step
 
 
@@ -130,6 +133,8 @@ def _solve(design: Design, residual: Floats, weight: Floats) -> tuple[Floats, Fl
     """Covariance, step, and whether the step is negligible."""
     cov = inverse(design.information(weight))
     delta = (cov @ design.gradient(weight * residual)[:, :, None])[:, :, 0]
+    if not np.isfinite(delta.sum()):
+        delta[~np.isfinite(delta).all(axis=1)] = 0.0
     variance = cov.diagonal(0, 1, 2) * _TOLERANCE_SD**2
     return cov, delta, np.logical_and.reduce(delta * delta <= variance, 1)
 

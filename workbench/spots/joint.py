@@ -66,8 +66,11 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
             break
     sd = np.sqrt(np.maximum(np.diag(cov)[3:], 0.0)).reshape(-1, 3)
     leverage = ((cov @ jacobian) * jacobian).sum(axis=0)
-    images = (values.reshape(1, *win.shape) for values in (signal, residual, used, leverage))
-    measured = Noise(noise.floor_dn2, photon_transfer_slope(*images, noise))
+    one = (1, *win.shape)
+    slope = photon_transfer_slope(
+        signal.reshape(one), residual.reshape(one), used.reshape(one), leverage.reshape(one), noise
+    )
+    measured = Noise(noise.floor_dn2, slope)
     return Joint(params, sd, float(used @ residual**2), residual, used, measured, converged)
 
 
@@ -135,6 +138,6 @@ def hidden_spot(joint: Joint, win: Windows) -> Floats | None:
     row, col = np.unravel_index(int(height.argmax()), win.shape)
     if height[row, col] < _HIDDEN_SD:
         return None
-    hidden = joint.params[0].copy()
+    hidden: Floats = joint.params[0].copy()
     hidden[FLUX], hidden[U], hidden[V] = matched[row, col] / told[row, col], col, row
     return hidden

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.spots.detect import FINE_PX, Peaks
 from workbench.spots.fit import Fit, Windows, fit_spots
-from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, Sheared, U, Upright, V
+from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, V, Sheared, axis_profiles
 from workbench.spots.noise import Noise
 from workbench.spots.pair import Scene
 from workbench.spots.types import NO_FLAGS, Bools, Failure, Floats, Spot
@@ -26,6 +26,10 @@ _MAX_WIDTH_PX: Final = 7.0
 _MIN_FLUX_SD: Final = 6.0
 _MIN_TOLD_SD: Final = 3.0
 _EDGE_WIDTHS: Final = 2.5
+# A window is cut anew only for a spot that outgrows it by this factor: the loss up to there is below 1 %.
+_OUTGROWN: Final = 0.9
+# First guesses of the width scatter upwards; a window too small is cut anew.
+_GUESSED: Final = 0.7
 _OFF_CENTRE_PX: Final = 1.5
 _OUTLIER_SD: Final = 6.0
 _MAX_OUTLIERS: Final = 3
@@ -136,9 +140,10 @@ def _refined(win: Windows, fit: Fit, guess: Noise) -> tuple[Windows, Fit]:
 
 def _tilted(fit: Fit) -> Bools:
     """(n,) whether the residuals of upright ellipses show that the spot's axes are at an angle."""
-    design = fit.design
-    assert isinstance(design, Upright)
-    of_u, of_v = design.along_u[1][:, :, None], design.along_v[1][:, None, :]
+    height, width = fit.residual.shape[1:]
+    params = fit.params
+    of_u = axis_profiles(params[:, U], params[:, LN_SU], width)[1][:, :, None]
+    of_v = axis_profiles(params[:, V], params[:, LN_SV], height)[1][:, None, :]
     score = (of_v @ (fit.weight * fit.residual) @ of_u)[:, 0, 0]
     told = ((of_v * of_v) @ fit.weight @ (of_u * of_u))[:, 0, 0]
     tilted: Bools = score * score > _SHEAR_SD**2 * told
@@ -156,14 +161,14 @@ def _fit_tilted(win: Windows, fit: Fit, i: int, guess: Noise) -> Fit | None:
 def spot_flags(scene: Scene, u: float, v: float, su: float, sv: float) -> frozenset[Failure]:
     """What can be told about a spot from its place: cut by the border, clipped."""
     height, width = scene.pair.on.shape
-    flags = set()
-    if min(u, width - 1 - u) < _EDGE_WIDTHS * su or min(v, height - 1 - v) < _EDGE_WIDTHS * sv:
-        flags.add(Failure.AT_EDGE)
+    at_edge = min(u, width - 1 - u) < _EDGE_WIDTHS * su or min(v, height - 1 - v) < _EDGE_WIDTHS * sv
     rows = slice(max(round(v - 2 * sv), 0), max(round(v + 2 * sv) + 1, 0))
     cols = slice(max(round(u - 2 * su), 0), max(round(u + 2 * su) + 1, 0))
-    if (scene.pair.on[rows, cols] >= scene.pair.clip_dn).any():
-        flags.add(Failure.SATURATED)
-    return frozenset(flags) if flags else NO_FLAGS
+    around = scene.pair.on[rows, cols]
+    clipped = around.size > 0 and around.max() >= scene.pair.clip_dn
+    if not at_edge and not clipped:
+        return NO_FLAGS
+    return frozenset(f for f, told in ((Failure.AT_EDGE, at_edge), (Failure.SATURATED, clipped)) if told)
 
 
 def _are_spots(fit: Fit, params: Floats, shape: tuple[int, int]) -> Bools:
@@ -196,7 +201,7 @@ def _traces(scene: Scene, fit: Fit, params: Floats) -> list[Trace | None]:
             found.append(None)
             continue
         flags = spot_flags(scene, u, v, *widths[i].tolist())
-        spot = Spot(u, v, *sds[i], flux, means[i], peaks[i], flags)
+        spot = Spot(u, v, sds[i][0], sds[i][1], flux, means[i], peaks[i], flags)
         found.append(Trace(spot, params[i], slopes[i]))
     return found
 
@@ -245,14 +250,14 @@ def measure(scene: Scene, peaks: Peaks) -> list[Trace]:
     start = first_guess(_apart(scene.pair.cut(rows, cols, half), rows, cols, todo, half), peaks, half)
     start[:, U] += cols - half
     start[:, V] += rows - half
-    sizes = np.array([half_for(w) for w in np.exp(start[:, LN_SU]).tolist()])
+    sizes = np.array([half_for(_GUESSED * w) for w in np.exp(start[:, LN_SU]).tolist()])
     found: list[Trace | None] = [None] * rows.size
     for _ in range(3):
         again = []
         for half in sorted(set(sizes[todo].tolist())):
             group = todo[sizes[todo] == half]
             params, traces = _fit_group(scene, rows, cols, group, start[group], half)
-            wanted = [half_for(w) for w in np.exp(params[:, LN_SU:SHEAR].max(axis=1)).tolist()]
+            wanted = [half_for(_OUTGROWN * w) for w in np.exp(params[:, LN_SU:SHEAR].max(axis=1)).tolist()]
             moved = np.maximum(np.abs(params[:, U] - cols[group]), np.abs(params[:, V] - rows[group]))
             for i, k in enumerate(group.tolist()):
                 found[k] = traces[i] or found[k]

@@ -13,7 +13,7 @@ _SAMPLES = 1200
 _CLIP_SD = 4.0
 # Variance that rounding to whole numbers alone leaves in a frame.
 ROUNDING_DN2 = 1.0 / 12.0
-_SLOPE_ROUNDS = 3
+_SLOPE_ROUNDS = 2
 # Windows whose slope is more than this many times the median's are left to themselves.
 _ALIKE = 3.0
 # Full wells of 3e5 and 300 electrons bound every camera; a misfit, or a few lucky pixels, can look beyond.
@@ -78,29 +78,45 @@ def photon_transfer_slope(
     excess *= signal
     excess -= noise.floor_dn2 * kept
     kept *= signal
-    slope, square = noise.slope_dn, weight * weight
+    square = weight * weight
+    told, over = np.add.reduce(square * kept, (1, 2)), np.add.reduce(square * excess, (1, 2))
+    pools = _agreeing(told, over)
+    assumed = float(noise.slope_dn[0, 0, 0])
+    slope = noise.slope_dn
     for _ in range(_SLOPE_ROUNDS):
-        told = np.add.reduce(square * kept, (1, 2))
-        excesses = np.add.reduce(square * excess, (1, 2))
-        slope = _agreed(told, excesses, slope, noise.slope_dn)
+        slope = _pooled(pools, told, over, slope, assumed)
         square = noise.floor_dn2 + slope * signal
         square *= square
         np.divide(weight > 0, square, out=square)
-    return slope
+        told, over = np.add.reduce(square * kept, (1, 2)), np.add.reduce(square * excess, (1, 2))
+    return _pooled(pools, told, over, slope, assumed)
 
 
-def _agreed(told: Floats, excess: Floats, slope: Floats, assumed: Floats) -> Floats:
-    """(n, 1, 1) slope of each window: that of all windows which agree, its own where it is far above them.
+def _agreeing(told: Floats, over: Floats) -> list[list[int]]:
+    """Windows grouped by what they say of the slope: all that agree, and each that is far above by itself.
 
     A window that holds no spot, or two, looks as if its light were noisier; it must not speak for the others.
     """
-    own = excess / np.maximum(told, 1e-30)
-    alike = own <= np.sort(own)[(len(own) - 1) // 2] * _ALIKE + 4.0 * np.sqrt(2.0 / np.maximum(told, 1e-30))
-    sums = np.where(alike, told @ alike, told), np.where(alike, excess @ alike, excess)
-    pixels = sums[0] * slope[:, 0, 0] ** 2
-    assumed = assumed[:, 0, 0]
-    measured = np.clip(sums[1] / np.maximum(sums[0], 1e-30), assumed / _SLOPE_SPAN, assumed * _SLOPE_SPAN)
-    share = _PRIOR_PIXELS / (pixels + _PRIOR_PIXELS)
-    agreed: Floats = assumed**share * measured ** (1.0 - share)
-    agreed *= 1.0 + 2.0 / np.maximum(pixels + 2.0, 8.0)
-    return agreed[:, None, None]
+    if len(told) == 1:
+        return [[0]]
+    own = over / np.maximum(told, 1e-30)
+    limit = np.sort(own)[(len(own) - 1) // 2] * _ALIKE + 4.0 * np.sqrt(2.0 / np.maximum(told, 1e-30))
+    alike = (own <= limit).tolist()
+    together = [i for i, same in enumerate(alike) if same]
+    alone = [[i] for i, same in enumerate(alike) if not same]
+    return [together, *alone] if together else alone
+
+
+def _pooled(pools: list[list[int]], told: Floats, over: Floats, slope: Floats, assumed: float) -> Floats:
+    """(n, 1, 1) slope of each window from the moments of its pool."""
+    pooled = np.empty_like(slope)
+    tolds, overs = told.tolist(), over.tolist()
+    for pool in pools:
+        amount = sum(tolds[i] for i in pool)
+        measured = sum(overs[i] for i in pool) / max(amount, 1e-30)
+        pixels = amount * float(slope[pool[0], 0, 0]) ** 2
+        share = _PRIOR_PIXELS / (pixels + _PRIOR_PIXELS)
+        within = min(max(measured, assumed / _SLOPE_SPAN), assumed * _SLOPE_SPAN)
+        value = assumed**share * within ** (1.0 - share)
+        pooled[pool] = value * (1.0 + 2.0 / max(pixels + 2.0, 8.0))
+    return pooled

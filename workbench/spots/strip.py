@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,12 @@ def distance_px(line: Scanline, u_px: Floats, v_px: Floats) -> Floats:
     across = (u_px - line.u0_px) * line.dv - (v_px - line.v0_px) * line.du
     distance: Floats = np.abs(across) / np.hypot(line.du, line.dv)
     return distance
+
+
+def is_on(line: Scanline, u_px: float, v_px: float) -> bool:
+    """Whether a point lies within the line's half-width."""
+    across = (u_px - line.u0_px) * line.dv - (v_px - line.v0_px) * line.du
+    return abs(across) <= line.half_width_px * math.hypot(line.du, line.dv)
 
 
 def check_line(line: Scanline) -> None:

@@ -62,10 +62,10 @@ def _allowed(shape: tuple[int, ...], scanlines: Sequence[Scanline], ambiguous_px
         return np.ones(shape, bool)
     v, u = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
     distances = np.stack([distance_px(line, u, v) for line in scanlines])
-    on_a_line: Bools = (distances <= np.array([li.half_width_px for li in scanlines])[:, None, None]).any(
-        axis=0
-    )
-    return on_a_line & ((distances < ambiguous_px).sum(axis=0) < 2)
+    half_widths = np.array([line.half_width_px for line in scanlines])[:, None, None]
+    on_a_line = np.logical_or.reduce(distances <= half_widths, axis=0)
+    allowed: Bools = on_a_line & (np.count_nonzero(distances < ambiguous_px, axis=0) < 2)
+    return allowed
 
 
 def _centroids(diff: Floats, threshold: float) -> Floats:

@@ -18,29 +18,20 @@ def rng(seed: int = 0) -> np.random.Generator:
 
 
 @pytest.mark.parametrize(
-    "line",
+    ("line", "middle"),
     [
-        Scanline(0, 30, 1, 0, 2),
-        Scanline(0, 30, -1, 0, 2),
-        Scanline(30, 0, 0, 1, 2),
-        Scanline(0, 0, 1, 1, 2),
-        Scanline(0, 59, 2, -2, 2),
-        Scanline(0, 20, 3, 1, 2),
+        (Scanline(0, 30, 1, 0, 2), (30.0, 30.0)),
+        (Scanline(0, 30, -1, 0, 2), (30.0, 30.0)),
+        (Scanline(30, 0, 0, 1, 2), (30.0, 30.0)),
+        (Scanline(0, 0, 1, 1, 2), (30.0, 30.0)),
+        (Scanline(0, 59, 2, -2, 2), (30.0, 29.0)),
+        (Scanline(0, 20, 3, 1, 2), (30.0, 30.0)),
     ],
 )
-def test_spots_on_a_line_come_in_its_order(line: Scanline) -> None:
-    centre = {
-        (1, 0): (30, 30),
-        (-1, 0): (30, 30),
-        (0, 1): (30, 30),
-        (1, 1): (30, 30),
-        (2, -2): (30, 29),
-        (3, 1): (30, 30),
-    }
-    middle = np.array(centre[line.du, line.dv], float)
+def test_spots_on_a_line_come_in_its_order(line: Scanline, middle: tuple[float, float]) -> None:
     along = np.array([line.du, line.dv]) / np.hypot(line.du, line.dv)
-    places = [middle + t * along for t in (-16.0, 0.3, 15.0)]
-    frame = draw([Drawn(*p) for p in places], rng(), (60, 60))
+    places = [np.array(middle) + t * along for t in (-16.0, 0.3, 15.0)]
+    frame = draw([Drawn(float(u), float(v)) for u, v in places], rng(), (60, 60))
     spots = find_spots(frame, scanlines=[line], expected=3).spots
     np.testing.assert_allclose([(s.u_px, s.v_px) for s in spots], places, atol=0.1)
 

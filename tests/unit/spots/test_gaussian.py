@@ -50,10 +50,10 @@ def test_separable_sums_equal_the_written_out_ones() -> None:
     weight = rng.uniform(0.0, 1.0, (2, 11, 13))
     flat = weight.reshape(2, 1, -1)
     np.testing.assert_allclose(
-        design.information(weight), (rows * flat) @ rows.transpose(0, 2, 1), atol=1e-12
+        design.information(weight), np.asarray((rows * flat) @ rows.transpose(0, 2, 1)), atol=1e-12
     )
     np.testing.assert_allclose(design.gradient(weight), (rows * flat).sum(axis=2), atol=1e-12)
-    cov = np.linalg.inv(design.information(weight))
+    cov = np.asarray(np.linalg.inv(design.information(weight)), np.float64)
     expected = np.einsum("nip,nij,njp->np", rows, cov, rows).reshape(weight.shape)
     np.testing.assert_allclose(design.leverage(cov), expected, atol=1e-9)
 
