@@ -15,7 +15,7 @@ from workbench.calibration.fit import Fit, data_share, fit
 from workbench.calibration.parameters import Parameter, ParameterTable
 from workbench.calibration.sightings import sight_rows
 from workbench.model.captures import load_captures
-from workbench.model.errors import BadInputError
+from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.rig import Rig, load_rig
 
 ROOT = Path(__file__).parents[2]
@@ -189,7 +189,9 @@ def test_what_captures_state_of_a_placement_replaces_the_rig_s_prior() -> None:
     result = fit(rig, told)
     by_name = {p.name: p.prior for p in result.table.parameters}
     assert by_name["125.error_mm"].sd == 0.01
-    assert by_name["125.slope_x"].value == pytest.approx(np.tan(np.radians(2.0)))
+    slope = np.tan(np.radians(2.0))
+    assert by_name["125.slope_x"].value == pytest.approx(slope)
+    assert by_name["125.slope_x"].sd == pytest.approx(np.radians(0.5) * (1 + slope**2))
 
 
 def test_a_laser_unknown_to_the_rig() -> None:
@@ -210,3 +212,28 @@ def test_standoffs_are_named_in_the_residuals() -> None:
     assert {p.standoff_mm for p in result.cells.placements} == set(STANDOFFS_MM)
     assert result.residual_px.shape == (len(result.cells.laser), 2)
     assert result.rms_px < 0.1
+
+
+def test_a_target_behind_the_pinhole() -> None:
+    rig = thesis_rig()
+    bench = rig.bench.model_copy(update={"offset_mm": prior(-300.0, 5.0)})
+    with pytest.raises(BadInputError, match=r"125 mm, which rig thesis puts at a depth of -175 mm"):
+        fit(rig.model_copy(update={"bench": bench}), World(rig, 1).sightings(repeats=1))
+
+
+def test_positions_that_contradict_everything_are_said_to() -> None:
+    rig = thesis_rig()
+    wild = [replace(s, v_px=1e200) for s in World(rig, 1).sightings(repeats=1)]
+    with pytest.raises(LimitFailedError, match="finite result"):
+        fit(rig, wild)
+
+
+def test_repeats_that_scatter_more_than_stated_are_believed() -> None:
+    """Noise ten times the stated: the means' deviations and the exported spot's must follow."""
+    rig = thesis_rig(noise_px=0.3)
+    told = thesis_rig(noise_px=0.03)
+    result = fit(told, World(rig, 1).sightings(repeats=20))
+    # 44 cells of 20 repeats and 2 coordinates: the ratio is known to 1 / sqrt(2 x 1672) = 1.7 %.
+    assert result.cells.repeat_scale == pytest.approx(10.0, rel=0.06)
+    np.testing.assert_allclose(result.cells.sd_px, np.hypot(0.3 / np.sqrt(20), 0.04), rtol=0.06)
+    assert result.noise_scale == 1.0

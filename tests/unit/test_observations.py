@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from workbench.calibration.averaging import strays
 from workbench.calibration.observations import Sighting, group
+from workbench.model.errors import BadInputError
 from workbench.model.rig import NoiseSpec
 
 NOISE = NoiseSpec(spot_sd_px=0.1, speckle_sd_px=0.04)
@@ -43,17 +45,42 @@ def test_cells_by_laser_and_placement() -> None:
 
 
 def test_a_repeat_far_from_its_fellows_is_rejected_by_name() -> None:
-    cells, rejected = group(sightings([100.0, 100.1, 99.9, 100.05, 103.0], [0.1] * 5), ["1"], NOISE)
-    assert [r.source for r in rejected] == ["row 4"]
-    assert "2.95 px" in rejected[0].reason
-    assert len(cells.members[0]) == 4
+    us = [100.0, 100.1, 99.9, 100.05, 99.95, 100.02, 100.04, 99.97, 100.01, 103.0]
+    cells, rejected = group(sightings(us, [0.1] * 10), ["1"], NOISE)
+    assert [r.source for r in rejected] == ["row 9"]
+    assert "2.98 px" in rejected[0].reason
+    assert len(cells.members[0]) == 9
 
 
-@pytest.mark.parametrize("us", [[100.0, 100.1, 103.0], [100.0, 100.1, 99.9, 100.5]])
+@pytest.mark.parametrize("us", [[100.0, 100.1, 103.0], [100.0, 100.1, 99.9, 100.5] * 3])
 def test_repeats_that_may_be_noise_stay(us: list[float]) -> None:
     cells, rejected = group(sightings(us, [0.1] * len(us)), ["1"], NOISE)
     assert rejected == []
     assert len(cells.members[0]) == len(us)
+
+
+def test_a_coordinate_that_some_repeats_lack_is_the_mean_of_the_others() -> None:
+    rows = sightings([100.0, 101.0, 102.0], [0.1] * 3)
+    cells, _ = group([replace(rows[0], u_px=np.nan), *rows[1:]], ["1"], NOISE)
+    np.testing.assert_allclose(cells.position_px, [[101.5, 10.0]])
+    scaled = cells.repeat_scale**2 * np.array([0.01 / 2, 0.01 / 3])
+    np.testing.assert_allclose(cells.sd_px[0] ** 2, scaled + 0.04**2)
+
+
+def test_rows_that_say_two_things_of_one_placement() -> None:
+    rows = sightings([100.0, 101.0], [0.1] * 2)
+    with pytest.raises(BadInputError, match=r"row 1: .*row 0 says of the same placement p .*got 600 mm"):
+        group([rows[0], replace(rows[1], standoff_mm=600.0)], ["1"], NOISE)
+
+
+def test_honest_repeats_are_hardly_ever_rejected() -> None:
+    """As the comment of STRAY_SD says, also where the stated deviation is far too small."""
+    rng = np.random.default_rng(5)
+    draws = rng.normal(0.0, 1.0, (4000, 10, 2))
+    far = sum(int(strays(d, np.full((10, 2), 1e-3)).sum()) for d in draws)
+    right = sum(int(strays(d, np.full((10, 2), 1.0)).sum()) for d in draws)
+    assert right == 0
+    assert far < 2 * 4000 * 10 / 250
 
 
 def test_a_coordinate_never_measured_stays_unknown() -> None:

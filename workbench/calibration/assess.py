@@ -16,6 +16,8 @@ from workbench.model.calibration import DeterminedBy
 from workbench.optics.lens import Lens
 from workbench.optics.rays import Ray, spot_at_inverse_depth
 
+CONTRADICTION_SD = 5.0
+"""By chance one parameter in 2 million lies so far from its prior."""
 DATA_SHARE_DETERMINED = 0.9
 PRIOR_UNMOVED = 0.9
 """A posterior sd above this part of the prior's: neither data nor other priors told anything."""
@@ -77,7 +79,8 @@ def judge(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> Assessm
     reasons = _too_few_standoffs(fit, limits)
     if not fit.converged:
         reasons.append("the solver did not converge; check the standoffs and the laser ids")
-    if fit.rms_px > limits.max_rms_px:
+    reasons += _contradictions(fit)
+    if not fit.rms_px <= limits.max_rms_px:
         reasons.append(f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px")
     if not max_relative_range_sd <= limits.max_relative_range_sd:
         reasons.append(
@@ -131,6 +134,16 @@ def _too_few_standoffs(fit: Fit, limits: Acceptance) -> list[str]:
     ]
 
 
+def _contradictions(fit: Fit) -> list[str]:
+    """Priors that the data contradict: a rig file that is wrong, or a standoff that was mistyped."""
+    return [
+        f"the data pull {p.name} {abs(pull):.1f} sd away from what the rig file says ({p.prior.value:g} +-"
+        f" {p.prior.sd:g} {p.unit}), to {value:.5g}; check it, and the standoffs"
+        for p, pull, value in zip(fit.table.parameters, fit.prior_pull, fit.values, strict=True)
+        if abs(pull) > CONTRADICTION_SD
+    ]
+
+
 def _warnings(fit: Fit) -> list[str]:
     sensor = [(p, by) for p, by in zip(fit.table.parameters, determined_by(fit), strict=True) if p.prior.sd]
     joint = [p.name for p, by in sensor if by == "joint" and p.kind == "sensor"]
@@ -145,6 +158,11 @@ def _warnings(fit: Fit) -> list[str]:
         warnings.append(f"determined only together with other parameters' priors: {', '.join(others)}")
     if others := [name for name in prior if name != "f_px"]:
         warnings.append(f"not determined by the data, the rig file's value stands: {', '.join(others)}")
+    if fit.cells.repeat_scale > 1:
+        warnings.append(
+            f"repeats scatter {fit.cells.repeat_scale:.2f} times more than the stated noise of the spots;"
+            " their sd was enlarged to match"
+        )
     if fit.noise_scale > 1:
         warnings.append(
             f"residuals are {fit.noise_scale:.2f} times larger than the stated noise of the spots"

@@ -14,6 +14,7 @@ from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
 from workbench.calibration.assess import Assessment, determined_by, judge
 from workbench.calibration.fit import Fit
+from workbench.calibration.observations import positions, stated_sd
 from workbench.calibration.sensor import Sensor
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import (
@@ -111,7 +112,7 @@ def _calibration(
                 for laser in fit.rig.lasers
             ),
             noise=Noise(
-                spot_sd_px=fit.rig.noise.spot_sd_px * fit.noise_scale,
+                spot_sd_px=_typical_spot_sd(fit),
                 speckle_sd_px=fit.rig.noise.speckle_sd_px * fit.noise_scale,
             ),
             parameters=_parameters(fit),
@@ -144,6 +145,12 @@ def _parameters(fit: Fit) -> Parameters:
         determined_by=determined_by(fit)[sensor],
         covariance=Matrix(rows=len(table), cols=len(table), data=tuple(symmetric.ravel().tolist())),
     )
+
+
+def _typical_spot_sd(fit: Fit) -> float:
+    """Root mean square deviation of a single spot, as stated and enlarged to match what was seen."""
+    sd, seen = stated_sd(fit.used, fit.rig.noise), np.isfinite(positions(fit.used))
+    return float(np.sqrt((sd[seen] ** 2).mean()) * fit.cells.repeat_scale * fit.noise_scale)
 
 
 def _worst_relative_sd(sensor: Sensor) -> float:

@@ -12,8 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 from jax import Array
-from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtrc
+from numpy.typing import NDArray
 
 from workbench.calibration.observations import Cells, PlacementInfo, Rejected, Sighting, group, positions
 from workbench.calibration.parameters import (
@@ -27,12 +26,11 @@ from workbench.calibration.parameters import (
     sensor_parameters,
 )
 from workbench.calibration.prediction import predict_cell
-from workbench.model.errors import BadInputError
+from workbench.calibration.scatter import scale_called_for
+from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.rig import Prior, Rig
 
 FloatArray = NDArray[np.float64]
-SCATTER_SIGNIFICANCE = 0.01
-"""Residuals less likely than this under the stated noise make the fit estimate the noise from them."""
 FLAT_PRIOR_SD = 1e3
 """A prior this many times wider than stated is as good as none."""
 
@@ -49,6 +47,8 @@ class Fit:
     """(P,) maximum a posteriori."""
     covariance: FloatArray
     """(P, P) posterior."""
+    prior_pull: FloatArray
+    """(P,) value - prior mean in units of the prior's sd; 0 for constants."""
     data_share: FloatArray
     """(P,) see `data_share`."""
     residual_px: FloatArray
@@ -93,9 +93,11 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
         rejected: what was already rejected before, to be listed with the fit's own.
 
     Raises:
-        BadInputError: no sightings, or one of a laser that the rig does not have.
+        BadInputError: no sightings, one of a laser that the rig does not have, placements that contradict
+            themselves, or a target that the rig file puts behind the pinhole.
+        LimitFailedError: the fit does not come to a finite result.
     """
-    _check_lasers(rig, sightings)
+    _check(rig, sightings)
     cells, strays = group(sightings, rig.laser_ids, rig.noise)
     table = table_of(rig, cells.placements)
     problem = _Problem.of(rig, table, cells)
@@ -105,6 +107,11 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
         if solution.scale_called_for <= scale * 1.001:
             break
         scale = solution.scale_called_for
+    if not (np.isfinite(solution.y).all() and np.isfinite(solution.covariance).all()):
+        raise LimitFailedError(
+            "the fit does not come to a finite result: the positions contradict the rig file altogether;"
+            " check its baselines, standoffs and image size"
+        )
     values = table.prior_mean + table.prior_sd * solution.y
     residual = solution.residual_px
     return Fit(
@@ -114,6 +121,7 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
         rejected=(*rejected, *strays),
         values=values,
         covariance=solution.covariance * np.outer(table.prior_sd, table.prior_sd),
+        prior_pull=np.where(table.prior_sd > 0, solution.y, 0.0),
         data_share=data_share(solution.jacobian, table),
         residual_px=residual,
         rms_px=_rms(cells, residual),
@@ -145,14 +153,6 @@ def data_share(jacobian: FloatArray, table: ParameterTable) -> FloatArray:
     variance = np.diag(np.linalg.inv(information + np.eye(len(information)) / FLAT_PRIOR_SD**2))
     share[sensor] = np.where(table.prior_sd[sensor] > 0, 1.0 / (1.0 + variance), 0.0)
     return share
-
-
-def scale_called_for(chi2: ArrayLike, freedom: ArrayLike) -> FloatArray:
-    """Factor on the stated pixel noise that residuals of this chi2 call for, 1 where they agree with it."""
-    chi2, freedom = np.asarray(chi2, float), np.asarray(freedom, float)
-    countable = np.where(freedom > 0, freedom, 1.0)
-    improbable = (freedom > 0) & (chdtrc(countable, chi2) < SCATTER_SIGNIFICANCE)
-    return np.where(improbable, np.maximum(1.0, np.sqrt(chi2 / countable)), 1.0)
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,8 @@ class _Problem:
         covariance = np.linalg.inv(information + np.eye(len(information)))
         count = int((self.inverse_sd > 0).sum())
         freedom = count - float(np.trace(information @ covariance))
-        chi2 = float(residual @ residual) * scale**2
+        with np.errstate(over="ignore"):  # a result that is not finite is refused by name
+            chi2 = float(residual @ residual) * scale**2
         pixels = -residual.reshape(-1, 2) / np.where(self.inverse_sd > 0, self.inverse_sd / scale, np.nan)
         return _Solution(
             y=np.asarray(y),
@@ -282,7 +283,9 @@ def _as_told(parameter: Parameter, told: dict[str, PlacementInfo]) -> Parameter:
     if name == "error_mm" and np.isfinite(info.standoff_sd_mm):
         return replace(parameter, prior=Prior(value=0.0, sd=info.standoff_sd_mm))
     if name == "slope_x" and info.yaw_deg:
-        return replace(parameter, prior=Prior(value=tan(radians(info.yaw_deg)), sd=parameter.prior.sd))
+        slope = tan(radians(info.yaw_deg))
+        # d tan(a) = (1 + tan^2 a) da: far from square the same tilt changes the slope more.
+        return replace(parameter, prior=Prior(value=slope, sd=parameter.prior.sd * (1 + slope**2)))
     return parameter
 
 
@@ -293,7 +296,7 @@ def _rms(cells: Cells, residual_px: FloatArray) -> float:
     return float(np.sqrt(np.nanmean(np.concatenate(single) ** 2)))
 
 
-def _check_lasers(rig: Rig, sightings: Sequence[Sighting]) -> None:
+def _check(rig: Rig, sightings: Sequence[Sighting]) -> None:
     if not sightings:
         raise BadInputError("no spot is left to fit: expected captures with a known standoff and a spot each")
     for s in sightings:
@@ -301,4 +304,10 @@ def _check_lasers(rig: Rig, sightings: Sequence[Sighting]) -> None:
             raise BadInputError(
                 f"{s.source}: laser_id: expected one of {', '.join(rig.laser_ids)} (rig {rig.rig}),"
                 f" got {s.laser_id}"
+            )
+        depth_mm = s.standoff_mm * (1 + rig.bench.ruler_scale.value) + rig.bench.offset_mm.value
+        if not depth_mm > 0:
+            raise BadInputError(
+                f"{s.source}: standoff_mm: expected a target before the pinhole, got {s.standoff_mm:g} mm,"
+                f" which rig {rig.rig} puts at a depth of {depth_mm:g} mm; check bench.offset_mm"
             )

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.calibration.averaging import scatter_chi2, strays, weighted_mean
+from workbench.calibration.scatter import scale_called_for
+from workbench.model.errors import BadInputError
 from workbench.model.rig import NoiseSpec
 
 FloatArray = NDArray[np.float64]
-REPEAT_LIMIT_SD = 6.0
-"""A repeat this far from the median of its fellows is no repeat: 1 in 5e8 by chance."""
-FEWEST_FOR_MEDIAN = 4
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,24 @@ class PlacementInfo:
     standoff_sd_mm: float
     """NaN when not stated: the rig's is used."""
     yaw_deg: float
+    source: str = ""
+    """Who said so first."""
+
+    @classmethod
+    def of(cls, s: Sighting) -> PlacementInfo:
+        """What a sighting says of its placement."""
+        return cls(s.placement, s.standoff_mm, s.standoff_sd_mm, s.yaw_deg, s.source)
+
+    @property
+    def told(self) -> tuple[float, float | None, float]:
+        """What must be the same for all sightings of a placement."""
+        return self.standoff_mm, None if isnan(self.standoff_sd_mm) else self.standoff_sd_mm, self.yaw_deg
+
+    @property
+    def describe(self) -> str:
+        """For people."""
+        sd = "" if isnan(self.standoff_sd_mm) else f" +- {self.standoff_sd_mm:g}"
+        return f"{self.standoff_mm:g}{sd} mm, {self.yaw_deg:g} deg"
 
 
 @dataclass(frozen=True)
@@ -73,35 +92,43 @@ class Cells:
     """(N, 2) 1 sigma of the mean, shared error of the repeats included."""
     members: tuple[tuple[Sighting, ...], ...]
     """The sightings behind each mean."""
+    repeat_scale: float = 1.0
+    """Factor on the stated deviations that the scatter of the repeats called for."""
 
 
 def group(
     sightings: Iterable[Sighting], laser_ids: Sequence[str], noise: NoiseSpec
 ) -> tuple[Cells, list[Rejected]]:
-    """Average the repeats of each laser at each placement; repeats far from their fellows are rejected."""
+    """Average the repeats of each laser at each placement; repeats far from their fellows are rejected.
+
+    Where the repeats scatter significantly more than their stated deviations, all of these are enlarged to
+    match (`Cells.repeat_scale`).
+
+    Raises:
+        BadInputError: sightings of one placement disagree about where the target stood.
+    """
     buckets: dict[tuple[str, str], list[Sighting]] = defaultdict(list)
     placements: dict[str, PlacementInfo] = {}
     for s in sightings:
         buckets[s.placement, s.laser_id].append(s)
-        placements.setdefault(
-            s.placement, PlacementInfo(s.placement, s.standoff_mm, s.standoff_sd_mm, s.yaw_deg)
-        )
-    order = list(placements)
+        _check_placement(placements.setdefault(s.placement, PlacementInfo.of(s)), s)
+    kept: dict[tuple[str, str], list[Sighting]] = {}
     rejected: list[Rejected] = []
-    rows = []
-    for (placement, laser_id), members in buckets.items():
-        kept, dropped = _reject_strays(members, noise)
+    for key, members in buckets.items():
+        kept[key], dropped = _without_strays(members, noise)
         rejected += dropped
-        mean, sd = _average(kept, noise)
-        rows.append((laser_ids.index(laser_id), order.index(placement), mean, sd, tuple(kept)))
+    scale = _repeat_scale(kept.values(), noise)
+    means = [weighted_mean(positions(m), scale * stated_sd(m, noise)) for m in kept.values()]
+    order = list(placements)
     return (
         Cells(
             placements=tuple(placements.values()),
-            laser=np.array([row[0] for row in rows], dtype=np.intp),
-            placement=np.array([row[1] for row in rows], dtype=np.intp),
-            position_px=np.array([row[2] for row in rows]).reshape(-1, 2),
-            sd_px=np.array([row[3] for row in rows]).reshape(-1, 2),
-            members=tuple(row[4] for row in rows),
+            laser=np.array([laser_ids.index(laser) for _, laser in kept], dtype=np.intp),
+            placement=np.array([order.index(placement) for placement, _ in kept], dtype=np.intp),
+            position_px=np.array([mean for mean, _ in means]).reshape(-1, 2),
+            sd_px=np.array([np.hypot(sd, noise.speckle_sd_px) for _, sd in means]).reshape(-1, 2),
+            members=tuple(tuple(m) for m in kept.values()),
+            repeat_scale=scale,
         ),
         rejected,
     )
@@ -112,31 +139,38 @@ def positions(sightings: Sequence[Sighting]) -> FloatArray:
     return np.array([(s.u_px, s.v_px) for s in sightings]).reshape(-1, 2)
 
 
-def _stated_sd(sightings: Sequence[Sighting], noise: NoiseSpec) -> FloatArray:
+def stated_sd(sightings: Sequence[Sighting], noise: NoiseSpec) -> FloatArray:
     """(n, 2) standard deviation of each position, the rig's where none is stated."""
     sd = np.array([(s.u_sd_px, s.v_sd_px) for s in sightings]).reshape(-1, 2)
     return np.where(np.isfinite(sd), sd, noise.spot_sd_px)
 
 
-def _average(sightings: Sequence[Sighting], noise: NoiseSpec) -> tuple[FloatArray, FloatArray]:
-    """Mean weighted by the stated variances, and its standard deviation."""
-    weight = 1.0 / _stated_sd(sightings, noise) ** 2
-    mean = (weight * positions(sightings)).sum(axis=0) / weight.sum(axis=0)
-    return mean, np.sqrt(1.0 / weight.sum(axis=0) + noise.speckle_sd_px**2)
+def _check_placement(first: PlacementInfo, sighting: Sighting) -> None:
+    other = PlacementInfo.of(sighting)
+    if other.told != first.told:
+        raise BadInputError(
+            f"{sighting.source}: standoff_mm: expected what {first.source} says of the same placement"
+            f" {first.key} ({first.describe}), got {other.describe}; give other placements other names"
+        )
 
 
-def _reject_strays(members: Sequence[Sighting], noise: NoiseSpec) -> tuple[list[Sighting], list[Rejected]]:
-    if len(members) < FEWEST_FOR_MEDIAN:
-        return list(members), []
+def _without_strays(members: Sequence[Sighting], noise: NoiseSpec) -> tuple[list[Sighting], list[Rejected]]:
     position = positions(members)
-    distance = np.abs(position - np.median(position, axis=0))
-    scatter = 1.4826 * np.median(distance, axis=0)
-    limit = REPEAT_LIMIT_SD * np.maximum(scatter, _stated_sd(members, noise))
-    stray = [bool(np.any(far)) for far in distance > limit]
-    kept = [s for s, out in zip(members, stray, strict=True) if not out]
+    stray = strays(position, stated_sd(members, noise))
+    kept = [s for s, out in zip(members, stray.tolist(), strict=True) if not out]
+    median = np.nanmedian(position, axis=0) if stray.any() else np.zeros(2)
     dropped = [
-        Rejected(s.source, f"laser {s.laser_id} at {s.standoff_mm:g} mm: {d:.2f} px from its other repeats")
-        for s, out, d in zip(members, stray, np.nanmax(distance, axis=1), strict=True)
+        Rejected(
+            s.source,
+            f"laser {s.laser_id} at {s.standoff_mm:g} mm:"
+            f" {np.nanmax(np.abs(p - median)):.2f} px from its other repeats",
+        )
+        for s, p, out in zip(members, position, stray.tolist(), strict=True)
         if out
     ]
     return kept, dropped
+
+
+def _repeat_scale(groups: Iterable[Sequence[Sighting]], noise: NoiseSpec) -> float:
+    parts = [scatter_chi2(positions(members), stated_sd(members, noise)) for members in groups]
+    return float(scale_called_for(sum(chi2 for chi2, _ in parts), sum(free for _, free in parts)))

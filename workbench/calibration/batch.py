@@ -1,0 +1,316 @@
+"""Many calibrations of one layout at once: simulation, bootstrap, design of standoffs.
+
+The posterior is that of `fit`, the solver another: Gauss-Newton on the normal equations, damped as Levenberg
+did where a step would climb. A placement's error and tilts meet only its own spots, so that their blocks are
+eliminated from the normal equations first (Schur complement; F. Zhang, "The Schur Complement and Its
+Applications", 2005) and what is left to solve has the size of the sensor alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from workbench.calibration.fit import table_of
+from workbench.calibration.observations import Cells, PlacementInfo
+from workbench.calibration.parameters import LENS, PLACEMENT, RAY, REFERENCE, ParameterTable
+from workbench.calibration.prediction import predict_cell
+from workbench.calibration.scatter import scale_called_for
+from workbench.model.rig import Rig
+
+FloatArray = NDArray[np.float64]
+CHUNK = 32
+"""Fits solved in step: enough to fill the vector units, few enough not to wait long for the slowest one."""
+COMMON = len(LENS) + len(REFERENCE)
+MAX_STEPS = 60
+STEP_TOLERANCE_SD = 1e-7
+"""Of the last step, in posterior standard deviations; what would follow is a tenth of it or less."""
+SCALE_TOLERANCE = 1.001
+SCALE_ROUNDS = 10
+FIRST_DAMPING = 1e-3
+LEAST_DAMPING = 1e-9
+
+
+@dataclass(frozen=True)
+class BatchFit:
+    """B calibrations. P parameters (S of the sensor, then 3 of each of J placements), 1 sigma throughout."""
+
+    table: ParameterTable
+    values: FloatArray
+    """(B, P) maximum a posteriori."""
+    sensor_covariance: FloatArray
+    """(B, S, S) posterior."""
+    placement_covariance: FloatArray
+    """(B, J, 3, 3) posterior of each placement's error and slopes."""
+    noise_scale: FloatArray
+    """(B,) as in `Fit`."""
+    chi2: FloatArray
+    """(B,) of the data at the stated noise."""
+    degrees_of_freedom: FloatArray
+    """(B,)"""
+    converged: NDArray[np.bool_]
+    """(B,)"""
+
+    @property
+    def sensor(self) -> FloatArray:
+        """(B, S) the sensor's values."""
+        return np.asarray(self.values[:, : self.sensor_covariance.shape[1]])
+
+    @property
+    def sd(self) -> FloatArray:
+        """(B, P) posterior standard deviations."""
+        sensor = np.diagonal(self.sensor_covariance, axis1=1, axis2=2)
+        placement = np.diagonal(self.placement_covariance, axis1=2, axis2=3)
+        variance = np.concatenate([sensor, placement.reshape(len(sensor), -1)], axis=1)
+        return np.asarray(np.sqrt(variance))
+
+
+def fit_batch(
+    rig: Rig,
+    placements: Sequence[PlacementInfo],
+    position_px: FloatArray,
+    sd_px: FloatArray,
+) -> BatchFit:
+    """Fit B calibrations of one rig at the same J placements.
+
+    Args:
+        rig: priors; its L lasers in the order of the file.
+        placements: J of them, shared by all calibrations.
+        position_px: (B, J, L, 2) mean positions, NaN where not measured.
+        sd_px: 1 sigma of the means, speckle included; broadcasts to `position_px`.
+    """
+    table = table_of(rig, placements)
+    measured = np.isfinite(position_px)
+    position = np.where(measured, position_px, 0.0)
+    inverse_sd = np.where(measured, 1.0 / np.where(measured, sd_px, 1.0), 0.0)
+    layout = (table.prior_mean, table.prior_sd, np.array([p.standoff_mm for p in placements]))
+    scale = np.ones(len(position))
+    solved = _in_chunks(layout, np.zeros((len(position), len(table.prior_mean))), position, inverse_sd)
+    for _ in range(SCALE_ROUNDS):
+        called_for = scale_called_for(solved.chi2 * scale**2, solved.freedom)
+        again = np.flatnonzero(called_for > scale * SCALE_TOLERANCE)
+        if not len(again):
+            break
+        scale[again] = called_for[again]
+        scaled = inverse_sd[again] / scale[again, None, None, None]
+        better = _in_chunks(layout, solved.y[again], position[again], scaled)
+        for whole, part in zip(solved, better, strict=True):
+            whole[again] = part
+    sd = table.prior_sd
+    sensor = COMMON + len(RAY) * len(rig.lasers)
+    by_placement = sd[sensor:].reshape(-1, len(PLACEMENT))
+    return BatchFit(
+        table=table,
+        values=table.prior_mean + sd * solved.y,
+        sensor_covariance=solved.sensor_covariance * np.outer(sd[:sensor], sd[:sensor]),
+        placement_covariance=solved.placement_covariance * by_placement[:, :, None] * by_placement[:, None],
+        noise_scale=scale,
+        chi2=solved.chi2 * scale**2,
+        degrees_of_freedom=solved.freedom,
+        converged=solved.converged,
+    )
+
+
+def as_grid(cells: Cells, lasers: int) -> tuple[FloatArray, FloatArray]:
+    """(J, L, 2) mean positions of one calibration and their standard deviations, NaN where not seen."""
+    shape = (len(cells.placements), lasers, 2)
+    position, sd = np.full(shape, np.nan), np.full(shape, np.nan)
+    position[cells.placement, cells.laser] = cells.position_px
+    sd[cells.placement, cells.laser] = cells.sd_px
+    return position, sd
+
+
+class _Solved(NamedTuple):
+    """Of each fit, in units of the priors."""
+
+    y: FloatArray
+    sensor_covariance: FloatArray
+    placement_covariance: FloatArray
+    chi2: FloatArray
+    freedom: FloatArray
+    converged: NDArray[np.bool_]
+
+
+def _in_chunks(
+    layout: tuple[FloatArray, ...], start: FloatArray, position: FloatArray, inverse_sd: FloatArray
+) -> _Solved:
+    """Solve CHUNK fits after CHUNK fits; the last ones are filled up with the first of theirs."""
+    parts = []
+    for first in range(0, len(position), CHUNK):
+        chosen = np.arange(first, first + CHUNK)
+        chosen = np.where(chosen < len(position), chosen, first)
+        solved = _solve_chunk(*layout, start[chosen], position[chosen], inverse_sd[chosen])
+        parts.append([np.asarray(part)[: len(position) - first] for part in solved])
+    return _Solved(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+
+class _Layout(NamedTuple):
+    """What the fits of a batch share."""
+
+    mean: Array
+    sd: Array
+    standoff_mm: Array
+
+
+class _State(NamedTuple):
+    y: Array
+    """(P,)"""
+    cost: Array
+    """Sum of squares, the prior's included."""
+    damping: Array
+    step_sd: Array
+    steps: Array
+
+
+class _Normal(NamedTuple):
+    """The normal equations with the placements eliminated, in the units of the priors."""
+
+    schur: Array
+    """(S, S) information on the sensor, every placement's error and tilts unknown."""
+    sensor_right: Array
+    """(S,)"""
+    coupling: Array
+    """(J, 3, S) H_p^-1 H_ps: how the placements follow the sensor."""
+    placement_right: Array
+    """(J, 3) H_p^-1 times the placements' negative gradient."""
+    placement_inverse: Array
+    """(J, 3, 3) H_p^-1."""
+    gradient: Array
+    """(P,)"""
+
+
+@jax.jit
+def _solve_chunk(
+    mean: Array, sd: Array, standoff_mm: Array, start: Array, position: Array, inverse_sd: Array
+) -> tuple[Array, ...]:
+    layout = _Layout(mean, sd, standoff_mm)
+    return jax.vmap(partial(_solve_one, layout))(start, position, inverse_sd)
+
+
+def _solve_one(layout: _Layout, start: Array, position: Array, inverse_sd: Array) -> tuple[Array, ...]:
+    data = (layout, position, inverse_sd)
+    state = _State(start, _cost(start, *data), jnp.zeros(()), jnp.full((), jnp.inf), jnp.zeros((), int))
+
+    def unfinished(state: _State) -> Array:
+        return (state.step_sd > STEP_TOLERANCE_SD) & (state.steps < MAX_STEPS)
+
+    state = jax.lax.while_loop(unfinished, lambda state: _step(state, *data), state)
+    normal = _normal(state.y, *data, jnp.zeros(()))
+    sensor = jnp.linalg.inv(normal.schur)
+    placement = normal.placement_inverse + jnp.einsum(
+        "jas,st,jbt->jab", normal.coupling, sensor, normal.coupling
+    )
+    effective = state.y.size - jnp.trace(sensor) - jnp.trace(placement, axis1=1, axis2=2).sum()
+    freedom = (inverse_sd > 0).sum() - effective
+    chi2 = state.cost - state.y @ state.y
+    return state.y, sensor, placement, chi2, freedom, state.step_sd <= STEP_TOLERANCE_SD
+
+
+def _step(state: _State, layout: _Layout, position: Array, inverse_sd: Array) -> _State:
+    """One step, taken if it descends; else the damping grows."""
+    normal = _normal(state.y, layout, position, inverse_sd, state.damping)
+    factor = jax.scipy.linalg.cho_factor(normal.schur, lower=True)
+    sensor = jax.scipy.linalg.cho_solve(factor, normal.sensor_right)
+    placement = normal.placement_right - normal.coupling @ sensor
+    step = jnp.concatenate([sensor, placement.ravel()])
+    trial = state.y + step
+    cost = _cost(trial, layout, position, inverse_sd)
+    # At the optimum costs differ by rounding alone: a step of no size may not be refused for that.
+    descends = cost <= state.cost * (1.0 + 1e-12)
+    return _State(
+        y=jnp.where(descends, trial, state.y),
+        cost=jnp.where(descends, cost, state.cost),
+        damping=jnp.where(descends, _relaxed(state.damping), jnp.maximum(10 * state.damping, FIRST_DAMPING)),
+        # The Gauss-Newton decrement: no parameter moves by more than this many posterior sd.
+        step_sd=jnp.where(descends, jnp.sqrt(jnp.abs(step @ normal.gradient)), jnp.inf),
+        steps=state.steps + 1,
+    )
+
+
+def _relaxed(damping: Array) -> Array:
+    return jnp.where(damping > LEAST_DAMPING, damping / 30.0, 0.0)
+
+
+def _spread(values: Array, placements: int) -> list[Array]:
+    """(P,) by the cell: scalars for all, (L,) by the laser, (J, 1) by the placement."""
+    sensor = values.size - len(PLACEMENT) * placements
+    rays = values[COMMON:sensor].reshape(-1, len(RAY))
+    errors = values[sensor:].reshape(placements, len(PLACEMENT))
+    by_placement = [errors[:, i : i + 1] for i in range(len(PLACEMENT))]
+    return [*values[:COMMON], *rays.T, *by_placement]
+
+
+def _cost(y: Array, layout: _Layout, position: Array, inverse_sd: Array) -> Array:
+    inputs = _spread(layout.mean + layout.sd * y, len(layout.standoff_mm))
+    u, v = predict_cell(tuple(inputs), layout.standoff_mm[:, None])
+    residual = (jnp.stack([u, v], axis=-1) - position) * inverse_sd
+    return (residual**2).sum() + y @ y
+
+
+def _linearise(
+    y: Array, layout: _Layout, position: Array, inverse_sd: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Residuals (J, L, 2) and their derivatives (J, L, 2, 10 | 4 | 3), in sd and units of the priors."""
+    standoff = layout.standoff_mm[:, None]
+    inputs = _spread(layout.mean + layout.sd * y, len(standoff))
+    scales = _spread(layout.sd, len(standoff))
+
+    def by(index: int) -> Array:
+        """Derivative by one input: all others have none, and the compiler need not work on zeros."""
+
+        def moved(value: Array) -> tuple[Array, Array]:
+            return predict_cell((*inputs[:index], value, *inputs[index + 1 :]), standoff)
+
+        _, tangent = jax.jvp(moved, (inputs[index],), (scales[index],))
+        return jnp.stack([jnp.broadcast_to(part, inverse_sd.shape[:2]) for part in tangent], axis=-1)
+
+    slopes = jnp.stack([by(index) * inverse_sd for index in range(len(inputs))], axis=-1)
+    u, v = predict_cell(tuple(inputs), standoff)
+    residual = (jnp.stack([u, v], axis=-1) - position) * inverse_sd
+    rays = COMMON + len(RAY)
+    return residual, slopes[..., :COMMON], slopes[..., COMMON:rays], slopes[..., rays:]
+
+
+def _normal(y: Array, layout: _Layout, position: Array, inverse_sd: Array, damping: Array) -> _Normal:
+    residual, common, ray, error = _linearise(y, layout, position, inverse_sd)
+    placements, lasers = residual.shape[:2]
+    # (J, 2 L, S): each ray has columns of its own.
+    spread = ray[:, :, :, None, :] * jnp.eye(lasers)[:, None, :, None]
+    sensor = jnp.concatenate([common, spread.reshape(*ray.shape[:3], -1)], axis=-1)
+    sensor = sensor.reshape(placements, 2 * lasers, -1)
+    error = error.reshape(placements, 2 * lasers, -1)
+    residual = residual.reshape(placements, 2 * lasers)
+
+    size = sensor.shape[-1]
+    prior = 1.0 + damping
+    inverse = _inverse3(jnp.einsum("jra,jrb->jab", error, error) + prior * jnp.eye(len(PLACEMENT)))
+    cross = jnp.einsum("jra,jrs->jas", error, sensor)
+    coupling = jnp.einsum("jab,jbs->jas", inverse, cross)
+    sensor_gradient = jnp.einsum("jrs,jr->s", sensor, residual) + y[:size]
+    placement_gradient = jnp.einsum("jra,jr->ja", error, residual) + y[size:].reshape(placements, -1)
+    flat = sensor.reshape(-1, size)
+    schur = flat.T @ flat - cross.reshape(-1, size).T @ coupling.reshape(-1, size) + prior * jnp.eye(size)
+    placement_right = -jnp.einsum("jab,jb->ja", inverse, placement_gradient)
+    return _Normal(
+        schur=schur,
+        sensor_right=-sensor_gradient - jnp.einsum("jas,ja->s", cross, placement_right),
+        coupling=coupling,
+        placement_right=placement_right,
+        placement_inverse=inverse,
+        gradient=jnp.concatenate([sensor_gradient, placement_gradient.ravel()]),
+    )
+
+
+def _inverse3(a: Array) -> Array:
+    """Inverse of symmetric positive 3 x 3 matrices (..., 3, 3), by cofactors."""
+    rows = [jnp.cross(a[..., (i + 1) % 3, :], a[..., (i + 2) % 3, :]) for i in range(3)]
+    adjugate = jnp.stack(rows, axis=-1)
+    return adjugate / (a[..., 0, :] * rows[0]).sum(axis=-1)[..., None, None]
