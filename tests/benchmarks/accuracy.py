@@ -112,15 +112,19 @@ def _waves(phase: Floats) -> Floats:
 def lines() -> Iterator[str]:
     """The table, line by line."""
     yield f"Centre of one spot, {TRIALS} trials a cell (others: the first {TRIALS_OF_OTHERS}), {SENSOR},"
-    yield f"background {BACKGROUND_ELECTRONS:g} electrons. rms/bound <= 1.15, z within 0.95 - 1.05, bias <= 0.005 px"
-    yield "above 1e4 electrons (+- its sampling deviation). Others: their rms over ours, >= 1 is worse than ours."
+    yield f"background {BACKGROUND_ELECTRONS:g} electrons. Targets: rms/bound <= 1.15,"
+    yield "sd of z within 0.95 - 1.05, bias <= 0.005 px above 1e4 electrons (+- its sampling deviation)."
+    yield "Other packages: their rms error over ours on the same frames; above 1 ours is better."
     names = "".join(f"{name:>20}" for name in OTHERS)
-    yield f"{'width':>6}{'electrons':>10}{'bound px':>10}{'rms/bound':>10}{'sd of z':>9}{'bias px':>17}{'missed':>7}{'extra':>6}{names}"
+    yield f"{'width':>6}{'electrons':>10}{'bound px':>10}{'rms/bound':>10}{'sd of z':>9}" + (
+        f"{'bias px':>17}{'missed':>7}{'extra':>6}{names}"
+    )
     for width in WIDTHS_PX:
         for electrons in ELECTRONS:
             cell = measure_cell(width, electrons)
             others = "".join(f"{ratio:20.2f}" for ratio in cell.others.values())
             yield (
                 f"{width:6.1f}{electrons:10.0e}{cell.bound_px:10.5f}{cell.rms_px / cell.bound_px:10.3f}"
+                f""
                 f"{cell.z_sd:9.3f}{cell.bias_px:9.4f}+-{cell.bias_sd_px:.4f}{cell.missed:7d}{cell.extra:6d}{others}"
             )

@@ -85,7 +85,7 @@ def _noise_electrons(ambient: Floats, v: float, u: float) -> float:
 
 
 def nuisances(rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Light in the on-frame alone, and in both: reflections beside the scanline, hot pixels steady and blinking."""
+    """Light in the on-frame alone (reflections, blinking pixels) and in both frames (hot pixels)."""
     on, both = np.zeros(SHAPE), np.zeros(SHAPE)
     for _ in range(int(rng.integers(0, 3))):
         row = ROW + rng.choice((-1, 1)) * rng.uniform(9.0, 20.0)
@@ -132,6 +132,8 @@ def run(pairs: int = PAIRS, seed: int = 3) -> Count:
 def lines() -> Iterator[str]:
     """The table, line by line."""
     count = run()
-    yield f"Detection: {PAIRS} pairs, 0.1 - 5 m, a band of {SHAPE[1]} x {SHAPE[0]} px; visible: peak SNR >= {VISIBLE_SNR:g}."
-    yield f"visible {count.visible}, found {count.found}: {100 * count.found / count.visible:.3f} % (target >= 99.5)"
-    yield f"reported {count.reported}, false {count.false}: {100 * count.false / count.reported:.3f} % (target <= 0.1)"
+    found, false = 100 * count.found / count.visible, 100 * count.false / count.reported
+    yield f"Detection: {PAIRS} pairs, 0.1 - 5 m, frames of {SHAPE[1]} x {SHAPE[0]} px around the scanline."
+    yield f"Visible: inside the image, peak at least {VISIBLE_SNR:g} sd of the difference without the spot."
+    yield f"visible {count.visible}, found {count.found}: {found:.3f} % (target >= 99.5)"
+    yield f"reported {count.reported}, false {count.false}: {false:.3f} % (target <= 0.1)"

@@ -20,7 +20,8 @@ PEAK_SD: Final = 5.5
 FINE_PX, COARSE_PX = 1.0, 3.0
 _MAX_PEAKS = 64
 _NEIGHBOURS: Final = np.ones((3, 3), np.uint8)
-# Peaks nearer than this are one unless a valley lies between them, this deep in sd and as a share of the lower.
+# Peaks nearer than this are one unless a valley lies between them, this deep in sd and as a share of the
+# lower.
 _NEAR_PX: Final = 16.0
 _VALLEY_SD: Final = 3.0
 _VALLEY_SHARE: Final = 0.08

@@ -8,7 +8,8 @@ from workbench.spots.types import Failure
 
 _WORDS: Final[dict[Failure, str]] = {
     Failure.NO_SPOT: (
-        "No spot stands out of the noise. Cause: laser off or blocked, target missing, or exposure too short. "
+        "No spot stands out of the noise. Cause: laser off or blocked, target missing, or exposure "
+        "too short. "
         "Do: check that the lasers are lit and reach the target, then raise exposure or gain."
     ),
     Failure.TOO_FEW: (
@@ -16,20 +17,24 @@ _WORDS: Final[dict[Failure, str]] = {
         "Do: check where each beam ends, or capture each laser alone."
     ),
     Failure.TOO_MANY: (
-        "More spots than lasers lit. Cause: a reflection on the scanline, or a lamp that came on between the frames. "
+        "More spots than lasers lit. Cause: a reflection on the scanline, or a lamp that came on "
+        "between the frames. "
         "Do: cover shiny surfaces, keep the light steady, or capture each laser alone."
     ),
     Failure.TOO_DIM: (
-        "Something that could be a spot is too weak to be told from noise. Cause: dark or distant target, short "
+        "Something that could be a spot is too weak to be told from noise. Cause: dark or distant "
+        "target, short "
         "exposure. Do: raise exposure, use a brighter target, or move it closer."
     ),
     Failure.SATURATED: (
         "A spot's middle is clipped; its position rests on the unclipped rim and its deviation is wider. "
-        "Cause: too much light. Do: shorten the exposure or lower the gain until the peak stays below full scale."
+        "Cause: too much light. Do: shorten the exposure or lower the gain until the peak stays "
+        "below full scale."
     ),
     Failure.OFF_SCANLINE: (
         "A spot lies outside the band where this rig's lasers can appear. Cause: a reflection, a lamp, or a "
-        "scanline that no longer fits the rig. Do: cover shiny surfaces; if it persists, realign or recalibrate."
+        "scanline that no longer fits the rig. Do: cover shiny surfaces; if it persists, realign or "
+        "recalibrate."
     ),
     Failure.MERGED: (
         "Two spots overlap, so that each position depends on the other, or they could not be separated. "
@@ -37,11 +42,13 @@ _WORDS: Final[dict[Failure, str]] = {
     ),
     Failure.AMBIENT_CHANGED: (
         "The light in the room differs between the on and the off frame; the difference was compensated. "
-        "Cause: a lamp switched, daylight, mains flicker. Do: keep the light steady, use an exposure that is a "
+        "Cause: a lamp switched, daylight, mains flicker. Do: keep the light steady, use an exposure "
+        "that is a "
         "multiple of the mains period."
     ),
     Failure.AT_EDGE: (
-        "A spot touches the border of the image; the part outside is missing. Cause: the target is too close or "
+        "A spot touches the border of the image; the part outside is missing. Cause: the target is "
+        "too close or "
         "too far aside. Do: move the target until the spot is wholly inside."
     ),
 }

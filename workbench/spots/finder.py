@@ -18,7 +18,8 @@ from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
 
 # A peak of the smoothed signal between this and the threshold is named: too dim to be told from noise.
 _DIM_SD: Final = 4.2
-# A spot whose peak is this many sd of a pixel is clear; one that is not has to give way when there are too many.
+# A spot whose peak is this many sd of a pixel is clear; one that is not has to give way when there are too
+# many.
 _CLEAR_SD: Final = 5.0
 
 
@@ -90,7 +91,7 @@ class SpotFinder:
         return self._as_many_as_lasers([trace for group in groups for trace in group], scenes)
 
     def _as_many_as_lasers(self, traces: list[Trace], scenes: list[Scene]) -> list[Trace]:
-        """The traces without the dimmest, as long as there are more than lasers and no pixel of it stands out."""
+        """The traces without the dim ones that are more than there are lasers."""
         if self._expected is None or len(traces) <= self._expected:
             return traces
         clear = _CLEAR_SD * min(scene.variance for scene in scenes) ** 0.5
@@ -166,8 +167,8 @@ def find_spots(
     For many frames of one size make a `SpotFinder` (which see for the arguments) and call `find`.
 
     Raises:
-        BadInputError: a frame is no grey uint8 or uint16 image, or the two differ in size or depth; a scanline
-            without direction or width.
+        BadInputError: a frame is no grey uint8 or uint16 image, or the two differ in size or depth; a
+            scanline without direction or width.
     """
     shape = np.shape(on)
     finder = SpotFinder(

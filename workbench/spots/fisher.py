@@ -31,8 +31,8 @@ class Camera:
 def pixel_information(electrons: float, camera: Camera) -> float:
     """Fisher information (1 / electrons^2) of one pixel's number about its mean number of electrons.
 
-    Exact for Poisson electrons, Gaussian read noise and rounding, averaged over the position of the mean between
-    two numbers; above 400 electrons the inverse of the variance.
+    Exact for Poisson electrons, Gaussian read noise and rounding, averaged over the position of the mean
+    between two numbers; above 400 electrons the inverse of the variance.
     """
     read = camera.read_sd_electrons
     least = 1.0 / _variance(electrons, camera)
@@ -92,7 +92,7 @@ def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, floa
 def position_bound_px(
     electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera
 ) -> Floats:
-    """(2,) lowest standard deviation of u and v that an unbiased estimator can reach, nothing else being known."""
+    """(2,) lowest standard deviation of u and v for an unbiased estimator to which nothing else is known."""
     cov = np.linalg.inv(fisher_matrix(electrons, width_px, phase_px, camera))
     bound: Floats = np.sqrt(np.diag(cov)[2:4])
     return bound

@@ -19,14 +19,15 @@ _MIN_STEP: Final = -_MAX_STEP
 # Of both logarithms of the width, and of the shear.
 _LOWEST: Final = np.array([np.log(0.15), np.log(0.15), -3.0])
 _HIGHEST: Final = np.array([np.log(12.0), np.log(12.0), 3.0])
-# Where the steps stop. Scoring shrinks the error some tenfold a step near the end: one of 0.3 sd, which is still
-# taken, leaves a few hundredths.
+# Where the steps stop. Scoring shrinks the error some tenfold a step near the end: one of 0.3 sd, which is
+# still taken, leaves a few hundredths.
 _TOLERANCE_SD: Final = 0.3
 # One window that never converges must not keep the noise of the others from being measured.
 _STEPS_TO_MEASURE: Final = 8
 # After so many steps it is settled which pixels clip: a set that changes with every step never converges.
 _STEPS_TO_SETTLE: Final = 6
-# A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would choose.
+# A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would
+# choose.
 _CLIP_MARGIN_SD: Final = 2.0
 _RIDGE: Final = [np.eye(k) * 1e-10 + 1.0 for k in range(8)]
 
@@ -90,7 +91,7 @@ def _weights(win: Windows, signal: Floats, background: Floats, noise: Noise) -> 
         usable = usable & (signal + background < win.clip_dn - _CLIP_MARGIN_SD * np.sqrt(variance))
     weights: Floats = 1.0 / variance
     if usable is not None:
-        weights *= usable
+        return weights * usable
     return weights
 
 

@@ -44,7 +44,8 @@ def check_pair(on: object, off: object | None) -> tuple[Image, Image | None]:
     off = check_frame(off, "off")
     if off.shape != on.shape or off.dtype != on.dtype:
         raise BadInputError(
-            f"frame 'off': expected the size and depth of 'on', {on.shape} {on.dtype}, got {off.shape} {off.dtype}; "
+            f"frame 'off': expected the size and depth of 'on', {on.shape} {on.dtype}, got "
+            f"{off.shape} {off.dtype}; "
             "take both frames with the same camera settings"
         )
     return on, off
@@ -53,7 +54,8 @@ def check_pair(on: object, off: object | None) -> tuple[Image, Image | None]:
 def default_saturation_dn(on: Image) -> int:
     """Value at which a pixel counts as clipped: the full scale of the depth.
 
-    A camera of 10, 12 or 14 bits delivers uint16; the smallest full scale that holds the brightest pixel is taken.
+    A camera of 10, 12 or 14 bits delivers uint16; the smallest full scale that holds the brightest pixel is
+    taken.
     """
     if on.dtype == np.uint8:
         return 255

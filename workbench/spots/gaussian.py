@@ -1,8 +1,8 @@
 """Models of a spot: Gaussians integrated over square pixels, with their derivatives, many windows at once.
 
-Pixels count from the centre of the window's first pixel. A `Design` holds the derivatives of the pixel values by
-the parameters at one point; those by position and width are still to be multiplied by the flux, so that nothing
-degenerates when the flux vanishes. Derivation: docs/spots.md.
+Pixels count from the centre of the window's first pixel. A `Design` holds the derivatives of the pixel values
+by the parameters at one point; those by position and width are still to be multiplied by the flux, so that
+nothing degenerates when the flux vanishes. Derivation: docs/spots.md.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from workbench.spots.types import Floats
 
 _MINUS_INV_SQRT_2PI: Final = -0.3989422804014327
 BACKGROUND, FLUX, U, V, LN_SU, LN_SV, SHEAR = range(7)
-"""Order of the parameters of one spot: DN per pixel, DN, pixels, pixels, ln(pixels) twice, pixels per pixel."""
+"""Order of a spot's parameters: DN per pixel, DN, pixels, pixels, ln(pixels) twice, pixels per pixel."""
 # Three nodes of Gauss and Legendre integrate a pixel of the narrowest spot to 1e-4 of its peak.
 _NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(3)
 _EDGES: Final = np.arange(-0.5, 128.0)
@@ -39,7 +39,7 @@ class Design(Protocol):
         """(n, k): sum over the pixels of values times derivatives."""
 
     def leverage(self, cov: Floats) -> Floats:
-        """(n, height, width): variance of the fitted pixel value for the covariance (n, k, k) of the parameters."""
+        """(n, height, width): variance of the fitted pixel values, from that of the parameters (n, k, k)."""
 
 
 def axis_profiles(centre_px: Floats, ln_sd: Floats, n: int) -> Floats:
@@ -68,7 +68,8 @@ def axis_profiles(centre_px: Floats, ln_sd: Floats, n: int) -> Floats:
     return profiles
 
 
-# Which factor each parameter's derivative has along v and along u: 0 share, 1 by centre, 2 by width, 3 constant.
+# Which factor each parameter's derivative has along v and along u: 0 share, 1 by centre, 2 by width, 3
+# constant.
 _ALONG_V: Final = np.array([3, 0, 0, 1, 0, 2])
 _ALONG_U: Final = np.array([3, 0, 1, 0, 2, 0])
 _PAIRS: Final = np.triu_indices(6)
@@ -201,7 +202,7 @@ class Sheared:
 
 
 def principal_axes(params: Floats) -> tuple[Floats, Floats]:
-    """Widths (2,), short and long in pixels, and unit vectors (u, v) in the columns of (2, 2), of one spot (7,)."""
+    """Short and long width in pixels (2,), their directions as columns (2, 2), of one spot (7,)."""
     su, sv = np.exp(params[LN_SU:SHEAR])
     mixed = params[SHEAR] * sv**2
     squares, axes = np.linalg.eigh([[su**2 + params[SHEAR] * mixed, mixed], [mixed, sv**2]])

@@ -124,7 +124,7 @@ def evidence(one: float, two: float, pixels: int, parameters: int) -> float:
 
 
 def hidden_spot(joint: Joint, win: Windows) -> Floats | None:
-    """(6,) first guess of a spot of the same widths that stands out of the residuals; None if there is none."""
+    """(6,) first guess of a spot of the same widths that stands out of the residuals; None without one."""
     su, sv = np.exp(joint.params[0, LN_SU:SHEAR])
     weight = joint.weight.reshape(win.shape)
     excess = weight * joint.residual.reshape(win.shape)

@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from workbench.spots.detect import FINE_PX, Peaks
 from workbench.spots.fit import Fit, Windows, fit_spots
-from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, V, Sheared, axis_profiles
+from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, Sheared, U, V, axis_profiles
 from workbench.spots.noise import Noise
 from workbench.spots.pair import Scene
 from workbench.spots.types import NO_FLAGS, Bools, Failure, Floats, Spot
 
 Ints = NDArray[np.intp]
-# Half-widths of windows; each holds spots whose width is up to (half - 0.5) / 3: what lies beyond 3 widths tells
-# next to nothing about the position.
+# Half-widths of windows; each holds spots whose width is up to (half - 0.5) / 3: what lies beyond 3 widths
+# tells next to nothing about the position.
 _HALVES_PX: Final = (5, 8, 13, 19)
 _REACH_WIDTHS: Final = 3.0
-# Narrower than any lens makes a spot: a hot pixel. (A pixel integrates; 0 is possible, 0.6 the least specified.)
+# Narrower than any lens makes a spot: a hot pixel. (A pixel integrates; 0 is possible, 0.6 the least
+# specified.)
 _MIN_WIDTH_PX: Final = 0.5
 _MAX_WIDTH_PX: Final = 7.0
 _MIN_FLUX_SD: Final = 6.0
@@ -90,7 +91,7 @@ def first_guess(win: Windows, peaks: Peaks, half: int) -> Floats:
 
 
 def _without_outliers(win: Windows, fit: Fit) -> Windows | None:
-    """The windows without a few pixels that no model of a spot explains (hot pixels); None if there are none."""
+    """The windows without a few pixels that no spot explains (hot pixels); None if there are none."""
     excess = fit.residual * fit.residual
     excess *= fit.weight
     if excess.max() <= _OUTLIER_SD**2:
@@ -113,10 +114,10 @@ def _rim_ratio(fit: Fit) -> Floats:
 
 
 def _local_floor(fit: Fit) -> Floats | None:
-    """(n, 1, 1) floor of each window, raised where the window's rim is noisier than predicted; None if nowhere.
+    """(n, 1, 1) floor of each window, raised where its rim is noisier than predicted; None if nowhere.
 
-    Clutter and bright surroundings do that. The threshold is 5 sd of the estimate, so that an even scene keeps
-    the strip's floor, which is known better.
+    Clutter and bright surroundings do that. The threshold is 5 sd of the estimate, so that an even scene
+    keeps the strip's floor, which is known better.
     """
     ratio = _rim_ratio(fit)
     noisy = ratio > 1.0 + 5.0 * (2.0 / (4 * (fit.residual.shape[1] - 1))) ** 0.5
@@ -223,7 +224,7 @@ def _apart(win: Windows, rows: Ints, cols: Ints, group: Ints, half: int) -> Wind
 def _fit_group(
     scene: Scene, rows: Ints, cols: Ints, group: Ints, start: Floats, half: int
 ) -> tuple[Floats, list[Trace | None]]:
-    """Fit spots that share a size of window; `start` and the parameters count from the image's first pixel."""
+    """Fit spots that share a size of window; all parameters count from the image's first pixel."""
     win = _apart(scene.pair.cut(rows[group], cols[group], half), rows, cols, group, half)
     origin = np.zeros((len(group), 6))
     origin[:, U] = cols[group] - half

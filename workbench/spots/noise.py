@@ -1,4 +1,4 @@
-"""Noise measured from the frame itself: the floor from its background, the slope from the residuals of the fit."""
+"""Noise measured from the frame itself: its floor from the background, its slope from the fit's residuals."""
 
 from __future__ import annotations
 
@@ -60,9 +60,10 @@ def photon_transfer_slope(
 
     On average a squared residual is its variance less the share that the fit has absorbed (its leverage), so
     what exceeds the floor is slope times signal. Weighted moments give the slope; the logarithm of the slope
-    assumed so far weighs in like a quarter of a pixel. Where only n pixels tell the slope, its inverse scatters
-    upwards and a deviation stated with it would be too small on average (Student's distribution, factor
-    n / (n - 2)); as the assumed slope keeps the measured one from vanishing, n / (n - 2) at n + 4 is enough.
+    assumed so far weighs in like a quarter of a pixel. Where only n pixels tell the slope, its inverse
+    scatters upwards and a deviation stated with it would be too small on average (Student's distribution,
+    factor n / (n - 2)); as the assumed slope keeps the measured one from vanishing, n / (n - 2) at n + 4 is
+    enough.
 
     Args:
         signal: (n, height, width) expected signal, DN.

@@ -15,7 +15,8 @@ from workbench.spots.types import Floats, Image
 
 Floats32 = NDArray[np.float32]
 Ints = NDArray[np.intp]
-# A change of the level below one DN or a quarter of the noise moves no spot: the fit has a background of its own.
+# A change of the level below one DN or a quarter of the noise moves no spot: the fit has a background of its
+# own.
 _LEVEL_CHANGE_DN = 1.0
 _LEVEL_CHANGE_SD = 0.25
 _MIN_OFF_SPREAD_DN = 2.0
@@ -43,7 +44,7 @@ class Pair:
         return np.asarray(out, np.float32)
 
     def cut(self, rows: Ints, cols: Ints, half: int) -> Windows:
-        """Square windows of 2 half + 1 pixels around pixels (n,); what lies outside the image is not usable."""
+        """Square windows of 2 half + 1 pixels around pixels (n,); none outside the image is usable."""
         span = np.arange(-half, half + 1)
         height, width = self.on.shape
         v, u = rows[:, None] + span, cols[:, None] + span
@@ -80,8 +81,8 @@ class Scene:
 def look(pair: Pair, strip: Strip) -> Scene:
     """Measure level and noise of a strip.
 
-    When the ambient light changed, the off-frame is scaled to the on-frame by a straight line through the pixels
-    of the strip, so that bright and dark parts of the scene vanish alike.
+    When the ambient light changed, the off-frame is scaled to the on-frame by a straight line through the
+    pixels of the strip, so that bright and dark parts of the scene vanish alike.
     """
     signal = pair.signal(strip)
     level, variance = level_and_variance(signal)

@@ -1,4 +1,4 @@
-"""Spots that overlap: duplicates dropped, neighbours fitted together, a blob of two split where the data allow."""
+"""Spots that overlap: duplicates dropped, neighbours fitted together, a blob of two split by evidence."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def grown(scene: Scene, group: list[Trace]) -> list[Trace]:
 
 
 def _proposals(best: Joint, start: Floats, win: Windows) -> Iterator[Floats]:
-    """First guesses with one spot more: where the residuals rise, or two for a member that is wider than others."""
+    """First guesses with one spot more: where the residuals rise, or two for the widest members."""
     hidden = hidden_spot(best, win)
     if hidden is not None:
         yield np.vstack([best.params, hidden])

@@ -51,7 +51,8 @@ def check_line(line: Scanline) -> None:
     values = (line.u0_px, line.v0_px, line.du, line.dv, line.half_width_px)
     if not np.isfinite(values).all() or line.half_width_px <= 0 or (line.du == 0 and line.dv == 0):
         raise BadInputError(
-            f"scanline: expected finite numbers, a direction other than (0, 0) and a half-width above 0, got {line}; "
+            f"scanline: expected finite numbers, a direction other than (0, 0) and a half-width above "
+            f"0, got {line}; "
             "give for example Scanline(0, 240, 1, 0, 3) for row 240"
         )
 

@@ -35,7 +35,8 @@ def thesis_centres(
         off: Frame with the lasers off; None where a filter keeps the ambient light out.
         scanlines: Pixels further than the half-width from all of them are dropped; none keeps all.
         expected: Number of lasers: the threshold is halved while nothing is seen, raised while too much is.
-        ambiguous_px: Pixels nearer than this to more than one scanline are dropped: nobody can say whose they are.
+        ambiguous_px: Pixels nearer than this to more than one scanline are dropped: nobody can say whose they
+            are.
 
     Raises:
         BadInputError: as `find_spots`.

@@ -43,7 +43,7 @@ class Spot:
     width_px: float
     """Standard deviation of the profile before the pixel integrates it, geometric mean of both axes."""
     peak_dn: float
-    """Highest pixel-integrated value of the fitted profile above the background, also where it was clipped."""
+    """Highest pixel of the fitted profile above the background, also where the pixel itself was clipped."""
     flags: frozenset[Failure] = NO_FLAGS
 
 
