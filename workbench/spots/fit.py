@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -29,7 +30,6 @@ _STEPS_TO_SETTLE: Final = 6
 # A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would
 # choose.
 _CLIP_MARGIN_SD: Final = 2.0
-_RIDGE: Final = [np.eye(k) * 1e-10 + 1.0 for k in range(8)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,15 +95,19 @@ def _weights(win: Windows, signal: Floats, background: Floats, noise: Noise) -> 
     return weights
 
 
+@lru_cache(maxsize=32)
+def _ridge(k: int) -> tuple[Floats, Floats]:
+    """Factor and addend of a matrix of k parameters that keep a singular one invertible."""
+    return 1.0 + 1e-10 * np.eye(k), 1e-12 * np.eye(k)
+
+
 def inverse(information: Floats) -> Floats:
     """Inverse of (n, k, k) information matrices; a ridge that only a singular one feels keeps it finite."""
-    ridged = information * _RIDGE[information.shape[1]] if information.shape[1] < 8 else information
-    ridged += _EYES[information.shape[1]]
+    factor, addend = _ridge(information.shape[1])
+    ridged: Floats = information * factor
+    ridged += addend
     inverted: Floats = np.linalg.inv(ridged)
     return inverted
-
-
-_EYES: Final = [np.eye(k) * 1e-12 for k in range(40)]
 
 
 def _moved(params: Floats, delta: Floats) -> Floats:
