@@ -124,17 +124,20 @@ def test_the_optimum_is_scipy_s(seed: int) -> None:
 
 
 def test_the_truth_lies_where_the_covariance_says() -> None:
-    """40 rigs drawn from the tolerances: squared standardised errors are chi-square distributed."""
+    """40 rigs drawn from the tolerances: errors whitened by the whole covariance are standard normal."""
     rig = thesis_rig()
-    names = ("f_px", "cx_px", "k1", "offset_mm", "L1.x_mm", "L4.tx")
-    scores = []
+    distance2, count = 0.0, 0
     for seed in range(100, 140):
         world = World(rig, seed)
         result = fit(rig, world.sightings())
-        scores.append([(value(result, n) - world.values[n]) / deviation(result, n) for n in names])
-    z2 = (np.array(scores) ** 2).mean(axis=0)
-    # The mean of 40 squared standard normals has the sd sqrt(2 / 40) = 0.22: within 3.5 of these.
-    np.testing.assert_allclose(z2, 1.0, atol=3.5 * np.sqrt(2 / 40))
+        free = result.table.free[result.table.free < result.sensor.stop]
+        names = [result.table.parameters[i].name for i in free]
+        error = result.values[free] - np.array([world.values[name] for name in names])
+        distance2 += float(error @ np.linalg.solve(result.covariance[np.ix_(free, free)], error))
+        count += len(free)
+    # Chi-square of 40 x 23 degrees of freedom: its mean square is known to sqrt(2 / 920) = 4.7 %. Deviations
+    # stated 10 % too large or too small would show as 0.83 or 1.23.
+    assert distance2 / count == pytest.approx(1.0, abs=3.5 * np.sqrt(2 / count))
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -79,7 +79,7 @@ def test_a_spot_gives_back_its_depth(z_mm: float, x_mm: float, sign: float, k1: 
     spot = Sighted(u, v, 0.1, 0.1) if v_known else Sighted(u, 0.0, 0.1, np.inf)
     found = estimate_depth(lens, ray, spot)
     assert 1 / float(found.inverse_depth_per_mm) == pytest.approx(z_mm, rel=1e-9)
-    assert float(found.misfit_sd) < 1e-6
+    assert abs(float(found.across_sd)) < 1e-6
 
 
 def test_derivatives_of_the_depth_are_those_of_the_estimate() -> None:

@@ -60,6 +60,25 @@ def test_spots_that_fit_two_ways_are_not_dealt(ranger: Ranger) -> None:
     assert assign(ranger.sensor, pixels, np.full((4, 2), 0.05)) is None
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_steps_in_depth_are_dealt_rightly_or_not_at_all(seed: int) -> None:
+    """A post before a wall, and one laser of a flat on another surface: where a swap could deceive."""
+    world = World(thesis_rig(), seed)
+    ranger = Ranger(calibrate(fit(world.rig, world.sightings()), Acceptance(), PROVENANCE)[0])
+    rng = np.random.default_rng(seed)
+    right = wrong = 0
+    for _ in range(150):
+        depths = np.full(4, rng.uniform(300.0, 3000.0))
+        depths[rng.integers(4)] *= rng.uniform(0.5, 2.0)
+        at = zip(IDS, depths + world.values["offset_mm"], strict=True)
+        pixels = np.array([world.pixel(i, z) for i, z in at]) + rng.normal(0.0, 0.05, (4, 2))
+        dealt = assign(ranger.sensor, pixels, np.full((4, 2), 0.03))
+        right += dealt == IDS
+        wrong += dealt not in (None, IDS)
+    assert wrong == 0
+    assert right > 75
+
+
 def test_fewer_spots_than_lasers_are_not_dealt(ranger: Ranger) -> None:
     assert assign(ranger.sensor, positions(ranger, {"L1": 500.0}), np.full((1, 2), 0.05)) is None
 
@@ -102,6 +121,44 @@ def test_a_laser_whose_spot_lies_beyond_infinity_does_not_count(ranger: Ranger) 
     assert [laser.laser_id for laser in reading.lasers] == ["L1"]
     assert reading.status == "not_enough_points"
     assert reading.flat_mm == pytest.approx(800.0)
+
+
+@pytest.mark.parametrize(
+    ("u_px", "v_px"),
+    [(300.0, -5.0), (300.0, 481.0), (645.0, 240.0), (300.0, 300.0)],
+    ids=["above", "below", "beside", "off the line"],
+)
+def test_a_spot_that_cannot_be_the_laser_s_has_no_range(ranger: Ranger, u_px: float, v_px: float) -> None:
+    reading = ranger.read_known("s", 1, ["L1"], np.array([[u_px, v_px]]), np.full((1, 2), 0.05))
+    assert (reading.status, reading.closest_mm, reading.lasers) == ("no_points", None, ())
+
+
+def test_a_spot_all_but_at_infinity_has_no_range(ranger: Ranger) -> None:
+    spot = ranger.sensor.spot_px("L4", np.array([3e6]))
+    assert ranger.read_known("s", 1, ["L4"], spot, np.full((1, 2), 0.05)).status == "no_points"
+
+
+def test_repeats_average_as_the_fit_averages_them(ranger: Ranger, tmp_path: Path) -> None:
+    (spot,) = ranger.sensor.spot_px("L1", np.array([800.0])).tolist()
+    one = captures(tmp_path, f"L1,,0,{spot[0]},{spot[1]},s")
+    (single,) = read_captures(ranger, load_captures(one))
+    many = captures(tmp_path, *(f"L1,,{n},{spot[0]},{spot[1]},s" for n in range(25)))
+    (mean,) = read_captures(ranger, load_captures(many))
+    assert single.sigma_mm is not None
+    assert mean.sigma_mm is not None
+    assert mean.sigma_mm < single.sigma_mm
+    lacking = captures(tmp_path, f"L1,,0,{spot[0]},{spot[1]},s", f"L1,,1,{spot[0]},,s")
+    (reading,) = read_captures(ranger, load_captures(lacking))
+    assert reading.status == "done"
+    assert reading.closest_mm == pytest.approx(800.0, rel=1e-6)
+
+
+def test_repeats_that_disagree_widen_the_deviation(ranger: Ranger, tmp_path: Path) -> None:
+    (spot,) = ranger.sensor.spot_px("L1", np.array([800.0])).tolist()
+    path = captures(tmp_path, f"L1,,0,{spot[0] - 1},{spot[1]},s", f"L1,,1,{spot[0] + 1},{spot[1]},s")
+    (reading,) = read_captures(ranger, load_captures(path))
+    # The mean of two readings 2 px apart is known to about 1 px: r^2 / (f b) of it in range.
+    assert reading.sigma_mm == pytest.approx(1.0 * 800.0**2 / (535.0 * 60.0), rel=0.4)
 
 
 def test_normal_capture_is_enough_where_every_spot_shows(ranger: Ranger) -> None:

@@ -81,21 +81,19 @@ def test_speckle_stays_in_every_range(sensor: Sensor) -> None:
 
 
 def test_ranges_of_unseen_standoffs_lie_where_stated() -> None:
-    """24 rigs: standardised errors of ranges at standoffs that the fits did not see."""
-    scores = []
-    for seed in range(200, 224):
+    """40 rigs: errors of ranges at standoffs that the fits did not see, whitened by their covariance."""
+    seen = [(i, r) for i in ("L1", "L2", "L3", "L4") for r in (180.0, 750.0, 1800.0)]
+    distance2 = 0.0
+    for seed in range(200, 240):
         sensor, world = sensor_of(seed)
-        for laser_id in ("L2", "L4"):
-            for standoff in (180.0, 750.0, 3000.0):
-                spot = world.pixel(laser_id, standoff + world.values["offset_mm"])[None]
-                noise = np.random.default_rng([seed, int(standoff)]).normal(0.0, 0.05, (1, 2))
-                own = np.full((1, 2), 0.03)  # with the speckle's 0.04 px: 0.05
-                found = sensor.ranges([laser_id], spot + noise, own)
-                scores.append((found.range_mm[0] - standoff) / found.sigma_mm[0])
-    z = np.array(scores).reshape(24, -1)
-    # Errors of one rig are correlated: 24 independent groups bound the mean square to sqrt(2 / 24) = 0.29.
-    assert (z**2).mean() == pytest.approx(1.0, abs=3 * 0.29)
-    assert (np.abs(z) < 1.96).mean() > 0.85
+        spots = np.array([world.pixel(i, r + world.values["offset_mm"]) for i, r in seen])
+        noise = np.random.default_rng([seed, 9]).normal(0.0, 0.05, spots.shape)
+        own = np.full_like(spots, 0.03)  # with the speckle's 0.04 px: 0.05
+        found = sensor.ranges([i for i, _ in seen], spots + noise, own)
+        error = found.range_mm - np.array([r for _, r in seen])
+        distance2 += float(error @ np.linalg.solve(found.covariance_mm2, error))
+    # Chi-square of 40 x 12 degrees of freedom: known to sqrt(2 / 480) = 6.5 %.
+    assert distance2 / 480 == pytest.approx(1.0, abs=3.5 * 0.065)
 
 
 def test_out_of_the_frame(sensor: Sensor) -> None:

@@ -102,12 +102,13 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
     table = table_of(rig, cells.placements)
     problem = _Problem.of(rig, table, cells)
     scale = 1.0
-    for _ in range(10):
-        solution = problem.solve(scale)
-        if solution.scale_called_for <= scale * 1.001:
-            break
-        scale = solution.scale_called_for
-    if not (np.isfinite(solution.y).all() and np.isfinite(solution.covariance).all()):
+    with np.errstate(over="ignore", invalid="ignore"):  # a result that is not finite is refused by name
+        for _ in range(10):
+            solution = problem.solve(scale)
+            if not solution.scale_called_for > scale * 1.001:
+                break
+            scale = solution.scale_called_for
+    if not np.isfinite([*solution.y, *np.diag(solution.covariance), solution.chi2]).all():
         raise LimitFailedError(
             "the fit does not come to a finite result: the positions contradict the rig file altogether;"
             " check its baselines, standoffs and image size"
@@ -205,8 +206,7 @@ class _Problem:
         covariance = np.linalg.inv(information + np.eye(len(information)))
         count = int((self.inverse_sd > 0).sum())
         freedom = count - float(np.trace(information @ covariance))
-        with np.errstate(over="ignore"):  # a result that is not finite is refused by name
-            chi2 = float(residual @ residual) * scale**2
+        chi2 = float(residual @ residual) * scale**2
         pixels = -residual.reshape(-1, 2) / np.where(self.inverse_sd > 0, self.inverse_sd / scale, np.nan)
         return _Solution(
             y=np.asarray(y),

@@ -34,7 +34,7 @@ class Ranges:
     covariance_mm2: FloatArray
     """(n, n) of everything: spots and calibration. Ranges from one calibration share its error."""
     misfit_sd: FloatArray
-    """(n,) distance of each spot from its laser's line, in standard deviations of the spot."""
+    """(n,) distance of each spot from its laser's line, in standard deviations of spot and line together."""
 
     @property
     def sigma_mm(self) -> FloatArray:
@@ -109,12 +109,16 @@ class Sensor:
         own_sd = np.where(np.isfinite(sd_px), sd_px, noise.spot_sd_px)
         sd = np.where(measured, np.hypot(own_sd, noise.speckle_sd_px), np.inf)
         found = _depths(self._lens, self._rays[laser], np.where(measured, position_px, 0.0), sd)
-        w, misfit, spot_sd, by_lens, by_ray = (np.asarray(part) for part in found)
+        w, across, spot_sd, by_lens, by_ray, across_by_lens, across_by_ray = map(np.asarray, found)
         with np.errstate(divide="ignore"):
             range_mm = np.where(w > 0, 1.0 / w, np.inf) - self.offset_mm
         gradient = self._gradient(laser_ids, by_lens, by_ray)
-        covariance = gradient @ self.calibration.laser_ranger.parameters.covariance_array @ gradient.T
-        return Ranges(range_mm, spot_sd, gradient, covariance + np.diag(spot_sd**2), misfit)
+        gradient[:, self._columns["offset_mm"]] = -1.0
+        parameters = self.calibration.laser_ranger.parameters.covariance_array
+        covariance = gradient @ parameters @ gradient.T + np.diag(spot_sd**2)
+        line = self._gradient(laser_ids, across_by_lens, across_by_ray)
+        line_variance = np.einsum("np,pq,nq->n", line, parameters, line)
+        return Ranges(range_mm, spot_sd, gradient, covariance, np.abs(across) / np.sqrt(1 + line_variance))
 
     def relative_range_sd(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
         """(n,) 1 sigma of a single range over the range, for spots of the calibration's typical noise."""
@@ -134,10 +138,9 @@ class Sensor:
         return np.asarray(inside, bool)
 
     def _gradient(self, laser_ids: Sequence[str], by_lens: FloatArray, by_ray: FloatArray) -> FloatArray:
-        """(n, P) derivatives of the range from those of the depth; those by other lasers' rays are 0."""
+        """(n, P) from derivatives by lens and own ray; those by other lasers' rays are 0."""
         gradient = np.zeros((len(laser_ids), len(self._columns)))
         gradient[:, [self._columns[name] for name in LENS]] = by_lens
-        gradient[:, self._columns["offset_mm"]] = -1.0
         for row, laser_id in enumerate(laser_ids):
             gradient[row, [self._columns[f"{laser_id}.{name}"] for name in RAY]] = by_ray[row]
         return gradient

@@ -52,6 +52,14 @@ class LaserRay(FileModel):
     origin_mm: Vector3
     direction: Vector3
 
+    @model_validator(mode="after")
+    def _is_in_normal_form(self) -> LaserRay:
+        if self.origin_mm[2] != 0:
+            raise ValueError(f"origin_mm: expected [x, y, 0.0], got z = {self.origin_mm[2]!r}")
+        if self.direction[2] != 1:
+            raise ValueError(f"direction: expected [tx, ty, 1.0], got {self.direction[2]!r} at its end")
+        return self
+
 
 class Noise(FileModel):
     """What a ranger adds to a spot's stated deviation, pixels, 1 sigma."""
@@ -97,6 +105,13 @@ class Validity(FileModel):
     standoff_mm: Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
     max_relative_range_sd: NonNegativeFloat
     """Largest standard deviation of a range, over the range, of any laser within `standoff_mm`."""
+
+    @model_validator(mode="after")
+    def _is_a_span(self) -> Validity:
+        nearest, farthest = self.standoff_mm
+        if not 0 < nearest <= farthest:
+            raise ValueError(f"standoff_mm: expected 0 < nearest <= farthest, got {list(self.standoff_mm)}")
+        return self
 
 
 class FitSummary(FileModel):
@@ -161,7 +176,13 @@ class Calibration(FileModel):
                     f"{name} is {value!r} in the camera's or laser's own key and {stated[name]!r} in"
                     " laser_ranger.parameters.values; expected the same number"
                 )
+        self._check_projection()
         return self
+
+    def _check_projection(self) -> None:
+        k, p = self.camera_matrix.data, self.projection_matrix.data
+        if p != (*k[0:3], 0.0, *k[3:6], 0.0, *k[6:9], 0.0):
+            raise ValueError("projection_matrix: expected the camera_matrix and a column of zeros")
 
     def geometry(self) -> dict[str, float]:
         """Every number that a range depends on, by the name of its parameter."""

@@ -34,14 +34,18 @@ class DepthEstimate(NamedTuple):
 
     inverse_depth_per_mm: Array
     """Not positive when the spot lies at or beyond the image of the laser's point at infinity."""
-    misfit_sd: Array
-    """Distance of the spot from the laser's line in the image, in standard deviations of the spot."""
+    across_sd: Array
+    """Distance of the spot from the laser's line in the image, signed, in standard deviations of the spot."""
     z_sd_of_spot_mm: Array
     """1 sigma of z from the spot's own standard deviation."""
     dz_dlens: Array
     """(8,) derivatives of z by f, cx, cy, k1, k2, p1, p2, k3."""
     dz_dray: Array
     """(4,) derivatives of z by x, y, tx, ty."""
+    dacross_dlens: Array
+    """(8,) derivatives of `across_sd`."""
+    dacross_dray: Array
+    """(4,) derivatives of `across_sd`."""
 
 
 def estimate_depth(lens: Lens, ray: Ray, spot: Sighted) -> DepthEstimate:
@@ -68,11 +72,14 @@ def estimate_depth(lens: Lens, ray: Ray, spot: Sighted) -> DepthEstimate:
     w = jax.lax.fori_loop(0, ITERATIONS, step, jnp.zeros(()))
     by_w, by_lens, by_ray = jax.jacfwd(residual, argnums=(0, 1, 2))(w, lens_vector, ray_vector)
     information = by_w @ by_w
+    across = jnp.array([-by_w[1], by_w[0]]) / jnp.sqrt(information)
     dz_dw = -1.0 / w**2
     return DepthEstimate(
         inverse_depth_per_mm=w,
-        misfit_sd=jnp.linalg.norm(residual(w, lens_vector, ray_vector)),
+        across_sd=across @ residual(w, lens_vector, ray_vector),
         z_sd_of_spot_mm=jnp.abs(dz_dw) / jnp.sqrt(information),
         dz_dlens=-dz_dw * (by_w @ by_lens) / information,
         dz_dray=-dz_dw * (by_w @ by_ray) / information,
+        dacross_dlens=across @ by_lens,
+        dacross_dray=across @ by_ray,
     )

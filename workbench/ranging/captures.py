@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from workbench.calibration.averaging import scatter_chi2, strays, weighted_mean
+from workbench.calibration.scatter import scale_called_for
 from workbench.model.captures import ALL_LASERS, CaptureRow
 from workbench.model.errors import BadInputError
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.session.capture_spots import find_row_spots
+
+FloatArray = NDArray[np.float64]
 
 
 def scenes(rows: Sequence[CaptureRow]) -> dict[str, list[CaptureRow]]:
@@ -18,11 +23,13 @@ def scenes(rows: Sequence[CaptureRow]) -> dict[str, list[CaptureRow]]:
     A row whose laser is `all` is a scene by itself, as is a row that names none; others share the scene that
     they name. A scene without a name is called by its row.
     """
+    named = {row.scene for row in rows}
     grouped: dict[str, list[CaptureRow]] = {}
     for row in rows:
-        alone = not row.scene or row.laser_id == ALL_LASERS
         name = row.scene or f"row {row.row}"
-        if alone and name in grouped:
+        if not row.scene and name in named:
+            name = f"{name} without a scene"
+        if row.laser_id == ALL_LASERS and name in grouped:
             name = f"{name} (row {row.row})"
         grouped.setdefault(name, []).append(row)
     return grouped
@@ -59,20 +66,27 @@ def _read_alone(ranger: Ranger, scene: str, rows: Sequence[CaptureRow]) -> Readi
     return ranger.read_known(scene, len(fired), list(seen), position, sd)
 
 
-def _mean_position(
-    ranger: Ranger, rows: Sequence[CaptureRow]
-) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Mean u, v and their standard deviations; None when no row shows the laser's spot."""
-    found = []
-    for row in rows:
-        if row.on is None:
-            found.append((row.u_px, row.v_px, row.u_sd_px, row.v_sd_px))
-            continue
-        index = ranger.sensor.ids.index(row.laser_id)
-        spots = find_row_spots(row, ranger.size_px, ranger.scanlines[index : index + 1], 1).spots
-        found += [(s.u_px, s.v_px, s.u_sd_px, s.v_sd_px) for s in spots if len(spots) == 1]
+def _mean_position(ranger: Ranger, rows: Sequence[CaptureRow]) -> tuple[FloatArray, FloatArray] | None:
+    """(2,) mean u, v and their standard deviations; None when no row shows the laser's spot.
+
+    As the fit does it: weighted by the stated deviations, without repeats that lie far off, and with the
+    deviations enlarged where the repeats scatter significantly more than that.
+    """
+    found = [seen for row in rows if (seen := _position(ranger, row)) is not None]
     if not found:
         return None
-    u, v, u_sd, v_sd = np.array(found).mean(axis=0)
-    shrink = len(found) ** 0.5
-    return (u, v), (u_sd / shrink, v_sd / shrink)
+    position = np.array([(u, v) for u, v, _, _ in found])
+    stated = np.array([(u_sd, v_sd) for _, _, u_sd, v_sd in found])
+    sd = np.where(np.isfinite(stated), stated, ranger.calibration.laser_ranger.noise.spot_sd_px)
+    kept = ~strays(position, sd)
+    scale = float(scale_called_for(*scatter_chi2(position[kept], sd[kept])))
+    return weighted_mean(position[kept], scale * sd[kept])
+
+
+def _position(ranger: Ranger, row: CaptureRow) -> tuple[float, float, float, float] | None:
+    """u, v and their standard deviations of the one spot that a row shows or states."""
+    if row.on is None:
+        return row.u_px, row.v_px, row.u_sd_px, row.v_sd_px
+    index = ranger.sensor.ids.index(row.laser_id)
+    spots = find_row_spots(row, ranger.size_px, ranger.scanlines[index : index + 1], 1).spots
+    return (spots[0].u_px, spots[0].v_px, spots[0].u_sd_px, spots[0].v_sd_px) if len(spots) == 1 else None

@@ -17,34 +17,14 @@ from workbench.ranging.assignment import assign
 from workbench.spots import Scanline, Spot
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 Status = Literal["done", "not_enough_points", "no_points"]
+MOST_MISFIT_SD = 6.0
+"""A spot farther from its laser's line is another light: by chance one in 5e8 is."""
+MOST_RELATIVE_SIGMA = 0.5
+"""Beyond, the spot is so near to its place at infinity that its range may be anything."""
 SCANLINE_HALF_WIDTH_PX = 8.0
 """A beam of 1.5 mm at the sensor's front spreads over some 8 px on either side of its line."""
-
-
-@dataclass(frozen=True)
-class Located:
-    """Spots with known lasers and their ranges."""
-
-    laser_ids: tuple[str, ...]
-    position_px: FloatArray
-    """(n, 2)"""
-    ranges: Ranges
-
-    def records(self) -> tuple[LaserRange, ...]:
-        """One record a laser that has a range, in the order of the spots."""
-        rows = zip(self.laser_ids, self.ranges.range_mm, self.ranges.sigma_mm, self.position_px, strict=True)
-        return tuple(
-            LaserRange(
-                laser_id=i,
-                range_mm=float(r),
-                sigma_mm=float(s),
-                u_px=None if np.isnan(p[0]) else float(p[0]),
-                v_px=None if np.isnan(p[1]) else float(p[1]),
-            )
-            for i, r, s, p in rows
-            if np.isfinite(r)
-        )
 
 
 @dataclass(frozen=True)
@@ -96,17 +76,14 @@ class Ranger:
             position_px: (n, 2), NaN where a coordinate was not measured.
             sd_px: (n, 2) 1 sigma, NaN where not known.
         """
-        if not len(laser_ids):
+        ranges = self.sensor.ranges(laser_ids, position_px, sd_px)
+        good = self._usable(position_px, ranges)
+        if not good.any():
             return Reading(scene, "no_points", None, None, (), None, None)
-        located = Located(tuple(laser_ids), position_px, self.sensor.ranges(laser_ids, position_px, sd_px))
-        lasers = located.records()
-        if not lasers:
-            return Reading(scene, "no_points", None, None, (), None, None)
+        lasers = _records(laser_ids, position_px, ranges, good)
         nearest = min(lasers, key=lambda laser: laser.range_mm)
         status: Status = "done" if len(lasers) == fired else "not_enough_points"
-        return Reading(
-            scene, status, nearest.range_mm, nearest.sigma_mm, lasers, *_flat_range(located.ranges)
-        )
+        return Reading(scene, status, nearest.range_mm, nearest.sigma_mm, lasers, *_flat_range(ranges, good))
 
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
         """Range the spots of a frame in which every laser is lit.
@@ -122,6 +99,15 @@ class Ranger:
             return Reading(scene, "not_enough_points", None, None, (), None, None)
         return self.read_known(scene, len(self.sensor.ids), laser_ids, position, sd)
 
+    def _usable(self, position_px: FloatArray, ranges: Ranges) -> BoolArray:
+        """(n,) spots that lie in the picture, on their laser's line, and before the range means nothing."""
+        size = np.array(self.size_px, float)
+        inside = np.isnan(position_px) | ((position_px > -0.5) & (position_px < size - 0.5))
+        with np.errstate(invalid="ignore"):
+            known = np.isfinite(ranges.range_mm) & (ranges.range_mm > 0)
+            sharp = ranges.sigma_mm < MOST_RELATIVE_SIGMA * ranges.range_mm
+        return np.asarray(inside.all(axis=1) & known & sharp & (ranges.misfit_sd < MOST_MISFIT_SD))
+
     def _scanline(self, laser_id: str, nearest_mm: float) -> Scanline:
         near, far = self.sensor.spot_px(laser_id, np.array([nearest_mm, np.inf]))
         return Scanline(far[0], far[1], near[0] - far[0], near[1] - far[1], SCANLINE_HALF_WIDTH_PX)
@@ -134,15 +120,30 @@ def spot_arrays(spots: Sequence[Spot]) -> tuple[FloatArray, FloatArray]:
     return position, sd
 
 
-def _flat_range(ranges: Ranges) -> tuple[float, float]:
+def _records(
+    laser_ids: Sequence[str], position_px: FloatArray, ranges: Ranges, good: BoolArray
+) -> tuple[LaserRange, ...]:
+    rows = zip(laser_ids, ranges.range_mm, ranges.sigma_mm, position_px, good, strict=True)
+    return tuple(
+        LaserRange(
+            laser_id=i,
+            range_mm=float(r),
+            sigma_mm=float(s),
+            u_px=None if np.isnan(p[0]) else float(p[0]),
+            v_px=None if np.isnan(p[1]) else float(p[1]),
+        )
+        for i, r, s, p, usable in rows
+        if usable
+    )
+
+
+def _flat_range(ranges: Ranges, good: BoolArray) -> tuple[float, float]:
     """Mean weighted by the spots' variances; its sigma from the full covariance.
 
     The calibration's part is common to the lasers: weights by the full covariance would lean on differences
     of nearly equal numbers for a gain that no bench would show.
     """
-    finite = np.isfinite(ranges.range_mm)
-    weight = np.where(finite, 1.0 / ranges.spot_sd_mm**2, 0.0)
+    weight = 1.0 / ranges.spot_sd_mm[good] ** 2
     weight = weight / weight.sum()
-    mean = float(weight[finite] @ ranges.range_mm[finite])
-    covariance = ranges.covariance_mm2[np.ix_(finite, finite)]
-    return mean, float(np.sqrt(weight[finite] @ covariance @ weight[finite]))
+    covariance = ranges.covariance_mm2[np.ix_(good, good)]
+    return float(weight @ ranges.range_mm[good]), float(np.sqrt(weight @ covariance @ weight))
