@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: help demo test lint bench lock clean
+.PHONY: help demo test lint bench prove lock clean
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
 	@echo "make test   lint, type check and test everything"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
+	@echo "make prove  10 000 simulated calibrations against what is stated of them (a minute or two)"
 	@echo "make lint   only the linters and the type checker"
 	@echo "make lock   renew requirements.lock from pyproject.toml"
 
@@ -22,6 +23,9 @@ $(INSTALLED): requirements.lock pyproject.toml
 
 demo: $(INSTALLED)
 	$(BIN)/workbench run procedures/calibrate-flat.yaml procedures/accuracy-flat.yaml --rig rigs/thesis-emulated.yaml
+
+prove: $(INSTALLED)
+	$(BIN)/python -m tests.proofs
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -1,0 +1,1 @@
+"""`make prove`: simulated calibrations against what the workbench states of them."""

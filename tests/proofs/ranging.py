@@ -1,0 +1,73 @@
+"""The ranges of `workbench.calibration.sensor.Sensor`, for many calibrations at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from tests.proofs.simulate import COMMON, LENS, RAY, Floats
+from workbench.optics.lens import Lens
+from workbench.optics.rays import Ray
+from workbench.optics.triangulate import Sighted, estimate_depth
+
+
+@dataclass(frozen=True)
+class Ranged:
+    """Ranges (N, K, L) in mm, 1 sigma, as their calibrations state them."""
+
+    range_mm: Floats
+    sd_mm: Floats
+    spot_sd_mm: Floats
+    gradient: Floats
+    """(N, K, L, S) derivatives by the sensor's parameters."""
+
+    def flat(self, covariance: Floats) -> tuple[Floats, Floats]:
+        """(N, K) range of a flat from all lasers, as the ranger weights them, and its sd."""
+        weight = np.where(np.isfinite(self.range_mm), 1.0 / self.spot_sd_mm**2, 0.0)
+        weight /= weight.sum(axis=-1, keepdims=True)
+        mean = (weight * np.where(weight > 0, self.range_mm, 0.0)).sum(axis=-1)
+        gradient = np.where(weight[..., None] > 0, self.gradient, 0.0)
+        gradient = (weight[..., None] * gradient).sum(axis=2)
+        shared = np.einsum("nks,nst,nkt->nk", gradient, covariance, gradient, optimize=True)
+        own = (weight * np.where(weight > 0, self.spot_sd_mm, 0.0)) ** 2
+        return np.asarray(mean), np.sqrt(shared + own.sum(axis=-1))
+
+
+def ranges(sensor: Floats, covariance: Floats, position_px: Floats, sd_px: Floats) -> Ranged:
+    """Range the spots of N sensors.
+
+    Args:
+        sensor: (N, S) fitted values.
+        covariance: (N, S, S) of them.
+        position_px: (N, K, L, 2); NaN where not seen: the range is NaN.
+        sd_px: (N,) 1 sigma of a spot in either coordinate, speckle included.
+    """
+    seen = np.asarray(np.isfinite(position_px).all(axis=-1))
+    rays = sensor[:, COMMON:].reshape(len(sensor), -1, len(RAY))
+    found = _depths(sensor[:, : len(LENS)], rays, np.where(seen[..., None], position_px, 0.0), sd_px)
+    w, spot_sd, by_lens, by_ray = (np.asarray(part) for part in found)
+    with np.errstate(divide="ignore"):
+        range_mm = np.where(w > 0, 1.0 / w, np.inf) - sensor[:, len(LENS), None, None]
+    gradient = np.zeros((*w.shape, sensor.shape[1]))
+    gradient[..., : len(LENS)], gradient[..., len(LENS)] = by_lens, -1.0
+    for laser in range(w.shape[2]):
+        start = COMMON + len(RAY) * laser
+        gradient[:, :, laser, start : start + len(RAY)] = by_ray[:, :, laser]
+    shared = np.einsum("nkls,nst,nklt->nkl", gradient, covariance, gradient, optimize=True)
+    sd = np.where(seen, np.sqrt(shared + spot_sd**2), np.nan)
+    return Ranged(np.where(seen, range_mm, np.nan), sd, spot_sd, gradient)
+
+
+@jax.jit
+def _depths(lens: Array, rays: Array, position_px: Array, sd_px: Array) -> tuple[Array, ...]:
+    def one(lens: Array, ray: Array, position: Array, sd: Array) -> tuple[Array, ...]:
+        found = estimate_depth(Lens(*lens), Ray(*ray), Sighted(position[0], position[1], sd, sd))
+        return found.inverse_depth_per_mm, found.z_sd_of_spot_mm, found.dz_dlens, found.dz_dray
+
+    by_laser = jax.vmap(one, in_axes=(None, 0, 0, None))
+    by_range = jax.vmap(by_laser, in_axes=(None, None, 0, None))
+    return tuple(jnp.asarray(part) for part in jax.vmap(by_range)(lens, rays, position_px, sd_px))

@@ -1,0 +1,123 @@
+"""Sensors drawn from a rig's tolerances and what they see: linear algebra and OpenCV's lens, nothing of ours.
+
+Pixels, millimetres; camera frame as in OpenCV. N sensors, J placements, L lasers, S parameters of the sensor:
+lens, bench, four a laser.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.model.rig import Prior, Rig
+
+Floats = NDArray[np.float64]
+LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
+BENCH = ("offset_mm", "ruler_scale")
+RAY = ("x_mm", "y_mm", "tx", "ty")
+COMMON = len(LENS) + len(BENCH)
+
+
+@dataclass(frozen=True)
+class Calibrations:
+    """What N sensors gave to fit."""
+
+    truth: Floats
+    """(N, S)"""
+    errors: Floats
+    """(N, J, 3) true placement error in mm and tangents of the tilts."""
+    position_px: Floats
+    """(N, J, L, 2) means of the repeats, NaN where every one fell out of the frame."""
+    sd_px: Floats
+    """(N, J, L, 2) 1 sigma of the means, speckle included; NaN likewise."""
+
+
+def priors(rig: Rig) -> list[Prior]:
+    """(S) priors of the sensor's parameters."""
+    lens = [getattr(rig.camera, name) for name in LENS]
+    bench = [getattr(rig.bench, name) for name in BENCH]
+    return [*lens, *bench, *(getattr(laser, name) for laser in rig.lasers for name in RAY)]
+
+
+def names(rig: Rig) -> list[str]:
+    """(S) names of the sensor's parameters."""
+    return [*LENS, *BENCH, *(f"{laser.id}.{name}" for laser in rig.lasers for name in RAY)]
+
+
+def draw_truths(rig: Rig, n: int, rng: np.random.Generator) -> Floats:
+    """(N, S) sensors drawn from the rig's priors."""
+    return np.stack([rng.normal(p.value, p.sd, n) for p in priors(rig)], axis=1)
+
+
+def spots(sensors: Floats, z0_mm: Floats, slopes: Floats) -> Floats:
+    """(N, J, L, 2) where the lasers' spots on planes appear; NaN beyond the fold of the drawn lens.
+
+    k1 and k2 drawn from wide tolerances can make a polynomial that folds over within the picture, so that one
+    pixel belongs to two ranges. No lens does that: beyond its fold a model shows nothing.
+
+    Args:
+        sensors: (N, S).
+        z0_mm: (N, J) depth of each plane on the camera's axis.
+        slopes: (N, J, 2) tangents of its tilts.
+    """
+    rays = sensors[:, None, COMMON:].reshape(len(sensors), 1, -1, len(RAY))
+    shape = (*z0_mm.shape, rays.shape[2])
+    x, y, tx, ty = (np.broadcast_to(part, shape) for part in np.moveaxis(rays, -1, 0))
+    system = np.zeros((*shape, 3, 3))
+    system[..., 0, 0] = system[..., 1, 1] = system[..., 2, 2] = 1.0
+    system[..., 0, 2], system[..., 1, 2] = -tx, -ty
+    system[..., 2, :2] = -slopes[:, :, None, :]
+    depth = np.broadcast_to(z0_mm[:, :, None], shape)
+    points = np.linalg.solve(system, np.stack([x, y, depth], axis=-1)[..., None])[..., 0]
+    seen = [_project(sensor, p.reshape(-1, 3)) for sensor, p in zip(sensors, points, strict=True)]
+    return np.where(
+        _unfolded(sensors, np.asarray(points, float))[..., None], np.stack(seen).reshape(*shape, 2), np.nan
+    )
+
+
+def depths(sensors: Floats, standoff_mm: Floats, error_mm: Floats | float = 0.0) -> Floats:
+    """(N, J) depths of planes at standoffs (J,) by the ruler."""
+    offset, scale = sensors[:, len(LENS)], sensors[:, len(LENS) + 1]
+    return standoff_mm * (1.0 + scale[:, None]) + offset[:, None] + error_mm
+
+
+def in_frame(rig: Rig, position_px: Floats) -> NDArray[np.bool_]:
+    """(...) whether positions (..., 2) lie between the centres of the outermost pixels."""
+    size = np.array([rig.camera.width_px, rig.camera.height_px])
+    return np.asarray(((position_px >= 0) & (position_px <= size - 1)).all(axis=-1))
+
+
+def calibrations(
+    rig: Rig, standoffs_mm: Floats, repeats: int, n: int, rng: np.random.Generator
+) -> Calibrations:
+    """Draw N sensors, place the target with errors and tilts, see every spot `repeats` times."""
+    truth = draw_truths(rig, n, rng)
+    error = rng.normal(0.0, rig.bench.placement_sd_mm, (n, len(standoffs_mm)))
+    slopes = np.tan(np.radians(rng.normal(0.0, rig.bench.tilt_sd_deg, (*error.shape, 2))))
+    centre = spots(truth, depths(truth, standoffs_mm, error), slopes)
+    centre = centre + rng.normal(0.0, rig.noise.speckle_sd_px, centre.shape)
+    single = centre[..., None, :] + rng.normal(0.0, rig.noise.spot_sd_px, (*centre.shape[:-1], repeats, 2))
+    seen = in_frame(rig, single)
+    count = seen.sum(axis=-1)[..., None].astype(float)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(seen[..., None], single, 0.0).sum(axis=-2) / count
+        sd = np.hypot(rig.noise.spot_sd_px / np.sqrt(count), rig.noise.speckle_sd_px)
+    sd = np.broadcast_to(np.where(count > 0, sd, np.nan), mean.shape)
+    return Calibrations(truth, np.concatenate([error[..., None], slopes], axis=-1), mean, sd)
+
+
+def _unfolded(sensors: Floats, points: Floats) -> NDArray[np.bool_]:
+    """(N, J, L) whether the distorted radius still grows with the radius."""
+    k1, k2, k3 = (sensors[:, LENS.index(name), None, None] for name in ("k1", "k2", "k3"))
+    r2 = (points[..., 0] ** 2 + points[..., 1] ** 2) / points[..., 2] ** 2
+    return np.asarray(1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3)) > 0)
+
+
+def _project(sensor: Floats, points: Floats) -> Floats:
+    f, cx, cy = sensor[:3]
+    camera = np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+    pixels, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera, sensor[3:8])
+    return np.asarray(pixels, np.float64).reshape(-1, 2)

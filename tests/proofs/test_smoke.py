@@ -1,0 +1,76 @@
+"""The proofs' own parts: few calibrations, in seconds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tests.proofs import bound, report, simulate, study
+from tests.proofs.ranging import ranges
+from tests.unit.rigs import STANDOFFS_MM, World, thesis_rig
+from tests.unit.test_calibration_file import PROVENANCE
+from workbench.calibration.batch import as_grid, fit_batch
+from workbench.calibration.export import calibrate
+from workbench.calibration.fit import fit
+from workbench.calibration.sensor import Sensor
+from workbench.model.acceptance import Acceptance
+from workbench.model.rig import load_rig
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_many_ranges_are_those_of_the_sensor() -> None:
+    world = World(thesis_rig(), 1)
+    single = fit(world.rig, world.sightings())
+    sensor = Sensor(calibrate(single, Acceptance(), PROVENANCE)[0])
+    position, sd = as_grid(single.cells, 4)
+    batch = fit_batch(world.rig, single.cells.placements, position[None], sd[None])
+    at = np.array([150.0, 700.0, 4000.0])
+    spots = np.stack([sensor.spot_px(i, at) for i in sensor.ids], axis=1) + 0.05
+    spots[0, 1] = np.nan
+
+    many = ranges(batch.sensor, batch.sensor_covariance, spots[None], np.array([np.hypot(0.03, 0.04)]))
+    flat, flat_sd = many.flat(batch.sensor_covariance)
+    for k in range(len(at)):
+        seen = [n for n in range(4) if np.isfinite(spots[k, n]).all()]
+        one = sensor.ranges([sensor.ids[n] for n in seen], spots[k, seen], np.full((len(seen), 2), np.nan))
+        np.testing.assert_allclose(many.range_mm[0, k, seen], one.range_mm, rtol=1e-9)
+        np.testing.assert_allclose(many.sd_mm[0, k, seen], one.sigma_mm, rtol=1e-6)
+        weight = one.spot_sd_mm**-2 / (one.spot_sd_mm**-2).sum()
+        np.testing.assert_allclose(flat[0, k], weight @ one.range_mm, rtol=1e-9)
+        np.testing.assert_allclose(flat_sd[0, k], np.sqrt(weight @ one.covariance_mm2 @ weight), rtol=1e-6)
+    assert np.isnan(many.range_mm[0, 0, 1])
+
+
+def test_the_simulator_is_the_unit_tests_world() -> None:
+    world = World(thesis_rig(), 7)
+    sensor = np.array([[world.values[name] for name in simulate.names(world.rig)]])
+    yaw, pitch = 0.02, -0.03
+    spots = simulate.spots(sensor, np.array([[300.0, 2000.0]]), np.tan([[[yaw, pitch]] * 2]).reshape(1, 2, 2))
+    for k, z0 in enumerate((300.0, 2000.0)):
+        for n, laser in enumerate(world.rig.laser_ids):
+            np.testing.assert_allclose(spots[0, k, n], world.pixel(laser, z0, yaw, pitch), atol=1e-9)
+
+
+def test_stated_deviations_are_near_the_bound() -> None:
+    """The stated covariance is taken at the estimate, the bound at the truth: a few per cent differ."""
+    rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
+    standoffs = np.array(STANDOFFS_MM)
+    data = simulate.calibrations(rig, standoffs, 10, 6, np.random.default_rng(3))
+    covariance = bound.parameter_covariance(rig, standoffs, data)
+    fitted = fit_batch(rig, study.placements(rig, standoffs), data.position_px, data.sd_px)
+    of_bound = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    stated = fitted.sd[:, : of_bound.shape[1]] / fitted.noise_scale[:, None]
+    np.testing.assert_allclose(stated, of_bound, rtol=0.1)
+
+
+def test_a_small_proof_makes_its_tables() -> None:
+    rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
+    outcome = study.run(rig, np.array(STANDOFFS_MM), 10, 40, np.random.default_rng(5))
+    lines, misses = report.tables(rig, outcome)
+    # Few calibrations miss limits by chance; every miss must be told by name.
+    assert [line for line in lines if line.startswith("MISSED")] == [f"MISSED  {miss}" for miss in misses]
+    assert any(line.startswith("not determined") and "ruler_scale" in line for line in lines)
+    assert np.isfinite(outcome.parameter).all()
+    assert not outcome.unsolved.any()
