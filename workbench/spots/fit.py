@@ -104,10 +104,8 @@ def _ridge(k: int) -> tuple[Floats, Floats]:
 def inverse(information: Floats) -> Floats:
     """Inverse of (n, k, k) information matrices; a ridge that only a singular one feels keeps it finite."""
     factor, addend = _ridge(information.shape[1])
-    ridged: Floats = information * factor
-    ridged += addend
-    inverted: Floats = np.linalg.inv(ridged)
-    return inverted
+    inverted = np.linalg.inv(information * factor + addend)
+    return np.asarray(inverted, np.float64)
 
 
 def _moved(params: Floats, delta: Floats) -> Floats:

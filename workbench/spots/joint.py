@@ -10,10 +10,11 @@ import numpy as np
 from workbench.spots.fit import Windows, inverse
 from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, Upright, V, principal_axes
 from workbench.spots.noise import Noise, photon_transfer_slope
-from workbench.spots.types import Floats
+from workbench.spots.types import Bools, Floats
 
 _MAX_STEPS = 30
 _HIDDEN_SD = 5.0
+_AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
 _MAX_MOVE_PX = 0.7
 _MAX_STRETCH = 0.3
 _LN_WIDTH_RANGE = (float(np.log(0.3)), float(np.log(12.0)))
@@ -123,18 +124,20 @@ def evidence(one: float, two: float, pixels: int, parameters: int) -> float:
     return (one - two) / 3.0 / max(left, 1e-12)
 
 
-def hidden_spot(joint: Joint, win: Windows) -> Floats | None:
+def hidden_spot(joint: Joint, win: Windows, allowed: Bools) -> Floats | None:
     """(6,) first guess of a spot of the same widths that stands out of the residuals; None without one."""
     su, sv = np.exp(joint.params[0, LN_SU:SHEAR])
     weight = joint.weight.reshape(win.shape)
-    excess = weight * joint.residual.reshape(win.shape)
+    residual = joint.residual.reshape(win.shape)
+    # A pixel that towers over all its neighbours is hot: it counts no more than the highest of them.
+    excess = weight * np.minimum(residual, cv2.dilate(residual, _AROUND))
     matched = cv2.GaussianBlur(excess, (0, 0), sigmaX=su, sigmaY=sv, borderType=cv2.BORDER_CONSTANT)
     # The square of a Gaussian is a Gaussian narrower by sqrt(2), of the sum 1 / (4 pi su sv).
     told = cv2.GaussianBlur(
         weight, (0, 0), sigmaX=su / 2**0.5, sigmaY=sv / 2**0.5, borderType=cv2.BORDER_CONSTANT
     )
     told = np.maximum(told / (4.0 * np.pi * su * sv), 1e-12)
-    height = matched / np.sqrt(told)
+    height = np.where(allowed, matched / np.sqrt(told), 0.0)
     row, col = np.unravel_index(int(height.argmax()), win.shape)
     if height[row, col] < _HIDDEN_SD:
         return None

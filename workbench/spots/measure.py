@@ -90,7 +90,7 @@ def first_guess(win: Windows, peaks: Peaks, half: int) -> Floats:
     return start
 
 
-def _without_outliers(win: Windows, fit: Fit) -> Windows | None:
+def without_outliers(win: Windows, fit: Fit) -> Windows | None:
     """The windows without a few pixels that no spot explains (hot pixels); None if there are none."""
     excess = fit.residual * fit.residual
     excess *= fit.weight
@@ -129,7 +129,7 @@ def _local_floor(fit: Fit) -> Floats | None:
 
 def _refined(win: Windows, fit: Fit, guess: Noise) -> tuple[Windows, Fit]:
     """The fit again where its residuals ask for it: hot pixels, a noisier surrounding."""
-    cleaned = _without_outliers(win, fit)
+    cleaned = without_outliers(win, fit)
     if cleaned is not None:
         win = cleaned
         fit = fit_spots(win, fit.params, guess)
@@ -251,7 +251,8 @@ def measure(scene: Scene, peaks: Peaks) -> list[Trace]:
     start = first_guess(_apart(scene.pair.cut(rows, cols, half), rows, cols, todo, half), peaks, half)
     start[:, U] += cols - half
     start[:, V] += rows - half
-    sizes = np.array([half_for(_GUESSED * w) for w in np.exp(start[:, LN_SU]).tolist()])
+    scatter = _GUESSED if peaks.scale_px == FINE_PX else 1.0
+    sizes = np.array([half_for(scatter * w) for w in np.exp(start[:, LN_SU]).tolist()])
     found: list[Trace | None] = [None] * rows.size
     for _ in range(3):
         again = []

@@ -14,7 +14,7 @@ _CLIP_SD = 4.0
 # Variance that rounding to whole numbers alone leaves in a frame.
 ROUNDING_DN2 = 1.0 / 12.0
 _SLOPE_ROUNDS = 2
-# Windows whose slope is more than this many times the median's are left to themselves.
+# Windows whose slope is surely this many times the lowest are left to themselves: misfits only raise it.
 _ALIKE = 3.0
 # Full wells of 3e5 and 300 electrons bound every camera; a misfit, or a few lucky pixels, can look beyond.
 _SLOPE_SPAN = 30.0
@@ -101,7 +101,8 @@ def _agreeing(told: Floats, over: Floats) -> list[list[int]]:
     if len(told) == 1:
         return [[0]]
     own = over / np.maximum(told, 1e-30)
-    limit = np.sort(own)[(len(own) - 1) // 2] * _ALIKE + 4.0 * np.sqrt(2.0 / np.maximum(told, 1e-30))
+    doubt = 2.0 * np.sqrt(2.0 / np.maximum(told, 1e-30))
+    limit = _ALIKE * (own + doubt).min() + doubt
     alike = (own <= limit).tolist()
     together = [i for i, same in enumerate(alike) if same]
     alone = [[i] for i, same in enumerate(alike) if not same]

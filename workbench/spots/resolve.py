@@ -11,13 +11,13 @@ import numpy as np
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, Sheared, U, V, principal_axes
 from workbench.spots.joint import Joint, evidence, fit_joint, halves, hidden_spot
-from workbench.spots.measure import Trace, half_for, spot_flags
+from workbench.spots.measure import Trace, half_for, spot_flags, without_outliers
 from workbench.spots.noise import Noise
 from workbench.spots.pair import Scene
-from workbench.spots.types import Failure, Floats, Spot
+from workbench.spots.types import Bools, Failure, Floats, Spot
 
-# F statistic that a second spot must reach: with some hundred pixels, chance gives this once in 1e9.
-_EVIDENCE = 15.0
+# F statistic that a second spot must reach: with some hundred pixels, chance gives this once in 1e5.
+_EVIDENCE = 10.0
 # Nearer than this, in widths, two spots move each other's centre.
 _OVERLAP_WIDTHS = 4.0
 _TAIL_WIDTHS = 2.5
@@ -26,6 +26,7 @@ _MIN_APART_WIDTHS = 1.0
 _MIN_SHARE = 0.08
 _MIN_FLUX_SD = 5.0
 _ELONGATED = 1.12
+_LONGISH = 1.3
 _MAX_HALF_PX = 30
 _MAX_HIDDEN = 4
 
@@ -151,10 +152,11 @@ def grown(scene: Scene, group: list[Trace]) -> list[Trace]:
     win, row0, col0 = _window(scene, points, max(t.reach_px for t in group))
     start = np.array([t.params[:SHEAR] for t in group]) - (0, 0, col0, row0, 0, 0)
     noise = _noise(scene, group)
+    allowed = _allowed(scene, win, row0, col0)
     best = fit_joint(win, start, noise)
     while len(best.params) < len(group) + _MAX_HIDDEN:
         better = next(
-            (m for p in _proposals(best, start, win) if (m := _asked_for(best, p, noise, win))), None
+            (m for p in _proposals(best, start, win, allowed) if (m := _asked_for(best, p, noise, win))), None
         )
         if better is None:
             break
@@ -162,17 +164,31 @@ def grown(scene: Scene, group: list[Trace]) -> list[Trace]:
     return group if len(best.params) == len(group) else _as_traces(scene, best, row0, col0)
 
 
-def _proposals(best: Joint, start: Floats, win: Windows) -> Iterator[Floats]:
-    """First guesses with one spot more: where the residuals rise, or two for the widest members."""
-    hidden = hidden_spot(best, win)
-    if hidden is not None:
-        yield np.vstack([best.params, hidden])
+def _proposals(best: Joint, start: Floats, win: Windows, allowed: Bools) -> Iterator[Floats]:
+    """First guesses with more spots: the longish ones as two, or one where the residuals rise."""
     if len(best.params) == len(start):
         narrowest = start[:, LN_SU:].min()
-        for i in np.flatnonzero(start[:, LN_SU:].max(axis=1) > narrowest + np.log(_ELONGATED)):
-            proposal = np.vstack([np.delete(best.params, i, axis=0), halves(np.append(start[i], 0.0))])
+        long = np.flatnonzero(start[:, LN_SU:].max(axis=1) > narrowest + np.log(_LONGISH))
+        for chosen in ([*long], *([i] for i in long)) if long.size else ():
+            pairs = [halves(np.append(start[i], 0.0)) for i in chosen]
+            proposal = np.vstack([np.delete(best.params, chosen, axis=0), *pairs])
             proposal[:, LN_SU:] = narrowest
             yield proposal
+    hidden = hidden_spot(best, win, allowed)
+    if hidden is not None:
+        yield np.vstack([best.params, hidden])
+
+
+def _allowed(scene: Scene, win: Windows, row0: int, col0: int) -> Bools:
+    """(height, width) where the scanline lets a spot be."""
+    if scene.strip.mask is None:
+        return np.ones(win.shape, bool)
+    rows = np.arange(row0, row0 + win.shape[0]) - scene.strip.rows.start
+    cols = np.arange(col0, col0 + win.shape[1]) - scene.strip.cols.start
+    height, width = scene.strip.mask.shape
+    inside = ((rows >= 0) & (rows < height))[:, None] & ((cols >= 0) & (cols < width))
+    allowed: Bools = inside & scene.strip.mask[np.ix_(rows.clip(0, height - 1), cols.clip(0, width - 1))]
+    return allowed
 
 
 def _asked_for(best: Joint, proposal: Floats, noise: Noise, win: Windows) -> Joint | None:
@@ -188,6 +204,9 @@ def split(scene: Scene, trace: Trace) -> list[Trace]:
     start[0, : trace.params.size] = trace.params - (0, 0, col0, row0, 0, 0, 0)[: trace.params.size]
     noise = _noise(scene, [trace])
     whole = fit_spots(win, start, noise, Sheared)
+    cleaned = without_outliers(win, whole)
+    if cleaned is not None:
+        win, whole = cleaned, fit_spots(cleaned, start, noise, Sheared)
     short, long = principal_axes(whole.params[0])[0]
     if not whole.converged[0] or long < _ELONGATED * short:
         return [trace]
