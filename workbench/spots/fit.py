@@ -20,9 +20,10 @@ _MIN_STEP: Final = -_MAX_STEP
 # Of both logarithms of the width, and of the shear.
 _LOWEST: Final = np.array([np.log(0.15), np.log(0.15), -3.0])
 _HIGHEST: Final = np.array([np.log(12.0), np.log(12.0), 3.0])
-# Where the steps stop. Scoring shrinks the error some tenfold a step near the end: one of 0.3 sd, which is
-# still taken, leaves a few hundredths.
-_TOLERANCE_SD: Final = 0.3
+# Where the steps stop. Near the end a step squares the error: one of 1 sd that is small against the spot too,
+# or of 0.1 sd, leaves some hundredths of an sd once it is taken.
+_TOLERANCE_SD: Final = 0.1
+_SMALL: Final = 0.05
 # One window that never converges must not keep the noise of the others from being measured.
 _STEPS_TO_MEASURE: Final = 8
 # After so many steps it is settled which pixels clip: a set that changes with every step never converges.
@@ -132,14 +133,23 @@ def _at(win: Windows, params: Floats, noise: Noise, model: Model) -> tuple[Desig
     return design, signal, residual, _weights(win, signal, background, noise)
 
 
-def _solve(design: Design, residual: Floats, weight: Floats) -> tuple[Floats, Floats, Bools]:
+def _solve(design: Design, params: Floats, residual: Floats, weight: Floats) -> tuple[Floats, Floats, Bools]:
     """Covariance, step, and whether the step is negligible."""
     cov = inverse(design.information(weight))
     delta = (cov @ design.gradient(weight * residual)[:, :, None])[:, :, 0]
     if not np.isfinite(delta.sum()):
         delta[~np.isfinite(delta).all(axis=1)] = 0.0
-    variance = cov.diagonal(0, 1, 2) * _TOLERANCE_SD**2
-    return cov, delta, np.logical_and.reduce(delta * delta <= variance, 1)
+    return cov, delta, _negligible(delta, cov, params)
+
+
+def _negligible(delta: Floats, cov: Floats, params: Floats) -> Bools:
+    """(n,) whether nothing is left to do once the step has been taken."""
+    variance = cov.diagonal(0, 1, 2)
+    limit = variance.copy()
+    np.minimum(limit[:, U:], (_SMALL * params[:, FLUX:U]) ** 2, out=limit[:, U:])
+    np.maximum(limit, _TOLERANCE_SD**2 * variance, out=limit)
+    negligible: Bools = np.logical_and.reduce(delta * delta <= limit, 1)
+    return negligible
 
 
 def fit_spots(win: Windows, start: Floats, noise: Noise, model: Model = Upright) -> Fit:
@@ -154,12 +164,12 @@ def fit_spots(win: Windows, start: Floats, noise: Noise, model: Model = Upright)
     params, guess, measured = start, noise, False
     for step in range(_MAX_STEPS):
         design, signal, residual, weight = _at(win, params, noise, model)
-        cov, delta, converged = _solve(design, residual, weight)
+        cov, delta, converged = _solve(design, params, residual, weight)
         if not measured and (converged.all() or step == _STEPS_TO_MEASURE):
             leverage = design.leverage(cov)
             noise = Noise(guess.floor_dn2, photon_transfer_slope(signal, residual, weight, leverage, guess))
             weight = _weights(win, signal, params[:, BACKGROUND, None, None], noise)
-            cov, delta, converged = _solve(design, residual, weight)
+            cov, delta, converged = _solve(design, params, residual, weight)
             measured = True
         if step == _STEPS_TO_SETTLE and win.clip_dn is not None:
             win = Windows(win.data, weight > 0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.spots.detect import FINE_PX, Peaks
 from workbench.spots.fit import Fit, Windows, fit_spots
-from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, Sheared, U, V, axis_profiles
+from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, Sheared, U, Upright, V
 from workbench.spots.noise import Noise
 from workbench.spots.pair import Scene
 from workbench.spots.types import NO_FLAGS, Bools, Failure, Floats, Spot
@@ -141,10 +141,9 @@ def _refined(win: Windows, fit: Fit, guess: Noise) -> tuple[Windows, Fit]:
 
 def _tilted(fit: Fit) -> Bools:
     """(n,) whether the residuals of upright ellipses show that the spot's axes are at an angle."""
-    height, width = fit.residual.shape[1:]
-    params = fit.params
-    of_u = axis_profiles(params[:, U], params[:, LN_SU], width)[1][:, :, None]
-    of_v = axis_profiles(params[:, V], params[:, LN_SV], height)[1][:, None, :]
+    if not isinstance(fit.design, Upright):
+        return np.zeros(len(fit.params), bool)
+    of_u, of_v = fit.design.along_u[1][:, :, None], fit.design.along_v[1][:, None, :]
     score = (of_v @ (fit.weight * fit.residual) @ of_u)[:, 0, 0]
     told = ((of_v * of_v) @ fit.weight @ (of_u * of_u))[:, 0, 0]
     tilted: Bools = score * score > _SHEAR_SD**2 * told
