@@ -24,7 +24,7 @@ def test_errors_are_measured_minus_true() -> None:
     assert (row.mean_error_mm, row.max_error_mm, row.min_error_mm) == pytest.approx((2.5 / 3, 2.0, -0.5))
     assert row.sd_mm == pytest.approx(np.std([1.0, -0.5, 2.0], ddof=1))
     assert row.range_sd_mm == pytest.approx(0.4)
-    assert row.reference_sd_mm == pytest.approx(0.5)  # 0.3 of the placement, 0.4 of the ruler
+    assert row.reference_sd_mm == 0.3
     assert (row.readings, row.missing) == (3, 0)
 
 

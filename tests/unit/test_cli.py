@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from workbench.cli.main import main
+from workbench.cli.stopping import SIGNALS
 from workbench.model.calibration import load_calibration
 
 ROOT = Path(__file__).parents[2]
@@ -34,6 +36,8 @@ Run = Callable[..., Outcome]
 
 @pytest.fixture
 def workbench(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+
     def run(*arguments: object) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["workbench", *map(str, arguments)])
         code = 0
@@ -41,6 +45,9 @@ def workbench(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str
             main()
         except SystemExit as stop:
             code = stop.code if isinstance(stop.code, int) else 0
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
         captured = capsys.readouterr()
         return Outcome(code, captured.out, captured.err)
 
@@ -164,7 +171,7 @@ class TestBadInput:
         refused(fit, 2, no, "No such file")
         refused(workbench("range", WEBCAM, "--calibration", no), 2, no)
         refused(workbench("run", no, "--rig", WEBCAM_RIG, "--sessions", tmp_path), 2, no)
-        refused(workbench("view", tmp_path), 2, "recording.rrd")
+        refused(workbench("view", tmp_path), 2, "session.yaml: no such file")
         assert list(tmp_path.iterdir()) == []
 
     def test_a_rig_without_a_driver(self, workbench: Run, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from tests.unit.rigs import STANDOFFS_MM, World, prior, thesis_rig
 from workbench.calibration.assess import derive, determined_by
 from workbench.calibration.fit import Fit, data_share, fit
+from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.parameters import Parameter, ParameterTable
 from workbench.calibration.sightings import sight_rows
 from workbench.model.captures import load_captures
@@ -202,6 +203,17 @@ def test_a_laser_unknown_to_the_rig() -> None:
     sighting = replace(World(rig, 1).sightings()[0], laser_id="L9", source="row 7")
     with pytest.raises(BadInputError, match=r"row 7: laser_id: expected one of L1.*got L9"):
         fit(rig, [sighting])
+
+
+@pytest.mark.parametrize(("standoff_mm", "cause"), [(40.0, "outside the picture, at u = "), (700.0, "dark")])
+def test_a_spot_that_cannot_be_in_the_picture_is_not_blamed_on_the_light(
+    standoff_mm: float, cause: str
+) -> None:
+    rig = thesis_rig()
+    sightings = World(rig, 1).sightings(repeats=1)
+    missing = Sighting("row 9", "L4", "near", standoff_mm, 0, np.nan, np.nan)
+    result = fit(rig, sightings, [Rejected("row 9", "too dark", missing)])
+    assert cause in result.rejected[0].reason
 
 
 def test_nothing_to_fit() -> None:

@@ -29,7 +29,7 @@ from workbench.model.calibration import (
     ReferencePlane,
     Validity,
 )
-from workbench.session.files import write_atomically
+from workbench.session.files import write_output
 
 NO_WRAPPING = 10**9
 """OpenCV reads a list of any length but no string that goes on in the next line."""
@@ -45,12 +45,12 @@ def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Cal
 
 
 def write_calibration(path: Path, calibration: Calibration) -> None:
-    """Write the YAML; an existing file is replaced whole or not at all.
+    """Write the YAML where the user wants it.
 
     Raises:
-        BadInputError: the folder cannot be written.
+        BadInputError: see `write_output`.
     """
-    write_atomically(path, render(calibration).encode())
+    write_output(path, render(calibration).encode())
 
 
 def render(calibration: Calibration) -> str:

@@ -44,6 +44,8 @@ class Rejected:
 
     source: str
     reason: str
+    missing: Sighting | None = None
+    """Where a spot was expected and none was seen: its laser and standoff."""
 
 
 @dataclass(frozen=True)

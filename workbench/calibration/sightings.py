@@ -35,7 +35,8 @@ def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | 
     where = f"laser {laser.id} at {sighting.standoff_mm:g} mm"
     if len(finding.spots) != 1:
         causes = "; ".join(f"{failure}: {explain(failure)}" for failure in finding.failures)
-        return Rejected(source, f"{where}: expected one spot, got {len(finding.spots)}. {causes}")
+        reason = f"{where}: expected one spot, got {len(finding.spots)}. {causes}"
+        return Rejected(source, reason, None if finding.spots else sighting)
     spot = finding.spots[0]
     if bad := [flag for flag in UNUSABLE if flag in spot.flags]:
         return Rejected(source, f"{where}: {bad[0]}: {explain(bad[0])}")

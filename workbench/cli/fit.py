@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import getpass
 import hashlib
 import json
-import shlex
-import sys
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -20,9 +16,10 @@ from workbench.calibration.fit import Fit
 from workbench.calibration.fit import fit as fit_sightings
 from workbench.calibration.records import parameter_records
 from workbench.calibration.sightings import sight_rows
+from workbench.cli.call import command_line, now, operator
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
-from workbench.model.captures import load_captures
+from workbench.model.captures import parse_captures, read_captures_file
 from workbench.model.errors import LimitFailedError
 from workbench.model.rig import Rig, load_rig
 from workbench.report.tables import derived_table, parameter_table, rejected_lines
@@ -37,8 +34,9 @@ def fit_captures(captures: Path, rig_path: Path, output: Path, as_json: bool) ->
         LimitFailedError: the calibration is refused; nothing is written.
     """
     rig = load_rig(rig_path)
-    fitted = fit_sightings(rig, *sight_rows(rig, load_captures(captures)))
-    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, captures))
+    content = read_captures_file(captures)
+    fitted = fit_sightings(rig, *sight_rows(rig, parse_captures(captures, content)))
+    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, content))
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))
     _print_tables(fitted, assessment)
@@ -49,16 +47,16 @@ def fit_captures(captures: Path, rig_path: Path, output: Path, as_json: bool) ->
     write_calibration(output, calibration)
 
 
-def _provenance(rig: Rig, captures: Path) -> Provenance:
+def _provenance(rig: Rig, captures: bytes) -> Provenance:
     return Provenance(
         session="",
-        captures_sha256=hashlib.sha256(captures.read_bytes()).hexdigest(),
+        captures_sha256=hashlib.sha256(captures).hexdigest(),
         rig=rig.rig,
         serial=rig.serial,
-        command=shlex.join(["workbench", *sys.argv[1:]]),
+        command=command_line(),
         version=workbench_version(),
-        operator=getpass.getuser(),
-        created=time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime()),
+        operator=operator(),
+        created=now(),
     )
 
 

@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from workbench.model.errors import StoppedError, WorkbenchError
+from workbench.cli.stopping import stop_at_once
+from workbench.model.errors import WorkbenchError
 
 app = typer.Typer(
     help="Calibration and lab-measurement workbench for laser-spot range sensors.",
@@ -72,14 +73,12 @@ def view(
 
 def main() -> None:
     """Entry point: every expected failure becomes a message and its exit code."""
+    stop_at_once()
     try:
         app()
     except WorkbenchError as error:
         _say(f"error: {error}")
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        _say("stopped")
-        sys.exit(StoppedError.exit_code)
     except Exception:
         traceback.print_exc()
         _say("internal error: this is a defect of the workbench, please report it with the lines above")

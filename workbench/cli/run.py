@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import getpass
-import shlex
-import signal
-import sys
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import TracebackType
 
 from rich.console import Console
 from rich.padding import Padding
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from workbench.cli.call import command_line, now, operator
+from workbench.cli.stopping import StopAfterShot
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
-from workbench.procedure.run import Plan, run
+from workbench.procedure.run import Caller, Plan, run
 from workbench.report.tables import parameter_table, rejected_lines, trial_table
 from workbench.viewer.recording import RecordingConsumer
 
@@ -29,13 +27,12 @@ def run_procedures(procedures: list[Path], rig_path: Path, sessions: Path) -> No
     """
     plan = Plan.load(rig_path, procedures)
     session_dir = plan.new_session(sessions)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _stop)
     console = Console(stderr=True)
-    command = shlex.join(["workbench", *sys.argv[1:]])
+    stopping = StopAfterShot()
     with RecordingConsumer(session_dir, plan.rig) as recording, Terminal(console) as terminal:
         consumers = (terminal, Guarded(recording, "the recording", console))
-        run(plan, session_dir, consumers, operator=getpass.getuser(), command=command)
+        caller = Caller(operator=operator(), command=command_line(), created=now())
+        run(plan, session_dir, consumers, caller, lambda: stopping.reason)
     console.print(f"session: {session_dir}", highlight=False, soft_wrap=True)
     console.print(f"replay:  workbench view {session_dir}", highlight=False, soft_wrap=True)
 
@@ -114,14 +111,10 @@ class Guarded:
             self._consumer = None
             self._console.print(
                 f"[yellow]warning: {self._name} stops here: {error}[/yellow]\n"
-                "Captures go on; it can be made again from the session folder."
+                "Captures go on. `workbench view` makes it again where it is missing."
             )
 
 
 def _counts(capture: ev.CaptureTaken) -> bool:
     """Whether a capture is one of those that the step announced; alternative captures come on top."""
     return capture.purpose == "calibration" or capture.laser_id == "all"
-
-
-def _stop(number: int, frame: FrameType | None) -> None:
-    raise StoppedError(f"stopped by {signal.Signals(number).name}")

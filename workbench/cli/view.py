@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from workbench.session.journal import read_journal
+from workbench.session.manifest import load_session_rig
 from workbench.viewer.window import open_viewer
 
 
 def view_session(session: Path) -> int:
     """Show the session's recording until the window is closed; the viewer's exit code.
 
+    A recording that is missing is made again from frames and journal.
+
     Raises:
-        BadInputError: there is no recording.
+        BadInputError: `session` is not a session folder, or a frame in it is damaged.
     """
-    return open_viewer(session / "recording.rrd")
+    recording = session / "recording.rrd"
+    if not recording.exists():
+        from workbench.viewer.recording import rebuild
+
+        rebuild(session, load_session_rig(session), read_journal(session), recording)
+    return open_viewer(recording)

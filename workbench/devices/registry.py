@@ -21,6 +21,16 @@ def open_bench(rig: Rig, session_dir: Path) -> Bench:
         BadInputError: the rig names no driver, or one that is not installed.
         RigNotReadyError: a device does not answer.
     """
+    bench: Bench = entry_points(group=GROUP)[check_driver(rig)].load()(rig, session_dir)
+    return bench
+
+
+def check_driver(rig: Rig) -> str:
+    """Name of the rig's driver, which is installed.
+
+    Raises:
+        BadInputError: it names none, or one that is not.
+    """
     drivers = entry_points(group=GROUP)
     if rig.driver is None or rig.driver not in drivers.names:
         known = ", ".join(sorted(drivers.names)) or "none"
@@ -28,5 +38,4 @@ def open_bench(rig: Rig, session_dir: Path) -> Bench:
             f"rig {rig.rig}: driver: expected an installed bench driver ({known}), got {rig.driver};"
             " a rig without a driver can be fitted but not run"
         )
-    bench: Bench = drivers[rig.driver].load()(rig, session_dir)
-    return bench
+    return rig.driver

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from workbench.model.rig import Name, NonNegativeFloat, PositiveFloat
+from workbench.model.rig import LaserId, NonNegativeFloat, PositiveFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 DeterminedBy = Literal["data", "joint", "prior"]
@@ -47,7 +47,7 @@ class ReferencePlane(FileModel):
 class LaserRay(FileModel):
     """A beam: the points origin + z direction, camera frame, z in mm."""
 
-    id: Name
+    id: LaserId
     axis: Literal["u", "v"]
     origin_mm: Vector3
     direction: Vector3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
@@ -16,6 +17,11 @@ REQUIRED = ("laser_id", "standoff_mm", "repeat")
 IMAGES = ("on", "off")
 POSITION = ("u_px", "v_px")
 OPTIONAL = ("scene", "standoff_sd_mm", "u_sd_px", "v_sd_px", "tilt_deg")
+LARGEST = 1e6
+"""Of any millimetres or pixels: a kilometre, and beyond every camera."""
+NEAREST_MM = 1e-3
+SMALLEST_SD_PX = 1e-6
+LONGEST_REPEAT = 9
 COLUMNS = (*REQUIRED, *IMAGES, *POSITION, *OPTIONAL)
 
 
@@ -24,7 +30,7 @@ class CaptureRow:
     """One row. NaN where a number was left empty; `on` is None for a row that gives the position itself."""
 
     row: int
-    """Counted as a spreadsheet does: the header is row 1."""
+    """Line of the file; the header is row 1."""
     laser_id: str
     standoff_mm: float
     repeat: int
@@ -44,21 +50,39 @@ def load_captures(path: Path) -> tuple[CaptureRow, ...]:
     """Read a captures file; image paths come back relative to the current folder.
 
     Raises:
-        BadInputError: missing, no such columns, no rows, or a wrong value; every wrong value is listed with
-            its row and column, what was expected and what came.
+        BadInputError: see `read_captures_file` and `parse_captures`.
+    """
+    return parse_captures(path, read_captures_file(path))
+
+
+def read_captures_file(path: Path) -> bytes:
+    """The file's bytes.
+
+    Raises:
+        BadInputError: it cannot be read.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            _check_header(path, reader.fieldnames or [])
-            rows, problems = [], []
-            for number, cells in enumerate(reader, start=2):
-                try:
-                    rows.append(_Parser(path, number, cells).row())
-                except BadInputError as error:
-                    problems.append(str(error))
-    except OSError as error:
-        raise BadInputError(f"{path}: expected a captures file: {error.strerror}") from None
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        raise BadInputError(f"{path}: expected a captures file: {error}") from None
+
+
+def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
+    """The rows in `content`; `path` is where it comes from, and image paths are relative to.
+
+    Raises:
+        BadInputError: no such columns, no rows, or a wrong value; every wrong value is listed with its row
+            and column, what was expected and what came.
+    """
+    try:
+        reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""))
+        _check_header(path, reader.fieldnames or [])
+        rows, problems = [], []
+        for cells in reader:
+            try:
+                rows.append(_Parser(path, reader.line_num, cells).row())
+            except BadInputError as error:
+                problems.append(str(error))
     except (UnicodeDecodeError, csv.Error) as error:
         raise BadInputError(f"{path}: expected a CSV file in UTF-8: {error}") from None
     if problems:
@@ -106,7 +130,7 @@ class _Parser:
         return CaptureRow(
             row=self._number,
             laser_id=laser_id,
-            standoff_mm=self._number_in("standoff_mm", above=0.0),
+            standoff_mm=self._number_in("standoff_mm", at_least=NEAREST_MM),
             repeat=self._repeat(),
             on=on,
             off=off,
@@ -114,19 +138,21 @@ class _Parser:
             v_px=v,
             scene=self._cells.get("scene", ""),
             standoff_sd_mm=self._number_in("standoff_sd_mm", at_least=0.0),
-            u_sd_px=self._number_in("u_sd_px", above=0.0),
-            v_sd_px=self._number_in("v_sd_px", above=0.0),
+            u_sd_px=self._number_in("u_sd_px", at_least=SMALLEST_SD_PX),
+            v_sd_px=self._number_in("v_sd_px", at_least=SMALLEST_SD_PX),
             tilt_deg=self._number_in("tilt_deg", above=-90.0, below=90.0),
         )
 
     def _image(self, column: str) -> Path | None:
         name = self._cells.get(column, "")
+        if "\0" in name:
+            raise self._error(column, "the path of an image", "a path with a zero byte in it")
         return self._path.parent / name if name else None
 
     def _repeat(self) -> int:
         text = self._cells["repeat"]
-        if not text.isdecimal():
-            raise self._error("repeat", "a whole number from 0", text or "nothing")
+        if not (text.isdecimal() and len(text) < LONGEST_REPEAT):
+            raise self._error("repeat", "a whole number from 0", text[:20] or "nothing")
         return int(text)
 
     def _number_in(
@@ -146,6 +172,8 @@ class _Parser:
             raise self._error(column, "a number", text) from None
         if not isfinite(value):
             raise self._error(column, "a finite number", text)
+        if abs(value) > LARGEST:
+            raise self._error(column, f"a number up to {LARGEST:g}", text)
         if above is not None and value <= above:
             raise self._error(column, f"a number above {above:g}", text)
         if at_least is not None and value < at_least:

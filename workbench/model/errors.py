@@ -34,7 +34,7 @@ class RigNotReadyError(WorkbenchError):
 
 
 class StoppedError(WorkbenchError):
-    """Stopped before the end; the session can be resumed (exit 5)."""
+    """Stopped before the end; what was captured is safe (exit 5)."""
 
     exit_code = 5
 

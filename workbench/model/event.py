@@ -206,7 +206,7 @@ class TrialRow(FileModel):
     range_sd_mm: float | None = None
     """Stated standard deviation of one reading: calibration and spots."""
     reference_sd_mm: float
-    """Standard deviation of the true range itself: placement and ruler."""
+    """Standard deviation of the true range itself: the placement's, by the ruler."""
 
 
 class TrialFinished(FileModel):

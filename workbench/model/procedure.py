@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -29,6 +29,7 @@ class MessageStep(FileModel):
 class CaptureGridStep(FileModel):
     """Fire each laser alone at each standoff, `repeats` pairs of frames each."""
 
+    gives: ClassVar = "captures"
     step: Literal["capture_grid"]
     standoffs_mm: Standoffs
     repeats: Annotated[int, Field(ge=1)]
@@ -48,6 +49,8 @@ class CaptureGridStep(FileModel):
 class FitStep(FileModel):
     """Fit the calibration to the captures so far; the session ends with exit code 3 where a limit fails."""
 
+    needs: ClassVar = "captures"
+    gives: ClassVar = "fit"
     step: Literal["fit"]
     limits: Acceptance = Acceptance()
 
@@ -60,8 +63,10 @@ class FitStep(FileModel):
 class ExportStep(FileModel):
     """Write the calibration to the session folder."""
 
+    needs: ClassVar = "fit"
+    gives: ClassVar = "calibration"
     step: Literal["export"]
-    file: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+\.ya?ml$")] = "calibration.yaml"
+    file: Annotated[str, Field(pattern=r"^calibration[A-Za-z0-9_.-]*\.yaml$")] = "calibration.yaml"
 
     @property
     def title(self) -> str:
@@ -72,6 +77,7 @@ class ExportStep(FileModel):
 class AccuracyTrialStep(FileModel):
     """Range a flat at standoffs that the fit did not see."""
 
+    needs: ClassVar = "calibration"
     step: Literal["accuracy_trial"]
     standoffs_mm: Standoffs
     readings: Annotated[int, Field(ge=1)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from workbench.model.board import Board
 from workbench.model.yamlfile import FileModel, load_yaml_model
@@ -17,6 +17,12 @@ Name = Annotated[
     str, BeforeValidator(lambda v: str(v) if isinstance(v, int) and not isinstance(v, bool) else v)
 ]
 
+LaserId = Annotated[Name, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+"""Part of file names: letters, digits, `_`, `.` and `-`."""
+LARGEST = 1e6
+"""Of any millimetres or pixels in a rig file."""
+SMALLEST_SD = 1e-9
+
 
 class Prior(FileModel):
     """A value known before the measurement, with its standard deviation (1 sigma, Gaussian).
@@ -24,8 +30,15 @@ class Prior(FileModel):
     `sd: 0` means known exactly: the value is then a constant of the fit.
     """
 
-    value: float
-    sd: NonNegativeFloat
+    value: Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+    sd: Annotated[float, Field(ge=0, le=LARGEST)]
+
+    @field_validator("sd")
+    @classmethod
+    def _is_zero_or_countable(cls, sd: float) -> float:
+        if 0 < sd < SMALLEST_SD:
+            raise ValueError(f"expected 0 (known exactly) or at least {SMALLEST_SD:g}")
+        return sd
 
 
 def exactly(value: float) -> Prior:
@@ -48,11 +61,18 @@ class CameraSpec(FileModel):
     p2: Prior = exactly(0.0)
     k3: Prior = exactly(0.0)
 
+    @field_validator("f_px")
+    @classmethod
+    def _has_a_focal_length(cls, f_px: Prior) -> Prior:
+        if f_px.value <= 0:
+            raise ValueError(f"expected a focal length above 0, got {f_px.value:g}")
+        return f_px
+
 
 class LaserSpec(FileModel):
     """One laser as a ray in the camera frame: origin (x, y, 0) mm, direction (tx, ty, 1)."""
 
-    id: Name
+    id: LaserId
     axis: Literal["u", "v"]
     """Image axis along which the spot moves with range: u for a laser beside the camera, v above or below."""
     x_mm: Prior
@@ -91,7 +111,7 @@ class BenchSpec(FileModel):
 class NoiseSpec(FileModel):
     """Noise of a spot's position, where the captures do not tell it. 1 sigma, pixels."""
 
-    spot_sd_px: PositiveFloat = 0.1
+    spot_sd_px: Annotated[float, Field(ge=1e-6)] = 0.1
     """Of one spot, where its row states none."""
     speckle_sd_px: NonNegativeFloat = 0.0
     """Shared by all repeats of one laser at one placement: the speckle pattern stands still."""

@@ -28,7 +28,18 @@ def load_yaml_model(path: Path, model: type[Model]) -> Model:
         BadInputError: the file is missing, is not YAML, or does not fit; one line for each problem, with
             file, line, key, what was expected and what came.
     """
-    data = load_yaml(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise BadInputError(f"{path}: no such file; expected a YAML file") from None
+    except (OSError, ValueError) as error:
+        raise BadInputError(f"{path}: expected a readable UTF-8 YAML file: {error}") from None
+    return parse_yaml_model(text, path, model)
+
+
+def parse_yaml_model(text: str, path: Path, model: type[Model]) -> Model:
+    """Validate YAML `text`, which comes from `path`, as `model`; the errors of `load_yaml_model`."""
+    data = parse_yaml(text, path)
     try:
         return model.model_validate(data)
     except ValidationError as error:
@@ -36,26 +47,22 @@ def load_yaml_model(path: Path, model: type[Model]) -> Model:
         raise BadInputError("\n".join(problems)) from None
 
 
-def load_yaml(path: Path) -> Any:
-    """Read `path` with YAML's safe subset; mappings and lists keep their line numbers.
+def parse_yaml(text: str, path: Path) -> Any:
+    """Read YAML's safe subset; mappings and lists keep their line numbers.
 
     Raises:
-        BadInputError: the file cannot be read or is not one YAML document.
+        BadInputError: it is not one YAML document.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise BadInputError(f"{path}: no such file; expected a YAML file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInputError(f"{path}: expected a readable UTF-8 YAML file: {error}") from None
     try:
         data = YAML(typ="rt").load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = "" if mark is None else f":{mark.line + 1}"
         raise BadInputError(f"{path}{line}: not valid YAML: {error.problem or error.context}") from None
-    except YAMLError as error:
+    except (YAMLError, ValueError) as error:
         raise BadInputError(f"{path}: not valid YAML: {error}") from None
+    except RecursionError:
+        raise BadInputError(f"{path}: not valid YAML: nested too deep") from None
     if data is None:
         raise BadInputError(f"{path}:1: expected a YAML mapping, the file is empty")
     return data

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,11 +10,12 @@ from workbench.devices.protocols import Bench
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration, Provenance
 from workbench.model.captures import ALL_LASERS
+from workbench.model.errors import LaserOffNotConfirmedError, StoppedError
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.session.frames import FrameStore
 from workbench.session.journal import Journal
-from workbench.spots import Finding, Scanline, find_spots
+from workbench.spots import Finding, Image, Scanline, find_spots
 
 LEASE_S = 2.0
 """Longest time that a laser may stay lit for one capture: many frames, and short for an eye."""
@@ -30,6 +31,8 @@ class Context:
     journal: Journal
     consumers: Sequence[ev.Consumer]
     provenance: Provenance
+    stopping: Callable[[], str | None]
+    """Asked between shots; a text ends the session with it."""
     captures: list[ev.CaptureTaken] = field(default_factory=list)
     findings: dict[str, Finding] = field(default_factory=dict)
     """By the capture's key."""
@@ -62,7 +65,13 @@ class Context:
         """Take a pair of frames with `laser_ids` lit and all off, store it, and find the spots in it.
 
         A capture with a scene belongs to a trial, one without to the calibration.
+
+        Raises:
+            StoppedError: a stop was asked for.
+            LaserOffNotConfirmedError: a beam stays on.
         """
+        if (reason := self.stopping()) is not None:
+            raise StoppedError(reason)
         self.bench.mark(key)
         with self.bench.lasers.lit(laser_ids, for_s=LEASE_S):
             on = self.bench.camera.grab()
@@ -82,9 +91,25 @@ class Context:
         self.emit(taken)
         finding = find_spots(on.image, off.image, scanlines=scanlines, expected=len(laser_ids))
         self.emit(_spots_found(key, finding, laser_ids))
+        if not finding.spots:
+            self._check_dark(key, off.image, scanlines)
         self.captures.append(taken)
         self.findings[key] = finding
         return finding
+
+    def _check_dark(self, key: str, off: Image, scanlines: Sequence[Scanline]) -> None:
+        """Look for a beam that burns in both frames of a pair: it leaves no spot in their difference.
+
+        Raises:
+            LaserOffNotConfirmedError: there is a spot in it.
+        """
+        if stuck := find_spots(off, scanlines=scanlines).spots:
+            at = f"u = {stuck[0].u_px:.0f}, v = {stuck[0].v_px:.0f} px"
+            raise LaserOffNotConfirmedError(
+                f"capture {key}: the frame with all lasers off shows a spot at {at}. A beam may be on"
+                " although the controller says that it is off: cut the lasers' supply, keep out of the beams, then"
+                " check the controller. If a lamp or its reflection stands there, cover it and start anew"
+            )
 
 
 def _spots_found(key: str, finding: Finding, laser_ids: Sequence[str]) -> ev.SpotsFound:

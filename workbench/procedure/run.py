@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.devices.registry import open_bench
+from workbench.devices.registry import check_driver, open_bench
 from workbench.model import event as ev
 from workbench.model.calibration import Provenance
 from workbench.model.errors import BadInputError, StoppedError, WorkbenchError
@@ -18,6 +18,15 @@ from workbench.procedure.context import Context
 from workbench.procedure.steps import run_step, shots
 from workbench.session.journal import Journal
 from workbench.session.manifest import create_session, workbench_version
+
+
+@dataclass(frozen=True)
+class Caller:
+    """Who runs a session, with what command, and when (ISO 8601 with zone)."""
+
+    operator: str
+    command: str
+    created: str
 
 
 @dataclass(frozen=True)
@@ -43,7 +52,10 @@ class Plan:
                 raise BadInputError(
                     f"{path}: procedure: expected a name that no other procedure of this call has, got {name}"
                 )
-        return cls(load_rig(rig_path), rig_path, procedures, tuple(procedure_paths))
+        _check_order(procedures, procedure_paths)
+        rig = load_rig(rig_path)
+        check_driver(rig)
+        return cls(rig, rig_path, procedures, tuple(procedure_paths))
 
     def new_session(self, sessions: Path) -> Path:
         """A folder name that sorts by time and says what was run; with a number where it is taken."""
@@ -53,35 +65,71 @@ class Plan:
         return base if not base.exists() else next(path for path in taken if not path.exists())
 
 
+def _check_order(procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:
+    """Every step finds what it needs made by an earlier one, of its own or an earlier procedure."""
+    made: set[str] = set()
+    for path, procedure in zip(paths, procedures, strict=True):
+        for index, step in enumerate(procedure.steps):
+            needs: str | None = getattr(step, "needs", None)
+            if needs is not None and needs not in made:
+                raise BadInputError(
+                    f"{path}: steps[{index}]: {step.step} needs a step before it that gives {needs};"
+                    " add one, or give a procedure that has one before this in the same call"
+                )
+            made.add(getattr(step, "gives", ""))
+
+
 def run(
-    plan: Plan, session_dir: Path, consumers: Sequence[ev.Consumer], *, operator: str, command: str
+    plan: Plan,
+    session_dir: Path,
+    consumers: Sequence[ev.Consumer],
+    caller: Caller,
+    stopping: Callable[[], str | None],
 ) -> None:
     """Run every procedure of the plan, in order, in one new session.
 
     Whatever ends the session early is journalled as its end before it goes on to the caller; frames and
     records up to there are on disk.
 
+    Args:
+        plan: what to run.
+        session_dir: where to keep it; must not exist.
+        consumers: who is shown every record.
+        caller: for the record.
+        stopping: asked between shots; a text ends the session with it.
+
     Raises:
         WorkbenchError: its exit code says what went wrong.
     """
-    created = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())
-    create_session(
-        session_dir, plan.rig, plan.rig_path, plan.procedure_paths, operator=operator, created=created
-    )
+    try:
+        session_dir.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInputError(
+            f"{session_dir.parent}: expected a folder for sessions: {error.strerror}"
+        ) from None
     provenance = Provenance(
         session=session_dir.name,
         captures_sha256="",
         rig=plan.rig.rig,
         serial=plan.rig.serial,
-        command=command,
+        command=caller.command,
         version=workbench_version(),
-        operator=operator,
-        created=created,
+        operator=caller.operator,
+        created=caller.created,
     )
     with ExitStack() as stack:
-        journal = stack.enter_context(Journal(session_dir))
+        # The bench first: one that does not open leaves no empty session behind.
         bench = stack.enter_context(open_bench(plan.rig, session_dir))
-        context = Context(session_dir, plan.rig, bench, journal, consumers, provenance)
+        create_session(
+            session_dir,
+            plan.rig,
+            plan.rig_path,
+            plan.procedure_paths,
+            operator=caller.operator,
+            created=caller.created,
+        )
+        journal = stack.enter_context(Journal(session_dir))
+        context = Context(session_dir, plan.rig, bench, journal, consumers, provenance, stopping)
         try:
             _run_all(plan, context)
         except BaseException as error:
@@ -95,8 +143,6 @@ def run(
 def _ending(error: BaseException) -> ev.SessionFinished:
     if isinstance(error, WorkbenchError):
         return ev.SessionFinished(exit_code=error.exit_code, message=str(error))
-    if isinstance(error, KeyboardInterrupt):
-        return ev.SessionFinished(exit_code=StoppedError.exit_code, message="stopped at the keyboard")
     return ev.SessionFinished(exit_code=1, message=f"internal error: {error!r}")
 
 

@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable
 from functools import singledispatch
 
-from workbench.calibration.export import calibrate, write_calibration
+from workbench.calibration.export import calibrate, render
 from workbench.calibration.fit import fit
 from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.records import fit_finished
@@ -24,7 +24,7 @@ from workbench.procedure.context import Context
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
 from workbench.session.capture_table import write_capture_table
-from workbench.session.files import write_atomically
+from workbench.session.files import write_record
 from workbench.spots import Finding
 from workbench.trials.accuracy import accuracy_csv, accuracy_row
 
@@ -101,10 +101,10 @@ def _(step: pr.ExportStep, context: Context, name: str) -> str:
     if context.accepted is None:
         raise BadInputError(f"step {name}: nothing to export; expected a fit step before it")
     path = context.session_dir / step.file
-    write_calibration(path, context.accepted)
+    content = render(context.accepted).encode()
+    write_record(path, content)
     context.calibration = context.accepted
-    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
-    context.emit(ev.CalibrationExported(path=step.file, sha256=sha256))
+    context.emit(ev.CalibrationExported(path=step.file, sha256=hashlib.sha256(content).hexdigest()))
     return f"{step.file} written"
 
 
@@ -140,7 +140,7 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
     trial = [c for c in context.captures if c.purpose == "trial"]
     write_capture_table(context.session_dir / TRIAL_TABLE, trial)
     table = f"{name}.csv"
-    write_atomically(context.session_dir / table, accuracy_csv(rows).encode())
+    write_record(context.session_dir / table, accuracy_csv(rows).encode())
     context.emit(ev.TrialFinished(trial=name, rows=tuple(rows)))
     return f"{sum(row.readings for row in rows)} readings, table in {table}"
 

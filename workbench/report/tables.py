@@ -80,7 +80,7 @@ def reading_table(readings: Iterable[Reading]) -> Table:
 def trial_table(rows: Sequence[TrialRow]) -> Table:
     """An accuracy trial: errors are measured - true."""
     table = Table(title="Accuracy (mm; error = measured - true)", title_justify="left")
-    for column in ("true", "mean", "max", "min", "sd", "stated", "ruler", "mean %"):
+    for column in ("true", "mean", "max", "min", "sd", "stated", "placing", "mean %"):
         table.add_column(column, justify="right")
     for row in rows:
         relative = None if row.mean_error_mm is None else 100 * row.mean_error_mm / row.standoff_mm
@@ -94,7 +94,7 @@ def trial_table(rows: Sequence[TrialRow]) -> Table:
             _plain(row.reference_sd_mm),
             _signed(relative),
         )
-    table.caption = "stated: 1 sigma of a reading by calibration and spots; ruler: 1 sigma of the true range"
+    table.caption = "stated: 1 sigma of a reading; placing: 1 sigma of the true range"
     table.caption_justify = "left"
     return table
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from workbench.model.event import CaptureTaken
-from workbench.session.files import write_atomically
+from workbench.session.files import write_record
 
 COLUMNS = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene")
 
@@ -30,5 +30,5 @@ def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
             (capture.laser_id, repr(capture.standoff_mm), capture.repeat, capture.on.path, off, scene)
         )
     content = stream.getvalue().encode()
-    write_atomically(path, content)
+    write_record(path, content)
     return hashlib.sha256(content).hexdigest()

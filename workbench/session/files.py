@@ -6,19 +6,45 @@ import os
 import tempfile
 from pathlib import Path
 
-from workbench.model.errors import BadInputError
+from workbench.model.errors import BadInputError, StoppedError
+
+
+def write_output(path: Path, content: bytes) -> None:
+    """Write a file that the user named; an existing one is replaced whole or not at all.
+
+    A link is followed: what it points to is replaced.
+
+    Raises:
+        BadInputError: the folder is missing, cannot be written or is full, or `path` is no regular file.
+    """
+    target = path.resolve()
+    if target.exists() and not target.is_file():
+        raise BadInputError(f"{path}: expected the name of a file to write, this is something else")
+    try:
+        write_atomically(target, content)
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def write_record(path: Path, content: bytes) -> None:
+    """Write a file of a session folder.
+
+    Raises:
+        StoppedError: the disk is full or cannot be written.
+    """
+    try:
+        write_atomically(path, content)
+    except OSError as error:
+        raise StoppedError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def write_atomically(path: Path, content: bytes) -> None:
     """Write `content` so that `path` holds the old bytes or all of the new, whatever is pulled when.
 
     Raises:
-        BadInputError: the folder is missing or cannot be written.
+        OSError: it could not be written; `path` is as it was.
     """
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    except OSError as error:
-        raise BadInputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     temporary = Path(name)
     try:
         with os.fdopen(handle, "wb") as file:

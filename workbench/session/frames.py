@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import FrameRef
-from workbench.session.files import write_atomically
+from workbench.session.files import write_record
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -43,9 +43,9 @@ class FrameStore:
         path = self.session_dir / relative
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, content)
         except OSError as error:
-            raise StoppedError(f"{path}: the frame cannot be stored: {error.strerror}") from error
+            raise StoppedError(f"{path.parent}: cannot be made: {error.strerror}") from error
+        write_record(path, content)
         return FrameRef(path=str(relative), sha256=hashlib.sha256(content).hexdigest(), time_ns=time_ns)
 
 
@@ -64,7 +64,12 @@ def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
     except OSError as error:
         raise BadInputError(f"{path}: expected an image: {error.strerror}") from None
     _check_whole(path, content)
-    image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE)
+    # A camera's idea of which side is up would move every spot: pixels are taken as they are stored.
+    how = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
+    try:
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), how)
+    except cv2.error as error:
+        raise BadInputError(f"{path}: expected an image, OpenCV refuses it: {error.err}") from None
     if image is None:
         raise BadInputError(f"{path}: expected an image, OpenCV cannot decode it; is it truncated?")
     if image.dtype not in (np.uint8, np.uint16):

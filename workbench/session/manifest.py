@@ -9,12 +9,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
 from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
-from workbench.session.files import write_atomically
+from workbench.model.yamlfile import load_yaml_model, parse_yaml_model
+from workbench.session.files import write_record
 
 MANIFEST = "session.yaml"
 DISTRIBUTION = "laser-range-workbench"
@@ -57,7 +59,28 @@ def create_session(
     }
     stream = io.StringIO()
     YAML().dump(manifest, stream)
-    write_atomically(folder / MANIFEST, stream.getvalue().encode())
+    write_record(folder / MANIFEST, stream.getvalue().encode())
+
+
+def load_session_rig(session_dir: Path) -> Rig:
+    """The rig as it was when the session began.
+
+    Raises:
+        BadInputError: this is no session folder, or its manifest is damaged.
+    """
+    path = session_dir / MANIFEST
+    text = load_yaml_model(path, _Manifest).rig.text
+    return parse_yaml_model(text, Path(f"{path} (rig)"), Rig)
+
+
+class _RigEntry(BaseModel):
+    text: str
+
+
+class _Manifest(BaseModel):
+    """What is read back of the manifest."""
+
+    rig: _RigEntry
 
 
 def _verbatim(path: Path) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
 
 import numpy as np
 import pandas as pd
@@ -22,7 +21,8 @@ def accuracy_row(standoff_mm: float, readings: Sequence[Reading], bench: BenchSp
     """Statistics of the readings at one standoff; errors are measured - true, mm, 1 sigma.
 
     The standard deviation over the readings shows what differs between them. What they share (calibration,
-    speckle, placement) it cannot show: hold the mean error against the stated deviations instead.
+    speckle, placement) it cannot show: hold the mean error against the stated deviations instead. The range's
+    contains the ruler's scale, which cancels where the calibration was made with the same ruler.
 
     Args:
         standoff_mm: true range, by the ruler.
@@ -31,9 +31,10 @@ def accuracy_row(standoff_mm: float, readings: Sequence[Reading], bench: BenchSp
     """
     ranges = np.array([r.flat_mm for r in readings if r.flat_mm is not None])
     stated = np.array([r.flat_sigma_mm for r in readings if r.flat_sigma_mm is not None])
-    reference = hypot(bench.placement_sd_mm, bench.ruler_scale.sd * standoff_mm)
     if not len(ranges):
-        return TrialRow(standoff_mm=standoff_mm, readings=0, missing=len(readings), reference_sd_mm=reference)
+        return TrialRow(
+            standoff_mm=standoff_mm, readings=0, missing=len(readings), reference_sd_mm=bench.placement_sd_mm
+        )
     error = ranges - standoff_mm
     return TrialRow(
         standoff_mm=standoff_mm,
@@ -44,5 +45,5 @@ def accuracy_row(standoff_mm: float, readings: Sequence[Reading], bench: BenchSp
         min_error_mm=float(error.min()),
         sd_mm=float(error.std(ddof=1)) if len(error) > 1 else None,
         range_sd_mm=float(np.sqrt((stated**2).mean())),
-        reference_sd_mm=reference,
+        reference_sd_mm=bench.placement_sd_mm,
     )
