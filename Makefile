@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: help demo test lint bench prove lock clean
+.PHONY: help demo test lint bench prove lock clean schema
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
@@ -42,6 +42,9 @@ bench: $(INSTALLED)
 lock:
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --fork-strategy fewest \
 		--generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements.lock
+
+schema: $(INSTALLED)
+	$(BIN)/python -c 'import json; from workbench.model.calibration import Calibration; print(json.dumps(Calibration.model_json_schema(), indent=2))' > docs/calibration.schema.json
 
 clean:
 	rm -rf $(VENV) sessions build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

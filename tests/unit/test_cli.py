@@ -161,7 +161,7 @@ class TestBadInput:
     """Exit code 2, the place, what was expected, and never a traceback."""
 
     def test_usage(self, workbench: Run) -> None:
-        refused(workbench("fit", WEBCAM), 2, "--rig")
+        refused(workbench("fit", WEBCAM), 2, "--output")
         refused(workbench("dance"), 2, "dance")
 
     def test_missing_files(self, workbench: Run, tmp_path: Path) -> None:
@@ -218,3 +218,67 @@ class TestBadInput:
         captures.write_text("laser_id,standoff_mm,repeat,on\n1,500,0,on.png\n")
         outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
         refused(outcome, 2, "no spot is left to fit")
+
+
+class TestAnotherModel:
+    """Refitting with something left out, and keeping what a limit refuses."""
+
+    def test_a_standoff_left_out_is_listed(self, workbench: Run, tmp_path: Path) -> None:
+        output = tmp_path / "c.yaml"
+        outcome = workbench(
+            "fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", output, "--json", "--without-standoff", 300
+        )
+        result = json.loads(outcome.out)
+        assert result["rejected"] == [{"row": 3, "reason": "left out: standoff 300 mm"}]
+        # Row 3 has the largest residual of the nine: the rest agree better.
+        assert result["rms_px"] < 0.4
+        assert load_calibration(output).laser_ranger.fit.observations == 8
+
+    def test_a_standoff_that_is_not_there(self, workbench: Run, tmp_path: Path) -> None:
+        arguments = ("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c", "--without-standoff", 1234)
+        refused(workbench(*arguments), 2, "no row has the standoff 1234 mm")
+
+    def test_a_parameter_held(self, workbench: Run, tmp_path: Path) -> None:
+        arguments = ("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c", "--json", "--fix", "f_px")
+        result = json.loads(workbench(*arguments).out)
+        f_px = result["parameters"][0]
+        assert (f_px["name"], f_px["value"], f_px["sd"]) == ("f_px", 650.0, 0.0)
+        # With the focal length known the data do give the baseline: 32478 / 650 = 50 mm.
+        baseline = next(p for p in result["parameters"] if p["name"] == "1.y_mm")
+        assert baseline["value"] == pytest.approx(-32478 / 650, rel=1e-3)
+        assert baseline["data_share"] > 0.99
+
+    def test_a_refused_calibration_kept_with_a_reason(self, workbench: Run, tmp_path: Path) -> None:
+        captures, output = tmp_path / "c.csv", tmp_path / "c.yaml"
+        captures.write_text("".join(WEBCAM.read_text().splitlines(keepends=True)[:3]))
+        arguments = ("fit", captures, "--rig", WEBCAM_RIG, "-o", output)
+        refused(workbench(*arguments), 3)
+        assert workbench(*arguments, "--accept", "only to try the ranger").code == 0
+        summary = load_calibration(output).laser_ranger.fit
+        assert (summary.verdict, summary.accepted_because) == ("refused", "only to try the ranger")
+        assert "seen at 2 standoffs" in summary.reasons[0]
+        assert workbench("range", WEBCAM, "--calibration", output).code == 0
+        output.write_text(output.read_text().replace("only to try the ranger", ""))
+        refused(
+            workbench("range", WEBCAM, "--calibration", output), 2, "refused because laser 1 was seen at 2"
+        )
+
+    def test_a_captures_file_needs_a_rig(self, workbench: Run, tmp_path: Path) -> None:
+        refused(workbench("fit", WEBCAM, "-o", tmp_path / "c"), 2, "needs --rig")
+
+
+def test_compare(workbench: Run, tmp_path: Path) -> None:
+    a, b, c = tmp_path / "a.yaml", tmp_path / "b.yaml", tmp_path / "c.csv"
+    workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", a)
+    same = workbench("compare", a, a, "--json")
+    assert (same.code, json.loads(same.out)["moved"]) == (0, False)
+    assert "same within uncertainty" in same.err
+    header, *rows = WEBCAM.read_text().splitlines()
+    split = [row.rsplit(",", 1) for row in rows]
+    c.write_text("\n".join([header, *(f"{left},{int(v_px) + 9}" for left, v_px in split)]) + "\n")
+    workbench("fit", c, "--rig", WEBCAM_RIG, "-o", b)
+    outcome = workbench("compare", a, b, "--json")
+    result = json.loads(outcome.out)
+    assert result["moved"]
+    assert {"cy_px", "1.ty"} <= set(result["explanations"])
+    assert "explained by" in outcome.err

@@ -44,6 +44,13 @@ def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Cal
     return _calibration(fit, values, provenance, assessment, worst), assessment
 
 
+def kept_because(calibration: Calibration, reason: str) -> Calibration:
+    """A refused calibration with somebody's reason for using it all the same."""
+    ranger = calibration.laser_ranger
+    summary = ranger.fit.model_copy(update={"accepted_because": reason})
+    return calibration.model_copy(update={"laser_ranger": ranger.model_copy(update={"fit": summary})})
+
+
 def write_calibration(path: Path, calibration: Calibration) -> None:
     """Write the YAML where the user wants it.
 
@@ -123,6 +130,7 @@ def _calibration(
                 rejected=len(fit.rejected),
                 noise_scale=fit.noise_scale,
                 verdict=assessment.verdict,
+                reasons=assessment.reasons,
                 warnings=assessment.warnings,
             ),
             provenance=provenance,

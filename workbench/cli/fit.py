@@ -4,52 +4,97 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
 from workbench.calibration.assess import Assessment, derive
-from workbench.calibration.export import calibrate, write_calibration
+from workbench.calibration.export import calibrate, kept_because, write_calibration
 from workbench.calibration.fit import Fit
 from workbench.calibration.fit import fit as fit_sightings
+from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.records import parameter_records
 from workbench.calibration.sightings import sight_rows
 from workbench.cli.call import command_line, now, operator
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
-from workbench.model.captures import parse_captures, read_captures_file
-from workbench.model.errors import LimitFailedError
+from workbench.model.captures import CaptureRow, parse_captures, read_captures_file
+from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.model.nested import hold
 from workbench.model.rig import Rig, load_rig
 from workbench.report.tables import derived_table, parameter_table, rejected_lines
-from workbench.session.manifest import workbench_version
+from workbench.session.capture_table import CALIBRATION_TABLE
+from workbench.session.manifest import load_session_rig, workbench_version
 
 
-def fit_captures(captures: Path, rig_path: Path, output: Path, as_json: bool) -> None:
+@dataclass(frozen=True)
+class Request:
+    """What the user asked for."""
+
+    source: Path
+    """A captures file, or a session folder."""
+    rig: Path | None
+    """None: the session's own."""
+    output: Path
+    accept: str | None
+    """Reason for keeping a calibration that its limits refuse."""
+    without_mm: tuple[float, ...]
+    """Standoffs to leave out."""
+    fixed: tuple[str, ...]
+    """Parameters to hold at the rig file's value."""
+
+
+def fit_captures(request: Request, as_json: bool) -> None:
     """Fit, print, and write the calibration if it is accepted.
 
     Raises:
-        BadInputError: a file is wrong.
+        BadInputError: a file or an option is wrong.
         LimitFailedError: the calibration is refused; nothing is written.
     """
-    rig = load_rig(rig_path)
+    rig = hold(_rig(request), request.fixed)
+    captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
     content = read_captures_file(captures)
-    fitted = fit_sightings(rig, *sight_rows(rig, parse_captures(captures, content)))
-    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, content))
+    fitted = fit_sightings(rig, *_sightings(rig, parse_captures(captures, content), request))
+    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))
     _print_tables(fitted, assessment)
     if assessment.verdict == "refused":
-        raise LimitFailedError(
-            f"the calibration is refused and {output} is not written: " + "; ".join(assessment.reasons)
-        )
-    write_calibration(output, calibration)
+        if request.accept is None:
+            raise LimitFailedError(
+                f"the calibration is refused and {request.output} is not written: "
+                + "; ".join(assessment.reasons)
+            )
+        calibration = kept_because(calibration, request.accept)
+    write_calibration(request.output, calibration)
 
 
-def _provenance(rig: Rig, captures: bytes) -> Provenance:
+def _rig(request: Request) -> Rig:
+    if request.rig is not None:
+        return load_rig(request.rig)
+    if not request.source.is_dir():
+        raise BadInputError(f"{request.source}: a captures file needs --rig; only a session knows its own")
+    return load_session_rig(request.source)
+
+
+def _sightings(
+    rig: Rig, rows: Sequence[CaptureRow], request: Request
+) -> tuple[list[Sighting], list[Rejected]]:
+    known = {row.standoff_mm for row in rows}
+    if unknown := [s for s in request.without_mm if s not in known]:
+        raise BadInputError(f"--without-standoff: no row has the standoff {unknown[0]:g} mm")
+    sightings, rejected = sight_rows(rig, [row for row in rows if row.standoff_mm not in request.without_mm])
+    left_out = [row for row in rows if row.standoff_mm in request.without_mm]
+    rejected += [Rejected(f"row {row.row}", f"left out: standoff {row.standoff_mm:g} mm") for row in left_out]
+    return sightings, rejected
+
+
+def _provenance(rig: Rig, request: Request, captures: bytes) -> Provenance:
     return Provenance(
-        session="",
+        session=request.source.resolve().name if request.source.is_dir() else "",
         captures_sha256=hashlib.sha256(captures).hexdigest(),
         rig=rig.rig,
         serial=rig.serial,

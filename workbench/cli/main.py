@@ -38,15 +38,38 @@ def run(
 
 @app.command()
 def fit(
-    captures: Annotated[Path, typer.Argument(help="Captures file (CSV).")],
-    rig: Annotated[Path, typer.Option(help="Rig file.")],
+    source: Annotated[Path, typer.Argument(help="Captures file (CSV), or a session folder.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Calibration file to write (YAML).")],
+    rig: Annotated[Path | None, typer.Option(help="Rig file; a session has its own.")] = None,
+    accept: Annotated[
+        str | None, typer.Option(metavar="REASON", help="Write it even if a limit fails, with this reason.")
+    ] = None,
+    without_standoff: Annotated[
+        list[float] | None, typer.Option(metavar="MM", help="Leave this standoff out; may be repeated.")
+    ] = None,
+    fix: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Hold a parameter at the rig's value; repeatable."),
+    ] = None,
     json: Json = False,
 ) -> None:
-    """Calibrate from a captures file: images or pixel positions at known standoffs."""
-    from workbench.cli.fit import fit_captures
+    """Calibrate from a captures file or a session: images or pixel positions at known standoffs."""
+    from workbench.cli.fit import Request, fit_captures
 
-    fit_captures(captures, rig, output, json)
+    request = Request(source, rig, output, accept, tuple(without_standoff or ()), tuple(fix or ()))
+    fit_captures(request, json)
+
+
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(help="Calibration file (YAML).")],
+    b: Annotated[Path, typer.Argument(help="Another of the same sensor.")],
+    json: Json = False,
+) -> None:
+    """Tell whether two calibrations give the same ranges, and what moved if not."""
+    from workbench.cli.compare import compare_calibrations
+
+    compare_calibrations(a, b, json)
 
 
 @app.command(name="range")

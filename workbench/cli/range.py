@@ -8,8 +8,9 @@ from typing import Any
 
 from rich.console import Console
 
-from workbench.model.calibration import load_calibration
+from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.captures import load_captures
+from workbench.model.errors import BadInputError
 from workbench.ranging.captures import read_captures
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.report.tables import reading_table
@@ -21,13 +22,24 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
     Raises:
         BadInputError: a file is wrong.
     """
-    ranger = Ranger(load_calibration(calibration))
+    ranger = Ranger(_usable(calibration))
     readings = []
     for reading in read_captures(ranger, load_captures(captures)):
         readings.append(reading)
         if as_json:
             print(json.dumps(_as_json(reading)), flush=True)
     Console(stderr=True).print(reading_table(readings))
+
+
+def _usable(path: Path) -> Calibration:
+    calibration = load_calibration(path)
+    summary = calibration.laser_ranger.fit
+    if not summary.usable:
+        raise BadInputError(
+            f"{path}: laser_ranger.fit.verdict: expected a calibration that was accepted, got one refused"
+            f" because {'; '.join(summary.reasons)}; if it must be used, fit it again with --accept REASON"
+        )
+    return calibration
 
 
 def _as_json(reading: Reading) -> dict[str, Any]:

@@ -122,7 +122,16 @@ class FitSummary(FileModel):
     rejected: int
     noise_scale: Annotated[float, Field(ge=1)]
     verdict: Literal["accepted", "refused"]
+    reasons: tuple[str, ...] = ()
+    """Why refused."""
+    accepted_because: str = ""
+    """Why somebody kept it all the same."""
     warnings: tuple[str, ...] = ()
+
+    @property
+    def usable(self) -> bool:
+        """Accepted by its limits, or by somebody with a reason."""
+        return self.verdict == "accepted" or bool(self.accepted_because)
 
 
 class Provenance(FileModel):

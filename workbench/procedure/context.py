@@ -107,8 +107,8 @@ class Context:
             at = f"u = {stuck[0].u_px:.0f}, v = {stuck[0].v_px:.0f} px"
             raise LaserOffNotConfirmedError(
                 f"capture {key}: the frame with all lasers off shows a spot at {at}. A beam may be on"
-                " although the controller says that it is off: cut the lasers' supply, keep out of the beams, then"
-                " check the controller. If a lamp or its reflection stands there, cover it and start anew"
+                " although the controller says that it is off: cut the lasers' supply, keep out of the"
+                " beams, then check the controller. If a lamp or its reflection stands there, cover it and start anew"
             )
 
 

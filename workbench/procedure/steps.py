@@ -23,13 +23,10 @@ from workbench.model.target import Placement
 from workbench.procedure.context import Context
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
-from workbench.session.capture_table import write_capture_table
+from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE, write_capture_table
 from workbench.session.files import write_record
 from workbench.spots import Finding
 from workbench.trials.accuracy import accuracy_csv, accuracy_row
-
-CALIBRATION_TABLE = "captures.csv"
-TRIAL_TABLE = "trial-captures.csv"
 
 
 @singledispatch

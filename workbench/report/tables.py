@@ -8,6 +8,7 @@ from math import floor, log10
 from rich.table import Table
 
 from workbench.calibration.assess import Derived
+from workbench.calibration.compare import Difference
 from workbench.calibration.observations import Rejected
 from workbench.model.event import ParameterRecord, RejectedRecord, TrialRow
 from workbench.ranging.ranger import Reading
@@ -52,6 +53,22 @@ def derived_table(derived: Iterable[Derived]) -> Table:
             significant(d.infinity_px, d.infinity_sd),
             _two_digits(d.infinity_sd),
         )
+    return table
+
+
+def difference_table(differences: Iterable[Difference]) -> Table:
+    """Range by B - range by A, over standoff and laser."""
+    rows = list(differences)
+    ids = list(dict.fromkeys(d.laser_id for d in rows))
+    table = Table(title="B - A (mm, +- 1 sigma)", title_justify="left")
+    table.add_column("range", justify="right")
+    for laser_id in ids:
+        table.add_column(laser_id, justify="right")
+    for range_mm in sorted({d.range_mm for d in rows}):
+        cells = {
+            d.laser_id: f"{d.difference_mm:+.2f} +- {d.sd_mm:.2f}" for d in rows if d.range_mm == range_mm
+        }
+        table.add_row(f"{range_mm:.0f}", *(cells.get(i, "-") for i in ids))
     return table
 
 

@@ -11,6 +11,8 @@ from pathlib import Path
 from workbench.model.event import CaptureTaken
 from workbench.session.files import write_record
 
+CALIBRATION_TABLE = "captures.csv"
+TRIAL_TABLE = "trial-captures.csv"
 COLUMNS = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene")
 
 

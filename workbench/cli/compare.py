@@ -1,0 +1,40 @@
+"""`workbench compare`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+
+from workbench.calibration.compare import Comparison, compare
+from workbench.model.calibration import load_calibration
+from workbench.report.tables import difference_table
+
+
+def compare_calibrations(a: Path, b: Path, as_json: bool) -> None:
+    """Compare two calibrations; a line of JSON on standard output, a table and the verdict on standard error.
+
+    Raises:
+        BadInputError: a file is wrong, or the two have nothing in common.
+    """
+    result = compare(load_calibration(a), load_calibration(b))
+    if as_json:
+        print(json.dumps(asdict(result)))
+    console = Console(stderr=True)
+    console.print(difference_table(result.differences))
+    console.print(verdict(result), highlight=False)
+
+
+def verdict(result: Comparison) -> str:
+    """The verdict in words."""
+    evidence = (
+        f"chi2 {result.chi2:.1f} for {result.degrees_of_freedom} degrees of freedom,"
+        f" p = {result.probability:.2g}"
+    )
+    if not result.moved:
+        return f"same within uncertainty ({evidence})"
+    if not result.explanations:
+        return f"moved ({evidence}); no single parameter explains it"
+    return f"moved ({evidence}); explained by {' or '.join(result.explanations)} alone"

@@ -1,0 +1,47 @@
+"""Simpler models of the same rig: parameters held at the rig file's value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TypeVar
+
+from workbench.model.errors import BadInputError
+from workbench.model.rig import Prior, Rig
+from workbench.model.yamlfile import FileModel
+
+Part = TypeVar("Part", bound=FileModel)
+
+
+def hold(rig: Rig, names: Iterable[str]) -> Rig:
+    """The rig with parameters made constants, by the names of the calibration: `k2`, `offset_mm`, `L1.tx`.
+
+    Raises:
+        BadInputError: the rig has no such parameter.
+    """
+    for name in names:
+        rig = _hold_one(rig, name)
+    return rig
+
+
+def _hold_one(rig: Rig, name: str) -> Rig:
+    laser_id, _, of_ray = name.rpartition(".")
+    if laser_id in rig.laser_ids and of_ray in _priors(rig.lasers[0]):
+        index = rig.laser_ids.index(laser_id)
+        laser = _constant(rig.lasers[index], of_ray)
+        return rig.model_copy(update={"lasers": (*rig.lasers[:index], laser, *rig.lasers[index + 1 :])})
+    if name in _priors(rig.camera):
+        return rig.model_copy(update={"camera": _constant(rig.camera, name)})
+    if name in _priors(rig.bench):
+        return rig.model_copy(update={"bench": _constant(rig.bench, name)})
+    rays = [f"{i}.{p}" for i in rig.laser_ids for p in _priors(rig.lasers[0])]
+    known = ", ".join([*_priors(rig.camera), *_priors(rig.bench), *rays])
+    raise BadInputError(f"parameter {name}: expected one of {known}")
+
+
+def _priors(part: FileModel) -> list[str]:
+    return [name for name, value in part if isinstance(value, Prior)]
+
+
+def _constant(part: Part, name: str) -> Part:
+    value: Prior = getattr(part, name)
+    return part.model_copy(update={name: Prior(value=value.value, sd=0.0)})
