@@ -108,7 +108,8 @@ class Context:
             raise LaserOffNotConfirmedError(
                 f"capture {key}: the frame with all lasers off shows a spot at {at}. A beam may be on"
                 " although the controller says that it is off: cut the lasers' supply, keep out of the"
-                " beams, then check the controller. If a lamp or its reflection stands there, cover it and start anew"
+                " beams, then check the controller. If a lamp or its reflection stands there, cover it"
+                " and start anew"
             )
 
 
