@@ -133,23 +133,29 @@ def _at(win: Windows, params: Floats, noise: Noise, model: Model) -> tuple[Desig
     return design, signal, residual, _weights(win, signal, background, noise)
 
 
-def _solve(design: Design, params: Floats, residual: Floats, weight: Floats) -> tuple[Floats, Floats, Bools]:
-    """Covariance, step, and whether the step is negligible."""
+def _solve(design: Design, residual: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Covariance and step."""
     cov = inverse(design.information(weight))
     delta = (cov @ design.gradient(weight * residual)[:, :, None])[:, :, 0]
     if not np.isfinite(delta.sum()):
         delta[~np.isfinite(delta).all(axis=1)] = 0.0
-    return cov, delta, _negligible(delta, cov, params)
+    return cov, delta
 
 
-def _negligible(delta: Floats, cov: Floats, params: Floats) -> Bools:
-    """(n,) whether nothing is left to do once the step has been taken."""
+def _is_last(delta: Floats, cov: Floats, params: Floats) -> Bools:
+    """(n,) whether nothing is left to do once this step has been taken."""
     variance = cov.diagonal(0, 1, 2)
     limit = variance.copy()
     np.minimum(limit[:, U:], (_SMALL * params[:, FLUX:U]) ** 2, out=limit[:, U:])
     np.maximum(limit, _TOLERANCE_SD**2 * variance, out=limit)
-    negligible: Bools = np.logical_and.reduce(delta * delta <= limit, 1)
-    return negligible
+    last: Bools = np.logical_and.reduce(delta * delta <= limit, 1)
+    return last
+
+
+def _is_there(delta: Floats, cov: Floats) -> Bools:
+    """(n,) whether the residuals are already those of the end; a step to come would still shrink them."""
+    there: Bools = np.logical_and.reduce(delta * delta <= _TOLERANCE_SD**2 * cov.diagonal(0, 1, 2), 1)
+    return there
 
 
 def fit_spots(win: Windows, start: Floats, noise: Noise, model: Model = Upright) -> Fit:
@@ -164,16 +170,17 @@ def fit_spots(win: Windows, start: Floats, noise: Noise, model: Model = Upright)
     params, guess, measured = start, noise, False
     for step in range(_MAX_STEPS):
         design, signal, residual, weight = _at(win, params, noise, model)
-        cov, delta, converged = _solve(design, params, residual, weight)
-        if not measured and (converged.all() or step == _STEPS_TO_MEASURE):
+        cov, delta = _solve(design, residual, weight)
+        if not measured and (step == _STEPS_TO_MEASURE or _is_there(delta, cov).all()):
             leverage = design.leverage(cov)
             noise = Noise(guess.floor_dn2, photon_transfer_slope(signal, residual, weight, leverage, guess))
             weight = _weights(win, signal, params[:, BACKGROUND, None, None], noise)
-            cov, delta, converged = _solve(design, params, residual, weight)
+            cov, delta = _solve(design, residual, weight)
             measured = True
         if step == _STEPS_TO_SETTLE and win.clip_dn is not None:
             win = Windows(win.data, weight > 0)
+        last = _is_last(delta, cov, params)
         params = _moved(params, delta)
-        if measured and converged.all():
+        if measured and last.all():
             break
-    return Fit(params, cov, design, signal, residual, weight, converged, noise)
+    return Fit(params, cov, design, signal, residual, weight, last, noise)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
 
+import cv2
 import numpy as np
 
 from workbench.spots.fit import Windows, fit_spots
@@ -76,8 +77,13 @@ def _window(scene: Scene, points: Floats, reach_px: float) -> tuple[Windows, int
     """A window around all points (k, 2), and its first row and column."""
     u, v = 0.5 * (points.min(axis=0) + points.max(axis=0))
     half = min(half_for(reach_px) + int(np.ceil(0.5 * np.ptp(points, axis=0).max())), _MAX_HALF_PX)
-    row, col = round(float(v)), round(float(u))
-    return scene.pair.cut(np.array([row]), np.array([col]), half), row - half, col - half
+    row0, col0 = round(float(v)) - half, round(float(u)) - half
+    win = scene.pair.cut(np.array([row0 + half]), np.array([col0 + half]), half)
+    # What lies off the scanline is not explained by spots on it.
+    size = 2 * int(np.ceil(_TAIL_WIDTHS * reach_px)) + 1
+    allowed = _allowed(scene, win, row0, col0).astype(np.uint8)
+    near = cv2.dilate(allowed, np.ones((size, size), np.uint8)).astype(bool)[None]
+    return Windows(win.data, near if win.usable is None else near & win.usable, win.clip_dn), row0, col0
 
 
 def _noise(scene: Scene, group: list[Trace]) -> Noise:
@@ -138,7 +144,7 @@ def fitted_together(scene: Scene, group: list[Trace]) -> list[Trace]:
     best, chosen = fit_joint(win, starts[:1], noise), starts[:1]
     for start in starts[1:]:
         tried = np.vstack([chosen, start])
-        more = fit_joint(win, tried, noise)
+        more = _fit_twice(win, tried, noise)
         if _is_better(fit_joint(win, best.params, noise, more.weight), more, win):
             best, chosen = more, more.params
     if len(best.params) == 1:
@@ -162,6 +168,12 @@ def grown(scene: Scene, group: list[Trace]) -> list[Trace]:
             break
         best = better
     return group if len(best.params) == len(group) else _as_traces(scene, best, row0, col0)
+
+
+def _fit_twice(win: Windows, start: Floats, noise: Noise) -> Joint:
+    """Fit with the noise that a first fit of the same model measures: that of a poorer model is too high."""
+    first = fit_joint(win, start, noise)
+    return fit_joint(win, first.params, first.noise)
 
 
 def _proposals(best: Joint, start: Floats, win: Windows, allowed: Bools) -> Iterator[Floats]:
@@ -193,7 +205,7 @@ def _allowed(scene: Scene, win: Windows, row0: int, col0: int) -> Bools:
 
 def _asked_for(best: Joint, proposal: Floats, noise: Noise, win: Windows) -> Joint | None:
     """The fit from `proposal` if it explains the data far better than `best`."""
-    more = fit_joint(win, proposal, noise)
+    more = _fit_twice(win, proposal, noise)
     return more if _is_better(fit_joint(win, best.params, noise, more.weight), more, win) else None
 
 
@@ -210,8 +222,7 @@ def split(scene: Scene, trace: Trace) -> list[Trace]:
     short, long = principal_axes(whole.params[0])[0]
     if not whole.converged[0] or long < _ELONGATED * short:
         return [trace]
-    two = fit_joint(win, halves(whole.params[0]), noise)
-    two = fit_joint(win, two.params, two.noise)
+    two = _fit_twice(win, halves(whole.params[0]), noise)
     one = float(two.weight @ whole.residual.ravel() ** 2)
     if not _is_better(replace(two, chi2=one), two, win):
         return [trace]
