@@ -31,8 +31,10 @@ CHUNK = 32
 """Fits solved in step: enough to fill the vector units, few enough not to wait long for the slowest one."""
 COMMON = len(LENS) + len(REFERENCE)
 MAX_STEPS = 60
-STEP_TOLERANCE_SD = 1e-7
-"""Of the last step, in posterior standard deviations; what would follow is a tenth of it or less."""
+STEP_TOLERANCE_SD = 1e-8
+"""Of the last step, in posterior standard deviations; each is smaller than the one before by 0.3 or less."""
+NEAR_SD = 10.0
+"""After a step shorter than this the normal equations hardly change any more."""
 SCALE_TOLERANCE = 1.001
 SCALE_ROUNDS = 10
 FIRST_DAMPING = 1e-3
@@ -175,12 +177,8 @@ class _Normal(NamedTuple):
 
     schur: Array
     """(S, S) information on the sensor, every placement's error and tilts unknown."""
-    sensor_right: Array
-    """(S,)"""
     coupling: Array
     """(J, 3, S) H_p^-1 H_ps: how the placements follow the sensor."""
-    placement_right: Array
-    """(J, 3) H_p^-1 times the placements' negative gradient."""
     placement_inverse: Array
     """(J, 3, 3) H_p^-1."""
     gradient: Array
@@ -198,13 +196,14 @@ def _solve_chunk(
 def _solve_one(layout: _Layout, start: Array, position: Array, inverse_sd: Array) -> tuple[Array, ...]:
     data = (layout, position, inverse_sd)
     state = _State(start, _cost(start, *data), jnp.zeros(()), jnp.full((), jnp.inf), jnp.zeros((), int))
+    state = _descend(state, NEAR_SD, *data)
+    state = _close_in(state, *data)
+    # Nothing is left to do here but for a fit so bent that the last steps did not close in.
+    state = _descend(state, STEP_TOLERANCE_SD, *data)
 
-    def unfinished(state: _State) -> Array:
-        return (state.step_sd > STEP_TOLERANCE_SD) & (state.steps < MAX_STEPS)
-
-    state = jax.lax.while_loop(unfinished, lambda state: _step(state, *data), state)
     normal = _normal(state.y, *data, jnp.zeros(()))
-    sensor = jnp.linalg.inv(normal.schur)
+    factor = jnp.linalg.cholesky(normal.schur)
+    sensor = jax.scipy.linalg.cho_solve((factor, True), jnp.eye(len(factor)))
     placement = normal.placement_inverse + jnp.einsum(
         "jas,st,jbt->jab", normal.coupling, sensor, normal.coupling
     )
@@ -214,13 +213,51 @@ def _solve_one(layout: _Layout, start: Array, position: Array, inverse_sd: Array
     return state.y, sensor, placement, chi2, freedom, state.step_sd <= STEP_TOLERANCE_SD
 
 
+def _descend(
+    state: _State, tolerance_sd: float, layout: _Layout, position: Array, inverse_sd: Array
+) -> _State:
+    """Steps until one is shorter than the tolerance."""
+
+    def unfinished(state: _State) -> Array:
+        return (state.step_sd > tolerance_sd) & (state.steps < MAX_STEPS)
+
+    return jax.lax.while_loop(unfinished, lambda s: _step(s, layout, position, inverse_sd), state)
+
+
+def _close_in(state: _State, layout: _Layout, position: Array, inverse_sd: Array) -> _State:
+    """Near the optimum: steps with the normal equations kept and the gradient alone renewed.
+
+    Gauss-Newton converges linearly there anyway, and a gradient is far cheaper than the equations.
+    """
+    data = (layout, position, inverse_sd)
+    normal = _normal(state.y, *data, jnp.zeros(()))
+    factor = jnp.linalg.cholesky(normal.schur)
+
+    def unfinished(loop: tuple[Array, Array, Array, Array]) -> Array:
+        _, step_sd, before, steps = loop
+        return (step_sd > STEP_TOLERANCE_SD) & (step_sd < before) & (steps < MAX_STEPS)
+
+    def closer(loop: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:
+        y, step_sd, _, steps = loop
+        gradient = 0.5 * jax.grad(_cost)(y, *data)
+        step = _newton_step(normal, factor, gradient)
+        return y + step, jnp.sqrt(jnp.abs(step @ gradient)), step_sd, steps + 1
+
+    begin = (state.y, jnp.full((), NEAR_SD), jnp.full((), 2.0 * NEAR_SD), jnp.zeros((), int))
+    y, step_sd, _, _ = jax.lax.while_loop(unfinished, closer, begin)
+    closed = step_sd <= STEP_TOLERANCE_SD
+    return state._replace(
+        y=jnp.where(closed, y, state.y),
+        cost=jnp.where(closed, _cost(y, *data), state.cost),
+        step_sd=jnp.where(closed, step_sd, jnp.inf),
+    )
+
+
 def _step(state: _State, layout: _Layout, position: Array, inverse_sd: Array) -> _State:
     """One step, taken if it descends; else the damping grows."""
     normal = _normal(state.y, layout, position, inverse_sd, state.damping)
-    factor = jax.scipy.linalg.cho_factor(normal.schur, lower=True)
-    sensor = jax.scipy.linalg.cho_solve(factor, normal.sensor_right)
-    placement = normal.placement_right - normal.coupling @ sensor
-    step = jnp.concatenate([sensor, placement.ravel()])
+    factor = jnp.linalg.cholesky(normal.schur)
+    step = _newton_step(normal, factor, normal.gradient)
     trial = state.y + step
     cost = _cost(trial, layout, position, inverse_sd)
     # At the optimum costs differ by rounding alone: a step of no size may not be refused for that.
@@ -233,6 +270,17 @@ def _step(state: _State, layout: _Layout, position: Array, inverse_sd: Array) ->
         step_sd=jnp.where(descends, jnp.sqrt(jnp.abs(step @ normal.gradient)), jnp.inf),
         steps=state.steps + 1,
     )
+
+
+def _newton_step(normal: _Normal, factor: Array, gradient: Array) -> Array:
+    """(P,) minus the inverse of the information times a gradient, by `factor` L of schur = L L^T."""
+    size = len(factor)
+    by_placement = gradient[size:].reshape(-1, len(PLACEMENT))
+    right = (normal.coupling * by_placement[..., None]).sum(axis=(0, 1)) - gradient[:size]
+    sensor = jax.scipy.linalg.cho_solve((factor, True), right)
+    own = (normal.placement_inverse * by_placement[:, None]).sum(axis=-1)
+    placement = -own - (normal.coupling * sensor).sum(axis=-1)
+    return jnp.concatenate([sensor, placement.ravel()])
 
 
 def _relaxed(damping: Array) -> Array:
@@ -255,10 +303,8 @@ def _cost(y: Array, layout: _Layout, position: Array, inverse_sd: Array) -> Arra
     return (residual**2).sum() + y @ y
 
 
-def _linearise(
-    y: Array, layout: _Layout, position: Array, inverse_sd: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Residuals (J, L, 2) and their derivatives (J, L, 2, 10 | 4 | 3), in sd and units of the priors."""
+def _linearise(y: Array, layout: _Layout, position: Array, inverse_sd: Array) -> tuple[Array, Array]:
+    """Residuals (J, L, 2) and their derivatives (17, J, L, 2), in sd and units of the priors."""
     standoff = layout.standoff_mm[:, None]
     inputs = _spread(layout.mean + layout.sd * y, len(standoff))
     scales = _spread(layout.sd, len(standoff))
@@ -272,40 +318,33 @@ def _linearise(
         _, tangent = jax.jvp(moved, (inputs[index],), (scales[index],))
         return jnp.stack([jnp.broadcast_to(part, inverse_sd.shape[:2]) for part in tangent], axis=-1)
 
-    slopes = jnp.stack([by(index) * inverse_sd for index in range(len(inputs))], axis=-1)
     u, v = predict_cell(tuple(inputs), standoff)
     residual = (jnp.stack([u, v], axis=-1) - position) * inverse_sd
-    rays = COMMON + len(RAY)
-    return residual, slopes[..., :COMMON], slopes[..., COMMON:rays], slopes[..., rays:]
+    return residual, jnp.stack([by(index) * inverse_sd for index in range(len(inputs))])
 
 
 def _normal(y: Array, layout: _Layout, position: Array, inverse_sd: Array, damping: Array) -> _Normal:
-    residual, common, ray, error = _linearise(y, layout, position, inverse_sd)
-    placements, lasers = residual.shape[:2]
-    # (J, 2 L, S): each ray has columns of its own.
-    spread = ray[:, :, :, None, :] * jnp.eye(lasers)[:, None, :, None]
-    sensor = jnp.concatenate([common, spread.reshape(*ray.shape[:3], -1)], axis=-1)
-    sensor = sensor.reshape(placements, 2 * lasers, -1)
-    error = error.reshape(placements, 2 * lasers, -1)
-    residual = residual.reshape(placements, 2 * lasers)
+    residual, slopes = _linearise(y, layout, position, inverse_sd)
+    lasers = residual.shape[1]
+    common, ray, error = jnp.split(slopes, (COMMON, COMMON + len(RAY)))
+    own = ray * jnp.eye(lasers)[:, None, None, :, None]
+    sensor = jnp.concatenate([common, own.reshape(-1, *residual.shape)])
 
-    size = sensor.shape[-1]
+    size = len(sensor)
     prior = 1.0 + damping
-    inverse = _inverse3(jnp.einsum("jra,jrb->jab", error, error) + prior * jnp.eye(len(PLACEMENT)))
-    cross = jnp.einsum("jra,jrs->jas", error, sensor)
-    coupling = jnp.einsum("jab,jbs->jas", inverse, cross)
-    sensor_gradient = jnp.einsum("jrs,jr->s", sensor, residual) + y[:size]
-    placement_gradient = jnp.einsum("jra,jr->ja", error, residual) + y[size:].reshape(placements, -1)
-    flat = sensor.reshape(-1, size)
-    schur = flat.T @ flat - cross.reshape(-1, size).T @ coupling.reshape(-1, size) + prior * jnp.eye(size)
-    placement_right = -jnp.einsum("jab,jb->ja", inverse, placement_gradient)
+    rows = sensor.reshape(size, -1)
+    # Sums of products, not matrix products: these are too small for a library call each.
+    information = (error[:, None] * error).sum(axis=(3, 4)).transpose(2, 0, 1)
+    inverse = _inverse3(information + prior * jnp.eye(len(PLACEMENT)))
+    cross = (error[:, None] * sensor).sum(axis=(3, 4)).transpose(2, 0, 1)
+    coupling = (inverse[..., None] * cross[:, None]).sum(axis=2)
+    eliminated = cross.reshape(-1, size).T @ coupling.reshape(-1, size)
+    by_placement = (error * residual).sum(axis=(2, 3)).T
     return _Normal(
-        schur=schur,
-        sensor_right=-sensor_gradient - jnp.einsum("jas,ja->s", cross, placement_right),
+        schur=rows @ rows.T - eliminated + prior * jnp.eye(size),
         coupling=coupling,
-        placement_right=placement_right,
         placement_inverse=inverse,
-        gradient=jnp.concatenate([sensor_gradient, placement_gradient.ravel()]),
+        gradient=jnp.concatenate([rows @ residual.ravel(), by_placement.ravel()]) + y,
     )
 
 
