@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -191,7 +192,7 @@ def test_a_failed_write_leaves_the_old_file(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("workbench.session.files.os.fsync", no_space)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(BadInputError, match="No space left"):
         write_calibration(path, calibration)
     assert path.read_bytes() == before
     assert [p.name for p in path.parent.iterdir()] == [path.name]
@@ -234,3 +235,17 @@ def test_the_warnings_say_what_the_data_cannot_tell(fitted: Fit) -> None:
     assert "cannot give the focal length f_px alone" in text
     assert "L1.x_mm" in text
     assert "the rig file's value stands: ruler_scale" in text
+
+
+def test_a_link_is_followed_and_a_special_file_is_left_alone(calibration: Calibration, path: Path) -> None:
+    link, pipe = path.with_name("link.yaml"), path.with_name("pipe")
+    link.symlink_to(path)
+    path.write_text("old")
+    write_calibration(link, calibration)
+    assert link.is_symlink()
+    assert load_calibration(path) == calibration
+    os.mkfifo(pipe)
+    for other in (pipe, path.parent):
+        with pytest.raises(BadInputError, match="expected the name of a file"):
+            write_calibration(other, calibration)
+    assert pipe.is_fifo()

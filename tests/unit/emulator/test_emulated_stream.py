@@ -17,7 +17,7 @@ from workbench.emulator import EmulatedBench, open_bench
 from workbench.emulator.spot import Spot
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import FlatTarget, Placement
-from workbench.model.yamlfile import load_yaml
+from workbench.model.yamlfile import parse_yaml
 
 THESIS = load_rig(Path(__file__).parents[3] / "rigs" / "thesis-emulated.yaml")
 
@@ -232,7 +232,7 @@ def test_a_whole_bench_shows_its_truth(tmp_path: Path, seed: int) -> None:
     with open_bench(thesis_rig(seed=seed), tmp_path / "s") as bench:
         for standoff in (300.0, 800.0, 2500.0):
             put(bench, standoff, f"P{standoff}")
-            truth = load_yaml(tmp_path / "s.truth.yaml")
+            truth = _read(tmp_path / "s.truth.yaml")
             for name in bench.lasers.ids:
                 bench.mark(f"{standoff} {name}")
                 with bench.lasers.lit([name], for_s=5.0):
@@ -260,3 +260,7 @@ def _predicted(truth: Any, name: str, standoff: float, key: str) -> tuple[float,
         float(truth["cx_px"] + truth["f_px"] * x * radial),
         float(truth["cy_px"] + truth["f_px"] * y * radial),
     )
+
+
+def _read(path: Path) -> Any:
+    return parse_yaml(path.read_text(), path)

@@ -17,7 +17,7 @@ from workbench.emulator.truth import Truth, draw_placement_error, draw_truth
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
-from workbench.model.yamlfile import load_yaml
+from workbench.model.yamlfile import parse_yaml
 
 THESIS = load_rig(Path(__file__).parents[3] / "rigs" / "thesis-emulated.yaml")
 
@@ -89,7 +89,7 @@ def test_truth_lies_beside_the_session(tmp_path: Path) -> None:
         with open_bench(THESIS, session) as bench:
             for key in keys:
                 bench.target.place(Placement(key=key, standoff_mm=500.0))
-    written = load_yaml(session.parent / "one.truth.yaml")
+    written = _read(session.parent / "one.truth.yaml")
     spec = emulator_spec(THESIS)
     truth = draw_truth(THESIS, spec)
     assert float(written["f_px"]) == truth.f_px
@@ -103,7 +103,7 @@ def test_truth_lies_beside_the_session(tmp_path: Path) -> None:
 def test_another_truth_begins_its_file_anew(tmp_path: Path) -> None:
     scene_of(ideal_rig(seed=1), tmp_path).place(Placement(key="old", standoff_mm=500.0))
     scene_of(ideal_rig(laser("L2", 30.0), seed=2), tmp_path).place(Placement(key="new", standoff_mm=500.0))
-    assert set(load_yaml(tmp_path / "truth.yaml")["placements"]) == {"new"}
+    assert set(_read(tmp_path / "truth.yaml")["placements"]) == {"new"}
 
 
 def test_a_torn_line_is_dropped(tmp_path: Path) -> None:
@@ -111,7 +111,7 @@ def test_a_torn_line_is_dropped(tmp_path: Path) -> None:
     with (tmp_path / "truth.yaml").open("a") as file:
         file.write('  "B": {error_mm: 0.')
     scene_of(ideal_rig(), tmp_path)
-    assert set(load_yaml(tmp_path / "truth.yaml")["placements"]) == {"A"}
+    assert set(_read(tmp_path / "truth.yaml")["placements"]) == {"A"}
 
 
 @pytest.mark.parametrize(
@@ -143,3 +143,7 @@ def test_no_other_room_knows_the_truth() -> None:
         text = path.read_text(encoding="utf-8")
         assert "truth.yaml" not in text, path
         assert "emulator.truth" not in text, path
+
+
+def _read(path: Path) -> Any:
+    return parse_yaml(path.read_text(), path)
