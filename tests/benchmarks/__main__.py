@@ -1,4 +1,4 @@
-"""`make bench`: print the three tables and keep them in docs/benchmarks under today's date."""
+"""`make bench`: print the tables and keep them in docs/benchmarks under today's date."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from tests.benchmarks import accuracy, detection, speed
+from tests.benchmarks import accuracy, calibration, detection, speed
 
 RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 
@@ -20,17 +20,18 @@ def main() -> None:
     """Run, print, write."""
     today = dt.datetime.now(tz=dt.UTC).date().isoformat()
     RESULTS.mkdir(parents=True, exist_ok=True)
-    with (RESULTS / f"{today}-spots.txt").open("w") as file:
-        for part in (
-            [f"Spots, {today}, Python {platform.python_version()}"],
-            speed.lines(),
-            detection.lines(),
-            accuracy.lines(),
-        ):
-            for line in part:
-                print(line, flush=True)
-                file.write(line + "\n")
-            file.write("\n")
+    subjects = {
+        "spots": (speed.lines, detection.lines, accuracy.lines),
+        "calibration": (calibration.lines,),
+    }
+    for subject, tables in subjects.items():
+        with (RESULTS / f"{today}-{subject}.txt").open("w") as file:
+            title = [f"{subject.capitalize()}, {today}, Python {platform.python_version()}"]
+            for part in (title, *(table() for table in tables)):
+                for line in part:
+                    print(line, flush=True)
+                    file.write(line + "\n")
+                file.write("\n")
 
 
 if __name__ == "__main__":

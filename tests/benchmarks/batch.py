@@ -1,7 +1,7 @@
 """A batch of fits over a loop of scipy.optimize.least_squares on the same residuals; run by `calibration`.
 
-One core, one process, one run; processor time. Both start at the prior means and minimise the same sum of squares: 23 free
-parameters of the sensor, 33 of the placements, spots averaged over their repeats.
+One core, one process, one run; processor time. Both start at the prior means and minimise the same sum of
+squares: 23 free parameters of the sensor, 33 of the placements, spots averaged over their repeats.
 """
 
 from __future__ import annotations

@@ -6,11 +6,15 @@ from collections import defaultdict
 from dataclasses import dataclass
 from typing import Literal
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
 from workbench.calibration.fit import Fit
 from workbench.calibration.parameters import LENS, RAY, REFERENCE
+from workbench.calibration.programs import stored
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import DeterminedBy
 from workbench.optics.lens import Lens
@@ -101,22 +105,27 @@ def _derive_one(fit: Fit, index: int) -> Derived:
     product[0] = baseline
     product[ray.start : ray.start + 2] = fit.values[0] * fit.values[ray][:2] / baseline
 
-    import jax  # the only function here that differentiates
-
-    def infinity(lens_values: NDArray[np.float64], ray_values: NDArray[np.float64]) -> jax.Array:
-        spot = spot_at_inverse_depth(Lens(*lens_values), Ray(*ray_values), 0.0)
-        return spot["uv".index(laser.axis)]
-
-    by_lens, by_ray = jax.grad(infinity, argnums=(0, 1))(fit.values[lens], fit.values[ray])
+    spot, by_lens, by_ray = map(np.asarray, _infinity(fit.values[lens], fit.values[ray]))
+    axis = "uv".index(laser.axis)
     vanishing = np.zeros(len(fit.values))
-    vanishing[lens], vanishing[ray] = by_lens, by_ray
+    vanishing[lens], vanishing[ray] = by_lens[axis], by_ray[axis]
     return Derived(
         laser_id=laser.id,
         f_b_px_mm=float(fit.values[0]) * baseline,
         f_b_sd=_sd(fit, product),
-        infinity_px=float(infinity(fit.values[lens], fit.values[ray])),
+        infinity_px=float(spot[axis]),
         infinity_sd=_sd(fit, vanishing),
     )
+
+
+@stored()
+def _infinity(lens: Array, ray: Array) -> tuple[Array, Array, Array]:
+    """(2,) where the spot of a target at infinity lies; (2, 8) and (2, 4) derivatives by lens and ray."""
+
+    def spot(lens: Array, ray: Array) -> Array:
+        return jnp.stack(spot_at_inverse_depth(Lens(*lens), Ray(*ray), 0.0))
+
+    return spot(lens, ray), *jax.jacfwd(spot, argnums=(0, 1))(lens, ray)
 
 
 def _sd(fit: Fit, gradient: NDArray[np.float64]) -> float:

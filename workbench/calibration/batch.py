@@ -23,6 +23,7 @@ from workbench.calibration.fit import table_of
 from workbench.calibration.observations import Cells, PlacementInfo
 from workbench.calibration.parameters import LENS, PLACEMENT, RAY, REFERENCE, ParameterTable
 from workbench.calibration.prediction import predict_cell
+from workbench.calibration.programs import stored
 from workbench.calibration.scatter import scale_called_for
 from workbench.model.rig import Rig
 
@@ -185,7 +186,7 @@ class _Normal(NamedTuple):
     """(P,)"""
 
 
-@jax.jit
+@stored()
 def _solve_chunk(
     mean: Array, sd: Array, standoff_mm: Array, start: Array, position: Array, inverse_sd: Array
 ) -> tuple[Array, ...]:

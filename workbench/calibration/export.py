@@ -165,9 +165,7 @@ def _worst_relative_sd(sensor: Sensor) -> float:
     """Largest relative standard deviation of a range between the nearest and the farthest standoff."""
     nearest, farthest = sensor.calibration.laser_ranger.validity.standoff_mm
     grid = np.geomspace(nearest, farthest, 30)
-    relative = [
-        float(sensor.relative_range_sd(i, visible).max())
-        for i in sensor.ids
-        if len(visible := grid[sensor.in_frame(i, grid)])
-    ]
-    return max(relative, default=float("inf"))
+    # The whole grid at once, seen or not: arrays of one shape are one compiled program.
+    with np.errstate(invalid="ignore", over="ignore"):
+        relative = [sensor.relative_range_sd(i, grid)[sensor.in_frame(i, grid)] for i in sensor.ids]
+    return max((float(r.max()) for r in relative if len(r)), default=float("inf"))

@@ -13,6 +13,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from workbench.calibration.parameters import LENS, RAY
+from workbench.calibration.programs import stored
 from workbench.model.calibration import Calibration
 from workbench.optics.lens import Lens, radial_slope
 from workbench.optics.rays import Ray, spot_at_inverse_depth
@@ -130,9 +131,8 @@ class Sensor:
     def in_frame(self, laser_id: str, range_mm: FloatArray) -> NDArray[np.bool_]:
         """(n,) whether the laser's spot lies in the image, where the lens model does not fold over."""
         u, v = self.spot_px(laser_id, range_mm).T
-        x, y, tx, ty = self._rays[self.ids.index(laser_id)]
         w = 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
-        unfolded = np.asarray(radial_slope(Lens(*self._lens), tx + x * w, ty + y * w)) > 0
+        unfolded = np.asarray(_slopes(self._lens, self._rays[self.ids.index(laser_id)], w)) > 0
         width, height = self.calibration.image_width, self.calibration.image_height
         inside = (u > -0.5) & (u < width - 0.5) & (v > -0.5) & (v < height - 0.5) & unfolded
         return np.asarray(inside, bool)
@@ -146,12 +146,19 @@ class Sensor:
         return gradient
 
 
-@jax.jit
+@stored()
+def _slopes(lens: Array, ray: Array, inverse_depth: Array) -> Array:
+    """(n,) radial slope of the lens where the ray's points at these inverse depths appear."""
+    x, y, tx, ty = ray
+    return radial_slope(Lens(*lens), tx + x * inverse_depth, ty + y * inverse_depth)
+
+
+@stored()
 def _spots(lens: Array, ray: Array, inverse_depth: Array) -> Array:
     return jnp.stack(spot_at_inverse_depth(Lens(*lens), Ray(*ray), inverse_depth), axis=1)
 
 
-@jax.jit
+@stored()
 def _spot_gradients(lens: Array, ray: Array, offset_mm: Array, range_mm: Array) -> tuple[Array, ...]:
     def spots(lens: Array, ray: Array, offset_mm: Array) -> Array:
         return jnp.asarray(_spots(lens, ray, 1.0 / (range_mm + offset_mm)))
@@ -160,7 +167,7 @@ def _spot_gradients(lens: Array, ray: Array, offset_mm: Array, range_mm: Array) 
     return derivatives
 
 
-@jax.jit
+@stored()
 def _depths(lens: Array, rays: Array, position_px: Array, sd_px: Array) -> tuple[Array, ...]:
     def one(ray: Array, position: Array, sd: Array) -> tuple[Array, ...]:
         return tuple(estimate_depth(Lens(*lens), Ray(*ray), Sighted(*position, *sd)))

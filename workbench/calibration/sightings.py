@@ -1,19 +1,22 @@
-"""From captures to sightings: which spot of which laser, at which standoff, and what was left out."""
+"""From captures to sightings: which spot of which laser, at which standoff, and what was left out.
+
+What finds spots in images is imported where there are images: positions need none of it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isnan
+from typing import TYPE_CHECKING
 
 from workbench.calibration.observations import Rejected, Sighting
 from workbench.model.captures import ALL_LASERS, CaptureRow
 from workbench.model.rig import LaserSpec, Rig
-from workbench.session.capture_spots import find_row_spots
-from workbench.spots import Failure, Finding, Scanline, explain
 
-UNUSABLE = (Failure.AT_EDGE, Failure.MERGED)
-"""A spot cut by the border or grown together with another has a centre that is not the laser's."""
+if TYPE_CHECKING:
+    from workbench.spots import Finding, Scanline
+
 PRIOR_REACH_SD = 4.0
 BEAM_HALF_WIDTH_PX = 8.0
 
@@ -31,6 +34,8 @@ def sight_rows(rig: Rig, rows: Sequence[CaptureRow]) -> tuple[list[Sighting], li
 
 def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | Rejected:
     """The one spot of a capture that fired one laser, put into `sighting`, or why there is none."""
+    from workbench.spots import Failure, explain
+
     source = sighting.source
     where = f"laser {laser.id} at {sighting.standoff_mm:g} mm"
     if len(finding.spots) != 1:
@@ -38,13 +43,16 @@ def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | 
         reason = f"{where}: expected one spot, got {len(finding.spots)}. {causes}"
         return Rejected(source, reason, None if finding.spots else sighting)
     spot = finding.spots[0]
-    if bad := [flag for flag in UNUSABLE if flag in spot.flags]:
+    # Cut by the border or grown together with another, its centre is not the laser's.
+    if bad := [flag for flag in (Failure.AT_EDGE, Failure.MERGED) if flag in spot.flags]:
         return Rejected(source, f"{where}: {bad[0]}: {explain(bad[0])}")
     return replace(sighting, u_px=spot.u_px, v_px=spot.v_px, u_sd_px=spot.u_sd_px, v_sd_px=spot.v_sd_px)
 
 
 def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
     """Where the rig file lets the laser's spots lie: along the projection of its baseline."""
+    from workbench.spots import Scanline
+
     camera = rig.camera
     x, y = laser.x_mm.value, laser.y_mm.value
     du, dv = x / (x**2 + y**2) ** 0.5, y / (x**2 + y**2) ** 0.5
@@ -85,6 +93,8 @@ def _sight_row(rig: Rig, row: CaptureRow) -> Sighting | Rejected:
     )
     if row.on is None:
         return sighting
+    from workbench.session.capture_spots import find_row_spots
+
     laser = rig.lasers[rig.laser_ids.index(row.laser_id)]
     size = rig.camera.width_px, rig.camera.height_px
     return sight(find_row_spots(row, size, [prior_scanline(rig, laser)], 1), laser, sighting)

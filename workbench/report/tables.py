@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from math import floor, log10
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 
@@ -11,7 +12,9 @@ from workbench.calibration.assess import Derived
 from workbench.calibration.compare import Difference
 from workbench.calibration.observations import Rejected
 from workbench.model.event import ParameterRecord, RejectedRecord, TrialRow
-from workbench.ranging.ranger import Reading
+
+if TYPE_CHECKING:  # the ranger finds spots in images, a table of a fit does without
+    from workbench.ranging.ranger import Reading
 
 DETERMINED_BY_WORDS = {"data": "data", "joint": "jointly", "prior": "prior"}
 
