@@ -12,7 +12,7 @@ from workbench.ranging.ranger import Reading
 from workbench.trials.accuracy import accuracy_csv, accuracy_row
 
 BENCH = BenchSpec(ruler_scale=Prior(value=0.0, sd=0.001), placement_sd_mm=0.3)
-EMPTY = Reading("s", "no_points", None, None, (), None, None)
+EMPTY = Reading("s", "no_points")
 
 
 def readings(*ranges_mm: float, sigma_mm: float = 0.4) -> list[Reading]:

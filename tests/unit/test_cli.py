@@ -103,6 +103,7 @@ def test_fit_prints_one_object_and_writes_the_calibration(workbench: Run, tmp_pa
     assert derived["laser"] == "1"
     assert (result["observations"], result["rejected"], result["verdict"]) == (9, [], "accepted")
     assert "cannot give the focal length f_px alone" in " ".join(result["warnings"])
+    assert "largest residual is -1.35 px in v of laser 1 at 300 mm" in " ".join(result["warnings"])
     assert "cannot give the focal length f_px alone" in " ".join(outcome.err.split())
     assert load_calibration(output).laser_ranger.provenance.command.startswith("workbench fit")
 
@@ -136,7 +137,7 @@ def test_range_from_the_yaml_alone(workbench: Run, tmp_path: Path) -> None:
     scenes = [json.loads(line) for line in outcome.out.splitlines()]
     assert len(scenes) == 9
     first = scenes[0]
-    assert list(first) == ["scene", "status", "closest_mm", "sigma_mm", "shape", "lasers"]
+    assert list(first) == ["scene", "status", "closest_mm", "sigma_mm", "shape", "lasers", "notes"]
     assert (first["scene"], first["status"], first["shape"]) == ("row 2", "done", {"kind": "unknown"})
     (laser,) = first["lasers"]
     assert laser == {

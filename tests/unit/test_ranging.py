@@ -106,6 +106,7 @@ def test_not_as_many_spots_as_lasers(ranger: Ranger, count: int) -> None:
     assert reading.status == ("not_enough_points" if count else "no_points")
     assert reading.closest_mm is None
     assert reading.lasers == ()
+    assert len(reading.notes) == 1
 
 
 def test_lasers_fired_alone_with_one_missing(ranger: Ranger) -> None:
@@ -124,18 +125,35 @@ def test_a_laser_whose_spot_lies_beyond_infinity_does_not_count(ranger: Ranger) 
 
 
 @pytest.mark.parametrize(
-    ("u_px", "v_px"),
-    [(300.0, -5.0), (300.0, 481.0), (645.0, 240.0), (300.0, 300.0)],
-    ids=["above", "below", "beside", "off the line"],
+    ("u_px", "v_px", "why"),
+    [
+        (300.0, -5.0, "outside the picture"),
+        (300.0, 481.0, "outside the picture"),
+        (645.0, 240.0, "outside the picture"),
+        (300.0, 300.0, "off the laser's line"),
+    ],
 )
-def test_a_spot_that_cannot_be_the_laser_s_has_no_range(ranger: Ranger, u_px: float, v_px: float) -> None:
+def test_a_spot_that_cannot_be_the_laser_s_has_no_range(
+    ranger: Ranger, u_px: float, v_px: float, why: str
+) -> None:
     reading = ranger.read_known("s", 1, ["L1"], np.array([[u_px, v_px]]), np.full((1, 2), 0.05))
     assert (reading.status, reading.closest_mm, reading.lasers) == ("no_points", None, ())
+    assert reading.notes[0].startswith("L1: ")
+    assert why in reading.notes[0]
 
 
 def test_a_spot_all_but_at_infinity_has_no_range(ranger: Ranger) -> None:
     spot = ranger.sensor.spot_px("L4", np.array([3e6]))
-    assert ranger.read_known("s", 1, ["L4"], spot, np.full((1, 2), 0.05)).status == "no_points"
+    reading = ranger.read_known("s", 1, ["L4"], spot, np.full((1, 2), 0.05))
+    assert reading.status == "no_points"
+    assert "mm only" in reading.notes[0] or "infinity" in reading.notes[0]
+
+
+def test_a_range_beyond_the_calibrated_ones_is_marked(ranger: Ranger) -> None:
+    reading = ranger.read_lit("s", spots(ranger, dict.fromkeys(IDS, 4600.0)))
+    assert reading.status == "done"
+    assert reading.notes[0] == "L1: 4600 mm lies outside the calibrated 125 to 4500 mm"
+    assert ranger.read_lit("s", spots(ranger, dict.fromkeys(IDS, 4400.0))).notes == ()
 
 
 def test_repeats_average_as_the_fit_averages_them(ranger: Ranger, tmp_path: Path) -> None:

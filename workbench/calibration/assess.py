@@ -153,6 +153,14 @@ def _contradictions(fit: Fit) -> list[str]:
     ]
 
 
+def _largest_residual(fit: Fit) -> str:
+    size = np.abs(fit.residual_px / fit.cells.sd_px)
+    cell, axis = np.unravel_index(np.nanargmax(size), size.shape)
+    laser = fit.rig.laser_ids[fit.cells.laser[cell]]
+    standoff = fit.cells.placements[fit.cells.placement[cell]].standoff_mm
+    return f"{fit.residual_px[cell, axis]:+.2f} px in {'uv'[axis]} of laser {laser} at {standoff:g} mm"
+
+
 def _warnings(fit: Fit) -> list[str]:
     sensor = [(p, by) for p, by in zip(fit.table.parameters, determined_by(fit), strict=True) if p.prior.sd]
     joint = [p.name for p, by in sensor if by == "joint" and p.kind == "sensor"]
@@ -176,6 +184,6 @@ def _warnings(fit: Fit) -> list[str]:
         warnings.append(
             f"residuals are {fit.noise_scale:.2f} times larger than the stated noise of the spots"
             f" (chi2 {fit.chi2:.1f} for {fit.degrees_of_freedom:.1f} degrees of freedom);"
-            " every sd was enlarged to match"
+            f" every sd was enlarged to match. The largest residual is {_largest_residual(fit)}"
         )
     return warnings

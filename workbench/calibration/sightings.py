@@ -39,14 +39,25 @@ def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | 
     source = sighting.source
     where = f"laser {laser.id} at {sighting.standoff_mm:g} mm"
     if len(finding.spots) != 1:
-        causes = "; ".join(f"{failure}: {explain(failure)}" for failure in finding.failures)
-        reason = f"{where}: expected one spot, got {len(finding.spots)}. {causes}"
+        cause = explain(finding.failures[0]) if finding.failures else ""
+        reason = f"{where}: expected one spot, got {len(finding.spots)}. {cause}"
         return Rejected(source, reason, None if finding.spots else sighting)
     spot = finding.spots[0]
     # Cut by the border or grown together with another, its centre is not the laser's.
     if bad := [flag for flag in (Failure.AT_EDGE, Failure.MERGED) if flag in spot.flags]:
         return Rejected(source, f"{where}: {bad[0]}: {explain(bad[0])}")
     return replace(sighting, u_px=spot.u_px, v_px=spot.v_px, u_sd_px=spot.u_sd_px, v_sd_px=spot.v_sd_px)
+
+
+def _in_picture(rig: Rig, sighting: Sighting) -> Sighting | Rejected:
+    for name, value, size in (
+        ("u_px", sighting.u_px, rig.camera.width_px),
+        ("v_px", sighting.v_px, rig.camera.height_px),
+    ):
+        if value < -0.5 or value >= size - 0.5:
+            where = f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm"
+            return Rejected(sighting.source, f"{where}: {name}: expected -0.5 to {size - 0.5}, got {value:g}")
+    return sighting
 
 
 def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
@@ -92,7 +103,7 @@ def _sight_row(rig: Rig, row: CaptureRow) -> Sighting | Rejected:
         yaw_deg=0.0 if isnan(row.tilt_deg) else row.tilt_deg,
     )
     if row.on is None:
-        return sighting
+        return _in_picture(rig, sighting)
     from workbench.session.capture_spots import find_row_spots
 
     laser = rig.lasers[rig.laser_ids.index(row.laser_id)]

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from workbench.calibration.compare import Comparison, compare
-from workbench.model.calibration import load_calibration
+from workbench.model.calibration import Calibration, load_calibration
 from workbench.report.tables import difference_table
 
 
@@ -19,12 +19,29 @@ def compare_calibrations(a: Path, b: Path, as_json: bool) -> None:
     Raises:
         BadInputError: a file is wrong, or the two have nothing in common.
     """
-    result = compare(load_calibration(a), load_calibration(b))
+    of_a, of_b = load_calibration(a), load_calibration(b)
+    result = compare(of_a, of_b)
     if as_json:
         print(json.dumps(asdict(result)))
     console = Console(stderr=True)
     console.print(difference_table(result.differences))
     console.print(verdict(result), highlight=False)
+    for note in _notes(of_a, of_b):
+        console.print(f"note: {note}", highlight=False)
+
+
+def _notes(a: Calibration, b: Calibration) -> list[str]:
+    """What makes the verdict less than it seems."""
+    notes = []
+    of_a, of_b = a.laser_ranger, b.laser_ranger
+    if of_a.provenance.captures_sha256 == of_b.provenance.captures_sha256:
+        notes.append("both come from the same captures: the deviations of two sessions are too wide here")
+    notes += [
+        f"{name} was refused by its limits and kept because: {c.fit.accepted_because or 'no reason given'}"
+        for name, c in (("A", of_a), ("B", of_b))
+        if c.fit.verdict == "refused"
+    ]
+    return notes
 
 
 def verdict(result: Comparison) -> str:

@@ -27,6 +27,7 @@ from workbench.model.nested import hold
 from workbench.model.rig import Rig, load_rig
 from workbench.report.tables import derived_table, parameter_table, rejected_lines
 from workbench.session.capture_table import CALIBRATION_TABLE
+from workbench.session.files import check_output
 from workbench.session.manifest import load_session_rig, workbench_version
 
 
@@ -54,6 +55,7 @@ def fit_captures(request: Request, as_json: bool) -> None:
         BadInputError: a file or an option is wrong.
         LimitFailedError: the calibration is refused; nothing is written.
     """
+    check_output(request.output)
     rig = hold(_rig(request), request.fixed)
     captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
     content = read_captures_file(captures)
@@ -70,6 +72,8 @@ def fit_captures(request: Request, as_json: bool) -> None:
             )
         calibration = kept_because(calibration, request.accept)
     write_calibration(request.output, calibration)
+    kept = "" if request.accept is None or assessment.verdict == "accepted" else f", kept: {request.accept}"
+    Console(stderr=True).print(f"{request.output} written{kept}", highlight=False, soft_wrap=True)
 
 
 def _rig(request: Request) -> Rig:

@@ -24,6 +24,23 @@ INTERNAL_ERROR = 1
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 
 
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(version("laser-range-workbench"))
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Calibration and lab-measurement workbench for laser-spot range sensors."""
+
+
 @app.command()
 def run(
     procedures: Annotated[list[Path], typer.Argument(help="Procedure files, run in this order.")],

@@ -28,7 +28,11 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
         readings.append(reading)
         if as_json:
             print(json.dumps(_as_json(reading)), flush=True)
-    Console(stderr=True).print(reading_table(readings))
+    console = Console(stderr=True)
+    console.print(reading_table(readings))
+    for reading in readings:
+        for note in reading.notes:
+            console.print(f"{reading.scene}: {note}", highlight=False)
 
 
 def _usable(path: Path) -> Calibration:
@@ -59,4 +63,5 @@ def _as_json(reading: Reading) -> dict[str, Any]:
             }
             for laser in reading.lasers
         ],
+        "notes": list(reading.notes),
     }

@@ -80,6 +80,8 @@ class Terminal:
                 self._console.print(parameter_table(e.parameters))
                 for line in rejected_lines(e.rejected):
                     self._console.print(Padding(Text(f"not used: {line}"), (0, 0, 0, 5)))
+                for warning in e.warnings:
+                    self._console.print(Padding(Text(f"note: {warning}"), (0, 0, 0, 5)))
             case ev.TrialFinished() as e:
                 self._console.print(trial_table(e.rows))
             case _:

@@ -14,15 +14,13 @@ from workbench.calibration.sensor import Ranges, Sensor
 from workbench.model.calibration import Calibration
 from workbench.model.event import LaserRange
 from workbench.ranging.assignment import assign
+from workbench.ranging.objections import objections, outside_validity
 from workbench.spots import Scanline, Spot
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+NOTHING_SEEN = "no spot was seen"
 Status = Literal["done", "not_enough_points", "no_points"]
-MOST_MISFIT_SD = 6.0
-"""A spot farther from its laser's line is another light: by chance one in 5e8 is."""
-MOST_RELATIVE_SIGMA = 0.5
-"""Beyond, the spot is so near to its place at infinity that its range may be anything."""
 SCANLINE_HALF_WIDTH_PX = 8.0
 """A beam of 1.5 mm at the sensor's front spreads over some 8 px on either side of its line."""
 
@@ -33,13 +31,16 @@ class Reading:
 
     scene: str
     status: Status
-    closest_mm: float | None
+    closest_mm: float | None = None
     """The nearest laser's range."""
-    sigma_mm: float | None
-    lasers: tuple[LaserRange, ...]
-    flat_mm: float | None
+    sigma_mm: float | None = None
+    lasers: tuple[LaserRange, ...] = ()
+    """In the calibration's order."""
+    flat_mm: float | None = None
     """Mean range of the lasers, weighted by their spots: the range of a flat target across the axis."""
-    flat_sigma_mm: float | None
+    flat_sigma_mm: float | None = None
+    notes: tuple[str, ...] = ()
+    """Why lasers have no range, and which ranges to take with care."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +78,26 @@ class Ranger:
             sd_px: (n, 2) 1 sigma, NaN where not known.
         """
         ranges = self.sensor.ranges(laser_ids, position_px, sd_px)
-        good = self._usable(position_px, ranges)
+        against = objections(position_px, ranges, self.size_px)
+        notes = [f"{i}: {why}" for i, why in zip(laser_ids, against, strict=True) if why is not None]
+        good = np.array([why is None for why in against], bool)
         if not good.any():
-            return Reading(scene, "no_points", None, None, (), None, None)
+            return Reading(scene, "no_points", notes=tuple(notes) or (NOTHING_SEEN,))
         lasers = _records(laser_ids, position_px, ranges, good)
         nearest = min(lasers, key=lambda laser: laser.range_mm)
         status: Status = "done" if len(lasers) == fired else "not_enough_points"
-        return Reading(scene, status, nearest.range_mm, nearest.sigma_mm, lasers, *_flat_range(ranges, good))
+        flat_mm, flat_sigma_mm = _flat_range(ranges, good)
+        notes += outside_validity(lasers, self.calibration.laser_ranger.validity)
+        return Reading(
+            scene,
+            status,
+            nearest.range_mm,
+            nearest.sigma_mm,
+            tuple(sorted(lasers, key=lambda laser: self.sensor.ids.index(laser.laser_id))),
+            flat_mm,
+            flat_sigma_mm,
+            tuple(notes),
+        )
 
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
         """Range the spots of a frame in which every laser is lit.
@@ -92,21 +106,14 @@ class Ranger:
         not tell, the status is `not_enough_points` and there is no range: fire each laser alone instead.
         """
         if not spots:
-            return Reading(scene, "no_points", None, None, (), None, None)
+            return Reading(scene, "no_points", notes=(NOTHING_SEEN,))
         position, sd = spot_arrays(spots)
         laser_ids = assign(self.sensor, position, sd)
         if laser_ids is None:
-            return Reading(scene, "not_enough_points", None, None, (), None, None)
+            seen, lasers = len(spots), len(self.sensor.ids)
+            note = f"{seen} spots of {lasers} lasers cannot be told apart: fire each laser alone"
+            return Reading(scene, "not_enough_points", notes=(note,))
         return self.read_known(scene, len(self.sensor.ids), laser_ids, position, sd)
-
-    def _usable(self, position_px: FloatArray, ranges: Ranges) -> BoolArray:
-        """(n,) spots that lie in the picture, on their laser's line, and before the range means nothing."""
-        size = np.array(self.size_px, float)
-        inside = np.isnan(position_px) | ((position_px > -0.5) & (position_px < size - 0.5))
-        with np.errstate(invalid="ignore"):
-            known = np.isfinite(ranges.range_mm) & (ranges.range_mm > 0)
-            sharp = ranges.sigma_mm < MOST_RELATIVE_SIGMA * ranges.range_mm
-        return np.asarray(inside.all(axis=1) & known & sharp & (ranges.misfit_sd < MOST_MISFIT_SD))
 
     def _scanline(self, laser_id: str, nearest_mm: float) -> Scanline:
         near, far = self.sensor.spot_px(laser_id, np.array([nearest_mm, np.inf]))

@@ -16,7 +16,7 @@ from workbench.model.event import ParameterRecord, RejectedRecord, TrialRow
 if TYPE_CHECKING:  # the ranger finds spots in images, a table of a fit does without
     from workbench.ranging.ranger import Reading
 
-DETERMINED_BY_WORDS = {"data": "data", "joint": "jointly", "prior": "prior"}
+DETERMINED_BY_WORDS = {"data": "data", "joint": "joint", "prior": "prior"}
 
 
 def parameter_table(parameters: Iterable[ParameterRecord]) -> Table:
@@ -37,7 +37,7 @@ def parameter_table(parameters: Iterable[ParameterRecord]) -> Table:
                 f"{100 * p.data_share:.0f} %",
                 DETERMINED_BY_WORDS[p.determined_by],
             )
-    table.caption = "jointly: the data tie it to other parameters, whose priors do the rest"
+    table.caption = "joint: the data tie it to others, whose priors do the rest"
     table.caption_justify = "left"
     return table
 
@@ -86,13 +86,13 @@ def rejected_lines(rejected: Iterable[Rejected | RejectedRecord]) -> list[str]:
 def reading_table(readings: Iterable[Reading]) -> Table:
     """The ranger's readings, a line a scene."""
     table = Table(title="Ranges (mm, 1 sigma)", title_justify="left")
-    table.add_column("scene")
+    table.add_column("scene", overflow="fold")
     table.add_column("status")
     table.add_column("closest", justify="right")
-    table.add_column("lasers")
+    table.add_column("lasers", no_wrap=True)
     for r in readings:
         closest = "-" if r.closest_mm is None or r.sigma_mm is None else _with_sd(r.closest_mm, r.sigma_mm)
-        lasers = "  ".join(f"{laser.laser_id} {laser.range_mm:.1f}" for laser in r.lasers)
+        lasers = "\n".join(f"{laser.laser_id} {laser.range_mm:.1f}" for laser in r.lasers)
         table.add_row(r.scene, r.status, closest, lasers)
     return table
 
@@ -114,7 +114,7 @@ def trial_table(rows: Sequence[TrialRow]) -> Table:
             _plain(row.reference_sd_mm),
             _signed(relative),
         )
-    table.caption = "stated: 1 sigma of a reading; placing: 1 sigma of the true range"
+    table.caption = "A reading is the mean of the lasers. stated: its 1 sigma; placing: the target's"
     table.caption_justify = "left"
     return table
 

@@ -20,9 +20,9 @@ def find_row_spots(
     """
     if row.on is None:
         raise ValueError(f"row {row.row} gives a position, not images")
-    on = read_image(row.on, size_px)
-    off = None if row.off is None else read_image(row.off, size_px)
     try:
+        on = read_image(row.on, size_px)
+        off = None if row.off is None else read_image(row.off, size_px)
         return find_spots(on, off, scanlines=scanlines, expected=expected)
     except BadInputError as error:
-        raise BadInputError(f"row {row.row}: {row.on} and {row.off}: {error}") from None
+        raise BadInputError(f"row {row.row}: {error}") from None

@@ -17,13 +17,24 @@ def write_output(path: Path, content: bytes) -> None:
     Raises:
         BadInputError: the folder is missing, cannot be written or is full, or `path` is no regular file.
     """
-    target = path.resolve()
-    if target.exists() and not target.is_file():
-        raise BadInputError(f"{path}: expected the name of a file to write, this is something else")
+    check_output(path)
     try:
-        write_atomically(target, content)
+        write_atomically(path.resolve(), content)
     except OSError as error:
         raise BadInputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def check_output(path: Path) -> None:
+    """See before the work whether its result can be written.
+
+    Raises:
+        BadInputError: the folder is missing, or `path` is no regular file.
+    """
+    target = path.resolve()
+    if not target.parent.is_dir():
+        raise BadInputError(f"{path}: cannot be written: there is no folder {target.parent}")
+    if target.exists() and not target.is_file():
+        raise BadInputError(f"{path}: expected the name of a file to write, this is something else")
 
 
 def write_record(path: Path, content: bytes) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -44,6 +45,8 @@ def open_viewer(recording: Path) -> int:
     """
     if not recording.is_file():
         raise BadInputError(f"{recording}: no such recording; expected a session's recording.rrd")
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+        raise BadInputError(f"no display here to show {recording} on; copy it to a machine that has one")
     command = [str(viewer_executable()), "--bind", LOOPBACK, "--port", "0", str(recording)]
     # The executable comes from our own dependency, the path is a file that exists.
     return subprocess.run(command, env=viewer_environment(), check=False).returncode  # noqa: S603
