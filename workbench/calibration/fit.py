@@ -14,6 +14,7 @@ import optimistix as optx
 from jax import Array
 from numpy.typing import NDArray
 
+from workbench.calibration.missing import name_out_of_frame
 from workbench.calibration.observations import Cells, PlacementInfo, Rejected, Sighting, group, positions
 from workbench.calibration.parameters import (
     LENS,
@@ -119,7 +120,7 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
         rig=rig,
         table=table,
         cells=cells,
-        rejected=(*rejected, *strays),
+        rejected=(*name_out_of_frame(rig, values, rejected), *strays),
         values=values,
         covariance=solution.covariance * np.outer(table.prior_sd, table.prior_sd),
         prior_pull=np.where(table.prior_sd > 0, solution.y, 0.0),
