@@ -4,41 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import radians, tan
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
-from jax import Array
 from numpy.typing import NDArray
 
+from workbench.calibration.boards import BoardView, PoseGuess, guess_pose, with_placements
 from workbench.calibration.missing import name_out_of_frame
 from workbench.calibration.observations import Cells, PlacementInfo, Rejected, Sighting, group, positions
 from workbench.calibration.parameters import (
-    LENS,
-    PLACEMENT,
-    RAY,
-    REFERENCE,
+    POSE,
+    PRINT,
     Parameter,
     ParameterTable,
+    board_parameters,
     placement_parameters,
+    sensor_parameter,
     sensor_parameters,
+    unit_of,
 )
-from workbench.calibration.prediction import predict_cell
-from workbench.calibration.scatter import scale_called_for
+from workbench.calibration.problem import Problem
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.rig import Prior, Rig
 
 FloatArray = NDArray[np.float64]
+POSE_SD = {"slope_x": 1.0, "slope_y": 1.0, "board_x_mm": 100.0, "board_y_mm": 100.0, "board_roll_rad": 1.0}
+"""A board's pose is what its corners say: these priors about the first guess are wider than it could err."""
 FLAT_PRIOR_SD = 1e3
 """A prior this many times wider than stated is as good as none."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted calibration. P parameters (sensor first, then placements), N cells, 1 sigma throughout."""
+    """A fitted calibration. P parameters (sensor first), N cells, K corners of boards, 1 sigma throughout."""
 
     rig: Rig
     table: ParameterTable
@@ -54,8 +52,11 @@ class Fit:
     """(P,) see `data_share`."""
     residual_px: FloatArray
     """(N, 2) measured - predicted mean positions; NaN where not measured."""
+    boards: tuple[BoardView, ...]
+    corner_residual_px: FloatArray
+    """(K, 2) measured - predicted corners, board by board."""
     rms_px: float
-    """Over all single positions used, not over the means."""
+    """Over all single positions of spots used, not over the means."""
     noise_scale: float
     """Factor on the stated pixel noise that the residuals called for; 1 where they agree with it."""
     chi2: float
@@ -80,8 +81,13 @@ class Fit:
         return slice(0, int(self.table.is_sensor.sum()))
 
 
-def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = ()) -> Fit:
-    """Fit the rig's parameters to sightings of a flat target.
+def fit(
+    rig: Rig,
+    sightings: Sequence[Sighting],
+    rejected: Sequence[Rejected] = (),
+    boards: Sequence[BoardView] = (),
+) -> Fit:
+    """Fit the rig's parameters to sightings of a flat target, and to the printed board where it was one.
 
     The estimate maximises the posterior of Gaussian noise and the rig's Gaussian priors. Placement errors and
     tilts are parameters with priors, so that repeats at one placement count as what they are: one placement.
@@ -92,6 +98,7 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
         rig: priors and noise.
         sightings: spots at known standoffs.
         rejected: what was already rejected before, to be listed with the fit's own.
+        boards: what was seen of the board, one view for each placement that had it as its target.
 
     Raises:
         BadInputError: no sightings, one of a laser that the rig does not have, placements that contradict
@@ -100,8 +107,9 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
     """
     _check(rig, sightings)
     cells, strays = group(sightings, rig.laser_ids, rig.noise)
-    table = table_of(rig, cells.placements)
-    problem = _Problem.of(rig, table, cells)
+    cells = with_placements(cells, boards)
+    table = table_of(rig, cells.placements, boards)
+    problem = Problem.of(len(rig.lasers), table, cells, boards, rig.board)
     scale = 1.0
     with np.errstate(over="ignore", invalid="ignore"):  # a result that is not finite is refused by name
         for _ in range(10):
@@ -115,7 +123,7 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
             " check its baselines, standoffs and image size"
         )
     values = table.prior_mean + table.prior_sd * solution.y
-    residual = solution.residual_px
+    residual, corner_residual = np.split(solution.residual_px, [len(cells.laser)])
     return Fit(
         rig=rig,
         table=table,
@@ -126,6 +134,8 @@ def fit(rig: Rig, sightings: Sequence[Sighting], rejected: Sequence[Rejected] = 
         prior_pull=np.where(table.prior_sd > 0, solution.y, 0.0),
         data_share=data_share(solution.jacobian, table),
         residual_px=residual,
+        boards=tuple(boards),
+        corner_residual_px=corner_residual,
         rms_px=_rms(cells, residual),
         noise_scale=scale,
         chi2=solution.chi2,
@@ -157,124 +167,37 @@ def data_share(jacobian: FloatArray, table: ParameterTable) -> FloatArray:
     return share
 
 
-@dataclass(frozen=True)
-class _Solution:
-    y: FloatArray
-    jacobian: FloatArray
-    covariance: FloatArray
-    residual_px: FloatArray
-    chi2: float
-    degrees_of_freedom: float
-    scale_called_for: float
-    converged: bool
-
-
-@dataclass(frozen=True)
-class _Problem:
-    """The numbers of one fit, ready for JAX."""
-
-    mean: FloatArray
-    sd: FloatArray
-    laser: NDArray[np.intp]
-    placement: NDArray[np.intp]
-    standoff_mm: FloatArray
-    position_px: FloatArray
-    inverse_sd: FloatArray
-    """(N, 2), 0 where a coordinate was not measured."""
-    lasers: int
-
-    @classmethod
-    def of(cls, rig: Rig, table: ParameterTable, cells: Cells) -> _Problem:
-        measured = np.isfinite(cells.position_px)
-        return cls(
-            mean=table.prior_mean,
-            sd=table.prior_sd,
-            laser=cells.laser,
-            placement=cells.placement,
-            standoff_mm=np.array([p.standoff_mm for p in cells.placements]),
-            position_px=np.where(measured, cells.position_px, 0.0),
-            inverse_sd=np.where(measured, 1.0 / cells.sd_px, 0.0),
-            lasers=len(rig.lasers),
-        )
-
-    def solve(self, scale: float) -> _Solution:
-        """Solve with the pixel noise `scale` times what was stated."""
-        arrays = (self.mean, self.sd, self.laser, self.placement, self.standoff_mm, self.position_px)
-        args = (*arrays, self.inverse_sd / scale)
-        y, converged = _solve(args, self.lasers)
-        residual, jacobian = (np.asarray(part) for part in _linearise(y, args, self.lasers))
-        information = jacobian.T @ jacobian
-        covariance = np.linalg.inv(information + np.eye(len(information)))
-        count = int((self.inverse_sd > 0).sum())
-        freedom = count - float(np.trace(information @ covariance))
-        chi2 = float(residual @ residual) * scale**2
-        pixels = -residual.reshape(-1, 2) / np.where(self.inverse_sd > 0, self.inverse_sd / scale, np.nan)
-        return _Solution(
-            y=np.asarray(y),
-            jacobian=jacobian,
-            covariance=covariance,
-            residual_px=pixels,
-            chi2=chi2,
-            degrees_of_freedom=freedom,
-            scale_called_for=float(scale_called_for(chi2, freedom)),
-            converged=bool(converged),
-        )
-
-
-@partial(jax.jit, static_argnums=1)
-def _solve(args: tuple[Array, ...], lasers: int) -> tuple[Array, Array]:
-    """(P,) optimum in units of the prior, and whether the solver converged."""
-
-    def residuals(y: Array, args: tuple[Array, ...]) -> Array:
-        return jnp.concatenate([_data_residual(y, args, lasers), y])
-
-    solver: optx.LevenbergMarquardt[Array, Array, None] = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-10)
-    start = jnp.zeros_like(args[0])
-    solution: optx.Solution[Array, None] = optx.least_squares(
-        residuals, solver, start, args, max_steps=200, throw=False
-    )
-    return solution.value, jnp.asarray(solution.result == optx.RESULTS.successful)
-
-
-@partial(jax.jit, static_argnums=2)
-def _linearise(y: Array, args: tuple[Array, ...], lasers: int) -> tuple[Array, Array]:
-    """Residuals of the data (M,) and their derivatives (M, P), both in standard deviations."""
-    return (
-        _data_residual(y, args, lasers),
-        jax.jacfwd(_data_residual)(y, args, lasers),
-    )
-
-
-def _data_residual(y: Array, args: tuple[Array, ...], lasers: int) -> Array:
-    """(2 N,) predicted - measured positions in standard deviations; 0 where not measured."""
-    mean, sd, laser, placement, standoff_mm, position_px, inverse_sd = args
-    predicted = predict(mean + sd * y, lasers, laser, placement, standoff_mm)
-    return ((predicted - position_px) * inverse_sd).ravel()
-
-
-def predict(values: Array, lasers: int, laser: Array, placement: Array, standoff_mm: Array) -> Array:
-    """(N, 2) pixel positions of laser `laser[n]` on the target of placement `placement[n]`.
-
-    Args:
-        values: (P,) parameters in the order of `sensor_parameters`, then `placement_parameters`.
-        lasers: how many lasers there are.
-        laser: (N,) index of the laser.
-        placement: (N,) index of the placement.
-        standoff_mm: standoffs of all placements by the ruler.
-    """
-    common = len(LENS) + len(REFERENCE)
-    sensor_end = common + len(RAY) * lasers
-    rays = values[common:sensor_end].reshape(lasers, len(RAY))[laser]
-    errors = values[sensor_end:].reshape(-1, len(PLACEMENT))[placement]
-    u, v = predict_cell((*values[:common], *rays.T, *errors.T), standoff_mm[placement])
-    return jnp.stack([u, v], axis=1)
-
-
-def table_of(rig: Rig, placements: Sequence[PlacementInfo]) -> ParameterTable:
-    """All parameters of a fit: the sensor's by the rig, then each placement's by rig and captures."""
+def table_of(
+    rig: Rig, placements: Sequence[PlacementInfo], boards: Sequence[BoardView] = ()
+) -> ParameterTable:
+    """All parameters of a fit, in the order of `prediction.Layout`: what the rig says, then the captures."""
     nuisances = placement_parameters(rig, [p.key for p in placements])
     told = {p.key: p for p in placements}
-    return ParameterTable((*sensor_parameters(rig), *(_as_told(n, told) for n in nuisances)))
+    flat = tuple(_as_told(n, told) for n in nuisances)
+    if not boards:
+        return ParameterTable((*sensor_parameters(rig), *flat))
+    printed = tuple(sensor_parameter(name, getattr(rig.bench, name)) for name in PRINT)
+    poses = {view.placement.key: guess_pose(rig, view) for view in boards}
+    return ParameterTable(
+        (
+            *sensor_parameters(rig),
+            *printed,
+            *(_as_guessed(parameter, poses) for parameter in flat),
+            *board_parameters(rig),
+            *(_pose_parameter(key, name, pose) for key, pose in poses.items() for name in POSE),
+        )
+    )
+
+
+def _as_guessed(parameter: Parameter, poses: dict[str, PoseGuess]) -> Parameter:
+    """A placement's parameter, its tilt by the board where there is one."""
+    key, _, name = parameter.name.rpartition(".")
+    return _pose_parameter(key, name, poses[key]) if key in poses and name in POSE_SD else parameter
+
+
+def _pose_parameter(key: str, name: str, pose: PoseGuess) -> Parameter:
+    prior = Prior(value=getattr(pose, name.removeprefix("board_")), sd=POSE_SD[name])
+    return Parameter(f"{key}.{name}", unit_of(name), prior, "placement")
 
 
 def _as_told(parameter: Parameter, told: dict[str, PlacementInfo]) -> Parameter:

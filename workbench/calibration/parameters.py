@@ -10,12 +10,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.model.board import BOW
 from workbench.model.rig import Prior, Rig
 
 LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
 REFERENCE = ("offset_mm", "ruler_scale")
 RAY = ("x_mm", "y_mm", "tx", "ty")
 PLACEMENT = ("error_mm", "slope_x", "slope_y")
+PRINT = ("print_scale",)
+"""Of the printed board; the sensor's, as the ruler's: both carry their lengths into the calibration."""
+POSE = ("board_x_mm", "board_y_mm", "board_roll_rad")
+"""How the board lies on the plane of a placement, see `workbench.optics.board.Pose`."""
 
 Kind = Literal["sensor", "placement"]
 
@@ -28,14 +33,16 @@ class Parameter:
     unit: str
     prior: Prior
     kind: Kind
-    """`sensor` parameters are the calibration; `placement` errors belong to one placing of the target."""
+    """`sensor` parameters are the calibration; `placement` ones belong to a target and its placings."""
 
 
 def sensor_parameters(rig: Rig) -> tuple[Parameter, ...]:
     """The parameters of the sensor and its ruler, in the order lens, reference, rays of each laser."""
-    lens = [_sensor(name, getattr(rig.camera, name)) for name in LENS]
-    reference = [_sensor(name, getattr(rig.bench, name)) for name in REFERENCE]
-    rays = [_sensor(f"{laser.id}.{name}", getattr(laser, name)) for laser in rig.lasers for name in RAY]
+    lens = [sensor_parameter(name, getattr(rig.camera, name)) for name in LENS]
+    reference = [sensor_parameter(name, getattr(rig.bench, name)) for name in REFERENCE]
+    rays = [
+        sensor_parameter(f"{laser.id}.{name}", getattr(laser, name)) for laser in rig.lasers for name in RAY
+    ]
     return (*lens, *reference, *rays)
 
 
@@ -52,12 +59,20 @@ def placement_parameters(rig: Rig, placements: Sequence[str]) -> tuple[Parameter
     )
 
 
+def board_parameters(rig: Rig) -> tuple[Parameter, ...]:
+    """Nuisance parameters: how the board's paper sags."""
+    flat = Prior(value=0.0, sd=rig.bench.board_flatness_sd_mm)
+    return tuple(Parameter(name, unit_of(name), flat, "placement") for name in BOW)
+
+
 def unit_of(name: str) -> str:
     """Unit by the suffix of a parameter's name; slopes and distortion coefficients have none ("1")."""
     if name.endswith("_px"):
         return "px"
     if name.endswith("_mm"):
         return "mm"
+    if name.endswith("_rad"):
+        return "rad"
     return "1"
 
 
@@ -92,5 +107,6 @@ class ParameterTable:
         return np.array([p.kind == "sensor" for p in self.parameters])
 
 
-def _sensor(name: str, prior: Prior) -> Parameter:
+def sensor_parameter(name: str, prior: Prior) -> Parameter:
+    """A parameter of the calibration."""
     return Parameter(name, unit_of(name), prior, "sensor")

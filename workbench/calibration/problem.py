@@ -1,0 +1,150 @@
+"""The least-squares problem of a fit: what is measured against what is predicted, and its solution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+from numpy.typing import NDArray
+
+from workbench.calibration.boards import BoardView
+from workbench.calibration.observations import Cells
+from workbench.calibration.parameters import ParameterTable
+from workbench.calibration.prediction import CornerData, Layout, SpotData, predict_corners, predict_spots
+from workbench.calibration.programs import stored
+from workbench.calibration.scatter import scale_called_for
+from workbench.model.board import Board
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Of a problem with P parameters and M measured positions (spots first, then corners)."""
+
+    y: FloatArray
+    """(P,) in units of the priors, counted from their means."""
+    jacobian: FloatArray
+    """(2 M, P) of the data's residuals, in standard deviations, by `y`."""
+    covariance: FloatArray
+    """(P, P) of `y`."""
+    residual_px: FloatArray
+    """(M, 2) measured - predicted, NaN where not measured."""
+    chi2: float
+    """Of the data at the stated noise."""
+    degrees_of_freedom: float
+    scale_called_for: float
+    converged: bool
+
+
+class _Data(NamedTuple):
+    """The numbers of one fit, for JAX."""
+
+    mean: ArrayLike
+    sd: ArrayLike
+    standoff_mm: ArrayLike
+    spots: SpotData
+    corners: CornerData
+    position_px: ArrayLike
+    """(M, 2)"""
+    inverse_sd: ArrayLike
+    """(M, 2), 0 where a coordinate was not measured."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One fit, ready to be solved at any noise."""
+
+    layout: Layout
+    data: _Data
+
+    @classmethod
+    def of(
+        cls, lasers: int, table: ParameterTable, cells: Cells, boards: Sequence[BoardView], board: Board
+    ) -> Problem:
+        """Spots on the cells' placements; every board's placement is one of them."""
+        position = np.concatenate([cells.position_px, *(b.corners.position_px for b in boards)])
+        sd = np.concatenate([cells.sd_px, *(b.corners.sd_px for b in boards)])
+        measured = np.isfinite(position)
+        data = _Data(
+            mean=table.prior_mean,
+            sd=table.prior_sd,
+            standoff_mm=np.array([p.standoff_mm for p in cells.placements]),
+            spots=SpotData(cells.laser, cells.placement),
+            corners=_corner_data(cells, boards, board),
+            position_px=np.where(measured, position, 0.0),
+            inverse_sd=np.where(measured, 1.0 / sd, 0.0),
+        )
+        return cls(Layout(lasers, len(cells.placements), len(boards)), data)
+
+    def solve(self, scale: float) -> Solution:
+        """Solve with the pixel noise `scale` times what was stated."""
+        inverse_sd = np.asarray(self.data.inverse_sd)
+        data = self.data._replace(inverse_sd=inverse_sd / scale)
+        y, converged = _solve(data, self.layout)
+        residual, jacobian = (np.asarray(part) for part in _linearise(y, data, self.layout))
+        information = jacobian.T @ jacobian
+        covariance = np.linalg.inv(information + np.eye(len(information)))
+        freedom = int((inverse_sd > 0).sum()) - float(np.trace(information @ covariance))
+        chi2 = float(residual @ residual) * scale**2
+        pixels = -residual.reshape(-1, 2) / np.where(inverse_sd > 0, inverse_sd / scale, np.nan)
+        return Solution(
+            y=np.asarray(y),
+            jacobian=jacobian,
+            covariance=covariance,
+            residual_px=pixels,
+            chi2=chi2,
+            degrees_of_freedom=freedom,
+            scale_called_for=float(scale_called_for(chi2, freedom)),
+            converged=bool(converged),
+        )
+
+
+def _corner_data(cells: Cells, boards: Sequence[BoardView], board: Board) -> CornerData:
+    order = [p.key for p in cells.placements]
+    counts = [len(b.corners.ids) for b in boards]
+    ids = np.concatenate([np.array([], np.intp), *(b.corners.ids for b in boards)])
+    return CornerData(
+        board=np.repeat(np.arange(len(boards)), counts),
+        placement=np.repeat(np.array([order.index(b.placement.key) for b in boards], np.intp), counts),
+        printed_mm=board.corners_mm[ids],
+    )
+
+
+@stored(1)
+def _solve(data: _Data, layout: Layout) -> tuple[Array, Array]:
+    """(P,) optimum in units of the prior, and whether the solver converged."""
+    import optimistix as optx  # a second; a stored program does without
+
+    def residuals(y: Array, data: _Data) -> Array:
+        return jnp.concatenate([_data_residual(y, data, layout), y])
+
+    solver: optx.LevenbergMarquardt[Array, Array, None] = optx.LevenbergMarquardt(rtol=1e-10, atol=1e-10)
+    start = jnp.zeros_like(jnp.asarray(data.mean))
+    solution: optx.Solution[Array, None] = optx.least_squares(
+        residuals, solver, start, data, max_steps=200, throw=False
+    )
+    return solution.value, jnp.asarray(solution.result == optx.RESULTS.successful)
+
+
+@stored(2)
+def _linearise(y: Array, data: _Data, layout: Layout) -> tuple[Array, Array]:
+    """Residuals of the data (2 M,) and their derivatives (2 M, P), both in standard deviations."""
+    return _data_residual(y, data, layout), jax.jacfwd(_data_residual)(y, data, layout)
+
+
+def _data_residual(y: Array, data: _Data, layout: Layout) -> Array:
+    """(2 M,) predicted - measured positions in standard deviations; 0 where not measured."""
+    values = jnp.asarray(data.mean) + jnp.asarray(data.sd) * y
+    standoff_mm = jnp.asarray(data.standoff_mm)
+    predicted = predict_spots(values, layout, data.spots, standoff_mm)
+    if layout.boards:
+        corners = predict_corners(values, layout, data.corners, standoff_mm)
+        predicted = jnp.concatenate([predicted, corners])
+    return ((predicted - data.position_px) * data.inverse_sd).ravel()
