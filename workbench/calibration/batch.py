@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -28,11 +27,11 @@ from workbench.calibration.scatter import scale_called_for
 from workbench.model.rig import Rig
 
 FloatArray = NDArray[np.float64]
-CHUNK = 32
+CHUNK = 16
 """Fits solved in step: enough to fill the vector units, few enough not to wait long for the slowest one."""
 COMMON = len(LENS) + len(REFERENCE)
 MAX_STEPS = 60
-STEP_TOLERANCE_SD = 1e-8
+STEP_TOLERANCE_SD = 1e-7
 """Of the last step, in posterior standard deviations; each is smaller than the one before by 0.3 or less."""
 NEAR_SD = 10.0
 """After a step shorter than this the normal equations hardly change any more."""
@@ -94,7 +93,8 @@ def fit_batch(
     measured = np.isfinite(position_px)
     position = np.where(measured, position_px, 0.0)
     inverse_sd = np.where(measured, 1.0 / np.where(measured, sd_px, 1.0), 0.0)
-    layout = (table.prior_mean, table.prior_sd, np.array([p.standoff_mm for p in placements]))
+    varied = tuple(np.flatnonzero(table.prior_sd[:COMMON]).tolist())
+    layout = (varied, table.prior_mean, table.prior_sd, np.array([p.standoff_mm for p in placements]))
     scale = np.ones(len(position))
     solved = _in_chunks(layout, np.zeros((len(position), len(table.prior_mean))), position, inverse_sd)
     for _ in range(SCALE_ROUNDS):
@@ -143,7 +143,7 @@ class _Solved(NamedTuple):
 
 
 def _in_chunks(
-    layout: tuple[FloatArray, ...], start: FloatArray, position: FloatArray, inverse_sd: FloatArray
+    layout: tuple[Any, ...], start: FloatArray, position: FloatArray, inverse_sd: FloatArray
 ) -> _Solved:
     """Solve CHUNK fits after CHUNK fits; the last ones are filled up with the first of theirs."""
     parts = []
@@ -156,11 +156,33 @@ def _in_chunks(
 
 
 class _Layout(NamedTuple):
-    """What the fits of a batch share."""
+    """What the fits of a batch share. P and S count what is solved for: no constants of lens and reference."""
 
+    varied: tuple[int, ...]
+    """Which of LENS and REFERENCE are no constants: the compiler knows, and leaves the others out."""
+    common: Array
+    """(10,) values of LENS and REFERENCE; those of the constants count."""
     mean: Array
+    """(P,)"""
     sd: Array
+    """(P,)"""
     standoff_mm: Array
+    """(J,)"""
+
+    def inputs(self, y: Array) -> list[Array]:
+        """The 17 inputs of every cell: scalars for all, (L,) by the laser, (J, 1) by the placement."""
+        values = self.mean + self.sd * y
+        common = list(self.common)
+        for place, index in enumerate(self.varied):
+            common[index] = values[place]
+        return [*common, *self.by_cell(values)[len(self.varied) :]]
+
+    def by_cell(self, values: Array) -> list[Array]:
+        """(P,) as the inputs that are varied."""
+        shared, sensor = len(self.varied), values.size - len(PLACEMENT) * len(self.standoff_mm)
+        rays = values[shared:sensor].reshape(-1, len(RAY))
+        errors = values[sensor:].reshape(-1, len(PLACEMENT))
+        return [*values[:shared], *rays.T, *(errors[:, i : i + 1] for i in range(len(PLACEMENT)))]
 
 
 class _State(NamedTuple):
@@ -186,12 +208,26 @@ class _Normal(NamedTuple):
     """(P,)"""
 
 
-@stored()
+@stored(0)
 def _solve_chunk(
-    mean: Array, sd: Array, standoff_mm: Array, start: Array, position: Array, inverse_sd: Array
+    varied: tuple[int, ...],
+    mean: Array,
+    sd: Array,
+    standoff_mm: Array,
+    start: Array,
+    position: Array,
+    inverse_sd: Array,
 ) -> tuple[Array, ...]:
-    layout = _Layout(mean, sd, standoff_mm)
-    return jax.vmap(partial(_solve_one, layout))(start, position, inverse_sd)
+    kept = np.array([*varied, *range(COMMON, mean.size)])
+    layout = _Layout(varied, mean[:COMMON], mean[kept], sd[kept], standoff_mm)
+
+    def one(start: Array, position: Array, inverse_sd: Array) -> tuple[Array, ...]:
+        y, sensor, *others = _solve_one(layout, start[kept], position, inverse_sd)
+        whole = COMMON + len(sensor) - len(varied)
+        among = np.ix_(kept[: len(sensor)], kept[: len(sensor)])
+        return start.at[kept].set(y), jnp.eye(whole).at[among].set(sensor), *others
+
+    return jax.vmap(one)(start, position, inverse_sd)
 
 
 def _solve_one(layout: _Layout, start: Array, position: Array, inverse_sd: Array) -> tuple[Array, ...]:
@@ -288,46 +324,38 @@ def _relaxed(damping: Array) -> Array:
     return jnp.where(damping > LEAST_DAMPING, damping / 30.0, 0.0)
 
 
-def _spread(values: Array, placements: int) -> list[Array]:
-    """(P,) by the cell: scalars for all, (L,) by the laser, (J, 1) by the placement."""
-    sensor = values.size - len(PLACEMENT) * placements
-    rays = values[COMMON:sensor].reshape(-1, len(RAY))
-    errors = values[sensor:].reshape(placements, len(PLACEMENT))
-    by_placement = [errors[:, i : i + 1] for i in range(len(PLACEMENT))]
-    return [*values[:COMMON], *rays.T, *by_placement]
-
-
 def _cost(y: Array, layout: _Layout, position: Array, inverse_sd: Array) -> Array:
-    inputs = _spread(layout.mean + layout.sd * y, len(layout.standoff_mm))
-    u, v = predict_cell(tuple(inputs), layout.standoff_mm[:, None])
+    u, v = predict_cell(tuple(layout.inputs(y)), layout.standoff_mm[:, None])
     residual = (jnp.stack([u, v], axis=-1) - position) * inverse_sd
     return (residual**2).sum() + y @ y
 
 
 def _linearise(y: Array, layout: _Layout, position: Array, inverse_sd: Array) -> tuple[Array, Array]:
-    """Residuals (J, L, 2) and their derivatives (17, J, L, 2), in sd and units of the priors."""
+    """Residuals (J, L, 2) and their derivatives (varied inputs, J, L, 2), in sd and units of the priors."""
     standoff = layout.standoff_mm[:, None]
-    inputs = _spread(layout.mean + layout.sd * y, len(standoff))
-    scales = _spread(layout.sd, len(standoff))
+    inputs = layout.inputs(y)
+    varied = [*layout.varied, *range(COMMON, len(inputs))]
 
-    def by(index: int) -> Array:
+    def by(index: int, scale: Array) -> Array:
         """Derivative by one input: all others have none, and the compiler need not work on zeros."""
 
         def moved(value: Array) -> tuple[Array, Array]:
             return predict_cell((*inputs[:index], value, *inputs[index + 1 :]), standoff)
 
-        _, tangent = jax.jvp(moved, (inputs[index],), (scales[index],))
+        _, tangent = jax.jvp(moved, (inputs[index],), (scale,))
         return jnp.stack([jnp.broadcast_to(part, inverse_sd.shape[:2]) for part in tangent], axis=-1)
 
+    slopes = [by(i, s) * inverse_sd for i, s in zip(varied, layout.by_cell(layout.sd), strict=True)]
     u, v = predict_cell(tuple(inputs), standoff)
     residual = (jnp.stack([u, v], axis=-1) - position) * inverse_sd
-    return residual, jnp.stack([by(index) * inverse_sd for index in range(len(inputs))])
+    return residual, jnp.stack(slopes)
 
 
 def _normal(y: Array, layout: _Layout, position: Array, inverse_sd: Array, damping: Array) -> _Normal:
     residual, slopes = _linearise(y, layout, position, inverse_sd)
     lasers = residual.shape[1]
-    common, ray, error = jnp.split(slopes, (COMMON, COMMON + len(RAY)))
+    shared = len(layout.varied)
+    common, ray, error = jnp.split(slopes, (shared, shared + len(RAY)))
     own = ray * jnp.eye(lasers)[:, None, None, :, None]
     sensor = jnp.concatenate([common, own.reshape(-1, *residual.shape)])
 
