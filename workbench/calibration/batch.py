@@ -156,7 +156,7 @@ def _in_chunks(
 
 
 class _Layout(NamedTuple):
-    """What the fits of a batch share. P and S count what is solved for: no constants of lens and reference."""
+    """What the fits of a batch share. P and S count what is solved for: no constants of lens and bench."""
 
     varied: tuple[int, ...]
     """Which of LENS and REFERENCE are no constants: the compiler knows, and leaves the others out."""
