@@ -162,7 +162,8 @@ def test_fit_and_range_on_the_session_s_images_give_the_session_s_results(demo: 
         scene = alone or scenes[reading.scene]
         assert scene["status"] == "done"
         ours = {laser["id"]: laser["range_mm"] for laser in scene["lasers"]}
-        assert ours == {laser.laser_id: laser.range_mm for laser in reading.lasers}
+        # The last digits depend on how many spots the compiled program ranges at once.
+        assert ours == pytest.approx({laser.laser_id: laser.range_mm for laser in reading.lasers}, rel=1e-9)
         compared += 1
     assert compared == 55
 

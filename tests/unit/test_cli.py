@@ -155,7 +155,9 @@ def test_range_from_the_yaml_alone(workbench: Run, tmp_path: Path) -> None:
 def test_without_json_nothing_is_on_stdout(workbench: Run, tmp_path: Path) -> None:
     outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
     assert outcome.out == ""
-    assert max(len(line) for line in outcome.err.splitlines()) <= 80
+    *tables, written = outcome.err.splitlines()
+    assert max(len(line) for line in tables) <= 80
+    assert written == f"{tmp_path / 'c.yaml'} written"
 
 
 class TestBadInput:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ def test_viewer_listens_on_loopback_only_and_reports_nothing(
         return subprocess.CompletedProcess(command, 3)
 
     monkeypatch.setattr(subprocess, "run", run)
+    monkeypatch.setenv("DISPLAY", ":0")
     recording = tmp_path / "recording.rrd"
     recording.touch()
     assert window.open_viewer(recording) == 3
@@ -35,6 +37,15 @@ def test_viewer_listens_on_loopback_only_and_reports_nothing(
 def test_missing_recording_is_named(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=r"none\.rrd: no such recording"):
         window.open_viewer(tmp_path / "none.rrd")
+
+
+def test_no_display_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    (tmp_path / "recording.rrd").touch()
+    with pytest.raises(BadInputError, match="no display here"):
+        window.open_viewer(tmp_path / "recording.rrd")
 
 
 def test_missing_viewer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
