@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import atan2
 from typing import TYPE_CHECKING
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 BAND_EDGE_MM = 3.0
-"""A spot's middle must lie this far inside the band: a beam is some 2.5 mm wide where the board can be read."""
+"""A spot's middle must lie this far inside the band: beams are some 2.5 mm wide where a board is read."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,28 @@ def on_band(view: BoardView, board: Board, sighting: Sighting) -> Sighting | Rej
         f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm: the spot lies {y / w:.0f} mm from the"
         f" middle of the board's blank band, expected at most {half_height:g} mm: shift the board",
     )
+
+
+def on_boards(
+    board: Board, seen: Mapping[str, BoardView | Rejected], found: Sequence[Sighting | Rejected]
+) -> list[Sighting | Rejected]:
+    """What was found of spots, without those that a board as their target spoils.
+
+    Args:
+        board: the board.
+        seen: by placement, what was seen of the board where it was the target.
+        found: sightings of any placement, and what was rejected already.
+    """
+    return [_on_board(board, seen.get(f.placement), f) if isinstance(f, Sighting) else f for f in found]
+
+
+def _on_board(board: Board, seen: BoardView | Rejected | None, sighting: Sighting) -> Sighting | Rejected:
+    if seen is None:
+        return sighting
+    if isinstance(seen, BoardView):
+        return on_band(seen, board, sighting)
+    where = f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm"
+    return Rejected(sighting.source, f"{where}: the board that it fell on was not found")
 
 
 def with_placements(cells: Cells, boards: Sequence[BoardView]) -> Cells:

@@ -71,6 +71,12 @@ class Fit:
         return np.sqrt(np.diag(self.covariance))
 
     @property
+    def corner_rms_px(self) -> float:
+        """Over all corners of boards; NaN where there are none."""
+        corners = self.corner_residual_px
+        return float(np.sqrt(np.mean(corners**2))) if corners.size else float("nan")
+
+    @property
     def used(self) -> tuple[Sighting, ...]:
         """Every sighting that the fit rests on."""
         return tuple(s for members in self.cells.members for s in members)

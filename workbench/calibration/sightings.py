@@ -5,31 +5,39 @@ What finds spots in images is imported where there are images: positions need no
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isnan
 from typing import TYPE_CHECKING
 
-from workbench.calibration.observations import Rejected, Sighting
-from workbench.model.captures import ALL_LASERS, CaptureRow
+from workbench.calibration.boards import BoardView, on_boards, see_board
+from workbench.calibration.observations import PlacementInfo, Rejected, Sighting
+from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
 from workbench.model.rig import LaserSpec, Rig
 
 if TYPE_CHECKING:
     from workbench.spots import Finding, Scanline
 
+NO_STANDOFF = "standoff_mm is empty: a calibration needs known standoffs"
 PRIOR_REACH_SD = 4.0
 BEAM_HALF_WIDTH_PX = 8.0
 
 
-def sight_rows(rig: Rig, rows: Sequence[CaptureRow]) -> tuple[list[Sighting], list[Rejected]]:
-    """The sightings in a captures file, and the rows that show none, each with its reason.
+def sight_rows(
+    rig: Rig, rows: Sequence[CaptureRow]
+) -> tuple[list[Sighting], list[Rejected], list[BoardView]]:
+    """The sightings in a captures file, the rows that show none, with their reasons, and the board's views.
 
     Raises:
         BadInputError: an image cannot be used.
     """
-    found = [_sight_row(rig, row) for row in rows]
+    boards = _see_boards(rig, [row for row in rows if row.laser_id == BOARD])
+    spots = [_sight_row(rig, row) for row in rows if row.laser_id != BOARD]
+    found = on_boards(rig.board, boards, spots)
     sightings = [f for f in found if isinstance(f, Sighting)]
-    return sightings, [f for f in found if isinstance(f, Rejected)]
+    rejected = [f for f in (*found, *boards.values()) if isinstance(f, Rejected)]
+    return sightings, rejected, [b for b in boards.values() if isinstance(b, BoardView)]
 
 
 def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | Rejected:
@@ -80,19 +88,44 @@ def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
     return Scanline(u, v, du, dv, BEAM_HALF_WIDTH_PX + reach)
 
 
+def _see_boards(rig: Rig, rows: Sequence[CaptureRow]) -> dict[str, BoardView | Rejected]:
+    """By placement, the board in the mean of its frames."""
+    placed: dict[str, list[CaptureRow]] = defaultdict(list)
+    for row in rows:
+        placed[_placement(row)].append(row)
+    return {key: _see_board(rig, key, of_one) for key, of_one in placed.items()}
+
+
+def _see_board(rig: Rig, key: str, rows: Sequence[CaptureRow]) -> BoardView | Rejected:
+    from workbench.session.frames import read_image
+
+    first, size = rows[0], (rig.camera.width_px, rig.camera.height_px)
+    source = f"row {first.row}"
+    if isnan(first.standoff_mm):
+        return Rejected(source, NO_STANDOFF)
+    tilt = 0.0 if isnan(first.tilt_deg) else first.tilt_deg
+    placement = PlacementInfo(key, first.standoff_mm, first.standoff_sd_mm, tilt, source)
+    frames = [read_image(row.on, size) for row in rows if row.on is not None]
+    return see_board(frames, rig.board, placement)
+
+
+def _placement(row: CaptureRow) -> str:
+    return row.scene or f"{row.standoff_mm:g} mm"
+
+
 def _sight_row(rig: Rig, row: CaptureRow) -> Sighting | Rejected:
     source = f"row {row.row}"
     if row.laser_id == ALL_LASERS:
         return Rejected(source, "a calibration needs captures of one laser at a time, got all")
     if isnan(row.standoff_mm):
-        return Rejected(source, "standoff_mm is empty: a calibration needs known standoffs")
+        return Rejected(source, NO_STANDOFF)
     if row.laser_id not in rig.laser_ids:
         known = ", ".join(rig.laser_ids)
         return Rejected(source, f"laser_id: expected one of {known} (rig {rig.rig}), got {row.laser_id}")
     sighting = Sighting(
         source=source,
         laser_id=row.laser_id,
-        placement=row.scene or f"{row.standoff_mm:g} mm",
+        placement=_placement(row),
         standoff_mm=row.standoff_mm,
         repeat=row.repeat,
         u_px=row.u_px,

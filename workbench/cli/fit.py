@@ -12,6 +12,7 @@ from typing import Any
 from rich.console import Console
 
 from workbench.calibration.assess import Assessment, derive
+from workbench.calibration.boards import BoardView
 from workbench.calibration.export import calibrate, kept_because, write_calibration
 from workbench.calibration.fit import Fit
 from workbench.calibration.fit import fit as fit_sightings
@@ -86,14 +87,15 @@ def _rig(request: Request) -> Rig:
 
 def _sightings(
     rig: Rig, rows: Sequence[CaptureRow], request: Request
-) -> tuple[list[Sighting], list[Rejected]]:
+) -> tuple[list[Sighting], list[Rejected], list[BoardView]]:
     known = {row.standoff_mm for row in rows}
     if unknown := [s for s in request.without_mm if s not in known]:
         raise BadInputError(f"--without-standoff: no row has the standoff {unknown[0]:g} mm")
-    sightings, rejected = sight_rows(rig, [row for row in rows if row.standoff_mm not in request.without_mm])
+    kept = [row for row in rows if row.standoff_mm not in request.without_mm]
+    sightings, rejected, boards = sight_rows(rig, kept)
     left_out = [row for row in rows if row.standoff_mm in request.without_mm]
     rejected += [Rejected(f"row {row.row}", f"left out: standoff {row.standoff_mm:g} mm") for row in left_out]
-    return sightings, rejected
+    return sightings, rejected, boards
 
 
 def _provenance(rig: Rig, request: Request, captures: bytes) -> Provenance:
@@ -135,6 +137,9 @@ def _print_tables(fitted: Fit, assessment: Assessment) -> None:
     console.print(parameter_table(parameter_records(fitted)))
     console.print(derived_table(derive(fitted)))
     console.print(f"residual rms {fitted.rms_px:.2f} px over {len(fitted.used)} observations")
+    if fitted.boards:
+        count, views = len(fitted.corner_residual_px), len(fitted.boards)
+        console.print(f"board: {fitted.corner_rms_px:.3f} px over {count} corners in {views} views")
     for line in rejected_lines(fitted.rejected):
         console.print(f"not used: {line}", highlight=False)
     for warning in assessment.warnings:

@@ -80,9 +80,11 @@ class CaptureTaken(FileModel):
     purpose: Literal["calibration", "trial"]
     scene: str | None = None
     laser_id: str
-    """`all` when every laser is lit."""
+    """`all` when every laser is lit; `board` for a frame of the board in room light, with no laser lit."""
     placement_key: str
     standoff_mm: float
+    standoff_sd_mm: float | None = None
+    """1 sigma, where the placement states one."""
     repeat: int
     on: FrameRef
     off: FrameRef | None = None

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from workbench.model.acceptance import Acceptance
-from workbench.model.rig import PositiveFloat
+from workbench.model.rig import NonNegativeFloat, PositiveFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 Standoffs = Annotated[tuple[PositiveFloat, ...], Field(min_length=1)]
@@ -44,6 +44,33 @@ class CaptureGridStep(FileModel):
     def title(self) -> str:
         """For the progress line."""
         return f"Capture at {len(self.standoffs_mm)} standoffs, {self.repeats} pairs a laser"
+
+
+class BoardPlacing(FileModel):
+    """How the board is to stand: at a standoff, turned about the vertical and the horizontal."""
+
+    standoff_mm: PositiveFloat
+    yaw_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
+    """Positive moves its right side away."""
+    pitch_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
+    """Positive moves its lower side away."""
+    standoff_sd_mm: NonNegativeFloat | None = None
+    """How well the ruler tells the standoff of a board that is tilted by hand; the rig's if not stated."""
+
+
+class CaptureBoardStep(FileModel):
+    """At each placing of the printed board: `frames` in room light, then `repeats` pairs of each laser."""
+
+    gives: ClassVar = "captures"
+    step: Literal["capture_board"]
+    placings: Annotated[tuple[BoardPlacing, ...], Field(min_length=1)]
+    frames: Annotated[int, Field(ge=1)]
+    repeats: Annotated[int, Field(ge=1)]
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return f"Capture the board in {len(self.placings)} placings"
 
 
 class FitStep(FileModel):
@@ -89,7 +116,7 @@ class AccuracyTrialStep(FileModel):
 
 
 Step = Annotated[
-    MessageStep | CaptureGridStep | FitStep | ExportStep | AccuracyTrialStep,
+    MessageStep | CaptureGridStep | CaptureBoardStep | FitStep | ExportStep | AccuracyTrialStep,
     Field(discriminator="step"),
 ]
 

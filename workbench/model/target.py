@@ -71,3 +71,5 @@ class Placement(FileModel):
     standoff_mm: Annotated[float, Field(gt=0)]
     """By the ruler, from the rig's reference plane."""
     target: TargetShape = FlatTarget()
+    standoff_sd_mm: Annotated[float, Field(ge=0)] | None = None
+    """How well the standoff is known, 1 sigma, where not as well as the rig's `placement_sd_mm`."""

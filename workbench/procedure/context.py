@@ -6,10 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from workbench.calibration.boards import BoardView
+from workbench.calibration.observations import Rejected
 from workbench.devices.protocols import Bench
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration, Provenance
-from workbench.model.captures import ALL_LASERS
+from workbench.model.captures import ALL_LASERS, BOARD
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
@@ -36,6 +38,8 @@ class Context:
     captures: list[ev.CaptureTaken] = field(default_factory=list)
     findings: dict[str, Finding] = field(default_factory=dict)
     """By the capture's key."""
+    boards: dict[str, BoardView | Rejected] = field(default_factory=dict)
+    """By the placement's key."""
     accepted: Calibration | None = None
     """What the last fit amounts to."""
     calibration: Calibration | None = None
@@ -70,9 +74,7 @@ class Context:
             StoppedError: a stop was asked for.
             LaserOffNotConfirmedError: a beam stays on.
         """
-        if (reason := self.stopping()) is not None:
-            raise StoppedError(reason)
-        self.bench.mark(key)
+        self._begin(key)
         with self.bench.lasers.lit(laser_ids, for_s=LEASE_S):
             on = self.bench.camera.grab()
         off = self.bench.camera.grab()
@@ -84,6 +86,7 @@ class Context:
             laser_id=laser_ids[0] if len(laser_ids) == 1 else ALL_LASERS,
             placement_key=placement.key,
             standoff_mm=placement.standoff_mm,
+            standoff_sd_mm=placement.standoff_sd_mm,
             repeat=repeat,
             on=frames.save(key, "on", on.image, on.time_ns),
             off=frames.save(key, "off", off.image, off.time_ns),
@@ -96,6 +99,33 @@ class Context:
         self.captures.append(taken)
         self.findings[key] = finding
         return finding
+
+    def capture_room_light(self, key: str, placement: Placement, repeat: int) -> Image:
+        """Take a frame of the board with no laser lit, and store it.
+
+        Raises:
+            StoppedError: a stop was asked for.
+        """
+        self._begin(key)
+        frame = self.bench.camera.grab_ambient()
+        taken = ev.CaptureTaken(
+            key=key,
+            purpose="calibration",
+            laser_id=BOARD,
+            placement_key=placement.key,
+            standoff_mm=placement.standoff_mm,
+            standoff_sd_mm=placement.standoff_sd_mm,
+            repeat=repeat,
+            on=FrameStore(self.session_dir).save(key, "on", frame.image, frame.time_ns),
+        )
+        self.emit(taken)
+        self.captures.append(taken)
+        return frame.image
+
+    def _begin(self, key: str) -> None:
+        if (reason := self.stopping()) is not None:
+            raise StoppedError(reason)
+        self.bench.mark(key)
 
     def _check_dark(self, key: str, off: Image, scanlines: Sequence[Scanline]) -> None:
         """Look for a beam that burns in both frames of a pair: it leaves no spot in their difference.

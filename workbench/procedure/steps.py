@@ -9,17 +9,20 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from functools import singledispatch
+from math import nan
 
+from workbench.calibration.boards import BoardView, on_boards, see_board
 from workbench.calibration.export import calibrate, render
 from workbench.calibration.fit import fit
-from workbench.calibration.observations import Rejected, Sighting
+from workbench.calibration.observations import PlacementInfo, Rejected, Sighting
 from workbench.calibration.records import fit_finished
 from workbench.calibration.sightings import prior_scanline, sight
 from workbench.model import event as ev
 from workbench.model import procedure as pr
+from workbench.model.captures import BOARD
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.rig import Rig
-from workbench.model.target import Placement
+from workbench.model.target import BoardTarget, Placement
 from workbench.procedure.context import Context
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
@@ -44,6 +47,11 @@ def _(step: pr.CaptureGridStep, rig: Rig) -> int:
 
 
 @shots.register
+def _(step: pr.CaptureBoardStep, rig: Rig) -> int:
+    return len(step.placings) * (step.frames + step.repeats * len(rig.lasers))
+
+
+@shots.register
 def _(step: pr.AccuracyTrialStep, rig: Rig) -> int:
     return len(step.standoffs_mm) * step.readings
 
@@ -62,13 +70,31 @@ def _(step: pr.MessageStep, context: Context, name: str) -> str:
 @run_step.register
 def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
     for standoff_mm in step.standoffs_mm:
-        placement = context.place(_placement(name, standoff_mm))
-        for laser in context.rig.lasers:
-            scanline = prior_scanline(context.rig, laser)
-            for repeat in range(step.repeats):
-                key = f"{placement.key}/{laser.id}/{repeat:02d}"
-                context.capture(key, [laser.id], placement, repeat, [scanline])
+        _capture_lasers(context, context.place(_placement(name, standoff_mm)), step.repeats)
     return f"{shots(step, context.rig)} pairs"
+
+
+@run_step.register
+def _(step: pr.CaptureBoardStep, context: Context, name: str) -> str:
+    for number, placing in enumerate(step.placings, start=1):
+        placement = context.place(_board_placement(f"{name}/{number:02d}", placing, context.rig))
+        frames = [
+            context.capture_room_light(f"{placement.key}/board/{repeat:02d}", placement, repeat)
+            for repeat in range(step.frames)
+        ]
+        told = PlacementInfo(
+            placement.key,
+            placement.standoff_mm,
+            nan if placement.standoff_sd_mm is None else placement.standoff_sd_mm,
+            0.0,
+            placement.key,
+        )
+        context.boards[placement.key] = see_board(frames, context.rig.board, told)
+        _capture_lasers(context, placement, step.repeats)
+    mine = [seen for key, seen in context.boards.items() if key.startswith(f"{name}/")]
+    corners = sum(len(seen.corners.ids) for seen in mine if isinstance(seen, BoardView))
+    missed = [seen.reason for seen in mine if isinstance(seen, Rejected)]
+    return "; ".join([f"{corners} corners in {len(mine) - len(missed)} of {len(mine)} placings", *missed])
 
 
 @run_step.register
@@ -77,9 +103,12 @@ def _(step: pr.FitStep, context: Context, name: str) -> str:
     if not captures:
         raise BadInputError(f"step {name}: nothing to fit; expected a capture_grid step before it")
     sha256 = write_capture_table(context.session_dir / CALIBRATION_TABLE, captures)
-    found = [_sight(context, capture) for capture in captures]
+    spots = [_sight(context, capture) for capture in captures if capture.laser_id != BOARD]
+    found = on_boards(context.rig.board, context.boards, spots)
     sightings = [f for f in found if isinstance(f, Sighting)]
-    fitted = fit(context.rig, sightings, [f for f in found if isinstance(f, Rejected)])
+    rejected = [f for f in (*found, *context.boards.values()) if isinstance(f, Rejected)]
+    boards = [b for b in context.boards.values() if isinstance(b, BoardView)]
+    fitted = fit(context.rig, sightings, rejected, boards)
     provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
     calibration, assessment = calibrate(fitted, step.limits, provenance)
     context.emit(fit_finished(fitted, assessment))
@@ -147,6 +176,28 @@ def _placement(name: str, standoff_mm: float) -> Placement:
     return Placement(key=f"{name}/{standoff_mm:.12g}mm", standoff_mm=standoff_mm)
 
 
+def _board_placement(key: str, placing: pr.BoardPlacing, rig: Rig) -> Placement:
+    upright = all(laser.axis == "v" for laser in rig.lasers)
+    target = BoardTarget(
+        yaw_deg=placing.yaw_deg, pitch_deg=placing.pitch_deg, roll_deg=90.0 if upright else 0.0
+    )
+    return Placement(
+        key=f"{key}-{placing.standoff_mm:.12g}mm",
+        standoff_mm=placing.standoff_mm,
+        target=target,
+        standoff_sd_mm=placing.standoff_sd_mm,
+    )
+
+
+def _capture_lasers(context: Context, placement: Placement, repeats: int) -> None:
+    """Fire each laser alone, `repeats` pairs of frames each."""
+    for laser in context.rig.lasers:
+        scanline = prior_scanline(context.rig, laser)
+        for repeat in range(repeats):
+            key = f"{placement.key}/{laser.id}/{repeat:02d}"
+            context.capture(key, [laser.id], placement, repeat, [scanline])
+
+
 def _shooter(
     context: Context, ranger: Ranger, placement: Placement, scene: str, number: int
 ) -> Callable[[tuple[str, ...]], Finding]:
@@ -168,7 +219,8 @@ def _sight(context: Context, capture: ev.CaptureTaken) -> Sighting | Rejected:
         placement=capture.placement_key,
         standoff_mm=capture.standoff_mm,
         repeat=capture.repeat,
-        u_px=float("nan"),
-        v_px=float("nan"),
+        u_px=nan,
+        v_px=nan,
+        standoff_sd_mm=nan if capture.standoff_sd_mm is None else capture.standoff_sd_mm,
     )
     return sight(context.findings[capture.key], laser, sighting)

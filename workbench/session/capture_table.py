@@ -13,7 +13,8 @@ from workbench.session.files import write_record
 
 CALIBRATION_TABLE = "captures.csv"
 TRIAL_TABLE = "trial-captures.csv"
-COLUMNS = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene")
+COLUMNS = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene", "standoff_sd_mm")
+"""The last one only where a capture states it."""
 
 
 def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
@@ -22,15 +23,24 @@ def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
     The scene of a capture of one laser is its placement: what was taken at one placing of the target shares
     that placing's error.
     """
+    rows = [_row(capture) for capture in captures]
+    columns = COLUMNS if any(row[-1] for row in rows) else COLUMNS[:-1]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for capture in captures:
-        off = "" if capture.off is None else capture.off.path
-        scene = capture.scene or capture.placement_key
-        writer.writerow(
-            (capture.laser_id, repr(capture.standoff_mm), capture.repeat, capture.on.path, off, scene)
-        )
+    writer.writerow(columns)
+    writer.writerows(row[: len(columns)] for row in rows)
     content = stream.getvalue().encode()
     write_record(path, content)
     return hashlib.sha256(content).hexdigest()
+
+
+def _row(capture: CaptureTaken) -> tuple[str, ...]:
+    return (
+        capture.laser_id,
+        repr(capture.standoff_mm),
+        str(capture.repeat),
+        capture.on.path,
+        "" if capture.off is None else capture.off.path,
+        capture.scene or capture.placement_key,
+        "" if capture.standoff_sd_mm is None else repr(capture.standoff_sd_mm),
+    )

@@ -143,4 +143,4 @@ def _charuco(board: Board, block: int) -> cv2.aruco.CharucoBoard:
 def _marker_places(board: Board, block: int) -> Floats:
     """(markers, 4, 2) corners of a block's markers, mm, clockwise from their top left."""
     places = np.array(_charuco(board, block).getObjPoints(), np.float64)[:, :, :2]
-    return places + np.array([board.left_mm, board.block_tops_mm[block]])
+    return np.asarray(places + np.array([board.left_mm, board.block_tops_mm[block]]), np.float64)

@@ -1,6 +1,6 @@
 """Sub-pixel position of a chessboard's corners, with its standard deviation.
 
-What a lens makes of a corner is fitted to it. Near it two straight edges cross, each blurred to an error function:
+A corner as a lens shows it is fitted: two straight edges that cross, each blurred to an error function:
 
     I(x) = a + b erf(d1 / (sqrt(2) w)) erf(d2 / (sqrt(2) w)),    d = distance from an edge through the corner
 
