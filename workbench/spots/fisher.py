@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import gammaln, ndtr, xlogy
 
-from workbench.spots.gaussian import FLUX, Upright
+from workbench.spots.gaussian import FLUX, derivatives
 from workbench.spots.types import Floats
 
 # Above this many electrons a Poisson count is Gaussian to 1e-3 of its information.
@@ -79,7 +79,7 @@ def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, floa
     """
     half = int(np.ceil(_REACH_WIDTHS * width_px)) + 2
     params = np.array([[0.0, electrons, half + phase_px[0], half + phase_px[1], *[np.log(width_px)] * 2]])
-    rows = Upright(params, (2 * half + 1, 2 * half + 1)).rows()[0]
+    rows = derivatives(params, (2 * half + 1, 2 * half + 1))[0].reshape(6, -1)
     mean = camera.background_electrons + electrons * rows[FLUX]
     jacobian = rows.copy()
     jacobian[2:] *= electrons

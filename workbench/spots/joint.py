@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from workbench.spots.fit import Windows, inverse
-from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, Upright, V, principal_axes
+from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, V, derivatives, principal_axes
 from workbench.spots.noise import Noise, photon_transfer_slope
 from workbench.spots.types import Bools, Floats
 
@@ -53,7 +53,7 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
     converged = False
     data = win.data.ravel()
     for _ in range(_MAX_STEPS):
-        rows = Upright(params, win.shape).rows()
+        rows = derivatives(params, win.shape).reshape(*params.shape, -1)
         signal = (params[:, FLUX, None] * rows[:, FLUX]).sum(axis=0)
         used = _weights(win, signal, noise) if weight is None else weight
         residual = data - params[0, 0] - signal
@@ -76,8 +76,8 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
 
 
 def _weights(win: Windows, signal: Floats, noise: Noise) -> Floats:
-    weights: Floats = 1.0 / (noise.floor_dn2.ravel() + noise.slope_dn.ravel() * np.maximum(signal, 0.0))
-    return weights if win.usable is None else weights * win.usable.ravel()
+    weights: Floats = 1.0 / (noise.floor_dn2 + noise.slope_dn * np.maximum(signal, 0.0))
+    return weights * win.usable.ravel()
 
 
 def _jacobian(params: Floats, rows: Floats) -> Floats:

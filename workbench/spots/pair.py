@@ -45,24 +45,10 @@ class Pair:
 
     def cut(self, rows: Ints, cols: Ints, half: int) -> Windows:
         """Square windows of 2 half + 1 pixels around pixels (n,); none outside the image is usable."""
-        span = np.arange(-half, half + 1)
-        height, width = self.on.shape
-        v, u = rows[:, None] + span, cols[:, None] + span
-        usable = None
-        if v.min() < 0 or u.min() < 0 or v.max() >= height or u.max() >= width:
-            usable = ((v >= 0) & (v < height))[:, :, None] & ((u >= 0) & (u < width))[:, None, :]
-            v, u = np.clip(v, 0, height - 1), np.clip(u, 0, width - 1)
-        at = (v * width)[:, :, None] + u[:, None, :]
-        raw = self.on.reshape(-1).take(at)
-        data = raw.astype(np.float64)
-        if self.off is not None:
-            data -= self.off_share * self.off.reshape(-1).take(at)
-        if self.level_dn:
-            data -= self.level_dn
-        if raw.max() < self.clip_dn:
-            return Windows(data, usable)
-        unclipped = raw < self.clip_dn
-        return Windows(data, unclipped if usable is None else usable & unclipped, data + (self.clip_dn - raw))
+        from workbench.spots.pixels import cut  # loads the compiler, which only a fit needs
+
+        off, share = (self.on, 0.0) if self.off is None else (self.off, self.off_share)
+        return Windows(*cut(self.on, off, share, self.level_dn, self.clip_dn, rows, cols, half))
 
 
 @dataclass(frozen=True, slots=True)

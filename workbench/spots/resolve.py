@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
@@ -10,7 +11,7 @@ import cv2
 import numpy as np
 
 from workbench.spots.fit import Windows, fit_spots
-from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, Sheared, U, V, principal_axes
+from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, U, principal_axes
 from workbench.spots.joint import Joint, evidence, fit_joint, halves, hidden_spot
 from workbench.spots.measure import Trace, half_for, spot_flags, without_outliers
 from workbench.spots.noise import Noise
@@ -38,12 +39,10 @@ def _apart_px(one: Trace, other: Trace) -> float:
 
 def are_apart(traces: list[Trace]) -> bool:
     """Whether no spot is a duplicate of another or disturbs it: the common case, told at once."""
-    reach = np.exp(np.array([t.params[LN_SU:SHEAR] for t in traces])).max()
-    u = np.array([t.spot.u_px for t in traces])
-    v = np.array([t.spot.v_px for t in traces])
-    square = (u[:, None] - u) ** 2 + (v[:, None] - v) ** 2
-    near = np.count_nonzero(square < (half_for(reach) + _TAIL_WIDTHS * reach) ** 2)
-    return int(near) <= len(traces)
+    reach = max(t.reach_px for t in traces)
+    limit = half_for(reach) + _TAIL_WIDTHS * reach
+    places = [(t.spot.u_px, t.spot.v_px) for t in traces]
+    return all(math.dist(one, other) >= limit for one, other in combinations(places, 2))
 
 
 def without_duplicates(traces: list[Trace]) -> list[Trace]:
@@ -83,12 +82,12 @@ def _window(scene: Scene, points: Floats, reach_px: float) -> tuple[Windows, int
     size = 2 * int(np.ceil(_TAIL_WIDTHS * reach_px)) + 1
     allowed = _allowed(scene, win, row0, col0).astype(np.uint8)
     near = cv2.dilate(allowed, np.ones((size, size), np.uint8)).astype(bool)[None]
-    return Windows(win.data, near if win.usable is None else near & win.usable, win.clip_dn), row0, col0
+    return Windows(win.data, near & win.usable, win.clip_dn), row0, col0
 
 
 def _noise(scene: Scene, group: list[Trace]) -> Noise:
     """To start from: of several measured slopes the lowest, for misfits only raise them."""
-    return Noise(np.full((1, 1, 1), scene.variance), np.full((1, 1, 1), min(t.slope_dn for t in group)))
+    return Noise(np.array([scene.variance]), np.array([min(t.slope_dn for t in group)]))
 
 
 def _is_better(one: Joint, two: Joint, win: Windows) -> bool:
@@ -110,26 +109,20 @@ def _is_better(one: Joint, two: Joint, win: Windows) -> bool:
 
 
 def _as_traces(scene: Scene, joint: Joint, row0: int, col0: int) -> list[Trace]:
+    absolute = joint.params + np.array([0, 0, col0, row0, 0, 0])
     traces = []
-    for i, (params, sd) in enumerate(zip(joint.params, joint.sd, strict=True)):
-        su, sv = (float(s) for s in np.exp(params[LN_SU:SHEAR]))
-        u, v, flux = float(params[U]) + col0, float(params[V]) + row0, float(params[FLUX])
-        flags = spot_flags(scene, u, v, su, sv)
-        others = np.delete(joint.params, i, axis=0)[:, U:LN_SU]
+    for i, (params, sd, flags) in enumerate(
+        zip(absolute, joint.sd, spot_flags(scene, absolute), strict=True)
+    ):
+        _, flux, u, v, ln_su, ln_sv = params.tolist()
+        others = np.delete(absolute, i, axis=0)[:, U:LN_SU]
         apart = float(np.hypot(*(others - params[U:LN_SU]).T).min())
-        if apart < _OVERLAP_WIDTHS * max(su, sv):
+        if apart < _OVERLAP_WIDTHS * math.exp(max(ln_su, ln_sv)):
             flags |= {Failure.MERGED}
-        width = float(np.sqrt(su * sv))
-        peak = flux / (2.0 * np.pi * (width**2 + 1.0 / 12.0))
-        absolute = params.copy()
-        absolute[U], absolute[V] = u, v
-        traces.append(
-            Trace(
-                Spot(u, v, float(sd[1]), float(sd[2]), flux, width, peak, flags),
-                absolute,
-                float(joint.noise.slope_dn[0, 0, 0]),
-            )
-        )
+        width = math.exp(0.5 * (ln_su + ln_sv))
+        peak = flux / (2.0 * math.pi * (width**2 + 1.0 / 12.0))
+        spot = Spot(u, v, float(sd[1]), float(sd[2]), flux, width, peak, flags)
+        traces.append(Trace(spot, params, float(joint.noise.slope_dn[0])))
     return traces
 
 
@@ -215,10 +208,10 @@ def split(scene: Scene, trace: Trace) -> list[Trace]:
     start = np.zeros((1, 7))
     start[0, : trace.params.size] = trace.params - (0, 0, col0, row0, 0, 0, 0)[: trace.params.size]
     noise = _noise(scene, [trace])
-    whole = fit_spots(win, start, noise, Sheared)
+    whole = fit_spots(win, start, noise)
     cleaned = without_outliers(win, whole)
     if cleaned is not None:
-        win, whole = cleaned, fit_spots(cleaned, start, noise, Sheared)
+        win, whole = cleaned, fit_spots(cleaned, start, noise)
     short, long = principal_axes(whole.params[0])[0]
     if not whole.converged[0] or long < _ELONGATED * short:
         return [trace]

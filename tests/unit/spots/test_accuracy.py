@@ -8,7 +8,7 @@ import pytest
 from tests.unit.spots.draw import Drawn, Sensor, draw
 from workbench.spots import Scanline, find_spots
 from workbench.spots.fisher import Camera, position_bound_px
-from workbench.spots.gaussian import Upright
+from workbench.spots.gaussian import derivatives
 
 SENSOR = Sensor()
 COLUMNS = (25.0, 70.0, 115.0, 160.0)
@@ -92,7 +92,8 @@ def test_saturation_widens_the_deviation_as_the_lost_pixels_demand() -> None:
 
 def lost_to_clipping(true: Drawn, sensor: Sensor) -> float:
     """Bound of u without the pixels that clip, over the bound with all."""
-    rows = Upright(np.array([[0.0, 1.0, true.u, true.v, np.log(1.6), np.log(1.6)]]), (61, 61)).rows()[0]
+    params = np.array([[0.0, 1.0, true.u, true.v, np.log(1.6), np.log(1.6)]])
+    rows = derivatives(params, (61, 61))[0].reshape(6, -1)
     mean = 5.0 + true.electrons * rows[1]
     weight = 1.0 / (mean + sensor.read_sd**2 + sensor.electrons_per_dn**2 / 12)
     whole = mean < (2**sensor.bits - 1 - sensor.black_dn) * sensor.electrons_per_dn
