@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import traceback
@@ -103,6 +104,17 @@ def range_(
 
 
 @app.command()
+def target(
+    pdf: Annotated[Path, typer.Option(help="PDF file to write.")],
+    rig: Annotated[Path | None, typer.Option(help="Rig file; its board, not the usual one.")] = None,
+) -> None:
+    """Print the board that calibrates the lens: a page of true size, with a ruler to check it."""
+    from workbench.cli.target import write_target
+
+    _say(write_target(pdf, rig))
+
+
+@app.command()
 def view(
     session: Annotated[Path, typer.Argument(help="Session folder.")],
 ) -> None:
@@ -116,6 +128,8 @@ def main() -> None:
     """Entry point: every expected failure becomes a message and its exit code."""
     # Before numpy loads: for matrices as small as a fit's a second thread costs more than it gains.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Imports make 10^5 objects that stay; looking for garbage among them is a tenth of a short command.
+    gc.set_threshold(100_000)
     stop_at_once()
     try:
         app()
