@@ -221,11 +221,12 @@ def measure(scene: Scene, peaks: Peaks) -> list[Trace]:
             is_cut = turn == 0 and half == least and len(group) == rows.size
             win = smallest if is_cut else _cut(scene, rows, cols, group, half)
             params, traces = _fit_group(scene, win, start[group], _origin(rows[group], cols[group], half))
-            for k, trace, one in zip(group, traces, params.tolist(), strict=True):
+            middles = zip(rows[group].tolist(), cols[group].tolist(), strict=True)
+            for k, trace, one, (row, col) in zip(group, traces, params.tolist(), middles, strict=True):
                 found[k] = trace or found[k]
                 _, _, u, v, ln_su, ln_sv = one
                 wanted = half_for(_OUTGROWN * math.exp(max(ln_su, ln_sv)))
-                moved = max(abs(u - cols[k]), abs(v - rows[k])) > _OFF_CENTRE_PX
+                moved = max(abs(u - col), abs(v - row)) > _OFF_CENTRE_PX
                 if trace is not None and (wanted > half or moved):
                     again.append(k)
                     start[k] = one
