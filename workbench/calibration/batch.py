@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -22,7 +23,6 @@ from workbench.calibration.fit import table_of
 from workbench.calibration.observations import Cells, PlacementInfo
 from workbench.calibration.parameters import LENS, PLACEMENT, RAY, REFERENCE, ParameterTable
 from workbench.calibration.prediction import predict_cell
-from workbench.calibration.programs import stored
 from workbench.calibration.scatter import scale_called_for
 from workbench.model.rig import Rig
 
@@ -208,7 +208,7 @@ class _Normal(NamedTuple):
     """(P,)"""
 
 
-@stored(0)
+@partial(jax.jit, static_argnums=0)
 def _solve_chunk(
     varied: tuple[int, ...],
     mean: Array,
