@@ -30,7 +30,10 @@ STEPS = 25
 STEP_TOLERANCE_PX = 1e-4
 OUTLIER_SD = 4.5
 """A pixel this far off is a hot one or dirt: in 150 pixels, one corner in a thousand loses a good one."""
+TONES = (2.0, 98.0)
+"""Percentiles of the pixels about all corners: ink and paper."""
 BLUR_RANGE_PX = (0.3, 4.0)
+"""A corner that wants less is sharper than its pixels, and one that wants more is none."""
 START_BLUR_PX = 0.8
 FARTHEST_MOVE_PX = 2.0
 """From where the markers put the corner."""
@@ -69,7 +72,8 @@ def fit_saddles(
     """
     x, y, tone, use = _windows(image, start_px, px_per_mm, square_mm, gap_mm)
     p = _start(start_px, px_per_mm, tone, use)
-    p = _improve(p, x, y, tone, use)
+    # A hot pixel many times brighter than paper would take its corner along: first, none is.
+    p = _improve(p, x, y, np.clip(tone, *np.percentile(tone, TONES)), use)
     rest = tone - _model(p, x, y)[0]
     scale = 1.4826 * float(np.median(np.abs(rest[use]))) if use.any() else 0.0
     use &= np.abs(rest) <= OUTLIER_SD * max(scale, 1e-12)
@@ -177,6 +181,8 @@ def _judge(
         enough
         & (variance <= WORST_MISFIT * common)
         & (np.linalg.norm(p[:, :2] - start_px, axis=1) <= FARTHEST_MOVE_PX)
+        & (np.exp(p[:, 4]) > 1.001 * BLUR_RANGE_PX[0])
+        & (np.exp(p[:, 4]) < 0.999 * BLUR_RANGE_PX[1])
         & (np.abs(np.sin(p[:, 2] - p[:, 3])) >= FLATTEST_SINE)
         & (np.abs(p[:, 6]) >= FAINTEST_SD * np.sqrt(common))
     )
