@@ -1,7 +1,8 @@
 """Pure maths of lens, rays and target, in JAX; no input or output.
 
 Importing this room switches JAX to 64 bits: a micrometre at five metres needs 9 digits, 32 bits have 7. It
-also lets JAX keep what it has compiled in the user's cache folder: the second `workbench fit` compiles nothing.
+also lets JAX keep what it has compiled in the cache folder of the user, so that the second `workbench fit`
+need not compile.
 """
 
 import os
