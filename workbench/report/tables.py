@@ -114,7 +114,7 @@ def trial_table(rows: Sequence[TrialRow]) -> Table:
             _plain(row.reference_sd_mm),
             _signed(relative),
         )
-    table.caption = "A reading is the mean of the lasers. stated: its 1 sigma; placing: the target's"
+    table.caption = "a reading is the mean of the lasers; stated, placing: 1 sigma"
     table.caption_justify = "left"
     return table
 
