@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from workbench.emulator import open_bench
+from workbench.emulator.board import BoardSurface
 from workbench.model.board import Board, sag_mm
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig, load_rig
@@ -51,6 +52,7 @@ def look(rig: Rig, folder: Path, standoff_mm: float, yaw_deg: float, pitch_deg: 
             bench.mark(f"P/board/{number}")
             frames.append(bench.camera.grab_ambient().image)
         board = bench.target._surfaces[0][0]
+        assert isinstance(board, BoardSurface)
         printed = rig.board.corners_mm
         sag = sag_mm(board.bow_mm, printed)[:, None] * board.axes[2]
         points = board.origin_mm + board.scale * printed @ board.axes[:2] + sag
@@ -134,7 +136,7 @@ class TestRefusals:
             find_board([frame[:, ::-1].copy() for frame in seen.frames], Board())
 
     def test_out_of_focus(self, seen: Seen) -> None:
-        blurred = [cv2.GaussianBlur(frame, (0, 0), 8.0) for frame in seen.frames]
+        blurred = [np.asarray(cv2.GaussianBlur(frame, (0, 0), 8.0), np.uint8) for frame in seen.frames]
         with pytest.raises(BadInputError, match="corners of the board"):
             find_board(blurred, Board())
 

@@ -69,7 +69,8 @@ def test_the_board_is_found_on_the_page_at_its_true_size(board: Board) -> None:
     page = Page(target_pdf(board))
     np.testing.assert_allclose(page.size_mm, board.page_mm, atol=1e-3)
     # A lens blurs: edges sharper than a pixel do not say where in it they lie.
-    found = find_board([cv2.GaussianBlur(page.drawn(), (0, 0), 0.8)], board)
+    seen = np.asarray(cv2.GaussianBlur(page.drawn(), (0, 0), 0.8), np.uint8)
+    found = find_board([seen], board)
     assert len(found.ids) == len(board.corners_mm)
     # The centre of the top left pixel is (0, 0).
     measured_mm = (found.position_px + 0.5) / DPI * 25.4 - np.array(board.page_mm) / 2
