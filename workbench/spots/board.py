@@ -62,7 +62,7 @@ def find_board(frames: Sequence[Image], board: Board) -> BoardCorners:
     if int(good.sum()) < FEWEST_CORNERS:
         raise BadInputError(
             f"expected at least {FEWEST_CORNERS} clear corners of the board, got {int(good.sum())} of"
-            f" {len(ids)} that its markers point to: is it in focus, flat, and evenly lit?"
+            f" {len(ids)} that its markers point to: is it near enough, in focus, and evenly lit?"
         )
     return BoardCorners(ids[good], fitted.position_px[good], fitted.sd_px[good], int((~good).sum()))
 

@@ -93,7 +93,7 @@ def _windows(
     inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
     tone = image[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)]
     from_start = np.stack([x - start_px[:, :1], y - start_px[:, 1:]], axis=1)
-    on_board = np.abs(np.linalg.solve(px_per_mm, from_start))
+    on_board = np.abs(np.linalg.pinv(px_per_mm) @ from_start)
     side_px = np.linalg.norm(px_per_mm, axis=1)
     radius = np.minimum(WINDOW_PX, SQUARE_SHARE * square_mm * side_px.min(axis=1))
     clear_mm = gap_mm - MARKER_PAD_PX / side_px
