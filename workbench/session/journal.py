@@ -11,7 +11,7 @@ from types import TracebackType
 from pydantic import ValidationError
 
 from workbench.model.errors import BadInputError, StoppedError
-from workbench.model.event import CaptureTaken, Event, Record, SpotsFound
+from workbench.model.event import Event, Record, SpotsFound
 
 JOURNAL = "journal.jsonl"
 
@@ -77,8 +77,3 @@ def read_journal(session_dir: Path) -> Iterator[Record]:
         except ValidationError as error:
             what = error.errors()[0]["msg"]
             raise BadInputError(f"{path}:{number}: expected a journal record: {what}") from None
-
-
-def captures_of(records: Iterator[Record]) -> Iterator[CaptureTaken]:
-    """Only the captures."""
-    return (record.event for record in records if isinstance(record.event, CaptureTaken))
