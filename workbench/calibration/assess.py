@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from workbench.calibration.fit import Fit
 from workbench.calibration.parameters import LENS, RAY, REFERENCE
+from workbench.calibration.programs import kept
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import DeterminedBy
 from workbench.optics.lens import Lens
@@ -117,7 +118,7 @@ def _derive_one(fit: Fit, index: int) -> Derived:
     )
 
 
-@jax.jit
+@kept()
 def _infinity(lens: Array, ray: Array) -> tuple[Array, Array, Array]:
     """(2,) where the spot of a target at infinity lies; (2, 8) and (2, 4) derivatives by lens and ray."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -18,6 +17,7 @@ from workbench.calibration.boards import BoardView
 from workbench.calibration.observations import Cells
 from workbench.calibration.parameters import ParameterTable
 from workbench.calibration.prediction import CornerData, Layout, SpotData, predict_corners, predict_spots
+from workbench.calibration.programs import kept
 from workbench.calibration.scatter import scale_called_for
 from workbench.model.board import Board
 
@@ -117,7 +117,7 @@ def _corner_data(cells: Cells, boards: Sequence[BoardView], board: Board) -> Cor
     )
 
 
-@partial(jax.jit, static_argnums=1)
+@kept(static=1)
 def _solve(data: _Data, layout: Layout) -> tuple[Array, Array]:
     """(P,) optimum in units of the prior, and whether the solver converged."""
     import optimistix as optx
@@ -133,7 +133,7 @@ def _solve(data: _Data, layout: Layout) -> tuple[Array, Array]:
     return solution.value, jnp.asarray(solution.result == optx.RESULTS.successful)
 
 
-@partial(jax.jit, static_argnums=2)
+@kept(static=1)
 def _linearise(y: Array, data: _Data, layout: Layout) -> tuple[Array, Array]:
     """Residuals of the data (2 M,) and their derivatives (2 M, P), both in standard deviations."""
     return _data_residual(y, data, layout), jax.jacfwd(_data_residual)(y, data, layout)

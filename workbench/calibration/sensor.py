@@ -13,6 +13,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from workbench.calibration.parameters import LENS, RAY
+from workbench.calibration.programs import kept
 from workbench.model.calibration import Calibration
 from workbench.optics.lens import Lens, radial_slope
 from workbench.optics.rays import Ray, spot_at_inverse_depth
@@ -145,19 +146,19 @@ class Sensor:
         return gradient
 
 
-@jax.jit
+@kept()
 def _slopes(lens: Array, ray: Array, inverse_depth: Array) -> Array:
     """(n,) radial slope of the lens where the ray's points at these inverse depths appear."""
     x, y, tx, ty = ray
     return radial_slope(Lens(*lens), tx + x * inverse_depth, ty + y * inverse_depth)
 
 
-@jax.jit
+@kept()
 def _spots(lens: Array, ray: Array, inverse_depth: Array) -> Array:
     return jnp.stack(spot_at_inverse_depth(Lens(*lens), Ray(*ray), inverse_depth), axis=1)
 
 
-@jax.jit
+@kept()
 def _spot_gradients(lens: Array, ray: Array, offset_mm: Array, range_mm: Array) -> tuple[Array, ...]:
     def spots(lens: Array, ray: Array, offset_mm: Array) -> Array:
         return jnp.asarray(_spots(lens, ray, 1.0 / (range_mm + offset_mm)))
@@ -166,7 +167,7 @@ def _spot_gradients(lens: Array, ray: Array, offset_mm: Array, range_mm: Array) 
     return derivatives
 
 
-@jax.jit
+@kept()
 def _depths(lens: Array, rays: Array, position_px: Array, sd_px: Array) -> tuple[Array, ...]:
     def one(ray: Array, position: Array, sd: Array) -> tuple[Array, ...]:
         return tuple(estimate_depth(Lens(*lens), Ray(*ray), Sighted(*position, *sd)))

@@ -10,15 +10,12 @@ from pathlib import Path
 
 import jax
 
-
-def _compilation_cache() -> str:
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return str(Path(base) / "laser-range-workbench" / "jax")
-
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "laser-range-workbench"
+"""What can be made again, at the price of some seconds."""
 
 for _name, _value in (
     ("jax_enable_x64", True),
-    ("jax_compilation_cache_dir", _compilation_cache()),
+    ("jax_compilation_cache_dir", str(CACHE / "jax")),
     ("jax_persistent_cache_min_compile_time_secs", 0.0),
     # A cache that cannot be written is no cache, and nothing worse.
     ("jax_raise_persistent_cache_errors", False),
