@@ -1,3 +1,4 @@
+import hashlib
 import json
 import os
 import subprocess
@@ -64,17 +65,14 @@ def test_other_statics_and_dtypes_are_other_programs(folder: Path) -> None:
     assert len(list(folder.iterdir())) == 3
 
 
-@pytest.mark.parametrize(
-    "damage", [lambda b: b[:40], lambda b: b"", lambda b: b[:-1] + b"x", lambda b: b * 2]
-)
-def test_a_damaged_file_is_made_again(folder: Path, damage: object) -> None:
-    assert callable(damage)
+@pytest.mark.parametrize("damage", [slice(0, 0), slice(40), slice(-1), slice(1, None)])
+def test_a_damaged_file_is_made_again(folder: Path, damage: slice) -> None:
     kept(static=1)(scaled)(X, Y, 2)
     (file,) = folder.iterdir()
-    whole = file.read_bytes()
-    file.write_bytes(whole[damage])
+    file.write_bytes(file.read_bytes()[damage])
     assert kept(static=1)(scaled)(X, Y, 2)[1] == 5.0
-    assert file.read_bytes() == whole
+    guard, content = file.read_bytes()[:32], file.read_bytes()[32:]
+    assert guard == hashlib.sha256(content).digest()
 
 
 def test_without_a_place_to_keep_it_it_runs_all_the_same(
