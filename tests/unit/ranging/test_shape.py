@@ -1,0 +1,293 @@
+"""Shapes through the ranges of one line of lasers: exact where those are exact, honest where they are not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from workbench.ranging.cylinder import fit_cylinder
+from workbench.ranging.points import Points, interval_mm
+from workbench.ranging.polynomial import fit_polynomial
+from workbench.ranging.shape import SIGNIFICANCE, Shape, fit_shape
+
+Floats = NDArray[np.float64]
+Surface = Callable[[Floats], Floats]
+X = np.array([-60.0, -30.0, 30.0, 60.0])
+SD_PX = 0.064  # a spot's 0.05 px and the speckle's 0.04
+F_PX = 533.0
+SEEDS = (1, 2, 3)
+
+
+def flat(range_mm: float) -> Surface:
+    return lambda x: np.full_like(x, range_mm)
+
+
+def incline(range_mm: float, angle_deg: float) -> Surface:
+    """`range_mm` is the closest, at the left end."""
+    return lambda x: range_mm + np.tan(np.radians(angle_deg)) * (x - X[0])
+
+
+def parabola(range_mm: float) -> Surface:
+    return lambda x: range_mm + 0.02 * x**2
+
+
+def cubic(range_mm: float) -> Surface:
+    return lambda x: range_mm + 0.0003 * (x - X[0]) ** 3
+
+
+def cylinder(range_mm: float, axis_x_mm: float = 0.0, radius_mm: float = 89.0) -> Surface:
+    return lambda x: range_mm + radius_mm - np.sqrt(radius_mm**2 - (x - axis_x_mm) ** 2)
+
+
+def seen(x: Floats, range_mm: Floats, sd_px: float = SD_PX) -> Points:
+    """What spots of this deviation tell: r^2 / (f b) of it in range."""
+    return Points(x, range_mm, np.diag((sd_px * range_mm**2 / (F_PX * np.abs(x))) ** 2))
+
+
+def readings(surface: Surface, n: int, seed: int, x: Floats = X, sd_px: float = SD_PX) -> list[Shape]:
+    """n noisy readings: Gaussian in pixels, that is in the inverse of the range."""
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(0.0, 1.0, (n, len(x))) * sd_px / (F_PX * np.abs(x))
+    return [fit_shape(seen(x, 1.0 / (1.0 / surface(x) + e), sd_px)) for e in noise]
+
+
+def share(shapes: list[Shape], is_so: Callable[[Shape], bool]) -> float:
+    return float(np.mean([is_so(s) for s in shapes]))
+
+
+def holds(shape: Shape, true_mm: float) -> bool:
+    nearest, farthest = shape.closest_interval_mm
+    return nearest <= true_mm <= farthest
+
+
+def inverse_of_information(jac: object) -> Floats:
+    j = np.asarray(jac, np.float64)
+    return np.asarray(np.linalg.inv(j.T @ j), np.float64)
+
+
+def spread(probability: float, n: int) -> float:
+    """Four standard deviations of a share of n trials."""
+    return float(4 * np.sqrt(probability * (1 - probability) / n))
+
+
+@pytest.mark.parametrize(
+    ("surface", "kind", "degree", "closest"),
+    [
+        (flat(500.0), "flat", 0, 500.0),
+        (incline(500.0, 30.0), "incline", 1, 500.0),
+        (incline(300.0, 60.0), "incline", 1, 300.0),
+        (parabola(400.0), "round", 2, 400.0),
+        (cubic(300.0), "round", 3, 300.0),
+        (cylinder(300.0, 25.0), "cylinder", None, 300.0),
+    ],
+)
+def test_exact_points_tell_the_shape(surface: Surface, kind: str, degree: int | None, closest: float) -> None:
+    shape = fit_shape(seen(X, surface(X)))
+    assert (shape.kind, shape.degree) == (kind, degree)
+    assert shape.closest_mm == pytest.approx(closest, abs=1e-6)
+    assert shape.coefficients == pytest.approx(
+        np.polynomial.polynomial.polyfit(X, surface(X), 3)[: len(shape.coefficients)], abs=1e-6
+    )
+
+
+@pytest.mark.parametrize("angle_deg", [-60.0, -20.0, 20.0, 60.0])
+def test_the_angle_of_an_incline(angle_deg: float) -> None:
+    shape = fit_shape(seen(X, 500.0 + np.tan(np.radians(angle_deg)) * X))
+    assert shape.angle_rad == pytest.approx(np.radians(angle_deg))
+    assert shape.closest_x_mm == (X[0] if angle_deg > 0 else X[-1])
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_polynomials_against_scipy(degree: int, seed: int) -> None:
+    """Correlated ranges: the same optimum and covariance as least squares on whitened inverse depths."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(0.0, 1.0, (5, 5)) + 3 * np.eye(5)
+    x = np.array([-70.0, -35.0, 5.0, 40.0, 60.0])
+    points = Points(x, 800.0 + root @ rng.normal(0.0, 1.0, 5), root @ root.T, offset_mm=12.0)
+    depth = points.range_mm + 12.0
+    whiten = np.linalg.inv(np.linalg.cholesky(points.covariance_mm2 / np.outer(depth**2, depth**2)))
+
+    def residual(c: Floats) -> Floats:
+        model = np.polynomial.polynomial.polyval(x, c) + 12.0
+        return np.asarray(whiten @ (1.0 / depth - 1.0 / model))
+
+    scale = 70.0 ** np.arange(degree + 1)
+    start = np.zeros(degree + 1)
+    start[0] = 800.0
+    found = least_squares(residual, start, x_scale=1.0 / scale, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    fit = fit_polynomial(points, degree)
+    assert fit is not None
+    np.testing.assert_allclose(fit.per_mm(), found.x, rtol=1e-6)
+    assert fit.chi2 == pytest.approx(2 * found.cost, rel=1e-6)
+    expected = inverse_of_information(found.jac) * np.outer(scale, scale)
+    np.testing.assert_allclose(fit.covariance, expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_circles_against_scipy(seed: int) -> None:
+    """The optimum along the range, by a solver that knows nothing of distances from the axis."""
+    rng = np.random.default_rng(seed)
+    x = np.array([-60.0, -30.0, 10.0, 30.0, 60.0])
+    sigma = np.array([0.1, 0.2, 0.15, 0.2, 0.1])
+    r = cylinder(250.0, 12.0)(x) + rng.normal(0.0, sigma)
+
+    def residual(p: Floats) -> Floats:
+        return np.asarray((p[1] - np.sqrt(p[2] ** 2 - (x - p[0]) ** 2) - r) / sigma)
+
+    found = least_squares(residual, [12.0, 339.0, 89.0], xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    fit = fit_cylinder(Points(x, r, np.diag(sigma**2)))
+    assert fit is not None
+    sd = np.sqrt(np.diag(inverse_of_information(found.jac)))
+    # Distance from the circle over the cosine is the misfit along the range to first order in noise / radius.
+    assert np.abs((np.array([fit.axis_x_mm, fit.axis_range_mm, fit.radius_mm]) - found.x) / sd).max() < 0.02
+    np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), sd, rtol=0.02)
+    assert fit.chi2 == pytest.approx(2 * found.cost, rel=0.02)
+
+
+@pytest.mark.parametrize("range_mm", [200.0, 1000.0, 4000.0])
+def test_true_flats_are_rejected_at_the_stated_level(range_mm: float) -> None:
+    shapes = [s for seed in SEEDS for s in readings(flat(range_mm), 1500, seed)]
+    rejected = share(shapes, lambda s: s.kind != "flat")
+    assert rejected == pytest.approx(SIGNIFICANCE, abs=spread(SIGNIFICANCE, len(shapes)))
+
+
+@pytest.mark.parametrize("range_mm", [200.0, 1000.0, 4000.0, 8000.0])
+def test_the_closest_range_of_a_flat_is_covered(range_mm: float) -> None:
+    shapes = [s for seed in SEEDS for s in readings(flat(range_mm), 1000, seed)]
+    told = [s for s in shapes if s.kind == "flat"]
+    assert share(told, lambda s: holds(s, range_mm)) == pytest.approx(0.95, abs=spread(0.95, len(told)))
+
+
+@pytest.mark.parametrize(
+    ("range_mm", "angle_deg"), [(200.0, 30.0), (1000.0, 30.0), (500.0, 60.0), (2000.0, 60.0)]
+)
+def test_inclines_are_told_and_covered(range_mm: float, angle_deg: float) -> None:
+    shapes = [s for seed in SEEDS for s in readings(incline(range_mm, angle_deg), 1000, seed)]
+    told = [s for s in shapes if s.kind == "incline"]
+    assert len(told) > 0.98 * len(shapes)
+    bound = spread(0.95, len(told))
+    assert share(told, lambda s: holds(s, range_mm)) == pytest.approx(0.95, abs=bound)
+    z = [(s.angle_rad - np.radians(angle_deg)) / s.angle_sigma_rad for s in told if s.angle_rad is not None]
+    assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=bound)
+
+
+@pytest.mark.parametrize(
+    ("surface", "kind", "degree"),
+    [
+        (parabola(500.0), "round", 2),
+        (cubic(500.0), "round", 3),
+        (cylinder(250.0, 20.0), "cylinder", None),
+    ],
+)
+def test_near_rounds_are_told(surface: Surface, kind: str, degree: int | None) -> None:
+    shapes = [s for seed in SEEDS for s in readings(surface, 300, seed)]
+    assert share(shapes, lambda s: (s.kind, s.degree) == (kind, degree)) > 0.95
+
+
+@pytest.mark.parametrize("range_mm", [125.0, 300.0, 600.0])
+def test_a_cylinder_on_the_axis_of_symmetric_lasers_is_a_parabola_as_well(range_mm: float) -> None:
+    """Four lasers at two distances from the axis: circle and parabola both pass; the interval spans both."""
+    shapes = [s for seed in SEEDS for s in readings(cylinder(range_mm), 300, seed)]
+    both = [s for s in shapes if s.kind == "round" and s.cylinder is not None]
+    assert len(both) > 0.95 * len(shapes)
+    assert share(both, lambda s: holds(s, range_mm)) > 0.95 - spread(0.95, len(both))
+    radius = [(s.cylinder.radius_mm - 89.0) / s.cylinder.radius_sigma_mm for s in both if s.cylinder]
+    assert np.mean(np.abs(radius) < 1.96) == pytest.approx(0.95, abs=spread(0.95, len(both)) + 0.02)
+
+
+def test_an_error_common_to_all_lasers_bends_nothing() -> None:
+    """2 mm in every range: a flat stays one, and its range is known no better than that."""
+    r = np.array([500.1, 499.9, 500.1, 499.9])
+    alone = fit_shape(Points(X, r, 0.01 * np.eye(4)))
+    shared = fit_shape(Points(X, r, 0.01 * np.eye(4) + 4.0))
+    assert (alone.kind, shared.kind) == ("flat", "flat")
+    assert shared.tried[0].chi2 == pytest.approx(alone.tried[0].chi2, rel=1e-2)
+    assert shared.closest_sigma_mm == pytest.approx(np.hypot(2.0, alone.closest_sigma_mm), rel=1e-2)
+
+
+def test_errors_of_the_places_count_by_the_slope() -> None:
+    """At 45 degrees a place wrong by 1 mm is a range wrong by 1 mm; on a flat it is nothing."""
+    steep, none = X + 700.0, np.full(4, 700.0)
+    exact, loose = 0.25 * np.eye(4), np.eye(4)
+    sigma = [
+        fit_shape(Points(X, r, exact, x_covariance_mm2=places)).closest_sigma_mm
+        for r, places in ((steep, None), (steep, loose), (none, None), (none, loose))
+    ]
+    assert sigma[1] == pytest.approx(sigma[0] * np.sqrt(1.25 / 0.25), rel=0.01)
+    assert sigma[3] == pytest.approx(sigma[2])
+    # A place that errs together with its range, along the surface, is no error at all.
+    sliding = fit_shape(Points(X, steep, 2 * np.eye(4), 0.0, 2 * np.eye(4), 1.999 * np.eye(4)))
+    assert sliding.closest_sigma_mm < 0.1
+
+
+def test_three_two_and_one_laser() -> None:
+    three = fit_shape(seen(X[:3], incline(500.0, 45.0)(X[:3])))
+    assert (three.kind, three.tried[-1].freedom) == ("incline", 1)
+    bent = fit_shape(seen(X[1:], parabola(300.0)(X[1:])))
+    assert (bent.kind, bent.degree, bent.probability) == ("round", 2, None)
+    two = fit_shape(seen(X[:2], incline(500.0, 45.0)(X[:2])))
+    assert (two.kind, two.probability) == ("incline", None)
+    one = fit_shape(seen(X[:1], np.array([500.0])))
+    assert (one.kind, one.closest_mm, one.tried) == ("unknown", 500.0, ())
+    assert one.closest_interval_mm == pytest.approx(interval_mm(500.0, one.closest_sigma_mm))
+
+
+def test_a_shape_that_reaches_behind_the_sensor_is_unknown() -> None:
+    wall = incline(100.0, 60.0)(X)
+    shape = fit_shape(seen(X, wall), front_mm=(-240.0, 60.0))
+    assert shape.kind == "unknown"
+    assert shape.closest_mm == pytest.approx(100.0)
+
+
+def test_the_front_may_be_wider_than_the_lasers() -> None:
+    shape = fit_shape(seen(X, incline(500.0, 30.0)(X)), front_mm=(-120.0, 120.0))
+    assert shape.closest_mm == pytest.approx(500.0 - 60.0 * np.tan(np.radians(30.0)))
+    assert shape.closest_x_mm == -120.0
+
+
+@pytest.mark.parametrize("relative", [0.02, 0.1, 0.2])
+def test_the_interval_of_a_far_range_holds_it(relative: float) -> None:
+    """Gaussian in inverse depth: 95 % in the interval, an equal share beyond either end."""
+    rng = np.random.default_rng(5)
+    true, offset, n = 5000.0, 40.0, 20_000
+    depth = 1.0 / (1.0 / (true + offset) + rng.normal(0.0, relative / (true + offset), n))
+    depth = depth[depth > 0]
+    sigma = relative / (true + offset) * depth**2
+    ends = np.array([interval_mm(d - offset, s, offset) for d, s in zip(depth, sigma, strict=True)])
+    assert np.mean(ends[:, 0] > true) == pytest.approx(0.025, abs=spread(0.025, n))
+    assert np.mean(ends[:, 1] < true) == pytest.approx(0.025, abs=spread(0.025, n))
+    symmetric_misses_far_side = np.mean(depth - offset + 1.96 * sigma < true)
+    if relative >= 0.1:
+        assert symmetric_misses_far_side > 0.035
+
+
+def test_an_interval_may_have_no_far_end() -> None:
+    assert interval_mm(5000.0, 2600.0)[1] == np.inf
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    st.lists(st.floats(30.0, 10_000.0), min_size=1, max_size=6),
+    st.floats(1e-4, 0.2),
+    st.floats(-50.0, 50.0),
+)
+def test_any_ranges_have_an_answer(ranges: list[float], relative: float, offset: float) -> None:
+    r = np.array(ranges)
+    x = np.linspace(-60.0, 60.0, len(r)) + 3.0
+    shape = fit_shape(Points(x, r, np.diag((relative * r) ** 2), offset))
+    assert shape.closest_mm > 0
+    assert np.isfinite([shape.closest_mm, shape.closest_sigma_mm]).all()
+    nearest, farthest = shape.closest_interval_mm
+    assert nearest <= shape.closest_mm <= farthest
+
+
+def test_places_must_differ() -> None:
+    with pytest.raises(ValueError, match="all differ"):
+        Points(np.zeros(2), np.full(2, 500.0), np.eye(2))

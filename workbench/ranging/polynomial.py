@@ -1,0 +1,95 @@
+"""Polynomials through spots: range over the place along the front, by weighted least squares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.ranging.points import Points
+
+FloatArray = NDArray[np.float64]
+STEPS = 3
+"""Gauss-Newton steps: the start is exact but for the curvature of inverse depth over a few deviations."""
+
+
+@dataclass(frozen=True)
+class PolynomialFit:
+    """range = sum of coefficients[k] (x / scale)^k."""
+
+    coefficients: FloatArray
+    """(degree + 1,) mm."""
+    covariance: FloatArray
+    """(degree + 1, degree + 1) of them."""
+    scale_mm: float
+    chi2: float
+    freedom: int
+
+    @property
+    def degree(self) -> int:
+        """Of the polynomial."""
+        return len(self.coefficients) - 1
+
+    def per_mm(self) -> tuple[float, ...]:
+        """Coefficients of x^k, mm^(1 - k)."""
+        return tuple((self.coefficients / self.scale_mm ** np.arange(self.degree + 1)).tolist())
+
+    def closest(self, front_mm: tuple[float, float]) -> tuple[float, float, float]:
+        """Smallest range over the front, its 1 sigma, and where it is (x, mm).
+
+        Where the smallest range lies moves with the coefficients, but at a minimum that does not change it.
+        """
+        places = np.array([*front_mm, *self._turns(front_mm)])
+        powers = _powers(places / self.scale_mm, self.degree)
+        ranges = powers @ self.coefficients
+        at = int(ranges.argmin())
+        sigma = float(np.sqrt(powers[at] @ self.covariance @ powers[at]))
+        return float(ranges[at]), sigma, float(places[at])
+
+    def _turns(self, front_mm: tuple[float, float]) -> list[float]:
+        """Places inside the front where the slope is 0."""
+        if self.degree < 2:
+            return []
+        slope = self.coefficients[1:] * np.arange(1, self.degree + 1)
+        roots = np.roots(slope[::-1])
+        real = roots.real[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots.real))] * self.scale_mm
+        return [x for x in real.tolist() if front_mm[0] < x < front_mm[1]]
+
+
+def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
+    """Maximum-likelihood polynomial; None where it would pass behind the pinhole at a spot.
+
+    Weights are the inverse of the full covariance. Residuals are those of inverse depth, whose deviation is
+    the same wherever a spot lies: in ranges, the spots that noise put too near would get too much weight. An
+    error of a place counts by the slope of the polynomial there.
+    """
+    scale = float(np.abs(points.x_mm).max()) or 1.0
+    t = points.x_mm / scale
+    powers = _powers(t, degree)
+    measured = 1.0 / (points.range_mm + points.offset_mm)
+    weight = np.linalg.inv(points.covariance_mm2)
+    coefficients = np.linalg.solve(powers.T @ weight @ powers, powers.T @ weight @ points.range_mm)
+    for _ in range(STEPS):
+        fitted = 1.0 / (powers @ coefficients + points.offset_mm)
+        slope = powers[:, :-1] @ (coefficients[1:] * np.arange(1, degree + 1)) / scale
+        weight = np.linalg.inv(points.residual_covariance(measured**2, -slope * measured**2))
+        by = powers * (fitted**2)[:, None]  # d(1 / z) = -dz / z^2
+        weighted = by.T @ weight
+        covariance = np.linalg.inv(weighted @ by)
+        coefficients = coefficients + covariance @ (weighted @ (fitted - measured))
+    depth = powers @ coefficients + points.offset_mm
+    if not (depth > 0).all():
+        return None
+    residual = 1.0 / depth - measured
+    chi2 = float(residual @ weight @ residual)
+    return PolynomialFit(_floats(coefficients), _floats(covariance), scale, chi2, len(points) - degree - 1)
+
+
+def _powers(t: FloatArray, degree: int) -> FloatArray:
+    """(n, degree + 1) t^0, t^1, ..."""
+    return np.vander(t, degree + 1, increasing=True)
+
+
+def _floats(array: NDArray[np.floating]) -> FloatArray:
+    return np.asarray(array, np.float64)
