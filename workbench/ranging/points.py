@@ -41,6 +41,8 @@ class Points:
             raise ValueError(f"expected spots at places that all differ, got {self.x_mm}")
         if np.shape(self.range_mm) != (n,) or np.shape(self.covariance_mm2) != (n, n):
             raise ValueError(f"expected {n} ranges and their covariance for {n} places")
+        if not (self.range_mm + self.offset_mm > 0).all():
+            raise ValueError(f"expected spots before the pinhole, got ranges {self.range_mm}")
 
     def __len__(self) -> int:
         return len(self.x_mm)
@@ -60,9 +62,12 @@ def interval_mm(range_mm: float, sigma_mm: float, offset_mm: float = 0.0) -> tup
     """The 95 % interval of a range whose inverse depth is Gaussian; its upper end may be infinite.
 
     Range is convex in the spot's place, so that far away the interval reaches farther beyond the range than
-    before it. Where sigma is small against the depth it is the range -+ 1.96 sigma.
+    before it. Where sigma is small against the depth it is the range -+ 1.96 sigma. At or behind the pinhole
+    there is no such range: anything before it is possible.
     """
     depth = range_mm + offset_mm
+    if depth <= 0:
+        return -offset_mm, np.inf
     relative = REACH * sigma_mm / depth
     farthest = depth / (1.0 - relative) if relative < 1 else np.inf
     return depth / (1.0 + relative) - offset_mm, farthest - offset_mm

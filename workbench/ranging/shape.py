@@ -73,7 +73,7 @@ def fit_shape(points: Points, front_mm: tuple[float, float] | None = None) -> Sh
     front = front_mm or (float(points.x_mm.min()), float(points.x_mm.max()))
     tried: list[Tried] = []
     shape = next(_not_rejected(points, front, tried), None) if len(points) > 1 else None
-    if shape is None or shape.closest_mm <= 0:
+    if shape is None or shape.closest_mm <= max(0.0, -points.offset_mm):
         return _unknown(points, tuple(tried))
     return replace(shape, tried=tuple(tried))
 
