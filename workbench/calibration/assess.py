@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from workbench.calibration.fit import Fit
 from workbench.calibration.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.programs import kept
+from workbench.calibration.validation import LeftOut, alarms, leave_each_out
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import DeterminedBy
 from workbench.optics.lens import Lens
@@ -48,6 +49,8 @@ class Assessment:
     reasons: tuple[str, ...]
     """Why refused; empty when accepted."""
     warnings: tuple[str, ...]
+    left_out: tuple[LeftOut, ...] = ()
+    """Cross-validation, a placement each."""
 
 
 def determined_by(fit: Fit) -> tuple[DeterminedBy, ...]:
@@ -84,6 +87,8 @@ def judge(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> Assessm
     if not fit.converged:
         reasons.append("the solver did not converge; check the standoffs and the laser ids")
     reasons += _contradictions(fit)
+    left_out = leave_each_out(fit)
+    reasons += [_alarm(one) for one in alarms(left_out)]
     if not fit.rms_px <= limits.max_rms_px:
         reasons.append(f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px")
     if not max_relative_range_sd <= limits.max_relative_range_sd:
@@ -91,7 +96,7 @@ def judge(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> Assessm
             f"standard deviation of a range up to {100 * max_relative_range_sd:.2g} % of it,"
             f" expected at most {100 * limits.max_relative_range_sd:g} %"
         )
-    return Assessment("refused" if reasons else "accepted", tuple(reasons), tuple(_warnings(fit)))
+    return Assessment("refused" if reasons else "accepted", tuple(reasons), tuple(_warnings(fit)), left_out)
 
 
 def _derive_one(fit: Fit, index: int) -> Derived:
@@ -151,6 +156,17 @@ def _contradictions(fit: Fit) -> list[str]:
         for p, pull, value in zip(fit.table.parameters, fit.prior_pull, fit.values, strict=True)
         if abs(pull) > CONTRADICTION_SD
     ]
+
+
+def _alarm(one: LeftOut) -> str:
+    if one.range_p <= one.spots_p:
+        off = f"lie {one.error_mm:+.2f} mm off in range, where it promises {one.sd_mm:.2g} mm (1 sigma)"
+    else:
+        off = f"lie apart from its prediction (chi2 {one.chi2:.0f} for {one.coordinates} coordinates)"
+    return (
+        f"the captures at {one.standoff_mm:g} mm contradict the others: to the fit without them they {off};"
+        f" check that standoff and its captures, or leave it out (--without-standoff {one.standoff_mm:g})"
+    )
 
 
 def _largest_residual(fit: Fit) -> str:

@@ -83,6 +83,14 @@ class Problem:
         )
         return cls(Layout(lasers, len(cells.placements), len(boards)), data)
 
+    def linearise(self, y: FloatArray, scale: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Predicted - measured (2 M,) and its derivatives by y (2 M, P), in `scale` times the stated noise.
+
+        u and v of one position after the other, spots first; 0 where not measured.
+        """
+        residual, jacobian = _linearise(jnp.asarray(y), self.data, self.layout)
+        return np.asarray(residual) / scale, np.asarray(jacobian) / scale
+
     def solve(self, scale: float) -> Solution:
         """Solve with the pixel noise `scale` times what was stated."""
         inverse_sd = np.asarray(self.data.inverse_sd)

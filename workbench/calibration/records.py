@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from workbench.calibration.assess import Assessment, determined_by
 from workbench.calibration.fit import Fit
-from workbench.model.event import FitFinished, ParameterRecord, RejectedRecord, ResidualRecord
+from workbench.calibration.validation import alarms
+from workbench.model.event import (
+    FitFinished,
+    LaserErrorRecord,
+    LeftOutRecord,
+    ParameterRecord,
+    RejectedRecord,
+    ResidualRecord,
+)
 
 
 def parameter_records(fit: Fit) -> tuple[ParameterRecord, ...]:
@@ -44,6 +52,25 @@ def fit_finished(fit: Fit, assessment: Assessment) -> FitFinished:
         verdict=assessment.verdict,
         reasons=assessment.reasons,
         warnings=assessment.warnings,
+        left_out=left_out_records(assessment),
+    )
+
+
+def left_out_records(assessment: Assessment) -> tuple[LeftOutRecord, ...]:
+    """The cross-validation."""
+    alarmed = alarms(assessment.left_out)
+    return tuple(
+        LeftOutRecord(
+            placement=one.placement,
+            standoff_mm=one.standoff_mm,
+            error_mm=one.error_mm,
+            sd_mm=one.sd_mm,
+            lasers=tuple(
+                LaserErrorRecord(laser_id=i.laser_id, error_mm=i.error_mm, sd_mm=i.sd_mm) for i in one.lasers
+            ),
+            alarm=one in alarmed,
+        )
+        for one in assessment.left_out
     )
 
 

@@ -17,7 +17,7 @@ from workbench.calibration.export import calibrate, kept_because, write_calibrat
 from workbench.calibration.fit import Fit
 from workbench.calibration.fit import fit as fit_sightings
 from workbench.calibration.observations import Rejected, Sighting
-from workbench.calibration.records import parameter_records
+from workbench.calibration.records import left_out_records, parameter_records
 from workbench.calibration.sightings import sight_rows
 from workbench.cli.call import command_line, now, operator
 from workbench.model.acceptance import Acceptance
@@ -26,7 +26,7 @@ from workbench.model.captures import CaptureRow, parse_captures, read_captures_f
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.nested import hold
 from workbench.model.rig import Rig, load_rig
-from workbench.report.tables import derived_table, parameter_table, rejected_lines
+from workbench.report.tables import derived_table, left_out_table, parameter_table, rejected_lines
 from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.files import check_output
 from workbench.session.manifest import load_session_rig, workbench_version
@@ -129,6 +129,7 @@ def _as_json(fitted: Fit, assessment: Assessment) -> dict[str, Any]:
         "warnings": list(assessment.warnings),
         "verdict": assessment.verdict,
         "reasons": list(assessment.reasons),
+        "left_out": [record.model_dump() for record in left_out_records(assessment)],
     }
 
 
@@ -140,6 +141,8 @@ def _print_tables(fitted: Fit, assessment: Assessment) -> None:
     if fitted.boards:
         count, views = len(fitted.corner_residual_px), len(fitted.boards)
         console.print(f"board: {fitted.corner_rms_px:.3f} px over {count} corners in {views} views")
+    if assessment.left_out:
+        console.print(left_out_table(left_out_records(assessment)))
     for line in rejected_lines(fitted.rejected):
         console.print(f"not used: {line}", highlight=False)
     for warning in assessment.warnings:

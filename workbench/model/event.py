@@ -147,6 +147,27 @@ class RejectedRecord(FileModel):
     reason: str
 
 
+class LaserErrorRecord(FileModel):
+    """Range by one laser's spot at a placement left out - its standoff; 1 sigma as promised."""
+
+    laser_id: str
+    error_mm: float
+    sd_mm: float
+
+
+class LeftOutRecord(FileModel):
+    """What the fit without one placement says of it; 1 sigma as promised."""
+
+    placement: str
+    standoff_mm: float
+    error_mm: float
+    """Range by all its spots - standoff."""
+    sd_mm: float
+    lasers: tuple[LaserErrorRecord, ...]
+    alarm: bool
+    """Farther off than promised; one sound fit in 1000 has any."""
+
+
 class FitFinished(FileModel):
     """A calibration has been fitted, accepted or not."""
 
@@ -159,6 +180,8 @@ class FitFinished(FileModel):
     verdict: Literal["accepted", "refused"]
     reasons: tuple[str, ...]
     warnings: tuple[str, ...]
+    left_out: tuple[LeftOutRecord, ...] = ()
+    """Cross-validation, a placement each."""
 
 
 class CalibrationExported(FileModel):

@@ -11,7 +11,7 @@ from rich.table import Table
 from workbench.calibration.assess import Derived
 from workbench.calibration.compare import Difference
 from workbench.calibration.observations import Rejected
-from workbench.model.event import ParameterRecord, RejectedRecord, TrialRow
+from workbench.model.event import LeftOutRecord, ParameterRecord, RejectedRecord, TrialRow
 
 if TYPE_CHECKING:  # the ranger finds spots in images, a table of a fit does without
     from workbench.ranging.ranger import Reading
@@ -56,6 +56,26 @@ def derived_table(derived: Iterable[Derived]) -> Table:
             significant(d.infinity_px, d.infinity_sd),
             _two_digits(d.infinity_sd),
         )
+    return table
+
+
+def left_out_table(left_out: Sequence[LeftOutRecord]) -> Table:
+    """Cross-validation: each standoff as the fit without it ranges it."""
+    ids = list(dict.fromkeys(laser.laser_id for one in left_out for laser in one.lasers))
+    table = Table(title="Each standoff ranged by the fit without it", title_justify="left")
+    for column in ("standoff", "error mm", "sd", "error/sd", *(f"{i} %" for i in ids)):
+        table.add_column(column, justify="right")
+    for one in left_out:
+        relative = {laser.laser_id: 100 * laser.error_mm / one.standoff_mm for laser in one.lasers}
+        table.add_row(
+            f"{one.standoff_mm:g}",
+            _signed(one.error_mm),
+            _two_digits(one.sd_mm),
+            f"{one.error_mm / one.sd_mm:+.1f}{' !' if one.alarm else ''}",
+            *(_signed(relative.get(i)) for i in ids),
+        )
+    table.caption = "error: range - standoff; sd: promised, 1 sigma; %: each laser alone"
+    table.caption_justify = "left"
     return table
 
 
