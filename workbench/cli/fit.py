@@ -130,11 +130,11 @@ def _as_json(fitted: Fit, assessment: Assessment) -> dict[str, Any]:
         "rejected": [
             {"row": int(r.source.removeprefix("row ")), "reason": r.reason} for r in fitted.rejected
         ],
-        "terms": [asdict(term) for term in fitted.terms],
         "warnings": list(assessment.warnings),
         "verdict": assessment.verdict,
         "reasons": list(assessment.reasons),
         "left_out": [record.model_dump() for record in left_out_records(assessment)],
+        "terms": [asdict(term) for term in fitted.terms],
     }
 
 
