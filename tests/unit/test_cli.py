@@ -94,19 +94,20 @@ def test_fit_prints_one_object_and_writes_the_calibration(workbench: Run, tmp_pa
         "observations",
         "rejected",
         "warnings",
+        "null_directions",
         "verdict",
         "reasons",
         "left_out",
-        "terms",
     ]
     assert set(result["parameters"][0]) >= {"name", "unit", "value", "sd", "prior_sd", "data_share"}
     (derived,) = result["derived"]
     assert set(derived) == {"laser", "f_b_px_mm", "f_b_sd", "infinity_px", "infinity_sd"}
     assert derived["laser"] == "1"
     assert (result["observations"], result["rejected"], result["verdict"]) == (9, [], "accepted")
-    assert "cannot give the focal length f_px alone" in " ".join(result["warnings"])
+    assert "the data cannot tell f_px from the baseline" in " ".join(result["warnings"])
+    assert list(result["null_directions"][0]["change"]) == ["f_px", "1.y_mm"]
     assert "largest residual is -1.35 px in v of laser 1 at 300 mm" in " ".join(result["warnings"])
-    assert "cannot give the focal length f_px alone" in " ".join(outcome.err.split())
+    assert "the data cannot tell f_px from the baseline" in " ".join(outcome.err.split())
     assert load_calibration(output).laser_ranger.provenance.command.startswith("workbench fit")
 
 

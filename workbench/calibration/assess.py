@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,6 +14,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from workbench.calibration.fit import Fit
+from workbench.calibration.observability import NullDirection, direction_lines
 from workbench.calibration.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.programs import kept
 from workbench.calibration.validation import LeftOut, alarms, leave_each_out
@@ -51,6 +53,8 @@ class Assessment:
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...] = ()
     """Cross-validation, a placement each."""
+    directions: tuple[NullDirection, ...] = ()
+    """What the data leave open."""
 
 
 def determined_by(fit: Fit) -> tuple[DeterminedBy, ...]:
@@ -75,13 +79,16 @@ def derive(fit: Fit) -> tuple[Derived, ...]:
     return tuple(_derive_one(fit, index) for index in range(len(fit.rig.lasers)))
 
 
-def judge(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> Assessment:
+def judge(
+    fit: Fit, limits: Acceptance, max_relative_range_sd: float, directions: Sequence[NullDirection] = ()
+) -> Assessment:
     """Hold a fit against the limits.
 
     Args:
         fit: the fit.
         limits: what to hold it against.
         max_relative_range_sd: as in the calibration's `validity`.
+        directions: what the data leave open, for the warnings.
     """
     reasons = _too_few_standoffs(fit, limits)
     if not fit.converged:
@@ -96,7 +103,13 @@ def judge(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> Assessm
             f"standard deviation of a range up to {100 * max_relative_range_sd:.2g} % of it,"
             f" expected at most {100 * limits.max_relative_range_sd:g} %"
         )
-    return Assessment("refused" if reasons else "accepted", tuple(reasons), tuple(_warnings(fit)), left_out)
+    return Assessment(
+        verdict="refused" if reasons else "accepted",
+        reasons=tuple(reasons),
+        warnings=(*direction_lines(directions), *_warnings(fit)),
+        left_out=left_out,
+        directions=tuple(directions),
+    )
 
 
 def _derive_one(fit: Fit, index: int) -> Derived:
@@ -179,24 +192,10 @@ def _largest_residual(fit: Fit) -> str:
 
 def _warnings(fit: Fit) -> list[str]:
     sensor = [(p, by) for p, by in zip(fit.table.parameters, determined_by(fit), strict=True) if p.prior.sd]
-    joint = [p.name for p, by in sensor if by == "joint" and p.kind == "sensor"]
     prior = [p.name for p, by in sensor if by == "prior" and p.kind == "sensor"]
-    warnings = []
-    if "f_px" in joint + prior:
-        warnings.append(
-            "the data cannot give the focal length f_px alone: only its products with the baselines are"
-            " determined. The value and sd of f_px rest on the rig file's priors."
-        )
-    if others := [name for name in joint if name != "f_px"]:
-        warnings.append(f"determined only together with other parameters' priors: {', '.join(others)}")
-    if others := [name for name in prior if name != "f_px"]:
-        warnings.append(f"not determined by the data, the rig file's value stands: {', '.join(others)}")
-    warnings += [
-        f"the data call for {term.name} (p {term.p_value:.1g}), which the rig file holds constant:"
-        " give it an sd there"
-        for term in fit.terms
-        if term.verdict == "called for"
-    ]
+    warnings: list[str] = []
+    if prior:
+        warnings.append(f"not determined by the data, the rig file's value stands: {', '.join(prior)}")
     if fit.cells.repeat_scale > 1:
         warnings.append(
             f"repeats scatter {fit.cells.repeat_scale:.2f} times more than the stated noise of the spots;"

@@ -14,8 +14,8 @@ from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
 from workbench.calibration.assess import Assessment, determined_by, judge
 from workbench.calibration.fit import Fit
+from workbench.calibration.observability import Ranges, null_directions
 from workbench.calibration.observations import positions, stated_sd
-from workbench.calibration.records import term_summaries
 from workbench.calibration.sensor import Sensor
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import (
@@ -40,8 +40,17 @@ def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Cal
     """The calibration that a fit amounts to, and the verdict on it."""
     values = dict(zip((p.name for p in fit.table.parameters), fit.values.tolist(), strict=True))
     provisional = _calibration(fit, values, provenance, Assessment("accepted", (), ()), 0.0)
-    worst = _worst_relative_sd(Sensor(provisional))
-    assessment = judge(fit, limits, worst)
+    ranges = _ranges(Sensor(provisional))
+    worst = float(ranges.sd.max()) if len(ranges.sd) else float("inf")
+    sensor = fit.sensor
+    directions = null_directions(
+        fit.rig,
+        fit.table.parameters[sensor],
+        fit.values[sensor],
+        fit.covariance[sensor, sensor],
+        ranges,
+    )
+    assessment = judge(fit, limits, worst, directions)
     return _calibration(fit, values, provenance, assessment, worst), assessment
 
 
@@ -133,7 +142,6 @@ def _calibration(
                 verdict=assessment.verdict,
                 reasons=assessment.reasons,
                 warnings=assessment.warnings,
-                terms=term_summaries(fit),
             ),
             provenance=provenance,
         ),
@@ -163,11 +171,15 @@ def _typical_spot_sd(fit: Fit) -> float:
     return float(np.sqrt((sd[seen] ** 2).mean()) * fit.cells.repeat_scale * fit.noise_scale)
 
 
-def _worst_relative_sd(sensor: Sensor) -> float:
-    """Largest relative standard deviation of a range between the nearest and the farthest standoff."""
+def _ranges(sensor: Sensor) -> Ranges:
+    """Of every laser, wherever its spot is in frame between the nearest and the farthest standoff."""
     nearest, farthest = sensor.calibration.laser_ranger.validity.standoff_mm
     grid = np.geomspace(nearest, farthest, 30)
+    rows, sd = [], []
     # The whole grid at once, seen or not: arrays of one shape are one compiled program.
     with np.errstate(invalid="ignore", over="ignore"):
-        relative = [sensor.relative_range_sd(i, grid)[sensor.in_frame(i, grid)] for i in sensor.ids]
-    return max((float(r.max()) for r in relative if len(r)), default=float("inf"))
+        for laser_id in sensor.ids:
+            found, seen = sensor.typical_ranges(laser_id, grid), sensor.in_frame(laser_id, grid)
+            rows.append((found.by_parameter / grid[:, None])[seen])
+            sd.append((found.sigma_mm / grid)[seen])
+    return Ranges(np.concatenate(rows), np.concatenate(sd))

@@ -11,7 +11,6 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from workbench.model.calibration import TermSummary
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
 
@@ -181,7 +180,6 @@ class FitFinished(FileModel):
     verdict: Literal["accepted", "refused"]
     reasons: tuple[str, ...]
     warnings: tuple[str, ...]
-    terms: tuple[TermSummary, ...] = ()
     left_out: tuple[LeftOutRecord, ...] = ()
     """Cross-validation, a placement each."""
 
