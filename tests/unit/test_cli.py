@@ -98,6 +98,7 @@ def test_fit_prints_one_object_and_writes_the_calibration(workbench: Run, tmp_pa
         "verdict",
         "reasons",
         "left_out",
+        "terms",
     ]
     assert set(result["parameters"][0]) >= {"name", "unit", "value", "sd", "prior_sd", "data_share"}
     (derived,) = result["derived"]

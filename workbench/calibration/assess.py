@@ -196,6 +196,12 @@ def _warnings(fit: Fit) -> list[str]:
     warnings: list[str] = []
     if prior:
         warnings.append(f"not determined by the data, the rig file's value stands: {', '.join(prior)}")
+    warnings += [
+        f"the data call for {term.name} (p {term.p_value:.1g}), which the rig file holds constant:"
+        " give it an sd there"
+        for term in fit.terms
+        if term.verdict == "called for"
+    ]
     if fit.cells.repeat_scale > 1:
         warnings.append(
             f"repeats scatter {fit.cells.repeat_scale:.2f} times more than the stated noise of the spots;"

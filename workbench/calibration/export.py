@@ -16,6 +16,7 @@ from workbench.calibration.assess import Assessment, determined_by, judge
 from workbench.calibration.fit import Fit
 from workbench.calibration.observability import Ranges, null_directions
 from workbench.calibration.observations import positions, stated_sd
+from workbench.calibration.records import term_summaries
 from workbench.calibration.sensor import Sensor
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import (
@@ -142,6 +143,7 @@ def _calibration(
                 verdict=assessment.verdict,
                 reasons=assessment.reasons,
                 warnings=assessment.warnings,
+                terms=term_summaries(fit),
             ),
             provenance=provenance,
         ),

@@ -24,6 +24,7 @@ from workbench.calibration.parameters import (
     unit_of,
 )
 from workbench.calibration.problem import Problem
+from workbench.calibration.term import Term
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.rig import Prior, Rig
 
@@ -64,6 +65,8 @@ class Fit:
     degrees_of_freedom: float
     """Data minus the effective number of parameters that they determine."""
     converged: bool
+    terms: tuple[Term, ...] = ()
+    """What the data say of parts of the model, where it was asked (`significance.choose`)."""
 
     @property
     def sd(self) -> FloatArray:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 from workbench.calibration.assess import Assessment, determined_by
 from workbench.calibration.fit import Fit
 from workbench.calibration.validation import alarms
+from workbench.model.calibration import TermSummary
 from workbench.model.event import (
     FitFinished,
     LaserErrorRecord,
@@ -41,6 +44,11 @@ def parameter_records(fit: Fit) -> tuple[ParameterRecord, ...]:
     )
 
 
+def term_summaries(fit: Fit) -> tuple[TermSummary, ...]:
+    """The evidence on the terms of the model."""
+    return tuple(TermSummary.model_validate(asdict(term)) for term in fit.terms)
+
+
 def fit_finished(fit: Fit, assessment: Assessment) -> FitFinished:
     """The event of a finished fit."""
     return FitFinished(
@@ -52,6 +60,7 @@ def fit_finished(fit: Fit, assessment: Assessment) -> FitFinished:
         verdict=assessment.verdict,
         reasons=assessment.reasons,
         warnings=assessment.warnings,
+        terms=term_summaries(fit),
         left_out=left_out_records(assessment),
     )
 

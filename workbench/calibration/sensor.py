@@ -81,12 +81,12 @@ class Sensor:
     def spot_px(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
         """(n, 2) where the laser's spot appears at ranges (n,); infinity allowed."""
         inverse_depth = 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
-        return np.asarray(_spots(self._lens, self._rays[self.ids.index(laser_id)], inverse_depth))
+        return np.asarray(spots(self._lens, self._rays[self.ids.index(laser_id)], inverse_depth))
 
     def spot_gradient(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
         """(n, 2, P) derivatives of `spot_px` by the calibration's parameters, in the order of its names."""
         ray = self._rays[self.ids.index(laser_id)]
-        by_lens, by_ray, by_offset = _spot_gradients(
+        by_lens, by_ray, by_offset = spot_gradients(
             self._lens, ray, self.offset_mm, np.asarray(range_mm, float)
         )
         gradient = np.zeros((len(range_mm), 2, len(self._columns)))
@@ -156,16 +156,22 @@ def _slopes(lens: Array, ray: Array, inverse_depth: Array) -> Array:
 
 
 @kept()
-def _spots(lens: Array, ray: Array, inverse_depth: Array) -> Array:
+def spots(lens: Array, ray: Array, inverse_depth: Array) -> Array:
+    """(n, 2) pixels where the points of a ray (4,) at inverse depths (n,), 1/mm, appear."""
     return jnp.stack(spot_at_inverse_depth(Lens(*lens), Ray(*ray), inverse_depth), axis=1)
 
 
 @kept()
-def _spot_gradients(lens: Array, ray: Array, offset_mm: Array, range_mm: Array) -> tuple[Array, ...]:
-    def spots(lens: Array, ray: Array, offset_mm: Array) -> Array:
-        return jnp.asarray(_spots(lens, ray, 1.0 / (range_mm + offset_mm)))
+def spot_gradients(lens: Array, ray: Array, offset_mm: Array, range_mm: Array) -> tuple[Array, ...]:
+    """Derivatives of `spots` at ranges (n,) by lens (n, 2, 8), ray (n, 2, 4) and offset (n, 2).
 
-    derivatives: tuple[Array, ...] = jax.jacfwd(spots, argnums=(0, 1, 2))(lens, ray, offset_mm)
+    The last is the derivative by the range as well: only their sum counts.
+    """
+
+    def at_ranges(lens: Array, ray: Array, offset_mm: Array) -> Array:
+        return jnp.asarray(spots(lens, ray, 1.0 / (range_mm + offset_mm)))
+
+    derivatives: tuple[Array, ...] = jax.jacfwd(at_ranges, argnums=(0, 1, 2))(lens, ray, offset_mm)
     return derivatives
 
 

@@ -17,8 +17,9 @@ from workbench.calibration.export import calibrate, kept_because, write_calibrat
 from workbench.calibration.fit import Fit
 from workbench.calibration.fit import fit as fit_sightings
 from workbench.calibration.observations import Rejected, Sighting
-from workbench.calibration.records import left_out_records, parameter_records
+from workbench.calibration.records import left_out_records, parameter_records, term_summaries
 from workbench.calibration.sightings import sight_rows
+from workbench.calibration.significance import choose
 from workbench.cli.call import command_line, now, operator
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
@@ -26,7 +27,7 @@ from workbench.model.captures import CaptureRow, parse_captures, read_captures_f
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.nested import hold
 from workbench.model.rig import Rig, load_rig
-from workbench.report.tables import derived_table, left_out_table, parameter_table, rejected_lines
+from workbench.report.tables import derived_table, left_out_table, parameter_table, rejected_lines, term_table
 from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.files import check_output
 from workbench.session.manifest import load_session_rig, workbench_version
@@ -47,6 +48,8 @@ class Request:
     """Standoffs to leave out."""
     fixed: tuple[str, ...]
     """Parameters to hold at the rig file's value."""
+    kept: tuple[str, ...]
+    """Terms of the model to keep whatever the data say."""
 
 
 def fit_captures(request: Request, as_json: bool) -> None:
@@ -60,7 +63,8 @@ def fit_captures(request: Request, as_json: bool) -> None:
     rig = hold(_rig(request), request.fixed)
     captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
     content = read_captures_file(captures)
-    fitted = fit_sightings(rig, *_sightings(rig, parse_captures(captures, content), request))
+    data = _sightings(rig, parse_captures(captures, content), request)
+    fitted = choose(lambda model: fit_sightings(model, *data), rig, request.kept)
     calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))
@@ -131,6 +135,7 @@ def _as_json(fitted: Fit, assessment: Assessment) -> dict[str, Any]:
         "verdict": assessment.verdict,
         "reasons": list(assessment.reasons),
         "left_out": [record.model_dump() for record in left_out_records(assessment)],
+        "terms": [asdict(term) for term in fitted.terms],
     }
 
 
@@ -138,6 +143,8 @@ def _print_tables(fitted: Fit, assessment: Assessment) -> None:
     console = Console(stderr=True)
     console.print(parameter_table(parameter_records(fitted)))
     console.print(derived_table(derive(fitted)))
+    if fitted.terms:
+        console.print(term_table(term_summaries(fitted)))
     console.print(f"residual rms {fitted.rms_px:.2f} px over {len(fitted.used)} observations")
     if fitted.boards:
         count, views = len(fitted.corner_residual_px), len(fitted.boards)

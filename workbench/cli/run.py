@@ -15,7 +15,7 @@ from workbench.cli.stopping import StopAfterShot
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.procedure.run import Caller, Plan, run
-from workbench.report.tables import parameter_table, rejected_lines, trial_table
+from workbench.report.tables import parameter_table, rejected_lines, term_table, trial_table
 from workbench.viewer.recording import RecordingConsumer
 
 
@@ -78,6 +78,8 @@ class Terminal:
                 self._end_step(e.outcome)
             case ev.FitFinished() as e:
                 self._console.print(parameter_table(e.parameters))
+                if e.terms:
+                    self._console.print(term_table(e.terms))
                 for line in rejected_lines(e.rejected):
                     self._console.print(Padding(Text(f"not used: {line}"), (0, 0, 0, 5)))
                 for warning in e.warnings:

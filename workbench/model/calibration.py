@@ -17,6 +17,17 @@ from workbench.model.rig import LaserId, NonNegativeFloat, PositiveFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 DeterminedBy = Literal["data", "joint", "prior"]
+TermVerdict = Literal["shown", "open", "below", "asked for", "absent", "idle", "called for"]
+TERM_VERDICTS: dict[TermVerdict, str] = {
+    "shown": "kept: the data show it",
+    "open": "kept: the data cannot tell",
+    "below": "kept: a higher order stays",
+    "asked for": "kept: asked for",
+    "absent": "left out: shown to be absent",
+    "idle": "left out: no range depends on it",
+    "called for": "MISSING: the data call for it",
+}
+"""What became of a term of the model, and why."""
 Vector3 = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 AGREEMENT = 1e-9
 """Relative difference that two copies of one number in the file may have."""
@@ -114,6 +125,19 @@ class Validity(FileModel):
         return self
 
 
+class TermSummary(FileModel):
+    """The evidence on a term of the model, against its absence."""
+
+    name: str
+    verdict: TermVerdict
+    p_value: float
+    """Of the data, were it absent."""
+    log10_bayes_factor: float
+    """For the model with it over the model without."""
+    range_shift_sd: float | None
+    """Largest change of a range without it, in standard deviations; null where the model lacks it."""
+
+
 class FitSummary(FileModel):
     """How the fit went."""
 
@@ -127,6 +151,7 @@ class FitSummary(FileModel):
     accepted_because: str = ""
     """Why somebody kept it all the same."""
     warnings: tuple[str, ...] = ()
+    terms: tuple[TermSummary, ...] = ()
 
     @property
     def usable(self) -> bool:

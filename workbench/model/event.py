@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from workbench.model.calibration import TermSummary
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
 
@@ -180,6 +181,7 @@ class FitFinished(FileModel):
     verdict: Literal["accepted", "refused"]
     reasons: tuple[str, ...]
     warnings: tuple[str, ...]
+    terms: tuple[TermSummary, ...] = ()
     left_out: tuple[LeftOutRecord, ...] = ()
     """Cross-validation, a placement each."""
 

@@ -9,11 +9,13 @@ from workbench.model.errors import BadInputError
 from workbench.model.rig import Prior, Rig
 from workbench.model.yamlfile import FileModel
 
+TILTS = "tilts"
+"""Of all placements of the target, together."""
 Part = TypeVar("Part", bound=FileModel)
 
 
 def hold(rig: Rig, names: Iterable[str]) -> Rig:
-    """The rig with parameters made constants, by the names of the calibration: `k2`, `offset_mm`, `L1.tx`.
+    """The rig with parameters made constants, by their names in the calibration: `k2`, `L1.tx`; or `tilts`.
 
     Raises:
         BadInputError: the rig has no such parameter.
@@ -24,6 +26,8 @@ def hold(rig: Rig, names: Iterable[str]) -> Rig:
 
 
 def _hold_one(rig: Rig, name: str) -> Rig:
+    if name == TILTS:
+        return rig.model_copy(update={"bench": rig.bench.model_copy(update={"tilt_sd_deg": 0.0})})
     laser_id, _, of_ray = name.rpartition(".")
     if laser_id in rig.laser_ids and of_ray in _priors(rig.lasers[0]):
         index = rig.laser_ids.index(laser_id)
@@ -34,7 +38,7 @@ def _hold_one(rig: Rig, name: str) -> Rig:
     if name in _priors(rig.bench):
         return rig.model_copy(update={"bench": _constant(rig.bench, name)})
     rays = [f"{i}.{p}" for i in rig.laser_ids for p in _priors(rig.lasers[0])]
-    known = ", ".join([*_priors(rig.camera), *_priors(rig.bench), *rays])
+    known = ", ".join([*_priors(rig.camera), *_priors(rig.bench), TILTS, *rays])
     raise BadInputError(f"parameter {name}: expected one of {known}")
 
 

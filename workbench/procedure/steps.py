@@ -17,6 +17,7 @@ from workbench.calibration.fit import fit
 from workbench.calibration.observations import PlacementInfo, Rejected, Sighting
 from workbench.calibration.records import fit_finished
 from workbench.calibration.sightings import prior_scanline, sight
+from workbench.calibration.significance import choose
 from workbench.model import event as ev
 from workbench.model import procedure as pr
 from workbench.model.captures import BOARD
@@ -108,7 +109,7 @@ def _(step: pr.FitStep, context: Context, name: str) -> str:
     sightings = [f for f in found if isinstance(f, Sighting)]
     rejected = [f for f in (*found, *context.boards.values()) if isinstance(f, Rejected)]
     boards = [b for b in context.boards.values() if isinstance(b, BoardView)]
-    fitted = fit(context.rig, sightings, rejected, boards)
+    fitted = choose(lambda model: fit(model, sightings, rejected, boards), context.rig)
     provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
     calibration, assessment = calibrate(fitted, step.limits, provenance)
     context.emit(fit_finished(fitted, assessment))

@@ -11,6 +11,7 @@ from rich.table import Table
 from workbench.calibration.assess import Derived
 from workbench.calibration.compare import Difference
 from workbench.calibration.observations import Rejected
+from workbench.model.calibration import TERM_VERDICTS, TermSummary
 from workbench.model.event import LeftOutRecord, ParameterRecord, RejectedRecord, TrialRow
 
 if TYPE_CHECKING:  # the ranger finds spots in images, a table of a fit does without
@@ -75,6 +76,26 @@ def left_out_table(left_out: Sequence[LeftOutRecord]) -> Table:
             *(_signed(relative.get(i)) for i in ids),
         )
     table.caption = "error: range - standoff; sd: promised, 1 sigma; %: each laser alone"
+    table.caption_justify = "left"
+    return table
+
+
+def term_table(terms: Iterable[TermSummary]) -> Table:
+    """The evidence on terms of the model."""
+    table = Table(title="Terms of the model, each against its absence", title_justify="left")
+    table.add_column("term")
+    for column in ("p", "evidence", "ranges"):
+        table.add_column(column, justify="right")
+    table.add_column("verdict")
+    for t in terms:
+        shift = "-" if t.range_shift_sd is None else f"{t.range_shift_sd:.2g} sd"
+        table.add_row(
+            t.name, f"{t.p_value:.2g}", f"{t.log10_bayes_factor:+.1f}", shift, TERM_VERDICTS[t.verdict]
+        )
+    table.caption = (
+        "p: chance of such data without the term; evidence: log10 of the Bayes factor for it;"
+        " ranges: how far they move without it"
+    )
     table.caption_justify = "left"
     return table
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from math import floor, log10
 
+from workbench.model.calibration import TERM_VERDICTS, TermSummary
 from workbench.model.event import FitFinished, ParameterRecord, ReadingTaken, TrialFinished, TrialRow
 
 
@@ -35,6 +36,24 @@ def parameter_table(parameters: Sequence[ParameterRecord]) -> str:
     ]
     head = ("parameter", "value", "unit", "prior", "from the data", "determined by")
     return "\n\n".join(["# Parameters (one sigma)", _table(head, rows)])
+
+
+def term_table(terms: Sequence[TermSummary]) -> str:
+    """The evidence on each term of the model; nothing for sessions recorded before it was weighed."""
+    if not terms:
+        return ""
+    head = ("term", "p without it", "log10 Bayes factor", "shift of ranges without it, sd", "verdict")
+    rows = [
+        (
+            one.name,
+            f"{one.p_value:.2g}",
+            f"{one.log10_bayes_factor:+.1f}",
+            _number(one.range_shift_sd, ".2g"),
+            TERM_VERDICTS[one.verdict],
+        )
+        for one in terms
+    ]
+    return "\n\n".join(["", "# Terms of the model", _table(head, rows)])
 
 
 def trial_table(trial: TrialFinished, readings: Sequence[ReadingTaken]) -> str:

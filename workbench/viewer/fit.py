@@ -33,7 +33,9 @@ def log_fit(stream: Stream, fit: FitFinished, moment: Moment, colors: Mapping[st
         chart = Chart("px", residual_marks(fit, axis), colors)
         log_chart(stream, f"{at.FIT_CHART}/{axis}", chart, f"{axis} was not measured")
     _document(stream, at.FIT_SUMMARY, documents.fit_summary(fit))
-    _document(stream, at.FIT_TABLE, documents.parameter_table(fit.parameters))
+    _document(
+        stream, at.FIT_TABLE, documents.parameter_table(fit.parameters) + documents.term_table(fit.terms)
+    )
     for residual in fit.residuals:
         stream.at(Moment(moment.capture, moment.step, moment.time_ns, residual.standoff_mm))
         _log_residual(stream, residual)

@@ -1,0 +1,157 @@
+"""Nested models against their marginal likelihoods, and choices against simulated truth."""
+
+from __future__ import annotations
+
+from math import log
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import kstest
+
+from tests.unit.rigs import World, prior, thesis_rig
+from workbench.calibration import significance
+from workbench.calibration.fit import Fit, fit
+from workbench.calibration.problem import Problem
+from workbench.calibration.significance import choose
+from workbench.calibration.term import Term
+from workbench.model.rig import Rig
+
+FloatArray = NDArray[np.float64]
+SEEDS = (3, 4, 8)
+
+
+def lens(rig: Rig, **priors: float) -> Rig:
+    """The rig with other standard deviations of its lens terms."""
+    camera = rig.camera.model_copy(update={name: prior(0.0, sd) for name, sd in priors.items()})
+    return rig.model_copy(update={"camera": camera})
+
+
+def chosen(rig: Rig, world: World, keep: tuple[str, ...] = ()) -> Fit:
+    sightings = world.sightings()
+    return choose(lambda model: fit(model, sightings), rig, keep)
+
+
+def told(fitted: Fit) -> dict[str, Term]:
+    return {term.name: term for term in fitted.terms}
+
+
+def linear(fitted: Fit) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """At the priors' means: residuals (n,), derivatives (n, P) in priors' sd; which are free (P,)."""
+    problem = Problem.of(len(fitted.rig.lasers), fitted.table, fitted.cells, (), fitted.rig.board)
+    sd = fitted.table.prior_sd
+    y = np.divide(fitted.values - fitted.table.prior_mean, sd, out=np.zeros_like(sd), where=sd > 0)
+    residual, jacobian = problem.linearise(y, fitted.noise_scale)
+    return residual - jacobian @ y, jacobian, sd > 0
+
+
+def log_likelihood(residual: FloatArray, jacobian: FloatArray) -> float:
+    """Marginal over parameters with unit priors and data with unit noise."""
+    covariance = np.eye(len(residual)) + jacobian @ jacobian.T
+    return float(-0.5 * (residual @ np.linalg.solve(covariance, residual) + np.linalg.slogdet(covariance)[1]))
+
+
+@pytest.mark.parametrize("name", ["k2", "k3", "ruler_scale", "tilts"])
+def test_the_bayes_factor_is_the_ratio_of_marginal_likelihoods(name: str) -> None:
+    rig = lens(thesis_rig(), k3=0.3)
+    fitted = fit(rig, World(rig, 3).sightings())
+    index = significance._indices(fitted, name)
+    residual, jacobian, _ = linear(fitted)
+    without = np.delete(jacobian, index, axis=1)
+    expected = (log_likelihood(residual, jacobian) - log_likelihood(residual, without)) / log(10)
+    assert significance._compare(fitted, index).log10_bayes_factor == pytest.approx(expected, abs=1e-4)
+
+
+def test_what_is_carried_is_the_error_of_the_smaller_estimate() -> None:
+    """Its gain applied to data whose k3 is as the prior says, against `_carried`."""
+    rig = lens(thesis_rig(), k3=0.05)
+    fitted = fit(rig, World(rig, 3).sightings())
+    index = significance._indices(fitted, "k3")
+    _, jacobian, free = linear(fitted)
+    free[index] = False
+    within, of_k3 = jacobian[:, free], jacobian[:, index]
+    gain = np.linalg.solve(within.T @ within + np.eye(free.sum()), within.T)
+    # Rows: errors of the others and of k3; columns: what they come from, all of unit variance.
+    by_others = np.concatenate([gain @ within - np.eye(free.sum()), np.zeros((1, free.sum()))])
+    by_noise = np.concatenate([gain, np.zeros((1, len(jacobian)))])
+    by_k3 = np.concatenate([gain @ of_k3, [[-1.0]]])
+    expected = sum(part @ part.T for part in (by_others, by_noise, by_k3))
+    carried = significance._carried(fitted, index, significance._compare(fitted, index).follow)
+    order = np.concatenate([np.flatnonzero(free), index])
+    sd = fitted.table.prior_sd[order]
+    np.testing.assert_allclose(carried[np.ix_(order, order)] / np.outer(sd, sd), expected, atol=1e-6)
+
+
+def test_p_values_of_an_absent_term_are_uniform() -> None:
+    rig = lens(thesis_rig(), k3=0.3)
+    worlds = [World(lens(rig, k3=0.0), seed) for seed in range(40)]
+    p_values = []
+    for world in worlds:
+        fitted = fit(rig, [s for s in world.sightings() if s.standoff_mm > 150])
+        p_values.append(significance._compare(fitted, significance._indices(fitted, "k3")).p_value)
+    assert kstest(p_values, "uniform").pvalue > 0.01
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_distortion_that_is_there_is_shown(seed: int) -> None:
+    world = World(thesis_rig(), seed)
+    world.values |= {"k1": -0.25, "k2": 0.3}
+    fitted = chosen(thesis_rig(), world)
+    assert told(fitted)["k2"].verdict == "shown"
+    assert told(fitted)["k2"].p_value < 0.01
+    assert told(fitted)["k1"].verdict in ("shown", "below")
+    assert fitted.rig == thesis_rig()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_tilts_that_are_not_there_are_left_out(seed: int) -> None:
+    square = thesis_rig()
+    world = World(
+        square.model_copy(update={"bench": square.bench.model_copy(update={"tilt_sd_deg": 0.0})}), seed
+    )
+    fitted = chosen(thesis_rig(), world)
+    assert told(fitted)["tilts"].verdict == "absent"
+    tilts = [p.name.endswith(("slope_x", "slope_y")) for p in fitted.table.parameters]
+    assert (fitted.sd[tilts] == 0).all()
+    assert told(chosen(square, World(square, seed)))["tilts"].verdict == "shown"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_k3_that_buys_nothing_is_left_out_and_stays_in_the_covariance(seed: int) -> None:
+    rig = lens(thesis_rig(), k3=0.1)
+    world = World(rig, seed)
+    fitted = chosen(rig, world)
+    term = told(fitted)["k3"]
+    assert (term.verdict, abs(term.log10_bayes_factor) < 1) == ("idle", True)
+    names = [p.name for p in fitted.table.parameters]
+    k3 = names.index("k3")
+    assert (fitted.values[k3], fitted.sd[k3]) == (0.0, pytest.approx(0.1))
+    full = chosen(rig, world, keep=("k3",))
+    assert told(full)["k3"].verdict == "asked for"
+    assert full.sd[k3] > 0
+    others = np.flatnonzero((full.sd > 0) & (np.arange(len(names)) != k3))
+    np.testing.assert_allclose(fitted.sd[others], full.sd[others], rtol=0.03)
+    # A fit that never knew of k3 claims too much.
+    never = fit(lens(rig, k3=0.0), world.sightings())
+    assert never.sd[names.index("k2")] < 0.9 * fitted.sd[names.index("k2")]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_term_that_the_rig_file_denies_is_called_for(seed: int) -> None:
+    rig = lens(thesis_rig(), k2=0.0)
+    world = World(thesis_rig(), seed)
+    world.values |= {"k1": -0.2, "k2": 0.4}
+    term = told(chosen(rig, world))["k2"]
+    assert (term.verdict, term.range_shift_sd) == ("called for", None)
+    assert term.p_value < 1e-3
+    assert term.log10_bayes_factor > 0
+    world.values |= {"k2": 0.0}
+    assert "k2" not in told(chosen(rig, world))
+
+
+def test_no_order_is_left_out_below_one_that_stays() -> None:
+    world = World(thesis_rig(), 3)
+    world.values |= {"k1": 0.0, "k2": 0.3}
+    for term in chosen(thesis_rig(), world).terms:
+        if term.name == "k1":
+            assert term.verdict in ("shown", "open", "below")
