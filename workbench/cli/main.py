@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 import traceback
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -43,16 +44,77 @@ def _common(
     """Calibration and lab-measurement workbench for laser-spot range sensors."""
 
 
+AnswersFile = Annotated[
+    Path | None, typer.Option(help="Answers to prompts (YAML); not to those that need eyes at the bench.")
+]
+NoInput = Annotated[
+    bool, typer.Option("--no-input", help="Ask nobody: an open prompt ends with exit code 6.")
+]
+
+
 @app.command()
 def run(
     procedures: Annotated[list[Path], typer.Argument(help="Procedure files, run in this order.")],
     rig: Annotated[Path, typer.Option(help="Rig file.")],
     sessions: Annotated[Path, typer.Option(help="Folder for the new session.")] = Path("sessions"),
+    answers: AnswersFile = None,
+    no_input: NoInput = False,
 ) -> None:
     """Run procedures on a rig, in one session."""
-    from workbench.cli.run import run_procedures
+    from workbench.cli.run import Answers, run_procedures
 
-    run_procedures(procedures, rig, sessions)
+    run_procedures(procedures, rig, sessions, Answers(answers, no_input))
+
+
+Sessions = Annotated[Path, typer.Option(help="Folder of sessions.")]
+
+
+@app.command()
+def resume(
+    session: Annotated[
+        Path | None, typer.Argument(help="Session, by folder or name; the last unfinished one if not given.")
+    ] = None,
+    sessions: Sessions = Path("sessions"),
+    accept_changes: Annotated[
+        str | None,
+        typer.Option(metavar="REASON", help="Go on although rig, procedure or versions changed."),
+    ] = None,
+    answers: AnswersFile = None,
+    no_input: NoInput = False,
+) -> None:
+    """Go on with a session that ended early: nothing that is whole is captured again."""
+    from workbench.cli.run import Answers, resume_session
+    from workbench.cli.sessions import find_session
+
+    resume_session(find_session(session, sessions), accept_changes, Answers(answers, no_input))
+
+
+@app.command(name="sessions")
+def sessions_(sessions: Sessions = Path("sessions"), json: Json = False) -> None:
+    """List sessions: finished, stopped, failed or interrupted, and how to go on."""
+    from workbench.cli.sessions import list_sessions
+
+    list_sessions(sessions, json)
+
+
+@app.command()
+def check(files: Annotated[list[Path], typer.Argument(help="Procedure and rig files.")]) -> None:
+    """Look through procedure and rig files: what is wrong is named with file and line."""
+    from workbench.cli.plan import check_files
+
+    check_files(files)
+
+
+@app.command()
+def plan(
+    procedures: Annotated[list[Path], typer.Argument(help="Procedure files, in the order of `run`.")],
+    rig: Annotated[Path, typer.Option(help="Rig file.")],
+    sessions: Sessions = Path("sessions"),
+) -> None:
+    """Print every step, the number of shots, seconds of emission, and the time it will take."""
+    from workbench.cli.plan import print_plan
+
+    print_plan(procedures, rig, sessions)
 
 
 @app.command()
@@ -149,4 +211,5 @@ def main() -> None:
 
 
 def _say(message: str) -> None:
-    typer.echo(message, err=True)
+    with suppress(OSError):  # a terminal that was closed
+        typer.echo(message, err=True)

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.model.prompt import Answer, Prompt
 from workbench.model.target import Placement
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
@@ -45,6 +46,21 @@ class Camera(Protocol):
         """Release the device."""
 
 
+@runtime_checkable
+class StreamingCamera(Camera, Protocol):
+    """A camera that lets its stream be looked at, so that its latency can be measured."""
+
+    discard_frames: int
+    """How many frames `grab` throws away as too old."""
+
+    def read(self) -> Frame:
+        """The next frame of the stream, as old as it is.
+
+        Raises:
+            RigNotReadyError: the camera does not deliver.
+        """
+
+
 class LaserBank(Protocol):
     """The lasers. There is one way to switch one on, and it ends by itself."""
 
@@ -74,6 +90,17 @@ class Target(Protocol):
         """Put the target there; returns the placement as it was measured by the ruler."""
 
 
+class Operator(Protocol):
+    """Whoever answers a procedure's questions."""
+
+    def ask(self, prompt: Prompt) -> Answer:
+        """Put one question and wait for its answer, which fits (`Prompt.refuse`).
+
+        Raises:
+            AnswerNeededError: nobody is there to answer.
+        """
+
+
 @dataclass(frozen=True)
 class Bench:
     """The devices of one rig, opened together and closed together."""
@@ -84,6 +111,8 @@ class Bench:
     mark: Callable[[str], None] = lambda key: None
     """Called with the key of the capture about to be taken. An emulated bench keys its noise by it, so that a
     capture taken again after a stop is the same to the bit; a real bench has no use for it."""
+    operator: Operator | None = None
+    """An emulated bench has one of its own, who does what he is told; at a real one a person answers."""
 
     def __enter__(self) -> Bench:
         return self

@@ -9,6 +9,7 @@ from workbench.devices.protocols import Bench
 from workbench.devices.serial_lasers import SerialLaserBank
 from workbench.emulator.camera import EmulatedCamera
 from workbench.emulator.controller import Controller
+from workbench.emulator.operator import EmulatedOperator
 from workbench.emulator.pty import PtyServer
 from workbench.emulator.scene import Scene
 from workbench.emulator.sensor import Sensor
@@ -62,6 +63,7 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
         camera=camera,
         lasers=lasers,
         target=scene,
+        operator=EmulatedOperator() if spec.answers else None,
         mark=camera.mark,
         controller=controller,
         server=server,

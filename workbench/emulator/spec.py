@@ -171,6 +171,8 @@ class EmulatorSpec(FileModel):
     surface: SurfaceSpec = SurfaceSpec()
     truth: TruthSpec = TruthSpec()
     controller: ControllerSpec = ControllerSpec()
+    answers: bool = True
+    """Whether the bench answers the procedures' questions; without it a person can practise on it."""
 
 
 def emulator_spec(rig: Rig) -> EmulatorSpec:

@@ -12,6 +12,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from workbench.model.calibration import TermSummary
+from workbench.model.limit import Verdict
+from workbench.model.prompt import Answer, By
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
 
@@ -60,6 +62,48 @@ class TargetPlaced(FileModel):
 
     kind: Literal["target_placed"] = "target_placed"
     placement: Placement
+    by: By | None = None
+    """Who says so."""
+
+
+class Answered(FileModel):
+    """A question has been answered. A target that was placed is told by `TargetPlaced` instead."""
+
+    kind: Literal["answered"] = "answered"
+    key: str
+    """Of the prompt: the step's name, a placement's key, or `safety`."""
+    question: str
+    answer: Answer
+
+
+class PlacementFinished(FileModel):
+    """Everything that was to be captured at a placement is captured; a resumed session keeps it."""
+
+    kind: Literal["placement_finished"] = "placement_finished"
+    key: str
+
+
+class SetAside(FileModel):
+    """The records from `from_n` on count no more: the operator has a placement captured again."""
+
+    kind: Literal["set_aside"] = "set_aside"
+    key: str
+    """The placement's."""
+    from_n: int
+    reason: str
+
+
+class SessionResumed(FileModel):
+    """A session that ended early goes on; its records from `from_n` on count no more."""
+
+    kind: Literal["session_resumed"] = "session_resumed"
+    from_n: int
+    operator: str
+    command: str
+    created: str
+    changes: tuple[str, ...] = ()
+    """What was different from the session's files: rig, procedure, version of the workbench."""
+    accepted_because: str | None = None
 
 
 class FrameRef(FileModel):
@@ -89,6 +133,8 @@ class CaptureTaken(FileModel):
     repeat: int
     on: FrameRef
     off: FrameRef | None = None
+    lit_s: float | None = None
+    """How long a laser was lit for it, switching included; None for a frame in room light."""
 
 
 class SpotRecord(FileModel):
@@ -114,6 +160,27 @@ class SpotsFound(FileModel):
     key: str
     spots: tuple[SpotRecord, ...]
     failures: tuple[str, ...] = ()
+
+
+class LimitChecked(FileModel):
+    """A measured quantity has been held against a limit of the procedure."""
+
+    kind: Literal["limit_checked"] = "limit_checked"
+    step: str
+    of: str
+    """What it was measured on: `fit`, or a laser at a placement."""
+    quantity: str
+    value: float | None
+    """None where it could not be measured."""
+    limit: str
+    verdict: Verdict
+
+
+class LatencyMeasured(FileModel):
+    """So many frames of the camera's stream are older than the last switching of a laser."""
+
+    kind: Literal["latency_measured"] = "latency_measured"
+    frames: int
 
 
 class ParameterRecord(FileModel):
@@ -258,8 +325,14 @@ Event = Annotated[
     | StepStarted
     | StepFinished
     | TargetPlaced
+    | Answered
+    | PlacementFinished
+    | SetAside
+    | SessionResumed
     | CaptureTaken
     | SpotsFound
+    | LimitChecked
+    | LatencyMeasured
     | FitFinished
     | CalibrationExported
     | ReadingTaken

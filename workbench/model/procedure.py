@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from workbench.model.acceptance import Acceptance
+from workbench.model.limit import Limit
 from workbench.model.rig import NonNegativeFloat, PositiveFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
@@ -26,6 +27,97 @@ class MessageStep(FileModel):
         return self.text
 
 
+class ConfirmStep(FileModel):
+    """Have the technician do something, and wait until it is done."""
+
+    step: Literal["confirm"]
+    text: str
+    expect: str = ""
+    """What is to be seen when it is done."""
+    otherwise: str = ""
+    """What to do if it is not so."""
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return self.text
+
+
+class NumberAsked(FileModel):
+    """A number to be read off."""
+
+    unit: str
+    within: Annotated[tuple[float, float], Field(alias="in")]
+    usual: float | None = None
+
+
+class AskStep(FileModel):
+    """Ask for a number or for one of some choices; the answer is kept in the journal."""
+
+    step: Literal["ask"]
+    text: str
+    number: NumberAsked | None = None
+    choices: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _asks_for_one_thing(self) -> AskStep:
+        if (self.number is None) == (not self.choices):
+            raise ValueError("expected either `number` or `choices`")
+        return self
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return self.text
+
+
+class PlaceTargetStep(FileModel):
+    """Have a flat target placed, for the steps that need one without capturing a grid."""
+
+    gives: ClassVar = "target"
+    step: Literal["place_target"]
+    standoff_mm: PositiveFloat
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return f"Place the target at {self.standoff_mm:g} mm"
+
+
+class WarmUpStep(FileModel):
+    """Let the camera run for some frames with the lasers off: its focal length drifts while it warms."""
+
+    step: Literal["warm_up"]
+    frames: Annotated[int, Field(ge=1)]
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return f"Warm up for {self.frames} frames"
+
+
+class MeasureLatencyStep(FileModel):
+    """Count the frames between a laser's switching on and the first that shows it; it holds from then on."""
+
+    needs: ClassVar = "target"
+    step: Literal["measure_latency"]
+    most_frames: Annotated[int, Field(ge=0, le=50)] = 20
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return "Measure the camera's latency"
+
+
+class GridLimits(FileModel):
+    """Limits on the captures of one laser at one placement; `workbench.procedure.quality` says of what."""
+
+    missing: Limit | None = None
+    saturated: Limit | None = None
+    snr: Limit | None = None
+    scatter_px: Limit | None = None
+
+
 class CaptureGridStep(FileModel):
     """Fire each laser alone at each standoff, `repeats` pairs of frames each."""
 
@@ -33,6 +125,7 @@ class CaptureGridStep(FileModel):
     step: Literal["capture_grid"]
     standoffs_mm: Standoffs
     repeats: Annotated[int, Field(ge=1)]
+    limits: GridLimits = GridLimits()
 
     @model_validator(mode="after")
     def _standoffs_differ(self) -> CaptureGridStep:
@@ -87,6 +180,37 @@ class FitStep(FileModel):
         return "Fit the calibration"
 
 
+class FitLimits(FileModel):
+    """Limits on a fit."""
+
+    rms_px: Limit | None = None
+    max_relative_range_sd: Limit | None = None
+    noise_scale: Limit | None = None
+    rejected: Limit | None = None
+
+
+class CheckLimitsStep(FileModel):
+    """Hold the last fit against limits; `on_fail: ask` leaves it to the operator, with a reason."""
+
+    needs: ClassVar = "fit"
+    step: Literal["check_limits"]
+    limits: FitLimits
+
+    @model_validator(mode="after")
+    def _a_fit_is_not_retried(self) -> CheckLimitsStep:
+        for name, limit in self.limits:
+            if limit is not None and limit.on_fail == "retry":
+                raise ValueError(
+                    f"{name}: on_fail: retry would give the same fit again; expected ask or stop"
+                )
+        return self
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return "Check the fit's limits"
+
+
 class ExportStep(FileModel):
     """Write the calibration to the session folder."""
 
@@ -116,7 +240,18 @@ class AccuracyTrialStep(FileModel):
 
 
 Step = Annotated[
-    MessageStep | CaptureGridStep | CaptureBoardStep | FitStep | ExportStep | AccuracyTrialStep,
+    MessageStep
+    | ConfirmStep
+    | AskStep
+    | PlaceTargetStep
+    | WarmUpStep
+    | MeasureLatencyStep
+    | CheckLimitsStep
+    | CaptureGridStep
+    | CaptureBoardStep
+    | FitStep
+    | ExportStep
+    | AccuracyTrialStep,
     Field(discriminator="step"),
 ]
 

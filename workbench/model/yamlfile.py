@@ -28,13 +28,12 @@ def load_yaml_model(path: Path, model: type[Model]) -> Model:
         BadInputError: the file is missing, is not YAML, or does not fit; one line for each problem, with
             file, line, key, what was expected and what came.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise BadInputError(f"{path}: no such file; expected a YAML file") from None
-    except (OSError, ValueError) as error:
-        raise BadInputError(f"{path}: expected a readable UTF-8 YAML file: {error}") from None
-    return parse_yaml_model(text, path, model)
+    return parse_yaml_model(_read(path), path, model)
+
+
+def load_yaml(path: Path) -> Any:
+    """Read `path` as `parse_yaml` does; the errors of `load_yaml_model`."""
+    return parse_yaml(_read(path), path)
 
 
 def parse_yaml_model(text: str, path: Path, model: type[Model]) -> Model:
@@ -68,23 +67,32 @@ def parse_yaml(text: str, path: Path) -> Any:
     return data
 
 
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise BadInputError(f"{path}: no such file; expected a YAML file") from None
+    except (OSError, ValueError) as error:
+        raise BadInputError(f"{path}: expected a readable UTF-8 YAML file: {error}") from None
+
+
 def _describe(path: Path, data: Any, problem: dict[str, Any]) -> str:
     """One line for one pydantic problem."""
     location = tuple(problem["loc"])
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
     message = problem["msg"][:1].lower() + problem["msg"][1:]
     came = "" if problem["type"] in {"missing", "extra_forbidden"} else f", got {_short(problem['input'])}"
-    return f"{path}:{_line(data, location)}: {key or 'document'}: {message}{came}"
+    return f"{path}:{line_of(data, location)}: {key or 'document'}: {message}{came}"
 
 
-def _line(data: Any, location: tuple[int | str, ...]) -> int:
+def line_of(data: Any, location: tuple[int | str, ...]) -> int:
     """Line (from 1) of the deepest part of `location` that stands in the file."""
     line = 1
     node = data
     for part in location:
         position = getattr(node, "lc", None)
         if position is None or part not in (position.data or {}):
-            break
+            continue  # the name of a kind of step, which pydantic puts in, or a key that is missing
         line = position.data[part][0] + 1
         node = node[part]
     return line

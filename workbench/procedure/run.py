@@ -8,6 +8,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from workbench.devices.protocols import Bench, Operator
 from workbench.devices.registry import check_driver, open_bench
 from workbench.model import event as ev
 from workbench.model.calibration import Provenance
@@ -15,9 +16,13 @@ from workbench.model.errors import BadInputError, StoppedError, WorkbenchError
 from workbench.model.procedure import Procedure, load_procedure
 from workbench.model.rig import Rig, load_rig
 from workbench.procedure.context import Context
+from workbench.procedure.operator import Nobody
+from workbench.procedure.recorder import Recorder
 from workbench.procedure.steps import run_step, shots
 from workbench.session.journal import Journal
 from workbench.session.manifest import create_session, workbench_version
+
+NOBODY = Nobody("the caller has given nobody to ask")
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,17 @@ class Plan:
             BadInputError: one of them is wrong.
         """
         procedures = tuple(load_procedure(path) for path in procedure_paths)
+        return cls.of(load_rig(rig_path), rig_path, procedures, procedure_paths)
+
+    @classmethod
+    def of(
+        cls, rig: Rig, rig_path: Path, procedures: Sequence[Procedure], procedure_paths: Sequence[Path]
+    ) -> Plan:
+        """Check what was read.
+
+        Raises:
+            BadInputError: steps do not find what they need, two procedures have one name, no such driver.
+        """
         names = [p.procedure for p in procedures]
         for path, name in zip(procedure_paths, names, strict=True):
             if names.count(name) > 1:
@@ -53,9 +69,8 @@ class Plan:
                     f"{path}: procedure: expected a name that no other procedure of this call has, got {name}"
                 )
         _check_order(procedures, procedure_paths)
-        rig = load_rig(rig_path)
         check_driver(rig)
-        return cls(rig, rig_path, procedures, tuple(procedure_paths))
+        return cls(rig, rig_path, tuple(procedures), tuple(procedure_paths))
 
     def new_session(self, sessions: Path) -> Path:
         """A folder name that sorts by time and says what was run; with a number where it is taken."""
@@ -85,11 +100,12 @@ def run(
     consumers: Sequence[ev.Consumer],
     caller: Caller,
     stopping: Callable[[], str | None],
+    operator: Operator = NOBODY,
 ) -> None:
     """Run every procedure of the plan, in order, in one new session.
 
     Whatever ends the session early is journalled as its end before it goes on to the caller; frames and
-    records up to there are on disk.
+    records up to there are on disk, and `resume` goes on from them.
 
     Args:
         plan: what to run.
@@ -97,6 +113,7 @@ def run(
         consumers: who is shown every record.
         caller: for the record.
         stopping: asked between shots; a text ends the session with it.
+        operator: who answers, unless the bench has somebody of its own.
 
     Raises:
         WorkbenchError: its exit code says what went wrong.
@@ -107,16 +124,6 @@ def run(
         raise BadInputError(
             f"{session_dir.parent}: expected a folder for sessions: {error.strerror}"
         ) from None
-    provenance = Provenance(
-        session=session_dir.name,
-        captures_sha256="",
-        rig=plan.rig.rig,
-        serial=plan.rig.serial,
-        command=caller.command,
-        version=workbench_version(),
-        operator=caller.operator,
-        created=caller.created,
-    )
     with ExitStack() as stack:
         # The bench first: one that does not open leaves no empty session behind.
         bench = stack.enter_context(open_bench(plan.rig, session_dir))
@@ -127,17 +134,46 @@ def run(
             plan.procedure_paths,
             operator=caller.operator,
             created=caller.created,
+            command=caller.command,
         )
         journal = stack.enter_context(Journal(session_dir))
-        context = Context(session_dir, plan.rig, bench, journal, consumers, provenance, stopping)
-        try:
-            _run_all(plan, context)
-        except BaseException as error:
-            # A journal that cannot be written any more must not hide why the session ended.
-            with suppress(StoppedError):
-                context.emit(_ending(error))
-            raise
-        context.emit(ev.SessionFinished(exit_code=0, message="done"))
+        recorder = Recorder(journal, consumers)
+        go_through(plan, open_context(plan, session_dir, bench, operator, recorder, caller, stopping))
+
+
+def go_through(plan: Plan, context: Context) -> None:
+    """Run every step, and journal how it ended."""
+    try:
+        _run_all(plan, context)
+    except BaseException as error:
+        # A journal that cannot be written any more must not hide why the session ended.
+        with suppress(StoppedError):
+            context.emit(_ending(error))
+        raise
+    context.emit(ev.SessionFinished(exit_code=0, message="done"))
+
+
+def open_context(
+    plan: Plan,
+    session_dir: Path,
+    bench: Bench,
+    operator: Operator,
+    recorder: Recorder,
+    caller: Caller,
+    stopping: Callable[[], str | None],
+) -> Context:
+    """The context that a session's steps run in; what they write names `caller`."""
+    provenance = Provenance(
+        session=session_dir.name,
+        captures_sha256="",
+        rig=plan.rig.rig,
+        serial=plan.rig.serial,
+        command=caller.command,
+        version=workbench_version(),
+        operator=caller.operator,
+        created=caller.created,
+    )
+    return Context(session_dir, plan.rig, bench, bench.operator or operator, recorder, provenance, stopping)
 
 
 def _ending(error: BaseException) -> ev.SessionFinished:

@@ -7,6 +7,7 @@ raises where the procedure cannot go on.
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Callable
 from functools import singledispatch
 from math import nan
@@ -22,9 +23,11 @@ from workbench.model import event as ev
 from workbench.model import procedure as pr
 from workbench.model.captures import BOARD
 from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.model.prompt import Prompt, Quantity
 from workbench.model.rig import Rig
 from workbench.model.target import BoardTarget, Placement
 from workbench.procedure.context import Context
+from workbench.procedure.limits import check_captures, check_fit
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE, write_capture_table
@@ -69,16 +72,65 @@ def _(step: pr.MessageStep, context: Context, name: str) -> str:
 
 
 @run_step.register
+def _(step: pr.ConfirmStep, context: Context, name: str) -> str:
+    context.ask(Prompt(name, step.text, step.expect, step.otherwise))
+    return "confirmed"
+
+
+@run_step.register
+def _(step: pr.AskStep, context: Context, name: str) -> str:
+    n = step.number
+    quantity = None if n is None else Quantity(n.unit, *n.within, n.usual)
+    answer = context.ask(Prompt(name, step.text, quantity=quantity, choices=step.choices))
+    unit = "" if n is None else f" {n.unit}"
+    return f"{answer.value}{unit}"
+
+
+@run_step.register
+def _(step: pr.PlaceTargetStep, context: Context, name: str) -> str:
+    placed = context.visit([_placement(name, step.standoff_mm)], lambda placement: placement)
+    return f"at {placed[0].standoff_mm:g} mm" if placed else "left out"
+
+
+@run_step.register
+def _(step: pr.WarmUpStep, context: Context, name: str) -> str:
+    context.warm_up(name, step.frames)
+    return f"{step.frames} frames"
+
+
+@run_step.register
+def _(step: pr.MeasureLatencyStep, context: Context, name: str) -> str:
+    return f"{context.measure_latency(name, step.most_frames)} frames, discarded before each capture"
+
+
+@run_step.register
+def _(step: pr.CheckLimitsStep, context: Context, name: str) -> str:
+    if context.accepted is None:
+        raise BadInputError(f"step {name}: nothing to check; expected a fit step before it")
+    return check_fit(context, name, context.accepted, step.limits)
+
+
+@run_step.register
 def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
-    for standoff_mm in step.standoffs_mm:
-        _capture_lasers(context, context.place(_placement(name, standoff_mm)), step.repeats)
-    return f"{shots(step, context.rig)} pairs"
+    placements = [_placement(name, standoff_mm) for standoff_mm in step.standoffs_mm]
+    retries: Counter[str] = Counter()
+
+    def work(placement: Placement) -> int:
+        pairs = _capture_lasers(context, placement, step.repeats)
+        check_captures(context, name, placement, step.limits, retries)
+        return pairs
+
+    return f"{sum(context.visit(placements, work))} pairs"
 
 
 @run_step.register
 def _(step: pr.CaptureBoardStep, context: Context, name: str) -> str:
-    for number, placing in enumerate(step.placings, start=1):
-        placement = context.place(_board_placement(f"{name}/{number:02d}", placing, context.rig))
+    placements = [
+        _board_placement(f"{name}/{number:02d}", placing, context.rig)
+        for number, placing in enumerate(step.placings, start=1)
+    ]
+
+    def work(placement: Placement) -> None:
         frames = [
             context.capture_room_light(f"{placement.key}/board/{repeat:02d}", placement, repeat)
             for repeat in range(step.frames)
@@ -92,6 +144,8 @@ def _(step: pr.CaptureBoardStep, context: Context, name: str) -> str:
         )
         context.boards[placement.key] = see_board(frames, context.rig.board, told)
         _capture_lasers(context, placement, step.repeats)
+
+    context.visit(placements, work)
     mine = [seen for key, seen in context.boards.items() if key.startswith(f"{name}/")]
     corners = sum(len(seen.corners.ids) for seen in mine if isinstance(seen, BoardView))
     missed = [seen.reason for seen in mine if isinstance(seen, Rejected)]
@@ -143,9 +197,8 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
             " in the same call"
         )
     ranger = Ranger(context.calibration)
-    rows = []
-    for standoff_mm in step.standoffs_mm:
-        placement = context.place(_placement(name, standoff_mm))
+
+    def work(placement: Placement) -> ev.TrialRow:
         readings = []
         for number in range(step.readings):
             scene = f"{placement.key}/{number:02d}"
@@ -163,7 +216,9 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
                     lasers=reading.lasers,
                 )
             )
-        rows.append(accuracy_row(placement.standoff_mm, readings, context.rig.bench))
+        return accuracy_row(placement.standoff_mm, readings, context.rig.bench)
+
+    rows = context.visit([_placement(name, standoff_mm) for standoff_mm in step.standoffs_mm], work)
     trial = [c for c in context.captures if c.purpose == "trial"]
     write_capture_table(context.session_dir / TRIAL_TABLE, trial)
     table = f"{name}.csv"
@@ -190,13 +245,14 @@ def _board_placement(key: str, placing: pr.BoardPlacing, rig: Rig) -> Placement:
     )
 
 
-def _capture_lasers(context: Context, placement: Placement, repeats: int) -> None:
-    """Fire each laser alone, `repeats` pairs of frames each."""
+def _capture_lasers(context: Context, placement: Placement, repeats: int) -> int:
+    """Fire each laser alone, `repeats` pairs of frames each; returns how many pairs."""
     for laser in context.rig.lasers:
         scanline = prior_scanline(context.rig, laser)
         for repeat in range(repeats):
             key = f"{placement.key}/{laser.id}/{repeat:02d}"
             context.capture(key, [laser.id], placement, repeat, [scanline])
+    return repeats * len(context.rig.lasers)
 
 
 def _shooter(

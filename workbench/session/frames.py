@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import FrameRef
-from workbench.session.files import write_record
+from workbench.session.files import sync_folder, write_record
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -47,6 +48,24 @@ class FrameStore:
             raise StoppedError(f"{path.parent}: cannot be made: {error.strerror}") from error
         write_record(path, content)
         return FrameRef(path=str(relative), sha256=hashlib.sha256(content).hexdigest(), time_ns=time_ns)
+
+    def set_aside(self, placement_key: str) -> None:
+        """Move the frames of a placement that is about to be captured again into `set-aside/<number>/`.
+
+        Raises:
+            StoppedError: the disk is full or cannot be written.
+        """
+        there = self.session_dir / "frames" / placement_key
+        if not there.exists():
+            return
+        aside = self.session_dir / "set-aside"
+        number = next(n for n in count(1) if not (aside / str(n)).exists())
+        try:
+            (aside / str(number) / placement_key).parent.mkdir(parents=True)
+            there.rename(aside / str(number) / placement_key)
+            sync_folder(there.parent)
+        except OSError as error:
+            raise StoppedError(f"{there}: cannot be moved aside: {error.strerror}") from error
 
 
 def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 import time
 from collections.abc import Iterator
@@ -17,12 +19,40 @@ JOURNAL = "journal.jsonl"
 
 
 class Journal:
-    """Appends records to `journal.jsonl` of a session folder, one write a record."""
+    """Appends records to `journal.jsonl` of a session folder, one write a record.
 
-    def __init__(self, session_dir: Path) -> None:
+    The file is locked while it is open: two programs never write one session.
+    """
+
+    def __init__(self, session_dir: Path, flags: int = os.O_CREAT | os.O_EXCL) -> None:
         self._path = session_dir / JOURNAL
-        self._file = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+        self._file = os.open(self._path, os.O_RDWR | os.O_APPEND | flags, 0o644)
         self._next = 0
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(self._file)
+            raise BadInputError(f"{session_dir}: another program is running this session") from None
+
+    @classmethod
+    def reopen(cls, session_dir: Path) -> tuple[Journal, tuple[Record, ...]]:
+        """Go on with a journal, or begin it where a kill came first; returns it with its records so far.
+
+        What a torn write left after the last whole record is cut off.
+
+        Raises:
+            BadInputError: another program writes it, or a record in it is damaged.
+        """
+        journal = cls(session_dir, os.O_CREAT)
+        try:
+            records = tuple(read_journal(session_dir))
+            content = journal._path.read_bytes()
+            os.ftruncate(journal._file, content.rfind(b"\n") + 1)
+        except BaseException:
+            os.close(journal._file)
+            raise
+        journal._next = len(records)
+        return journal, records
 
     def append(self, event: Event) -> Record:
         """Write one event. It is synced to disk unless thousands of its kind come in a row.
@@ -34,7 +64,7 @@ class Journal:
         line = (record.model_dump_json() + "\n").encode()
         try:
             if os.write(self._file, line) != len(line):
-                raise OSError(28, "no space left on device")
+                raise OSError(errno.ENOSPC, "no space left on device")
             # The spots are computed again from the frames; losing some costs nothing.
             if not isinstance(event, SpotsFound):
                 os.fsync(self._file)
@@ -77,3 +107,18 @@ def read_journal(session_dir: Path) -> Iterator[Record]:
         except ValidationError as error:
             what = error.errors()[0]["msg"]
             raise BadInputError(f"{path}:{number}: expected a journal record: {what}") from None
+
+
+def is_running(session_dir: Path) -> bool:
+    """Whether a program has the session's journal open for writing."""
+    try:
+        handle = os.open(session_dir / JOURNAL, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(handle)
+    return False

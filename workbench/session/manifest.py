@@ -6,6 +6,7 @@ import io
 import platform
 from collections.abc import Sequence
 from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
 from workbench.model.errors import BadInputError
-from workbench.model.rig import Rig
-from workbench.model.yamlfile import load_yaml_model, parse_yaml_model
+from workbench.model.rig import Name, Rig
+from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model
 from workbench.session.files import write_record
 
 MANIFEST = "session.yaml"
@@ -35,8 +36,40 @@ def workbench_version() -> str:
     return version(DISTRIBUTION)
 
 
+class FileEntry(FileModel):
+    """A file that the session started from."""
+
+    file: str
+    text: str
+    """Word for word."""
+
+
+class RigEntry(FileEntry):
+    """The rig file."""
+
+    serial: Name
+
+
+class Manifest(BaseModel):
+    """What is read back of a manifest; those before `command` was kept have none."""
+
+    created: str
+    operator: str
+    command: str = ""
+    rig: RigEntry
+    procedures: tuple[FileEntry, ...]
+    versions: dict[str, str]
+
+
 def create_session(
-    folder: Path, rig: Rig, rig_path: Path, procedure_paths: Sequence[Path], *, operator: str, created: str
+    folder: Path,
+    rig: Rig,
+    rig_path: Path,
+    procedure_paths: Sequence[Path],
+    *,
+    operator: str,
+    created: str,
+    command: str,
 ) -> None:
     """Create the session folder with its manifest.
 
@@ -48,14 +81,42 @@ def create_session(
         (folder / "frames").mkdir()
     except OSError as error:
         raise BadInputError(f"{folder}: the session folder cannot be made: {error.strerror}") from None
+    caller = {"created": created, "operator": operator, "command": command}
+    entry = RigEntry(file=str(rig_path.resolve()), text=_read(rig_path), serial=rig.serial)
+    procedures = [FileEntry(file=str(path.resolve()), text=_read(path)) for path in procedure_paths]
+    _write(folder, caller, entry, procedures)
+
+
+def replace_manifest(folder: Path, before: Manifest, rig: RigEntry, procedures: Sequence[FileEntry]) -> None:
+    """Have the session go on with other files; its manifest up to now stays beside the new one."""
+    number = next(n for n in count(1) if not (folder / f"session-{n}.yaml").exists())
+    write_record(folder / f"session-{number}.yaml", (folder / MANIFEST).read_bytes())
+    caller = {"created": before.created, "operator": before.operator, "command": before.command}
+    _write(folder, caller, rig, procedures)
+
+
+def load_manifest(session_dir: Path) -> Manifest:
+    """Read the manifest.
+
+    Raises:
+        BadInputError: this is no session folder, or its manifest is damaged.
+    """
+    return load_yaml_model(session_dir / MANIFEST, Manifest)
+
+
+def recorded_versions() -> dict[str, str]:
+    """Python and the libraries that decide what a session computes."""
+    return {"python": platform.python_version()} | {n: version(n) for n in RECORDED_VERSIONS}
+
+
+def _write(folder: Path, caller: dict[str, str], rig: RigEntry, procedures: Sequence[FileEntry]) -> None:
     manifest: dict[str, Any] = {
         "format": 1,
         "session": folder.name,
-        "created": created,
-        "operator": operator,
-        "rig": {"file": str(rig_path), "serial": rig.serial, "text": _verbatim(rig_path)},
-        "procedures": [{"file": str(path), "text": _verbatim(path)} for path in procedure_paths],
-        "versions": {"python": platform.python_version()} | {n: version(n) for n in RECORDED_VERSIONS},
+        **caller,
+        "rig": {"file": rig.file, "serial": rig.serial, "text": LiteralScalarString(rig.text)},
+        "procedures": [{"file": p.file, "text": LiteralScalarString(p.text)} for p in procedures],
+        "versions": recorded_versions(),
     }
     stream = io.StringIO()
     YAML().dump(manifest, stream)
@@ -68,21 +129,9 @@ def load_session_rig(session_dir: Path) -> Rig:
     Raises:
         BadInputError: this is no session folder, or its manifest is damaged.
     """
-    path = session_dir / MANIFEST
-    text = load_yaml_model(path, _Manifest).rig.text
-    return parse_yaml_model(text, Path(f"{path} (rig)"), Rig)
+    text = load_manifest(session_dir).rig.text
+    return parse_yaml_model(text, Path(f"{session_dir / MANIFEST} (rig)"), Rig)
 
 
-class _RigEntry(BaseModel):
-    text: str
-
-
-class _Manifest(BaseModel):
-    """What is read back of the manifest."""
-
-    rig: _RigEntry
-
-
-def _verbatim(path: Path) -> str:
-    text: str = LiteralScalarString(path.read_text(encoding="utf-8"))
-    return text
+def _read(path: Path) -> str:
+    return path.read_text(encoding="utf-8")

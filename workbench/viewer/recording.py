@@ -158,6 +158,24 @@ class _OpenRecording:
         steps.say(self.stream, f"Target placed at {event.placement.standoff_mm:g} mm")
 
     @_log.register
+    def _(self, event: ev.Answered, moment: Moment) -> None:
+        answer = event.answer
+        said = answer.action if answer.value is None else answer.value
+        steps.say(self.stream, f"{event.question} {said} {answer.reason or ''}".rstrip())
+
+    @_log.register
+    def _(self, event: ev.PlacementFinished, moment: Moment) -> None:
+        """Of use to a resumed session alone."""
+
+    @_log.register
+    def _(self, event: ev.SetAside, moment: Moment) -> None:
+        steps.say(self.stream, f"Placement {event.key} is captured again: {event.reason}", steps.WARN)
+
+    @_log.register
+    def _(self, event: ev.SessionResumed, moment: Moment) -> None:
+        steps.say(self.stream, f"Resumed by {event.operator} at {event.created}", steps.WARN)
+
+    @_log.register
     def _(self, event: ev.CaptureTaken, moment: Moment) -> None:
         self._captures[event.key] = (moment.capture, event, self._placement)
         self._exposure = Moment(moment.capture, moment.step, event.on.time_ns, event.standoff_mm)
@@ -175,6 +193,16 @@ class _OpenRecording:
             scene.log_spots_on_target(self.stream, event.spots, placement, self._geometry, self._colors)
         for failure in event.failures:
             steps.say(self.stream, f"Capture {event.key}: {failure}", steps.WARN)
+
+    @_log.register
+    def _(self, event: ev.LimitChecked, moment: Moment) -> None:
+        value = "not measured" if event.value is None else f"{event.value:.4g}"
+        text = f"{event.of}: {event.quantity} {value}, limit {event.limit}: {event.verdict}"
+        steps.say(self.stream, text, steps.INFO if event.verdict == "pass" else steps.WARN)
+
+    @_log.register
+    def _(self, event: ev.LatencyMeasured, moment: Moment) -> None:
+        steps.say(self.stream, f"Camera latency: {event.frames} frames")
 
     @_log.register
     def _(self, event: ev.FitFinished, moment: Moment) -> None:

@@ -1,0 +1,93 @@
+"""`workbench check` and `workbench plan`: what will happen, before anybody stands at the bench."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from workbench.model.errors import BadInputError
+from workbench.procedure.check import check_file
+from workbench.procedure.latency import LEASE_S
+from workbench.procedure.outline import Pace, PlannedStep, learn_pace, outline
+from workbench.procedure.run import Plan
+
+
+def check_files(files: list[Path]) -> None:
+    """Print what is wrong with each file, and what is worth knowing.
+
+    Raises:
+        BadInputError: one of them is wrong.
+    """
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    wrong = []
+    for path in files:
+        try:
+            notes = check_file(path)
+        except BadInputError as error:
+            wrong.append(str(error))
+            continue
+        for note in notes:
+            console.print(f"note: {note}")
+        console.print(f"{path}: good")
+    if wrong:
+        raise BadInputError("\n".join(wrong))
+
+
+def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
+    """Print every step, its shots, their emission, and the time it will take.
+
+    Raises:
+        BadInputError: a file is wrong.
+    """
+    plan = Plan.load(rig_path, procedures)
+    pace = learn_pace(sessions, plan.rig.rig)
+    steps = outline(plan.procedures, plan.rig)
+    console = Console(stderr=True)
+    console.print(_table(steps, pace))
+    total = sum(step.shots for step in steps)
+    console.print(
+        f"{total} shots, {emission(total, pace)}; {duration(sum(map(pace.seconds, steps)))} in all",
+        highlight=False,
+    )
+    console.print(_told_by(pace, plan.rig.rig), highlight=False)
+
+
+def emission(shots: int, pace: Pace) -> str:
+    """Seconds of emission, as measured before or as the lease bounds them."""
+    if pace.lit_s is None:
+        return f"at most {shots * LEASE_S:.0f} s of emission (leases of {LEASE_S:g} s)"
+    return f"{shots * pace.lit_s:.1f} s of emission"
+
+
+def duration(seconds: float) -> str:
+    """For people: seconds below two minutes, then minutes, then hours."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    if seconds < 7200:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"
+
+
+def _table(steps: list[PlannedStep], pace: Pace) -> Table:
+    table = Table(title="Plan", title_justify="left")
+    table.add_column("step", overflow="fold")
+    table.add_column("", overflow="fold")
+    for column in ("placings", "shots", "emission", "time"):
+        table.add_column(column, justify="right")
+    for step in steps:
+        lit_s = step.shots * (LEASE_S if pace.lit_s is None else pace.lit_s)
+        counts = [str(step.placements), str(step.shots), f"{lit_s:.1f} s"] if step.shots else ["", "", ""]
+        name = f"{step.procedure}.{step.index}"
+        table.add_row(name, step.title, *counts, duration(pace.seconds(step)))
+    return table
+
+
+def _told_by(pace: Pace, rig: str) -> str:
+    if pace.sessions == 0:
+        return (
+            f"Times are guesses: {pace.placing_s:g} s a placing, {pace.shot_s:g} s a shot; no session of"
+            f" {rig} has told them yet."
+        )
+    return f"Times are medians over {pace.sessions} sessions of {rig}."

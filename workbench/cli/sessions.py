@@ -1,0 +1,66 @@
+"""`workbench sessions`, and which session is meant by its name."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from workbench.model.errors import BadInputError
+from workbench.session.manifest import MANIFEST
+from workbench.session.state import Standing, standings
+
+SHOWN = 20
+
+
+def list_sessions(sessions: Path, as_json: bool) -> None:
+    """Print where every session stands, and how to go on with the last unfinished one.
+
+    Raises:
+        BadInputError: there is no such folder.
+    """
+    found = standings(sessions)
+    if as_json:
+        for each in found:
+            print(json.dumps(asdict(each) | {"session_dir": str(each.session_dir)}))
+        return
+    console = Console(stderr=True)
+    if not found:
+        console.print(f"no sessions in {sessions}")
+        return
+    console.print(_table(found[-SHOWN:]))
+    if len(found) > SHOWN:
+        console.print(f"and {len(found) - SHOWN} older ones")
+    if unfinished := [each for each in found if each.unfinished]:
+        console.print(f"go on: workbench resume {unfinished[-1].session_dir}", soft_wrap=True)
+
+
+def find_session(name: Path | None, sessions: Path) -> Path:
+    """The folder of the session `name`, a path or a name in `sessions`; without one the last unfinished.
+
+    Raises:
+        BadInputError: there is none.
+    """
+    if name is not None:
+        known = [path for path in (name, sessions / name) if (path / MANIFEST).is_file()]
+        if known:
+            return known[0]
+        raise BadInputError(f"{name}: expected a session folder, or the name of one in {sessions}")
+    unfinished = [each for each in standings(sessions) if each.unfinished]
+    if not unfinished:
+        raise BadInputError(f"{sessions}: no unfinished session to resume")
+    return unfinished[-1].session_dir
+
+
+def _table(found: list[Standing]) -> Table:
+    table = Table(title="Sessions", title_justify="left")
+    table.add_column("session", overflow="fold")
+    table.add_column("state")
+    table.add_column("captures", justify="right")
+    table.add_column("how it ended", overflow="fold")
+    for each in found:
+        table.add_row(each.session_dir.name, each.state, str(each.captures), each.why)
+    return table

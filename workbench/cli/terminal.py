@@ -1,0 +1,178 @@
+"""What a running session shows on the terminal."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from types import TracebackType
+
+from rich.console import Console
+from rich.padding import Padding
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
+from rich.text import Text
+
+from workbench.model import event as ev
+from workbench.model.errors import StoppedError
+from workbench.procedure.outline import Forecast
+from workbench.procedure.quality import Quality, quality_of
+from workbench.report.tables import parameter_table, rejected_lines, term_table, trial_table
+
+
+class Terminal:
+    """Shows the records of a session as they come."""
+
+    def __init__(self, console: Console, forecast: Forecast) -> None:
+        self._console, self._forecast = console, forecast
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=12),
+            MofNCompleteColumn(),
+            console=console,
+            transient=True,
+        )
+        self._task: TaskID | None = None
+        self._captures: dict[str, ev.CaptureTaken] = {}
+        self._spots: dict[str, list[Sequence[ev.SpotRecord]]] = defaultdict(list)
+
+    def __enter__(self) -> Terminal:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with suppress(OSError):  # a terminal that was closed
+            self._progress.stop()
+
+    @contextmanager
+    def quiet(self) -> Iterator[None]:
+        """No progress while somebody is asked."""
+        self._progress.stop()
+        try:
+            yield
+        finally:
+            self._progress.start()
+
+    def __call__(self, record: ev.Record) -> None:
+        """Show one record."""
+        self._forecast.take(record)
+        match record.event:
+            case ev.ProcedureStarted() as e:
+                self._console.print(f"[bold]{e.title}[/bold] ({e.procedure}, {e.steps} steps)")
+            case ev.StepStarted() as e:
+                self._print(f"{e.index}. {e.title}", indent=2)
+                if e.shots:
+                    self._task = self._progress.add_task("     capturing", total=e.shots)
+            case ev.TargetPlaced():
+                self._spots.clear()
+            case ev.CaptureTaken() as e:
+                self._captures[e.key] = e
+                if self._task is not None and _counts(e):
+                    self._progress.advance(self._task)
+            case ev.SpotsFound() as e if e.key in self._captures:
+                self._show_capture(self._captures.pop(e.key), e)
+            case ev.PlacementFinished() as e if self._spots:
+                self._print(f"{self._placement}. {self.how_far()}")
+            case ev.LimitChecked() as e if e.verdict != "pass":
+                value = "not measured" if e.value is None else f"{e.value:.3g}"
+                self._print(f"{e.verdict}: {e.of}: {e.quantity} {value}, limit {e.limit}", style="yellow")
+            case ev.SetAside() as e:
+                self._print(f"captured again: {e.reason}", style="yellow")
+            case ev.SessionResumed() as e:
+                self._print(f"resumed, {len(e.changes)} changes accepted" if e.changes else "resumed", 2)
+            case ev.StepFinished() as e:
+                self._end_step(e.outcome)
+            case ev.FitFinished() as e:
+                self._console.print(parameter_table(e.parameters))
+                if e.terms:
+                    self._console.print(term_table(e.terms))
+                for line in rejected_lines(e.rejected):
+                    self._print(f"not used: {line}")
+                for warning in e.warnings:
+                    self._print(f"note: {warning}")
+            case ev.TrialFinished() as e:
+                self._console.print(trial_table(e.rows))
+            case _:
+                pass
+
+    def how_far(self) -> str:
+        """`Step 7 of 48, about 11 min left`."""
+        left_s = self._forecast.seconds_left
+        left = f"{left_s:.0f} s" if left_s < 90 else f"{left_s / 60:.0f} min"
+        return f"Step {self._forecast.done} of {self._forecast.total}, about {left} left"
+
+    def _show_capture(self, capture: ev.CaptureTaken, found: ev.SpotsFound) -> None:
+        """The live line: this laser here, over its repeats so far."""
+        self._spots[capture.laser_id].append(found.spots)
+        self._placement = f"{capture.standoff_mm:g} mm: {_summary(self._spots)}"
+        if self._task is not None:
+            name = f"{capture.standoff_mm:g} mm {capture.laser_id}"
+            seen = _live(quality_of(self._spots[capture.laser_id])) if capture.laser_id != "all" else ""
+            self._progress.update(self._task, description=f"     {name} {seen}")
+
+    _placement = ""
+
+    def _end_step(self, outcome: str) -> None:
+        if self._task is not None:
+            self._progress.remove_task(self._task)
+            self._task = None
+        self._print(outcome)
+
+    def _print(self, text: str, indent: int = 5, style: str = "") -> None:
+        self._console.print(Padding(Text(text, style=style), (0, 0, 0, indent)))
+
+
+class Guarded:
+    """A consumer that may fail without stopping the session: frames and journal are the record, not it."""
+
+    def __init__(self, consumer: ev.Consumer, name: str, console: Console) -> None:
+        self._consumer: ev.Consumer | None = consumer
+        self._name, self._console = name, console
+
+    def __call__(self, record: ev.Record) -> None:
+        """Hand the record on; after a failure, never again."""
+        if self._consumer is None:
+            return
+        try:
+            self._consumer(record)
+        except StoppedError:
+            raise  # a signal that came while the consumer was at work
+        except Exception as error:
+            self._consumer = None
+            with suppress(OSError):
+                self._console.print(
+                    f"[yellow]warning: {self._name} stops here: {error}[/yellow]\n"
+                    "Captures go on. `workbench view` makes it again where it is missing."
+                )
+
+
+def _counts(capture: ev.CaptureTaken) -> bool:
+    """Whether a capture is one of those that the step announced; alternative captures come on top."""
+    return capture.purpose == "calibration" or capture.laser_id == "all"
+
+
+def _live(quality: Quality) -> str:
+    if quality.u_px is None or quality.v_px is None or quality.snr is None:
+        return "no spot"
+    scatter = "" if quality.scatter_px is None else f", scatter {quality.scatter_px:.3f} px"
+    clipped = ", SATURATED" if quality.saturated else ""
+    return f"u {quality.u_px:.1f} v {quality.v_px:.1f} snr {quality.snr:.0f}{scatter}{clipped}"
+
+
+def _summary(spots: dict[str, list[Sequence[ev.SpotRecord]]]) -> str:
+    """All lasers of a placement, the worst of each; of those lit together only how many spots they made."""
+    if "all" in spots:
+        each = spots["all"]
+        return f"{len(each)} readings, {min(map(len, each))} spots or more"
+    found = {name: quality_of(each) for name, each in spots.items()}
+    snr = [q.snr for q in found.values() if q.snr is not None]
+    scatter = [q.scatter_px for q in found.values() if q.scatter_px is not None]
+    parts = [f"{len(snr)}/{len(found)} lasers"]
+    if snr:
+        parts.append(f"snr {min(snr):.0f}")
+    if scatter:
+        parts.append(f"scatter {max(scatter):.3f} px")
+    if clipped := [name for name, q in found.items() if q.saturated]:
+        parts.append(f"SATURATED: {', '.join(clipped)}")
+    return ", ".join(parts)

@@ -1,0 +1,104 @@
+"""Holding measured quantities against a procedure's limits, and what follows where one fails."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+from workbench.model import event as ev
+from workbench.model.calibration import Calibration
+from workbench.model.errors import LimitFailedError
+from workbench.model.limit import Limit
+from workbench.model.procedure import FitLimits, GridLimits
+from workbench.model.prompt import Prompt
+from workbench.model.target import Placement
+from workbench.model.yamlfile import FileModel
+from workbench.procedure.context import Context, RetakeError
+from workbench.procedure.quality import quality_of
+
+RETRIES = 2
+"""`on_fail: retry` captures a placement again so often before it stops."""
+
+
+def check_captures(
+    context: Context, step: str, placement: Placement, limits: GridLimits, retries: Counter[str]
+) -> None:
+    """Hold what each laser gave at a placement against the limits.
+
+    Args:
+        context: the session; its operator is asked where a limit says so.
+        step: name of the step.
+        placement: where the captures were taken.
+        limits: of the step.
+        retries: counts by placement how often it was captured again for its limits.
+
+    Raises:
+        RetakeError: the placement is to be captured again.
+        LimitFailedError: a limit failed, and the session ends.
+    """
+    for laser_id in context.rig.laser_ids:
+        keys = [c.key for c in context.captures if (c.placement_key, c.laser_id) == (placement.key, laser_id)]
+        quality = quality_of([context.findings[key].spots for key in keys])
+        for name, limit in _stated(limits):
+            of = f"{placement.key}/{laser_id}"
+            failed = _check(context, step, of, name, getattr(quality, name), limit)
+            if failed is None:
+                continue
+            if limit.on_fail == "retry" and retries[placement.key] < RETRIES:
+                retries[placement.key] += 1
+                raise RetakeError(failed)
+            if limit.on_fail == "ask":
+                context.settle(_about_captures(f"{of}/{name}", failed), failed)
+            else:
+                raise LimitFailedError(failed)
+
+
+def check_fit(context: Context, step: str, calibration: Calibration, limits: FitLimits) -> str:
+    """Hold the fit against the limits; returns how it went.
+
+    Raises:
+        LimitFailedError: a limit failed, and the session ends.
+        StoppedError: the operator, asked about it, stops.
+    """
+    ranger = calibration.laser_ranger
+    values = ranger.fit.model_dump() | ranger.validity.model_dump()
+    remarks = []
+    for name, limit in _stated(limits):
+        failed = _check(context, step, "fit", name, float(values[name]), limit)
+        if failed is None:
+            continue
+        if limit.on_fail == "stop":
+            raise LimitFailedError(failed)
+        context.ask(
+            Prompt(f"{step}/{name}", f"{failed}. Go on all the same?", otherwise="Abort, and say why.")
+        )
+        remarks.append(failed)
+    return "; ".join(remarks) or "within the limits"
+
+
+def _check(
+    context: Context, step: str, of: str, quantity: str, value: float | None, limit: Limit
+) -> str | None:
+    """Journal the verdict; what failed, in words."""
+    verdict = limit.judge(value)
+    context.emit(
+        ev.LimitChecked(
+            step=step, of=of, quantity=quantity, value=value, limit=limit.describe(), verdict=verdict
+        )
+    )
+    came = "not measured" if value is None else f"{value:.4g}"
+    return f"{of}: {quantity}: expected {limit.describe()}, got {came}" if verdict == "fail" else None
+
+
+def _stated(limits: FileModel) -> Iterator[tuple[str, Limit]]:
+    return ((name, limit) for name, limit in limits if limit is not None)
+
+
+def _about_captures(key: str, failed: str) -> Prompt:
+    return Prompt(
+        key=key,
+        do=f"{failed}. Keep these captures?",
+        expect="The spot is whole, lies on the target, and nothing reflects it.",
+        otherwise="Put right what is wrong, then `redo`; `skip` leaves the placement out.",
+        may=("redo", "skip"),
+    )

@@ -1,0 +1,99 @@
+"""The journal as a running procedure sees it: it writes what is new, and knows what is there already.
+
+A resumed session runs its procedures from the start. What it would tell again, word for word, is taken from
+the journal; from the first thing on that is new, it is written. Captures of whole placements are served from
+the frames on disk, everything computed from them is computed again.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+from workbench.model import event as ev
+from workbench.model.errors import BadInputError
+from workbench.model.prompt import Answer
+from workbench.session.journal import Journal
+from workbench.session.state import Group, groups, safe_part
+
+SAFETY = "safety"
+"""Key of the confirmation before the first emission; asked for anew whenever a session goes on."""
+
+
+class Recorder:
+    """Writes events and shows their records to the consumers."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        consumers: Sequence[ev.Consumer],
+        before: Sequence[ev.Record] = (),
+        resumed: ev.SessionResumed | None = None,
+    ) -> None:
+        """Start, or go on after the records `before`; `resumed` is then written before anything new."""
+        self._journal, self._consumers = journal, consumers
+        self._kept = deque(safe_part(before))
+        self._from_n = 0
+        self._resumed = resumed if before else None
+        self.whole = {key: group for key, group in groups(before).items() if group.whole}
+        """By placement key: what need not be captured again."""
+        self._answers = {
+            e.key: e for e in (record.event for record in self._kept) if isinstance(e, ev.Answered)
+        }
+
+        told = [e for e in (r.event for r in self._kept) if isinstance(e, ev.LatencyMeasured)]
+        self.latency = told[-1].frames if told else None
+        """As measured before the session ended early."""
+
+    def emit(self, event: ev.Event) -> ev.Record:
+        """Write an event unless the journal has it, then show it to every consumer.
+
+        Raises:
+            StoppedError: the journal cannot be written.
+            BadInputError: the session is another one.
+        """
+        self._show_notes()
+        if self._kept and self._kept[0].event == event:
+            return self._show(self._kept.popleft())
+        if self._kept and isinstance(event, ev.SessionStarted):
+            raise BadInputError(
+                f"session {event.session}: expected the rig and the procedures that it began with,"
+                f" {self._kept[0].event}, got {event}; run these anew"
+            )
+        self._kept.clear()
+        if self._resumed is not None:
+            resumed = self._resumed.model_copy(update={"from_n": self._from_n})
+            self._resumed = None
+            self._show(self._journal.append(resumed))
+        return self._show(self._journal.append(event))
+
+    def group(self, key: str) -> Group | None:
+        """What is captured at a placement already, all of it."""
+        return self.whole.get(key)
+
+    def answer(self, key: str) -> Answer | None:
+        """What was answered before the session ended early."""
+        given = self._answers.get(key)
+        return None if given is None or key == SAFETY else given.answer
+
+    def forget(self, key: str) -> None:
+        """What is known of a placement counts no more: it is captured again."""
+        self.whole.pop(key, None)
+        self._answers = {k: e for k, e in self._answers.items() if k != key and not k.startswith(f"{key}/")}
+
+    def _show_notes(self) -> None:
+        """Pass over what no procedure tells: resumptions, repetitions, confirmations of safety."""
+        while self._kept and _is_note(self._kept[0].event):
+            self._show(self._kept.popleft())
+
+    def _show(self, record: ev.Record) -> ev.Record:
+        self._from_n = record.n + 1
+        for consumer in self._consumers:
+            consumer(record)
+        return record
+
+
+def _is_note(event: ev.Event) -> bool:
+    return isinstance(event, ev.SessionResumed | ev.SetAside) or (
+        isinstance(event, ev.Answered) and event.key == SAFETY
+    )

@@ -1,0 +1,115 @@
+"""From a session's records to where it stands: what still counts, and what is whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from workbench.model import event as ev
+from workbench.model.errors import BadInputError, StoppedError
+from workbench.session.journal import JOURNAL, is_running, read_journal
+from workbench.session.manifest import MANIFEST
+
+
+def effective(records: Iterable[ev.Record]) -> list[ev.Record]:
+    """The records that count: without those that a resumption or a repeated placement has set aside."""
+    kept: list[ev.Record] = []
+    for record in records:
+        if isinstance(record.event, ev.SessionResumed | ev.SetAside):
+            while kept and kept[-1].n >= record.event.from_n:
+                kept.pop()
+        kept.append(record)
+    return kept
+
+
+@dataclass
+class Group:
+    """Everything captured at one placement."""
+
+    placed: ev.TargetPlaced
+    captures: dict[str, ev.CaptureTaken] = field(default_factory=dict)
+    """By key."""
+    whole: bool = False
+
+
+def groups(records: Iterable[ev.Record]) -> dict[str, Group]:
+    """The latest capture of each placement, by its key, whole or not.
+
+    Frames count whatever became of what was computed from them: only a repeated placement takes a group away.
+    """
+    found: dict[str, Group] = {}
+    for event in (record.event for record in records):
+        match event:
+            case ev.TargetPlaced(placement=placement):
+                found[placement.key] = Group(event)
+            case ev.CaptureTaken() if event.placement_key in found:
+                found[event.placement_key].captures[event.key] = event
+            case ev.PlacementFinished() if event.key in found:
+                found[event.key].whole = True
+            case ev.SetAside():
+                found.pop(event.key, None)
+            case _:
+                pass
+    return found
+
+
+def safe_part(records: Sequence[ev.Record]) -> list[ev.Record]:
+    """The records that count, up to the placement that was under way when the session ended."""
+    kept = [r for r in effective(records) if not isinstance(r.event, ev.SessionFinished)]
+    for index in range(len(kept) - 1, -1, -1):
+        event = kept[index].event
+        if isinstance(event, ev.PlacementFinished):
+            break
+        if isinstance(event, ev.TargetPlaced):
+            return kept[:index]
+    return kept
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a session stands."""
+
+    session_dir: Path
+    state: Literal["finished", "running", "stopped", "failed", "interrupted", "damaged"]
+    """`stopped` by somebody, `failed` by an error or a limit, `interrupted` without a word, by a kill."""
+    procedures: tuple[str, ...]
+    captures: int
+    why: str
+    """How it ended, one line."""
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether `workbench resume` has something to do."""
+        return self.state in {"stopped", "failed", "interrupted"}
+
+
+def standings(sessions: Path) -> list[Standing]:
+    """Every session of a folder, by name, which is by time.
+
+    Raises:
+        BadInputError: there is no such folder.
+    """
+    if not sessions.is_dir():
+        raise BadInputError(f"{sessions}: expected a folder of sessions, there is none")
+    return [standing(path.parent) for path in sorted(sessions.glob(f"*/{MANIFEST}"))]
+
+
+def standing(session_dir: Path) -> Standing:
+    """Where one session stands."""
+    try:
+        exists = (session_dir / JOURNAL).exists()
+        events = [r.event for r in effective(read_journal(session_dir))] if exists else []
+    except BadInputError as error:
+        return Standing(session_dir, "damaged", (), 0, str(error))
+    first, last = (events[0], events[-1]) if events else (None, None)
+    procedures = first.procedures if isinstance(first, ev.SessionStarted) else ()
+    captures = sum(isinstance(event, ev.CaptureTaken) for event in events)
+    if is_running(session_dir):
+        return Standing(session_dir, "running", procedures, captures, "under way in another program")
+    if not isinstance(last, ev.SessionFinished):
+        return Standing(session_dir, "interrupted", procedures, captures, "killed, or the power went")
+    why = (last.message.splitlines() or [""])[0]
+    states: dict[int, Literal["finished", "stopped"]] = {0: "finished", StoppedError.exit_code: "stopped"}
+    return Standing(session_dir, states.get(last.exit_code, "failed"), procedures, captures, why)
