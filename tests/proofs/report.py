@@ -14,7 +14,7 @@ BANDS = ((125.0, 2000.0, 0.5, 2.5), (2000.0, 4500.0, 1.0, 3.5))
 """Nearest and farthest standoff in mm; mean absolute error in %: the most that it may be, the thesis's."""
 
 
-def tables(rig: Rig, outcome: Outcome) -> tuple[list[str], list[str]]:
+def tables(rig: Rig, outcome: Outcome, fitted_by: str) -> tuple[list[str], list[str]]:
     """All lines, the misses at their end, and the misses by themselves."""
     parameters, undetermined = parameter_scores(rig, outcome)
     by_range = range_scores(rig, outcome)
@@ -23,7 +23,7 @@ def tables(rig: Rig, outcome: Outcome) -> tuple[list[str], list[str]]:
     if unsolved := int(outcome.unsolved.sum()):
         misses.append(f"{unsolved} fits did not converge")
     lines = [
-        *_about(rig, outcome),
+        *_about(rig, outcome, fitted_by),
         "",
         "Every parameter that the data determine, alone or jointly",
         HEADER,
@@ -65,12 +65,13 @@ def range_scores(rig: Rig, outcome: Outcome) -> list[Score]:
     ]
 
 
-def _about(rig: Rig, outcome: Outcome) -> list[str]:
+def _about(rig: Rig, outcome: Outcome, fitted_by: str) -> list[str]:
     n = len(outcome.parameter)
     return [
         f"{n} sensors drawn from the tolerances of {rig.rig}, calibrated at the standoffs of",
         "calibrate-flat.yaml with placement errors, tilts, speckle and noise (OpenCV's lens, not ours),",
-        "fitted by workbench.calibration.batch. Coverage: of the stated 95 % interval, 93 - 97 % expected.",
+        f"{fitted_by}.",
+        "Coverage: of the stated 95 % interval, 93 - 97 % expected.",
         "rms / bound: root mean square error over the Bayesian Cramér-Rao bound, at most 1.05 expected.",
         "+-: 1 sigma, from the number of calibrations.",
         f"Spots out of the frame, or beyond the fold of a drawn lens: {100 * outcome.missing.mean():.2f} %.",

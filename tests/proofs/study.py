@@ -9,7 +9,7 @@ import numpy as np
 from tests.proofs import bound, simulate
 from tests.proofs.ranging import ranges
 from tests.proofs.simulate import Floats
-from workbench.calibration.batch import fit_batch
+from tests.proofs.solve import Solve, at_once
 from workbench.calibration.observations import PlacementInfo, Sighting, group
 from workbench.model.rig import Rig
 
@@ -44,21 +44,22 @@ class Outcome:
     """(N,) share of the cells without a spot in the frame."""
 
 
-def run(rig: Rig, standoffs_mm: Floats, repeats: int, n: int, rng: np.random.Generator) -> Outcome:
+def run(
+    rig: Rig, standoffs_mm: Floats, repeats: int, n: int, rng: np.random.Generator, solve: Solve = at_once
+) -> Outcome:
     """Simulate and score N calibrations."""
     data = simulate.calibrations(rig, standoffs_mm, repeats, n, rng)
-    fitted = fit_batch(rig, placements(rig, standoffs_mm), data.position_px, data.sd_px)
+    fitted = solve(rig, placements(rig, standoffs_mm), data)
     covariance = bound.parameter_covariance(rig, standoffs_mm, data)
     spot_sd = float(np.hypot(rig.noise.spot_sd_px, rig.noise.speckle_sd_px))
     stated = spot_sd * fitted.noise_scale
 
-    far = ranges(fitted.sensor, fitted.sensor_covariance, _read(rig, data.truth, RANGES_MM, rng), stated)
-    held = ranges(fitted.sensor, fitted.sensor_covariance, _read(rig, data.truth, HELD_MM, rng), stated)
-    flat, _ = held.flat(fitted.sensor_covariance)
-    sensor = fitted.sensor.shape[1]
+    far = ranges(fitted.sensor, fitted.covariance, _read(rig, data.truth, RANGES_MM, rng), stated)
+    held = ranges(fitted.sensor, fitted.covariance, _read(rig, data.truth, HELD_MM, rng), stated)
+    flat, _ = held.flat(fitted.covariance)
     return Outcome(
         parameter=fitted.sensor - data.truth,
-        parameter_sd=fitted.sd[:, :sensor],
+        parameter_sd=np.sqrt(np.diagonal(fitted.covariance, axis1=1, axis2=2)),
         parameter_bound=np.diagonal(covariance, axis1=1, axis2=2),
         range=far.range_mm - RANGES_MM[:, None],
         range_sd=far.sd_mm,
@@ -66,7 +67,7 @@ def run(rig: Rig, standoffs_mm: Floats, repeats: int, n: int, rng: np.random.Gen
         held=held.range_mm - HELD_MM[:, None],
         held_flat=flat - HELD_MM,
         noise_scaled=(fitted.noise_scale > 1).astype(float),
-        unsolved=(~fitted.converged).astype(float),
+        unsolved=1.0 - fitted.converged,
         missing=np.isnan(data.position_px[..., 0]).mean(axis=(1, 2)),
     )
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from tests.proofs import bound, report, simulate, study
 from tests.proofs.ranging import ranges
+from tests.proofs.solve import at_once, one_by_one
 from tests.unit.rigs import STANDOFFS_MM, World, thesis_rig
 from tests.unit.test_calibration_file import PROVENANCE
 from workbench.calibration.batch import as_grid, fit_batch
@@ -68,9 +69,21 @@ def test_stated_deviations_are_near_the_bound() -> None:
 def test_a_small_proof_makes_its_tables() -> None:
     rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
     outcome = study.run(rig, np.array(STANDOFFS_MM), 10, 40, np.random.default_rng(5))
-    lines, misses = report.tables(rig, outcome)
+    lines, misses = report.tables(rig, outcome, "fitted")
     # Few calibrations miss limits by chance; every miss must be told by name.
     assert [line for line in lines if line.startswith("MISSED")] == [f"MISSED  {miss}" for miss in misses]
     assert any(line.startswith("not determined") and "ruler_scale" in line for line in lines)
     assert np.isfinite(outcome.parameter).all()
     assert not outcome.unsolved.any()
+
+
+def test_one_by_one_is_at_once_where_every_term_stays() -> None:
+    rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
+    standoffs = np.array(STANDOFFS_MM)
+    data = simulate.calibrations(rig, standoffs, 10, 4, np.random.default_rng(5))
+    many = at_once(rig, study.placements(rig, standoffs), data)
+    single = one_by_one(rig, study.placements(rig, standoffs), data)
+    sd = np.sqrt(np.diagonal(many.covariance, axis1=1, axis2=2))
+    free = sd > 0
+    np.testing.assert_allclose((single.sensor - many.sensor)[free] / sd[free], 0.0, atol=1e-5)
+    np.testing.assert_allclose(single.covariance, many.covariance, atol=1e-6 * many.covariance.max())

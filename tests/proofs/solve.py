@@ -1,0 +1,62 @@
+"""The two ways to a calibration: many at once, and as `workbench fit` does it, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.proofs.simulate import Calibrations, Floats
+from workbench.calibration.batch import fit_batch
+from workbench.calibration.fit import fit
+from workbench.calibration.observations import PlacementInfo, Sighting
+from workbench.calibration.significance import choose
+from workbench.model.rig import Rig
+
+
+@dataclass(frozen=True)
+class Solved:
+    """N calibrations of S parameters."""
+
+    sensor: Floats
+    """(N, S)"""
+    covariance: Floats
+    """(N, S, S)"""
+    noise_scale: Floats
+    """(N,)"""
+    converged: Floats
+    """(N,) 1 or 0."""
+
+
+Solve = Callable[[Rig, Sequence[PlacementInfo], Calibrations], Solved]
+
+
+def at_once(rig: Rig, placements: Sequence[PlacementInfo], data: Calibrations) -> Solved:
+    """By `calibration.batch`: the whole model."""
+    fitted = fit_batch(rig, placements, data.position_px, data.sd_px)
+    return Solved(fitted.sensor, fitted.sensor_covariance, fitted.noise_scale, fitted.converged.astype(float))
+
+
+def one_by_one(rig: Rig, placements: Sequence[PlacementInfo], data: Calibrations) -> Solved:
+    """By the functions of `workbench fit`, with the terms of the model that each calibration chooses."""
+    sensors, covariances, scales, converged = [], [], [], []
+    for position, sd in zip(data.position_px, data.sd_px, strict=True):
+        seen = _sightings(rig, placements, position, sd)
+        fitted = choose(lambda model, seen=seen: fit(model, seen), rig)  # type: ignore[misc]
+        sensors.append(fitted.values[fitted.sensor])
+        covariances.append(fitted.covariance[fitted.sensor, fitted.sensor])
+        scales.append(fitted.noise_scale)
+        converged.append(float(fitted.converged))
+    return Solved(np.array(sensors), np.array(covariances), np.array(scales), np.array(converged))
+
+
+def _sightings(rig: Rig, placements: Sequence[PlacementInfo], position: Floats, sd: Floats) -> list[Sighting]:
+    """One sighting a cell: the mean of its repeats, with the sd of that mean; speckle is the fit's to add."""
+    own = np.sqrt(np.maximum(sd**2 - rig.noise.speckle_sd_px**2, 0.0))
+    return [
+        Sighting(f"{laser} {p.key}", laser, p.key, p.standoff_mm, 0, *position[j, i], *own[j, i])
+        for j, p in enumerate(placements)
+        for i, laser in enumerate(rig.laser_ids)
+        if np.isfinite(position[j, i]).all()
+    ]
