@@ -15,6 +15,9 @@ import typer
 from workbench.cli.stopping import stop_at_once
 from workbench.model.errors import WorkbenchError
 
+# Our matrices are small: threads of the linear algebra wait for each other longer than they work.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 app = typer.Typer(
     help="Calibration and lab-measurement workbench for laser-spot range sensors.",
     no_args_is_help=True,
