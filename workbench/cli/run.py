@@ -20,6 +20,7 @@ from workbench.procedure.operator import Scripted
 from workbench.procedure.outline import Forecast, learn_pace, outline
 from workbench.procedure.resume import plan_of, resume
 from workbench.procedure.run import Caller, Plan, run
+from workbench.report.thesis_figures import FigureWriter
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.viewer.recording import RecordingConsumer
 
@@ -74,7 +75,11 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     with RecordingConsumer(session_dir, plan.rig) as recording, Terminal(console, forecast) as terminal:
         person = whoever_is_there(answers.no_input, console, lambda: asked.reason, terminal.quiet)
         operator = person if answers.file is None else Scripted.load(answers.file, person)
-        consumers = (Guarded(terminal, "the progress", console), Guarded(recording, "the recording", console))
+        consumers = (
+            Guarded(terminal, "the progress", console),
+            Guarded(recording, "the recording", console),
+            Guarded(FigureWriter(session_dir), "drawing figures", console),
+        )
         try:
             yield Screen(consumers, lambda: asked.reason, operator)
         except (RigNotReadyError, StoppedError, AnswerNeededError):

@@ -14,9 +14,10 @@ from rich.text import Text
 
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
+from workbench.model.simulation import SceneSimulated, SimulationFinished
 from workbench.procedure.outline import Forecast
 from workbench.procedure.quality import Quality, quality_of
-from workbench.report.tables import parameter_table, rejected_lines, term_table, trial_table
+from workbench.report.tables import claim_table, parameter_table, rejected_lines, term_table, trial_table
 
 
 class Terminal:
@@ -93,6 +94,10 @@ class Terminal:
                     self._print(f"note: {warning}")
             case ev.TrialFinished() as e:
                 self._console.print(trial_table(e.rows))
+            case SceneSimulated() as e:
+                self._print(f"{e.scene.name}, {e.scene.source}: {len(e.set_mm)} distances")
+            case SimulationFinished() as e:
+                self._console.print(claim_table(e.rows))
             case _:
                 pass
 

@@ -14,6 +14,7 @@ from pydantic import Field
 from workbench.model.calibration import TermSummary
 from workbench.model.limit import Verdict
 from workbench.model.prompt import Answer, By
+from workbench.model.simulation import SceneSimulated, SimulationFinished
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
 
@@ -337,6 +338,8 @@ Event = Annotated[
     | CalibrationExported
     | ReadingTaken
     | TrialFinished
+    | SceneSimulated
+    | SimulationFinished
     | SessionFinished,
     Field(discriminator="kind"),
 ]

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from workbench.model.acceptance import Acceptance
 from workbench.model.limit import Limit
 from workbench.model.rig import NonNegativeFloat, PositiveFloat
+from workbench.model.simulation import SimulatedScene
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 Standoffs = Annotated[tuple[PositiveFloat, ...], Field(min_length=1)]
@@ -239,6 +240,27 @@ class AccuracyTrialStep(FileModel):
         return f"Accuracy at {len(self.standoffs_mm)} standoffs, {self.readings} readings each"
 
 
+class ThesisSimulationStep(FileModel):
+    """Range simulated scenes as the thesis did and as the workbench does; no camera takes part."""
+
+    step: Literal["thesis_simulation"]
+    points: Annotated[int, Field(ge=2)]
+    """Distances of each scene that does not say its own number."""
+    scenes: Annotated[tuple[SimulatedScene, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> ThesisSimulationStep:
+        names = [scene.name for scene in self.scenes]
+        if len(set(names)) != len(names):
+            raise ValueError(f"names of scenes must differ, got {names}")
+        return self
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return f"Simulate {len(self.scenes)} scenes"
+
+
 Step = Annotated[
     MessageStep
     | ConfirmStep
@@ -251,7 +273,8 @@ Step = Annotated[
     | CaptureBoardStep
     | FitStep
     | ExportStep
-    | AccuracyTrialStep,
+    | AccuracyTrialStep
+    | ThesisSimulationStep,
     Field(discriminator="step"),
 ]
 

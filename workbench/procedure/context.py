@@ -237,16 +237,23 @@ class Context:
         self.emit(ev.LatencyMeasured(frames=frames))
         return frames
 
-    def _begin(self, key: str) -> None:
+    def check_stop(self) -> None:
+        """End here if a stop was asked for.
+
+        Raises:
+            StoppedError: it was.
+        """
         if (reason := self.stopping()) is not None:
             raise StoppedError(reason)
+
+    def _begin(self, key: str) -> None:
+        self.check_stop()
         self.bench.mark(key)
 
     def _ask_now(self, prompt: Prompt) -> Answer:
         self.bench.lasers.all_off()
         answer = self.operator.ask(prompt)
-        if (reason := self.stopping()) is not None:
-            raise StoppedError(reason)
+        self.check_stop()
         if answer.action == "abort":
             raise StoppedError(f"aborted by the operator at {prompt.key}: {answer.reason}")
         return answer

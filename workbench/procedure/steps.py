@@ -12,6 +12,8 @@ from collections.abc import Callable
 from functools import singledispatch
 from math import nan
 
+import numpy as np
+
 from workbench.calibration.boards import BoardView, on_boards, see_board
 from workbench.calibration.export import calibrate, render
 from workbench.calibration.fit import fit
@@ -25,6 +27,7 @@ from workbench.model.captures import BOARD
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.prompt import Prompt, Quantity
 from workbench.model.rig import Rig
+from workbench.model.simulation import SimulationFinished
 from workbench.model.target import BoardTarget, Placement
 from workbench.procedure.context import Context
 from workbench.procedure.limits import check_captures, check_fit
@@ -34,6 +37,9 @@ from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE, writ
 from workbench.session.files import write_record
 from workbench.spots import Finding
 from workbench.trials.accuracy import accuracy_csv, accuracy_row
+from workbench.trials.thesis_simulation import claim_rows, claims_csv, readings_csv, simulate
+
+SIMULATION_SEED = 2001
 
 
 @singledispatch
@@ -225,6 +231,25 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
     write_record(context.session_dir / table, accuracy_csv(rows).encode())
     context.emit(ev.TrialFinished(trial=name, rows=tuple(rows)))
     return f"{sum(row.readings for row in rows)} readings, table in {table}"
+
+
+@run_step.register
+def _(step: pr.ThesisSimulationStep, context: Context, name: str) -> str:
+    simulated, rows = [], []
+    for number, scene in enumerate(step.scenes):
+        context.check_stop()
+        rng = np.random.default_rng([SIMULATION_SEED, number])
+        simulated.append(simulate(name, scene, context.rig, scene.points or step.points, rng))
+        rows += claim_rows(simulated[-1])
+        context.emit(simulated[-1])
+    write_record(context.session_dir / f"{name}.csv", claims_csv(rows).encode())
+    write_record(context.session_dir / f"{name}-readings.csv", readings_csv(simulated).encode())
+    context.emit(SimulationFinished(trial=name, rows=tuple(rows)))
+    stated = [row for row in rows if row.reproduced is not None]
+    return (
+        f"as in the thesis: {sum(row.reproduced is True for row in stated)} of {len(stated)} claims kept;"
+        f" ours better in {sum(row.better for row in rows)} of {len(rows)} rows; tables in {name}.csv"
+    )
 
 
 def _placement(name: str, standoff_mm: float) -> Placement:

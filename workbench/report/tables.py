@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from math import floor, log10
 from typing import TYPE_CHECKING
 
+from rich import box
 from rich.table import Table
 
 from workbench.calibration.assess import Derived
@@ -13,6 +14,7 @@ from workbench.calibration.compare import Difference
 from workbench.calibration.observations import Rejected
 from workbench.model.calibration import TERM_VERDICTS, TermSummary
 from workbench.model.event import LeftOutRecord, ParameterRecord, RejectedRecord, TrialRow
+from workbench.model.simulation import ClaimRow
 
 if TYPE_CHECKING:  # the ranger finds spots in images, a table of a fit does without
     from workbench.ranging.ranger import Reading
@@ -160,12 +162,52 @@ def trial_table(rows: Sequence[TrialRow]) -> Table:
     return table
 
 
+def claim_table(rows: Iterable[ClaimRow]) -> Table:
+    """What the thesis states of its simulation, what its chain reaches and what ours does."""
+    table = Table(
+        title="The thesis's simulation (without noise but for the last column)",
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+    table.add_column("scene", no_wrap=True)
+    table.add_column("what", no_wrap=True)
+    for column in ("stated", "thesis", "ours", "noise"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for row in rows:
+        stated, thesis, ours, noisy = (
+            _reached(row, value) for value in (row.stated, row.thesis, row.ours, row.noisy)
+        )
+        table.add_row(
+            row.scene,
+            f"{row.quantity} {row.nearest_mm:g}-{row.farthest_mm:g}",
+            stated,
+            thesis + ("*" if row.reproduced is False else " "),
+            ours + (" " if row.better else "!"),
+            noisy,
+        )
+    table.caption = (
+        "range, angle: largest error; shape: farthest distance with the right\n"
+        "one, mm; readings: how many. thesis: its own chain, run again;\n"
+        "*: not what it states. !: ours is not better"
+    )
+    table.caption_justify = "left"
+    return table
+
+
 def significant(value: float, sd: float) -> str:
     """`value` with the digits that its standard deviation leaves meaningful: two of the sd."""
     if sd <= 0:
         return f"{value:g}"
     digits = max(0, 1 - floor(log10(sd)))
     return f"{value:.{digits}f}"
+
+
+def _reached(row: ClaimRow, value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{100 * value:.2f} %" if row.quantity in {"range", "angle"} else f"{value:.0f}"
 
 
 def _and_more(names: list[str]) -> str:

@@ -15,6 +15,7 @@ from types import TracebackType
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
+from workbench.model.simulation import SceneSimulated, SimulationFinished
 from workbench.model.target import Placement
 from workbench.viewer import camera, fit, scene, steps
 from workbench.viewer import entities as at
@@ -237,6 +238,14 @@ class _OpenRecording:
     def _(self, event: ev.TrialFinished, moment: Moment) -> None:
         self._trial.finish(event)
         steps.say(self.stream, f"Trial {event.trial} finished, {len(event.rows)} standoffs")
+
+    @_log.register
+    def _(self, event: SceneSimulated, moment: Moment) -> None:
+        steps.say(self.stream, f"Scene {event.scene.name} simulated at {len(event.set_mm)} distances")
+
+    @_log.register
+    def _(self, event: SimulationFinished, moment: Moment) -> None:
+        steps.say(self.stream, f"Simulation {event.trial} finished, {len(event.rows)} rows")
 
     @_log.register
     def _(self, event: ev.SessionFinished, moment: Moment) -> None:

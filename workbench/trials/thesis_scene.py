@@ -1,0 +1,146 @@
+"""The scene of the thesis's stand-alone simulation: lines of parallel lasers before a surface by a formula.
+
+Deborah L. Tran, "Obstacle Detection for Robot Navigation Using Structured Light", MIT 2001, section
+5.2.3.2.1. A beam meets the surface at its own place on the front: beams are parallel and have no width here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan, degrees, radians, tan
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.model.errors import BadInputError
+from workbench.model.rig import Rig
+from workbench.model.simulation import LineName, SimulatedScene
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+BEAM_EXIT_MM = 1.5
+DIVERGENCE = 1.6e-3
+"""Full angle, radians."""
+FRONT_STEP_MM = 0.1
+FEWEST_LASERS = 2
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of lasers, and the row or column of pixels along which their spots move."""
+
+    axis: Literal["u", "v"]
+    ids: tuple[str, ...]
+    baselines_mm: FloatArray
+    """(n,) ascending; negative for lasers left of the camera, or above it."""
+    f_px: float
+    centre_px: float
+    """Where the optical axis meets the row (column); whole pixels are at whole numbers."""
+    length_px: int
+    speckle_sd_px: float
+
+    @property
+    def baselines_by_id(self) -> dict[str, float]:
+        """Baselines, mm."""
+        return dict(zip(self.ids, self.baselines_mm.tolist(), strict=True))
+
+    @property
+    def front_mm(self) -> FloatArray:
+        """(n,) places along the front, from the first laser."""
+        return np.asarray(self.baselines_mm - self.baselines_mm[0])
+
+    def spots_px(self, depths_mm: FloatArray) -> FloatArray:
+        """(n,) where beams that end at these depths are seen: (4.1) and (4.2) of the thesis."""
+        return np.asarray(self.centre_px + self.f_px * self.baselines_mm / depths_mm)
+
+    def radii_px(self, depths_mm: FloatArray) -> FloatArray:
+        """(n,) 1/e^2 radii of the spots: (4.5), scaled as the camera sees them."""
+        return np.asarray((BEAM_EXIT_MM + DIVERGENCE * depths_mm) / 2 * self.f_px / depths_mm)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a chain makes of one reading, or what is true of it."""
+
+    closest_mm: float | None
+    """Smallest range over the front; None where no spot was seen."""
+    shape: str
+    """`flat`, `incline`, `round 2` and so on, `cylinder`, `unknown`, `none`."""
+    angle_deg: float | None = None
+    sigma_mm: float | None = None
+    """1 sigma of the closest range, where the chain states one."""
+
+
+def line_of(rig: Rig, name: LineName) -> Line:
+    """The lasers of one line of an ideal rig: pinhole, parallel beams, every value as the rig file has it.
+
+    Raises:
+        BadInputError: the rig has not two lasers on that line, or its lens or beams are not ideal.
+    """
+    along: Literal["u", "v"] = "u" if name == "horizontal" else "v"
+    camera = rig.camera
+    lasers = sorted(
+        (laser for laser in rig.lasers if laser.axis == along),
+        key=lambda laser: laser.x_mm.value if along == "u" else laser.y_mm.value,
+    )
+    if len(lasers) < FEWEST_LASERS:
+        raise BadInputError(
+            f"rig {rig.rig}: expected at least {FEWEST_LASERS} lasers with axis: {along} for a {name} line,"
+            f" got {len(lasers)}"
+        )
+    bent = [name for name in ("k1", "k2", "p1", "p2", "k3") if getattr(camera, name).value != 0]
+    bent += [f"{x.id}.{t}" for x in lasers for t in ("tx", "ty") if getattr(x, t).value != 0]
+    if bent or rig.bench.offset_mm.value != 0:
+        raise BadInputError(
+            f"rig {rig.rig}: expected a pinhole in the reference plane and parallel beams, as in the thesis's"
+            f" simulation; set to 0: {', '.join(bent) or 'bench.offset_mm'}"
+        )
+    baselines = np.array([(x.x_mm if along == "u" else x.y_mm).value for x in lasers])
+    return Line(
+        axis=along,
+        ids=tuple(laser.id for laser in lasers),
+        baselines_mm=baselines,
+        f_px=camera.f_px.value,
+        centre_px=camera.cx_px.value if along == "u" else camera.cy_px.value,
+        length_px=camera.width_px if along == "u" else camera.height_px,
+        speckle_sd_px=rig.noise.speckle_sd_px,
+    )
+
+
+def surface_mm(scene: SimulatedScene, x_mm: FloatArray, set_mm: float) -> FloatArray:
+    """(n,) distance of the surface from the front at places x."""
+    if scene.incline_deg is not None:
+        return set_mm + tan(radians(scene.incline_deg)) * x_mm
+    powers = np.arange(1, len(scene.coefficients) + 1)
+    from_vertex = x_mm - scene.shift_mm
+    return np.asarray(set_mm + (from_vertex[:, None] ** powers) @ np.array(scene.coefficients, float))
+
+
+def truth(scene: SimulatedScene, lines: Sequence[Line], set_mm: float) -> Outcome:
+    """What is there: the smallest distance before the front, whether a beam falls on it or not."""
+    closest = min(float(surface_mm(scene, _front(line), set_mm).min()) for line in lines)
+    return Outcome(closest, scene.shape, scene.incline_deg)
+
+
+def seen(scene: SimulatedScene, line: Line) -> BoolArray:
+    """(n,) lasers whose spots can be seen.
+
+    Raises:
+        BadInputError: the scene loses a laser that the line does not have.
+    """
+    if (missing := [n for n in scene.lost if n > len(line.ids)]) != []:
+        raise BadInputError(
+            f"scene {scene.name}: lost: expected numbers from 1 to {len(line.ids)}, got {missing[0]}"
+        )
+    return np.array([n not in scene.lost for n in range(1, len(line.ids) + 1)])
+
+
+def angle_deg(slope: float) -> float:
+    """Incline of a slope."""
+    return degrees(atan(slope))
+
+
+def _front(line: Line) -> FloatArray:
+    return np.arange(0.0, line.front_mm[-1] + FRONT_STEP_MM / 2, FRONT_STEP_MM)
