@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.unit.rigs import World, thesis_rig
+from tests.unit.rigs import World, prior, thesis_rig
 from tests.unit.test_calibration_file import PROVENANCE
 from workbench.calibration.export import calibrate
 from workbench.calibration.fit import fit
 from workbench.model.acceptance import Acceptance
 from workbench.model.captures import load_captures
 from workbench.model.errors import BadInputError
-from workbench.ranging.acquire import acquire
-from workbench.ranging.assignment import assign
+from workbench.ranging.acquire import NEXT, State, acquire
+from workbench.ranging.assignment import assign, pair_up
 from workbench.ranging.captures import read_captures, scenes
 from workbench.ranging.ranger import Ranger
 from workbench.spots import Finding, Spot
@@ -38,26 +38,36 @@ def spots(ranger: Ranger, ranges_mm: dict[str, float]) -> list[Spot]:
     return [Spot(u, v, 0.03, 0.03, 1e4, 1.5, 150.0) for u, v in positions(ranger, ranges_mm).tolist()]
 
 
+def dealt(ranger: Ranger, pixels: np.ndarray, sd_px: float = 0.05) -> tuple[str, ...] | None:
+    """The lasers of the spots, in the order of the spots; None where they are not told."""
+    pairs = pair_up(ranger.sensor, pixels, np.full(pixels.shape, sd_px))
+    found = assign(pairs, np.arange(len(ranger.sensor.ids)))
+    if found is None:
+        return None
+    by_spot = dict(zip(found[1].tolist(), found[0].tolist(), strict=True))
+    return tuple(ranger.sensor.ids[by_spot[n]] for n in sorted(by_spot))
+
+
 @pytest.mark.parametrize("range_mm", [150.0, 600.0, 2500.0, 4000.0])
 def test_spots_of_a_flat_are_dealt_in_any_order(ranger: Ranger, range_mm: float) -> None:
     pixels = positions(ranger, dict.fromkeys(IDS, range_mm))
     for order in permutations(range(4)):
         expected = tuple(IDS[i] for i in order)
-        assert assign(ranger.sensor, pixels[list(order)], np.full((4, 2), 0.05)) == expected
+        assert dealt(ranger, pixels[list(order)]) == expected
 
 
 @pytest.mark.parametrize("angle_deg", [-45.0, 30.0, 60.0])
 def test_spots_of_an_incline_are_dealt(ranger: Ranger, angle_deg: float) -> None:
     slope = np.tan(np.radians(angle_deg))
     tilted = {i: 500.0 + slope * x for i, x in zip(IDS, (-60, -30, 30, 60), strict=True)}
-    assert assign(ranger.sensor, positions(ranger, tilted), np.full((4, 2), 0.05)) == IDS
+    assert dealt(ranger, positions(ranger, tilted)) == IDS
 
 
 def test_spots_that_fit_two_ways_are_not_dealt(ranger: Ranger) -> None:
     """Two spots in one place can be swapped at will."""
     pixels = positions(ranger, {"L1": 500.0, "L2": 500.0, "L3": 500.0, "L4": 500.0})
     pixels[1] = pixels[0]
-    assert assign(ranger.sensor, pixels, np.full((4, 2), 0.05)) is None
+    assert dealt(ranger, pixels) is None
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -72,15 +82,64 @@ def test_steps_in_depth_are_dealt_rightly_or_not_at_all(seed: int) -> None:
         depths[rng.integers(4)] *= rng.uniform(0.5, 2.0)
         at = zip(IDS, depths + world.values["offset_mm"], strict=True)
         pixels = np.array([world.pixel(i, z) for i, z in at]) + rng.normal(0.0, 0.05, (4, 2))
-        dealt = assign(ranger.sensor, pixels, np.full((4, 2), 0.03))
-        right += dealt == IDS
-        wrong += dealt not in (None, IDS)
+        told = dealt(ranger, pixels, 0.03)
+        right += told == IDS
+        wrong += told not in (None, IDS)
     assert wrong == 0
     assert right > 75
 
 
-def test_fewer_spots_than_lasers_are_not_dealt(ranger: Ranger) -> None:
-    assert assign(ranger.sensor, positions(ranger, {"L1": 500.0}), np.full((1, 2), 0.05)) is None
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("missing", [1, 2])
+def test_missing_spots_leave_the_others_told(seed: int, missing: int) -> None:
+    """Lasers aligned by eye do not share a line: that tells their spots apart, steps in depth included."""
+    world = World(thesis_rig(), seed)
+    ranger = Ranger(calibrate(fit(world.rig, world.sightings()), Acceptance(), PROVENANCE)[0])
+    rng = np.random.default_rng([seed, missing])
+    right = wrong = 0
+    for _ in range(100):
+        depths = np.full(4, rng.uniform(300.0, 3000.0))
+        depths[rng.integers(4)] *= rng.uniform(0.5, 2.0)
+        seen = np.sort(rng.permutation(4)[missing:])
+        at = [world.pixel(IDS[n], depths[n] + world.values["offset_mm"]) for n in seen]
+        told = dealt(ranger, np.array(at) + rng.normal(0.0, 0.05, (len(seen), 2)), 0.03)
+        expected = tuple(IDS[n] for n in seen)
+        right += told == expected
+        wrong += told not in (None, expected)
+    assert wrong == 0
+    assert right >= 95
+
+
+@pytest.fixture(scope="module")
+def coplanar() -> Ranger:
+    """Beams in one plane with the pinhole to a micrometre: every spot lies on the line of every laser."""
+    rig = thesis_rig()
+    level = {"y_mm": prior(0.0, 1e-3), "ty": prior(0.0, 1e-6)}
+    rig = rig.model_copy(update={"lasers": tuple(laser.model_copy(update=level) for laser in rig.lasers)})
+    return Ranger(calibrate(fit(rig, World(rig, 1).sightings()), Acceptance(), PROVENANCE)[0])
+
+
+def test_on_one_line_three_spots_of_a_flat_are_told_and_two_are_not(coplanar: Ranger) -> None:
+    """The inner pair of a flat at 1 m is the outer pair of a flat at 2 m."""
+    for gone in IDS:
+        seen = [i for i in IDS if i != gone]
+        assert dealt(coplanar, positions(coplanar, dict.fromkeys(seen, 900.0))) == tuple(seen)
+    assert dealt(coplanar, positions(coplanar, {"L2": 1000.0, "L3": 1000.0})) is None
+    assert dealt(coplanar, positions(coplanar, {"L2": 1000.0})) is None
+
+
+def test_more_spots_than_lasers_are_not_dealt(coplanar: Ranger) -> None:
+    flat = positions(coplanar, dict.fromkeys(IDS, 900.0))
+    assert dealt(coplanar, np.vstack((flat, flat[:1] + np.array([9.0, 0.0])))) is None
+
+
+def test_a_spot_on_no_laser_s_line_is_other_light(ranger: Ranger) -> None:
+    astray = Spot(300.0, 60.0, 0.03, 0.03, 1e4, 1.5, 150.0)
+    reading = ranger.read_lit("s", [*spots(ranger, dict.fromkeys(IDS, 800.0)), astray])
+    assert reading.status == "done"
+    assert reading.notes == ("1 of 5 spots on no laser's line: other light",)
+    alone = ranger.read_lit("s", [astray])
+    assert (alone.status, alone.closest_mm) == ("no_points", None)
 
 
 def test_a_flat(ranger: Ranger) -> None:
@@ -91,17 +150,30 @@ def test_a_flat(ranger: Ranger) -> None:
     assert reading.flat_mm == pytest.approx(800.0)
     assert reading.flat_sigma_mm is not None
     assert reading.sigma_mm is not None
-    assert 0 < reading.flat_sigma_mm < reading.sigma_mm
+    assert reading.sigma_mm <= reading.flat_sigma_mm < min(laser.sigma_mm for laser in reading.lasers)
+    (line,) = reading.lines
+    assert (line.axis, line.shape.kind) == ("u", "flat")
+    assert reading.mean_mm == reading.closest_mm
 
 
-def test_the_closest_is_the_nearest_laser_s(ranger: Ranger) -> None:
+def test_the_closest_is_at_the_near_end_of_an_incline(ranger: Ranger) -> None:
     reading = ranger.read_lit("s", spots(ranger, {"L1": 520.0, "L2": 510.0, "L3": 490.0, "L4": 480.0}))
-    assert reading.closest_mm == pytest.approx(480.0)
+    (line,) = reading.lines
+    assert line.shape.kind == "incline"
+    # Beams that are not parallel shift the spots by some millimetres along the front.
+    assert reading.closest_mm == pytest.approx(480.0, abs=1.5)
+    assert line.shape.angle_rad == pytest.approx(-np.arctan(40 / 120), abs=0.01)
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 5])
-def test_not_as_many_spots_as_lasers(ranger: Ranger, count: int) -> None:
-    seen = (spots(ranger, dict.fromkeys(IDS, 800.0)) * 2)[:count]
+def test_not_as_many_spots_as_lasers(coplanar: Ranger, count: int) -> None:
+    ranger = coplanar
+    flat = (
+        spots(ranger, dict.fromkeys(IDS, 800.0))
+        if count != 3
+        else spots(ranger, {"L1": 800.0, "L2": 1300.0, "L3": 500.0, "L4": 800.0})
+    )
+    seen = (flat * 2)[:count]
     reading = ranger.read_lit("s", seen)
     assert reading.status == ("not_enough_points" if count else "no_points")
     assert reading.closest_mm is None
@@ -113,7 +185,8 @@ def test_lasers_fired_alone_with_one_missing(ranger: Ranger) -> None:
     pixels = positions(ranger, {"L1": 800.0, "L4": 805.0})
     reading = ranger.read_known("s", 3, ["L1", "L4"], pixels, np.full((2, 2), np.nan))
     assert reading.status == "not_enough_points"
-    assert reading.closest_mm == pytest.approx(800.0)
+    assert reading.closest_mm == pytest.approx(800.0, abs=0.5)
+    assert reading.lasers[0].range_mm == pytest.approx(800.0)
 
 
 def test_a_laser_whose_spot_lies_beyond_infinity_does_not_count(ranger: Ranger) -> None:
@@ -190,13 +263,45 @@ def test_normal_capture_is_enough_where_every_spot_shows(ranger: Ranger) -> None
     assert fired == [IDS]
 
 
-def test_alternative_capture_fires_each_laser_alone(ranger: Ranger) -> None:
+def test_no_spot_asks_for_no_more(ranger: Ranger) -> None:
+    fired: list[tuple[str, ...]] = []
+
+    def shoot(ids: tuple[str, ...]) -> Finding:
+        fired.append(ids)
+        return Finding(())
+
+    assert acquire(ranger, "s", shoot).status == "no_points"
+    assert fired == [IDS]
+
+
+def test_spots_that_are_told_apart_ask_for_no_more(ranger: Ranger) -> None:
+    fired: list[tuple[str, ...]] = []
+
+    def shoot(ids: tuple[str, ...]) -> Finding:
+        fired.append(ids)
+        return Finding(tuple(spots(ranger, dict.fromkeys(("L1", "L3", "L4"), 700.0))))
+
+    reading = acquire(ranger, "s", shoot)
+    assert fired == [IDS]
+    assert reading.status == "not_enough_points"
+    assert [laser.laser_id for laser in reading.lasers] == ["L1", "L3", "L4"]
+
+
+def test_every_state_leads_to_an_answer() -> None:
+    for state in (State.NORMAL, State.ALTERNATIVE):
+        followers = {NEXT[s, seen] for s, seen in NEXT if s is state}
+        assert State.ANSWER in followers
+        assert state not in followers
+
+
+def test_alternative_capture_fires_each_laser_alone(coplanar: Ranger) -> None:
+    ranger = coplanar
     fired: list[tuple[str, ...]] = []
 
     def shoot(ids: tuple[str, ...]) -> Finding:
         fired.append(ids)
         if len(ids) > 1:
-            return Finding(tuple(spots(ranger, dict.fromkeys(ids[:3], 700.0))))
+            return Finding(tuple(spots(ranger, dict.fromkeys(ids[:2], 700.0))))
         return Finding(() if ids == ("L2",) else tuple(spots(ranger, dict.fromkeys(ids, 700.0))))
 
     reading = acquire(ranger, "s", shoot)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -12,12 +13,12 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from workbench.calibration.curves import SpotCurves
 from workbench.calibration.parameters import LENS, RAY
 from workbench.calibration.programs import kept
 from workbench.model.calibration import Calibration
 from workbench.optics.lens import Lens, radial_slope
 from workbench.optics.rays import Ray, spot_at_inverse_depth
-from workbench.optics.triangulate import Sighted, estimate_depth
 
 FloatArray = NDArray[np.float64]
 
@@ -41,6 +42,16 @@ class Ranges:
     def sigma_mm(self) -> FloatArray:
         """(n,) 1 sigma of each range."""
         return np.sqrt(np.diag(self.covariance_mm2))
+
+    def only(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Ranges:
+        """Some of them."""
+        return Ranges(
+            self.range_mm[index],
+            self.spot_sd_mm[index],
+            self.by_parameter[index],
+            self.covariance_mm2[index][:, index],
+            self.misfit_sd[index],
+        )
 
 
 @dataclass(frozen=True)
@@ -72,6 +83,31 @@ class Sensor:
     @cached_property
     def _columns(self) -> dict[str, int]:
         return {name: i for i, name in enumerate(self.calibration.laser_ranger.parameters.names)}
+
+    @cached_property
+    def _own_columns(self) -> NDArray[np.intp]:
+        """(lasers, 12) columns of the lens and of each laser's ray."""
+        lens = [self._columns[name] for name in LENS]
+        return np.array([[*lens, *(self._columns[f"{i}.{name}"] for name in RAY)] for i in self.ids])
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """(P, P) of the calibration's parameters."""
+        return self.calibration.laser_ranger.parameters.covariance_array
+
+    def lasers_on(self, axis: Literal["u", "v"]) -> NDArray[np.intp]:
+        """Indices of the lasers whose spots move along an image axis."""
+        lasers = self.calibration.laser_ranger.lasers
+        return np.array([n for n, laser in enumerate(lasers) if laser.axis == axis], np.intp)
+
+    def front_mm(self, axis: Literal["u", "v"]) -> tuple[float, float]:
+        """From the first to the last laser of a line, mm along x or y."""
+        origins = self._rays[self.lasers_on(axis), RAY.index("x_mm" if axis == "u" else "y_mm")]
+        return float(origins.min()), float(origins.max())
+
+    @cached_property
+    def _curves(self) -> SpotCurves:
+        return SpotCurves(self._lens, self._rays)
 
     @property
     def offset_mm(self) -> float:
@@ -105,21 +141,44 @@ class Sensor:
                 The speckle's is added here.
         """
         noise = self.calibration.laser_ranger.noise
-        laser = [self.ids.index(i) for i in laser_ids]
+        laser = np.array([self.ids.index(i) for i in laser_ids], np.intp)
         measured = np.isfinite(position_px)
         own_sd = np.where(np.isfinite(sd_px), sd_px, noise.spot_sd_px)
-        sd = np.where(measured, np.hypot(own_sd, noise.speckle_sd_px), np.inf)
-        found = _depths(self._lens, self._rays[laser], np.where(measured, position_px, 0.0), sd)
-        w, across, spot_sd, by_lens, by_ray, across_by_lens, across_by_ray = map(np.asarray, found)
-        with np.errstate(divide="ignore"):
+        inverse_sd = measured / np.hypot(own_sd, noise.speckle_sd_px)
+        with np.errstate(divide="ignore", invalid="ignore"):  # a spot at infinity, or not measured at all
+            found = self._curves.invert(laser, np.where(measured, position_px, 0.0), inverse_sd)
+            w = found.inverse_depth_per_mm
             range_mm = np.where(w > 0, 1.0 / w, np.inf) - self.offset_mm
-        gradient = self._gradient(laser_ids, by_lens, by_ray)
+        gradient = self._by_parameter(laser, found.dz)
         gradient[:, self._columns["offset_mm"]] = -1.0
-        parameters = self.calibration.laser_ranger.parameters.covariance_array
-        covariance = gradient @ parameters @ gradient.T + np.diag(spot_sd**2)
-        line = self._gradient(laser_ids, across_by_lens, across_by_ray)
-        line_variance = np.einsum("np,pq,nq->n", line, parameters, line)
-        return Ranges(range_mm, spot_sd, gradient, covariance, np.abs(across) / np.sqrt(1 + line_variance))
+        covariance = gradient @ self.covariance @ gradient.T
+        covariance[np.diag_indices(len(laser))] += found.z_sd_of_spot_mm**2
+        line = self._by_parameter(laser, found.dacross)
+        line_variance = ((line @ self.covariance) * line).sum(axis=1)
+        misfit_sd = np.abs(found.across_sd) / np.sqrt(1 + line_variance)
+        return Ranges(range_mm, found.z_sd_of_spot_mm, gradient, covariance, misfit_sd)
+
+    def places(
+        self, laser_ids: Sequence[str], axis: Literal["u", "v"], ranges: Ranges
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Where n spots lie along x (axis u) or y (axis v), origin + tangent x depth.
+
+        Returns:
+            (n,) places, mm; (n, P) their derivatives by the parameters of the calibration; (n,) tangents,
+            which are their derivatives by range.
+        """
+        names = ("x_mm", "tx") if axis == "u" else ("y_mm", "ty")
+        laser = [self.ids.index(i) for i in laser_ids]
+        origin, tangent = (self._rays[laser, RAY.index(name)] for name in names)
+        depth = ranges.range_mm + self.offset_mm
+        gradient = ranges.by_parameter * tangent[:, None]
+        gradient[:, self._columns["offset_mm"]] = (
+            0.0  # the spot stays where the plane is counted from elsewhere
+        )
+        rows = np.arange(len(laser))
+        for name, slope in zip(names, (np.ones(len(laser)), depth), strict=True):
+            gradient[rows, [self._columns[f"{i}.{name}"] for i in laser_ids]] += slope
+        return origin + tangent * depth, gradient, tangent
 
     def relative_range_sd(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
         """(n,) 1 sigma of a single range over the range, for spots of the calibration's typical noise."""
@@ -139,12 +198,10 @@ class Sensor:
         inside = (u > -0.5) & (u < width - 0.5) & (v > -0.5) & (v < height - 0.5) & unfolded
         return np.asarray(inside, bool)
 
-    def _gradient(self, laser_ids: Sequence[str], by_lens: FloatArray, by_ray: FloatArray) -> FloatArray:
-        """(n, P) from derivatives by lens and own ray; those by other lasers' rays are 0."""
-        gradient = np.zeros((len(laser_ids), len(self._columns)))
-        gradient[:, [self._columns[name] for name in LENS]] = by_lens
-        for row, laser_id in enumerate(laser_ids):
-            gradient[row, [self._columns[f"{laser_id}.{name}"] for name in RAY]] = by_ray[row]
+    def _by_parameter(self, laser: NDArray[np.intp], own: FloatArray) -> FloatArray:
+        """(n, P) from (n, 12) derivatives by lens and own ray; those by other lasers' rays are 0."""
+        gradient = np.zeros((len(laser), len(self._columns)))
+        gradient[np.arange(len(laser))[:, None], self._own_columns[laser]] = own
         return gradient
 
 
@@ -173,11 +230,3 @@ def spot_gradients(lens: Array, ray: Array, offset_mm: Array, range_mm: Array) -
 
     derivatives: tuple[Array, ...] = jax.jacfwd(at_ranges, argnums=(0, 1, 2))(lens, ray, offset_mm)
     return derivatives
-
-
-@kept()
-def _depths(lens: Array, rays: Array, position_px: Array, sd_px: Array) -> tuple[Array, ...]:
-    def one(ray: Array, position: Array, sd: Array) -> tuple[Array, ...]:
-        return tuple(estimate_depth(Lens(*lens), Ray(*ray), Sighted(*position, *sd)))
-
-    return jax.vmap(one)(rays, position_px, sd_px)

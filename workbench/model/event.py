@@ -270,6 +270,9 @@ class LaserRange(FileModel):
     sigma_mm: float
     u_px: float | None
     v_px: float | None
+    low_mm: float | None = None
+    high_mm: float | None = None
+    """The 95 % interval, longer beyond the range than before it; no upper end where it reaches infinity."""
 
 
 class ReadingTaken(FileModel):

@@ -1,28 +1,95 @@
-"""One reading of the sensor: all lasers at once, and each alone where that does not tell enough."""
+"""One reading of the sensor: all lasers at once, and each alone where that does not tell enough.
+
+The control flow of the thesis's main control (its Figure 17), as a table of states. A capture is: lasers on,
+frame, all off, frame, subtract, spots.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import Enum
+from typing import Final
 
-from workbench.ranging.ranger import Ranger, Reading, spot_arrays
-from workbench.spots import Finding
+import numpy as np
+
+from workbench.ranging.ranger import Dealt, Ranger, Reading, spot_arrays
+from workbench.spots import Finding, Spot
 
 Shoot = Callable[[tuple[str, ...]], Finding]
 """Fires the lasers with these ids, captures a pair and finds the spots."""
 
 
+class State(Enum):
+    """Where the control is."""
+
+    NORMAL = "every laser lit at once"
+    ALTERNATIVE = "each laser whose spot was not told, alone"
+    ANSWER = "range and shape; the next reading starts with a normal capture"
+
+
+class Seen(Enum):
+    """What a state's captures showed."""
+
+    NOTHING = "no spot"
+    TOLD = "every spot is some laser's"
+    UNTOLD = "spots that may be one laser's or another's"
+
+
+NEXT: Final = {
+    (State.NORMAL, Seen.NOTHING): State.ANSWER,
+    (State.NORMAL, Seen.TOLD): State.ANSWER,
+    (State.NORMAL, Seen.UNTOLD): State.ALTERNATIVE,
+    (State.ALTERNATIVE, Seen.NOTHING): State.ANSWER,
+    (State.ALTERNATIVE, Seen.TOLD): State.ANSWER,
+}
+
+
 def acquire(ranger: Ranger, scene: str, shoot: Shoot) -> Reading:
-    """Main control of the thesis (its Figure 17): normal capture, then alternative capture if need be.
+    """One reading: normal capture, and alternative capture of the lines whose spots cannot be told apart.
 
-    Normal capture lights every laser. Unless each made a spot that can be told from the others, alternative
-    capture fires each alone, so that one capture shows one laser.
+    A line that is told stands whatever becomes of the other one. Spots that are missing are not asked for
+    again where the others are told.
     """
-    ids = ranger.sensor.ids
-    reading = ranger.read_lit(scene, shoot(ids).spots)
-    return reading if reading.status == "done" else _alternative(ranger, scene, shoot)
+    control = _Control(ranger, scene, shoot)
+    state = State.NORMAL
+    while state is not State.ANSWER:
+        state = NEXT[state, control.run(state)]
+    assert control.reading is not None  # noqa: S101 - every way to the answer leads through a capture
+    return control.reading
 
 
-def _alternative(ranger: Ranger, scene: str, shoot: Shoot) -> Reading:
-    found = [(i, spots[0]) for i in ranger.sensor.ids if len(spots := shoot((i,)).spots) == 1]
-    position, sd = spot_arrays([spot for _, spot in found])
-    return ranger.read_known(scene, len(ranger.sensor.ids), [i for i, _ in found], position, sd)
+class _Control:
+    """What is carried from one state to the next."""
+
+    def __init__(self, ranger: Ranger, scene: str, shoot: Shoot) -> None:
+        self._ranger, self._scene, self._shoot = ranger, scene, shoot
+        self._known: list[tuple[str, Spot]] = []
+        self._untold: tuple[str, ...] = ()
+        self.reading: Reading | None = None
+
+    def run(self, state: State) -> Seen:
+        """Do what a state asks for, and tell what was seen."""
+        return self._normal() if state is State.NORMAL else self._alternative()
+
+    def _normal(self) -> Seen:
+        spots = self._shoot(self._ranger.sensor.ids).spots
+        dealt = self._ranger.deal(spots)
+        self._known, self._untold = self._of(spots, dealt), dealt.untold
+        self.reading = self._ranger.read_dealt(self._scene, spots, dealt)
+        if not spots:
+            return Seen.NOTHING
+        return Seen.UNTOLD if dealt.untold else Seen.TOLD
+
+    def _alternative(self) -> Seen:
+        for laser_id in self._untold:
+            spot = self._ranger.alone(laser_id, self._shoot((laser_id,)).spots)
+            if spot is not None:
+                self._known.append((laser_id, spot))
+        position, sd = spot_arrays([spot for _, spot in self._known])
+        ids = [laser_id for laser_id, _ in self._known]
+        self.reading = self._ranger.read_known(self._scene, len(self._ranger.sensor.ids), ids, position, sd)
+        return Seen.TOLD if ids else Seen.NOTHING
+
+    def _of(self, spots: tuple[Spot, ...], dealt: Dealt) -> list[tuple[str, Spot]]:
+        ids = self._ranger.sensor.ids
+        return [(ids[i], spots[n]) for i, n in np.stack((dealt.lasers, dealt.spots), axis=1).tolist()]

@@ -2,58 +2,107 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
 from itertools import permutations
-from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from workbench.calibration.sensor import Sensor
+from workbench.calibration.sensor import Ranges, Sensor
 
 FloatArray = NDArray[np.float64]
-CLEARLY_BETTER = 2.0
-"""The best assignment is believed when the spread of the next best is this many times larger."""
+Ints = NDArray[np.intp]
+MOST_MISFIT_SD = 6.0
+"""A spot farther from a laser's line is not that laser's: by chance one in 5e8 is."""
 IMPROBABLE = 1e-4
 """Chance of distances from the lines as large as these, below which a way of dealing is out."""
+CLEARLY_BETTER = 2.0
+"""The best way is believed when the spread of the next best is this many times larger."""
+SMOOTH = 0.05
+"""Where spots are missing: the largest relative spread of inverse depths that is taken for one surface."""
+FEWEST_FOR_SMOOTH = 3
+"""Two spots lie on some surface whichever lasers made them."""
 MOST_LASERS = 6
 
 
-def assign(sensor: Sensor, position_px: FloatArray, sd_px: FloatArray) -> tuple[str, ...] | None:
-    """Laser ids of n spots, n the number of lasers; None where the spots do not tell.
+@dataclass(frozen=True)
+class Pairs:
+    """What each of L lasers would make of each of S spots."""
 
-    Each way of dealing the spots to the lasers puts each spot at a distance from its laser's line and at an
-    inverse depth. Ways in which the distances are improbable are out: the lines of real lasers, which are
-    never quite coplanar, are often enough. Of the rest, a surface that does not jump gives all lasers about
-    the same inverse depth and a swap of two does not, neighbouring baselines differing by half and more: the
-    way with the smallest relative spread is taken, if it is clearly so. What remains undecided, or wrong, is
-    a target that jumps in depth as far as a swap would make it, seen by lasers whose lines coincide.
+    ranges: Ranges
+    """Of the L x S pairs, row by row: laser 0 with every spot, laser 1, ..."""
+    inverse_depth: FloatArray
+    """(L, S) not positive where the laser cannot have made the spot."""
+    misfit_sd: FloatArray
+    """(L, S)"""
+
+    def chosen(self, lasers: Ints, spots: Ints) -> Ranges:
+        """Ranges of some pairs."""
+        return self.ranges.only(lasers * self.misfit_sd.shape[1] + spots)
+
+
+def pair_up(sensor: Sensor, position_px: FloatArray, sd_px: FloatArray) -> Pairs:
+    """Range every spot as if every laser had made it.
 
     Args:
         sensor: the calibrated sensor.
-        position_px: (n, 2) u, v of the spots, in any order.
-        sd_px: (n, 2) their 1 sigma.
+        position_px: (S, 2) u, v of the spots.
+        sd_px: (S, 2) their 1 sigma.
     """
-    ids = sensor.ids
-    n = len(ids)
-    if len(position_px) != n or n > MOST_LASERS:
+    lasers, spots = len(sensor.ids), len(position_px)
+    every_laser = [i for i in sensor.ids for _ in range(spots)]
+    ranges = sensor.ranges(every_laser, np.tile(position_px, (lasers, 1)), np.tile(sd_px, (lasers, 1)))
+    inverse_depth = (1.0 / (ranges.range_mm + sensor.offset_mm)).reshape(lasers, spots)
+    possible = (inverse_depth > 0) & (ranges.range_mm.reshape(lasers, spots) > 0)
+    misfit = ranges.misfit_sd.reshape(lasers, spots)
+    return Pairs(ranges, np.where(possible, inverse_depth, -1.0), np.where(possible, misfit, np.inf))
+
+
+def assign(pairs: Pairs, lasers: Ints) -> tuple[Ints, Ints] | None:
+    """Indices of lasers and of the spots that they made, equally many; None where the spots do not tell.
+
+    Spots that lie off the line of every laser are other light. Each way of dealing the others to the lasers
+    puts them at distances from the lasers' lines and at inverse depths. Ways in which the distances are
+    improbable are out: the lines of real lasers, which are never quite coplanar, are often enough. Of the
+    rest, a surface that does not jump gives all lasers about the same inverse depth and a swap of two does
+    not, neighbouring baselines differing by half and more: the way with the smallest relative spread is
+    taken, if it is clearly so. Where spots are missing, the spread must be small, too. What remains
+    undecided, or wrong, is a target that jumps in depth as far as a swap would make it, seen by lasers whose
+    lines coincide.
+
+    Args:
+        pairs: of all lasers with all spots.
+        lasers: (n,) indices of the lasers of one line that are lit.
+    """
+    on_line = pairs.misfit_sd[lasers] < MOST_MISFIT_SD
+    spots = np.flatnonzero(on_line.any(axis=0))
+    n, m = len(lasers), len(spots)
+    if m > n or n > MOST_LASERS:
         return None
-    every_laser = [i for i in ids for _ in range(n)]
-    ranges = sensor.ranges(every_laser, np.tile(position_px, (n, 1)), np.tile(sd_px, (n, 1)))
-    inverse_depth = (1.0 / (ranges.range_mm + sensor.offset_mm)).reshape(n, n)  # [laser, spot]
-    misfit = ranges.misfit_sd.reshape(n, n)
-    ways = np.array(list(permutations(range(n)))).reshape(factorial(n), n)
-    dealt = inverse_depth[np.arange(n), ways]
-    on_line = chdtrc(n, (misfit[np.arange(n), ways] ** 2).sum(axis=1)) > IMPROBABLE
-    possible = (dealt > 0).all(axis=1) & on_line
-    if not possible.any():
+    if m == 0:
+        return lasers[:0], spots
+    ways = _ways(n, m)
+    to, columns = lasers[ways], spots[None, :]
+    dealt = pairs.inverse_depth[to, columns]
+    misfit2 = (pairs.misfit_sd[to, columns] ** 2).sum(axis=1)
+    possible = (dealt > 0).all(axis=1) & (misfit2 < MOST_MISFIT_SD**2 * m)
+    possible[possible] = chdtrc(m, misfit2[possible]) > IMPROBABLE
+    left = np.flatnonzero(possible)
+    if len(left) == 0:
         return None
-    ways, dealt = ways[possible], dealt[possible]
-    spread = dealt.std(axis=1) / dealt.mean(axis=1)
-    order = np.argsort(spread)
-    if len(order) > 1 and spread[order[1]] < CLEARLY_BETTER * spread[order[0]]:
+    if len(left) == 1:
+        return to[left[0]], spots
+    spread = dealt[left].std(axis=1) / dealt[left].mean(axis=1)
+    best, next_best = np.partition(spread, 1)[:2]
+    smooth = m == n or (m >= FEWEST_FOR_SMOOTH and best < SMOOTH < next_best)
+    if next_best < CLEARLY_BETTER * best or not smooth:
         return None
-    assigned = [""] * n
-    for laser, spot in zip(ids, ways[order[0]], strict=True):
-        assigned[spot] = laser
-    return tuple(assigned)
+    return to[left[spread.argmin()]], spots
+
+
+@lru_cache(maxsize=64)
+def _ways(lasers: int, spots: int) -> Ints:
+    """(ways, spots) every way of giving each spot a laser of its own."""
+    return np.array(list(permutations(range(lasers), spots)), np.intp)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.ranging.points import Points
+from workbench.ranging.points import Closest, Points
 
 FloatArray = NDArray[np.float64]
 STEPS = 12
@@ -27,6 +27,8 @@ class CylinderFit:
     radius_mm: float
     covariance: FloatArray
     """(3, 3) of the three."""
+    by_range: FloatArray
+    """(3, n) their derivatives by the ranges that were fitted."""
     chi2: float
     freedom: int
 
@@ -35,13 +37,14 @@ class CylinderFit:
         """1 sigma."""
         return math.sqrt(self.covariance[2, 2])
 
-    def closest(self, front_mm: tuple[float, float]) -> tuple[float, float, float]:
-        """Smallest range over the front, its 1 sigma, and where it is (x, mm)."""
+    def closest(self, front_mm: tuple[float, float]) -> Closest:
+        """Smallest range over the front."""
         x = min(max(self.axis_x_mm, front_mm[0]), front_mm[1])
         aside = x - self.axis_x_mm
         ahead = math.sqrt(max(self.radius_mm**2 - aside**2, (GRAZING * self.radius_mm) ** 2))
         gradient = np.array([-aside / ahead, 1.0, -self.radius_mm / ahead])
-        return self.axis_range_mm - ahead, math.sqrt(gradient @ self.covariance @ gradient), x
+        sigma = math.sqrt(gradient @ self.covariance @ gradient)
+        return Closest(self.axis_range_mm - ahead, sigma, x, gradient @ self.by_range)
 
 
 def fit_cylinder(points: Points) -> CylinderFit | None:
@@ -61,7 +64,8 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
         by = np.column_stack((-along, -cosine, -np.ones(len(points))))
         weighted = by.T @ weight
         covariance = np.linalg.inv(weighted @ by)
-        step = covariance @ (weighted @ (distance - circle[2]))
+        gain = covariance @ weighted
+        step = gain @ (distance - circle[2])
         circle = circle - step
         if not np.abs(circle).max() < 1e6:
             return None
@@ -71,7 +75,8 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
     residual = distance - circle[2]
     x, z, radius = circle.tolist()
     chi2 = float(residual @ weight @ residual)
-    fit = CylinderFit(x, z, radius, np.asarray(covariance, np.float64), chi2, len(points) - 3)
+    by_range = np.asarray(-gain * cosine, np.float64)
+    fit = CylinderFit(x, z, radius, np.asarray(covariance, np.float64), by_range, chi2, len(points) - 3)
     believed = (cosine < -GRAZING).all() and 0 < fit.radius_sigma_mm < MOST_RELATIVE_SIGMA * radius
     return fit if believed else None
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from math import hypot
+
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.calibration.sensor import Ranges
 from workbench.model.calibration import Validity
 from workbench.model.event import LaserRange
+from workbench.ranging.assignment import MOST_MISFIT_SD
+from workbench.spots import Scanline
 
 FloatArray = NDArray[np.float64]
-MOST_MISFIT_SD = 6.0
-"""A spot farther from its laser's line is another light: by chance one in 5e8 is."""
 MOST_RELATIVE_SIGMA = 0.5
 """Beyond, the spot is so near to its place at infinity that its range may be anything."""
+LEAST_BEYOND_PX = 0.5
+"""Beyond the calibrated field by less than this is not worth telling."""
 
 
 def objections(position_px: FloatArray, ranges: Ranges, size_px: tuple[int, int]) -> list[str | None]:
@@ -50,12 +55,30 @@ def _objection(
     return None
 
 
-def outside_validity(lasers: tuple[LaserRange, ...], validity: Validity) -> list[str]:
-    """A remark for each range that the calibration was not measured at."""
+def outside_validity(
+    lasers: Sequence[LaserRange], validity: Validity, lines: Mapping[str, Scanline]
+) -> list[str]:
+    """A remark for each range that the calibration was not measured at, and how far off the spot lies."""
     nearest, farthest = validity.standoff_mm
-    calibrated = f"{nearest:g} to {farthest:g}"
-    return [
-        f"{laser.laser_id}: {laser.range_mm:.0f} mm lies outside the calibrated {calibrated} mm"
-        for laser in lasers
-        if not nearest <= laser.range_mm <= farthest
-    ]
+    remarks = []
+    for laser in lasers:
+        if nearest <= laser.range_mm <= farthest:
+            continue
+        calibrated = f"{nearest:g} to {farthest:g}"
+        remark = f"{laser.laser_id}: {laser.range_mm:.0f} mm lies outside the calibrated {calibrated} mm"
+        beyond = _beyond_field_px(laser, lines[laser.laser_id])
+        remarks.append(
+            remark
+            if beyond < LEAST_BEYOND_PX
+            else f"{remark}, its spot {beyond:.0f} px outside the calibrated field"
+        )
+    return remarks
+
+
+def _beyond_field_px(laser: LaserRange, field: Scanline) -> float:
+    """How far a spot lies outside the part of its line where the calibration saw it (0: inside)."""
+    length = hypot(field.du, field.dv)
+    du = 0.0 if laser.u_px is None else (laser.u_px - field.u0_px) * field.du
+    dv = 0.0 if laser.v_px is None else (laser.v_px - field.v0_px) * field.dv
+    along = (du + dv) / length
+    return max(along - length, -along, 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,16 @@ class Points:
         if self.x_covariance_mm2 is not None:
             total = total + by_x[:, None] * self.x_covariance_mm2 * by_x
         return total
+
+
+class Closest(NamedTuple):
+    """The smallest range of a fitted shape over the front, mm."""
+
+    range_mm: float
+    sigma_mm: float
+    x_mm: float
+    by_range: FloatArray
+    """(n,) its derivatives by the ranges that were fitted."""
 
 
 def interval_mm(range_mm: float, sigma_mm: float, offset_mm: float = 0.0) -> tuple[float, float]:

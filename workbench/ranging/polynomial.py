@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.ranging.points import Points
+from workbench.ranging.points import Closest, Points
 
 FloatArray = NDArray[np.float64]
 STEPS = 3
@@ -22,6 +23,8 @@ class PolynomialFit:
     """(degree + 1,) mm."""
     covariance: FloatArray
     """(degree + 1, degree + 1) of them."""
+    by_range: FloatArray
+    """(degree + 1, n) their derivatives by the ranges that were fitted."""
     scale_mm: float
     chi2: float
     freedom: int
@@ -35,8 +38,8 @@ class PolynomialFit:
         """Coefficients of x^k, mm^(1 - k)."""
         return tuple((self.coefficients / self.scale_mm ** np.arange(self.degree + 1)).tolist())
 
-    def closest(self, front_mm: tuple[float, float]) -> tuple[float, float, float]:
-        """Smallest range over the front, its 1 sigma, and where it is (x, mm).
+    def closest(self, front_mm: tuple[float, float]) -> Closest:
+        """Smallest range over the front.
 
         Where the smallest range lies moves with the coefficients, but at a minimum that does not change it.
         """
@@ -44,8 +47,8 @@ class PolynomialFit:
         powers = _powers(places / self.scale_mm, self.degree)
         ranges = powers @ self.coefficients
         at = int(ranges.argmin())
-        sigma = float(np.sqrt(powers[at] @ self.covariance @ powers[at]))
-        return float(ranges[at]), sigma, float(places[at])
+        sigma = math.sqrt(powers[at] @ self.covariance @ powers[at])
+        return Closest(float(ranges[at]), sigma, float(places[at]), powers[at] @ self.by_range)
 
     def _turns(self, front_mm: tuple[float, float]) -> list[float]:
         """Places inside the front where the slope is 0."""
@@ -77,13 +80,21 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
         by = powers * (fitted**2)[:, None]  # d(1 / z) = -dz / z^2
         weighted = by.T @ weight
         covariance = np.linalg.inv(weighted @ by)
-        coefficients = coefficients + covariance @ (weighted @ (fitted - measured))
+        gain = covariance @ weighted
+        coefficients = coefficients + gain @ (fitted - measured)
     depth = powers @ coefficients + points.offset_mm
     if not (depth > 0).all():
         return None
     residual = 1.0 / depth - measured
     chi2 = float(residual @ weight @ residual)
-    return PolynomialFit(_floats(coefficients), _floats(covariance), scale, chi2, len(points) - degree - 1)
+    return PolynomialFit(
+        _floats(coefficients),
+        _floats(covariance),
+        _floats(gain * measured**2),
+        scale,
+        chi2,
+        len(points) - degree - 1,
+    )
 
 
 def _powers(t: FloatArray, degree: int) -> FloatArray:

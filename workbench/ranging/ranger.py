@@ -1,10 +1,11 @@
-"""The ranger: spots and a calibration in, ranges with their uncertainty out."""
+"""The ranger: spots and a calibration in, ranges and shapes with their uncertainty out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 from typing import Literal
 
 import numpy as np
@@ -13,12 +14,15 @@ from numpy.typing import NDArray
 from workbench.calibration.sensor import Ranges, Sensor
 from workbench.model.calibration import Calibration
 from workbench.model.event import LaserRange
-from workbench.ranging.assignment import assign
+from workbench.ranging.assignment import MOST_MISFIT_SD, Pairs, assign, pair_up
+from workbench.ranging.lines import NAMES, Axis, Line, Weights, line_of, mean_of_lines
 from workbench.ranging.objections import objections, outside_validity
+from workbench.ranging.points import interval_mm
 from workbench.spots import Scanline, Spot
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+Ints = NDArray[np.intp]
 NOTHING_SEEN = "no spot was seen"
 Status = Literal["done", "not_enough_points", "no_points"]
 SCANLINE_HALF_WIDTH_PX = 8.0
@@ -32,10 +36,17 @@ class Reading:
     scene: str
     status: Status
     closest_mm: float | None = None
-    """The nearest laser's range."""
+    """Smallest range over the front, by the shapes before the lines."""
     sigma_mm: float | None = None
+    interval_mm: tuple[float, float] | None = None
+    """95 %, if the shape is the one told."""
+    mean_mm: float | None = None
+    """Mean of the closest ranges of the lines; that of the only one where there is one."""
+    mean_sigma_mm: float | None = None
     lasers: tuple[LaserRange, ...] = ()
     """In the calibration's order."""
+    lines: tuple[Line, ...] = ()
+    """The shape before each line of lasers that has a range; horizontal first."""
     flat_mm: float | None = None
     """Mean range of the lasers, weighted by their spots: the range of a flat target across the axis."""
     flat_sigma_mm: float | None = None
@@ -44,10 +55,27 @@ class Reading:
 
 
 @dataclass(frozen=True)
+class Dealt:
+    """The spots of a frame in which every laser is lit, as far as they tell their lasers."""
+
+    lasers: Ints
+    """(n,) indices of lasers with a spot."""
+    spots: Ints
+    """(n,) indices of their spots."""
+    ranges: Ranges
+    """(n)"""
+    untold: tuple[str, ...]
+    """Lasers whose spots, if they have any, cannot be told apart: fire each alone."""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Ranger:
     """Consumes a calibration, and nothing else."""
 
     calibration: Calibration
+    weights: Weights = "information"
+    """How the ranges of two lines are averaged."""
 
     @cached_property
     def sensor(self) -> Sensor:
@@ -65,6 +93,16 @@ class Ranger:
         nearest, _ = self.calibration.laser_ranger.validity.standoff_mm
         return tuple(self._scanline(i, nearest) for i in self.sensor.ids)
 
+    @cached_property
+    def _fields(self) -> dict[str, Scanline]:
+        return dict(zip(self.sensor.ids, self.scanlines, strict=True))
+
+    @cached_property
+    def _axes(self) -> dict[Axis, Ints]:
+        """The lasers of each line that there is."""
+        axes: tuple[Axis, ...] = ("u", "v")
+        return {axis: lasers for axis in axes if len(lasers := self.sensor.lasers_on(axis))}
+
     def read_known(
         self, scene: str, fired: int, laser_ids: Sequence[str], position_px: FloatArray, sd_px: FloatArray
     ) -> Reading:
@@ -78,42 +116,103 @@ class Ranger:
             sd_px: (n, 2) 1 sigma, NaN where not known.
         """
         ranges = self.sensor.ranges(laser_ids, position_px, sd_px)
-        against = objections(position_px, ranges, self.size_px)
-        notes = [f"{i}: {why}" for i, why in zip(laser_ids, against, strict=True) if why is not None]
-        good = np.array([why is None for why in against], bool)
-        if not good.any():
-            return Reading(scene, "no_points", notes=tuple(notes) or (NOTHING_SEEN,))
-        lasers = _records(laser_ids, position_px, ranges, good)
-        nearest = min(lasers, key=lambda laser: laser.range_mm)
-        status: Status = "done" if len(lasers) == fired else "not_enough_points"
-        flat_mm, flat_sigma_mm = _flat_range(ranges, good)
-        notes += outside_validity(lasers, self.calibration.laser_ranger.validity)
-        return Reading(
-            scene,
-            status,
-            nearest.range_mm,
-            nearest.sigma_mm,
-            tuple(sorted(lasers, key=lambda laser: self.sensor.ids.index(laser.laser_id))),
-            flat_mm,
-            flat_sigma_mm,
-            tuple(notes),
-        )
+        return self._answer(scene, fired, laser_ids, position_px, ranges)
 
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
         """Range the spots of a frame in which every laser is lit.
 
-        As many spots as lasers are dealt to the lasers by `assign`. With fewer or more, or where the spots do
-        not tell, the status is `not_enough_points` and there is no range: fire each laser alone instead.
+        Lines of lasers whose spots cannot be told apart have no range: fire these lasers alone instead.
         """
+        return self.read_dealt(scene, spots, self.deal(spots))
+
+    def read_dealt(self, scene: str, spots: Sequence[Spot], dealt: Dealt) -> Reading:
+        """Range spots that have been dealt to their lasers."""
         if not spots:
             return Reading(scene, "no_points", notes=(NOTHING_SEEN,))
+        ids = [self.sensor.ids[i] for i in dealt.lasers]
+        position, _ = spot_arrays([spots[i] for i in dealt.spots.tolist()])
+        reading = self._answer(scene, len(self.sensor.ids), ids, position, dealt.ranges, dealt.notes)
+        if dealt.untold and reading.status == "no_points":
+            return Reading(scene, "not_enough_points", notes=reading.notes)
+        return reading
+
+    def deal(self, spots: Sequence[Spot]) -> Dealt:
+        """Deal the spots of a frame in which every laser is lit to the lasers, each line apart.
+
+        A spot that two lines claim leaves both untold.
+        """
+        pairs = pair_up(self.sensor, *spot_arrays(spots))
+        found = {axis: assign(pairs, lasers) for axis, lasers in self._axes.items()}
+        claimed = np.concatenate([np.empty(0, np.intp), *(f[1] for f in found.values() if f is not None)])
+        twice = {i for i in claimed if (claimed == i).sum() > 1}
+        told = {axis: f for axis, f in found.items() if f is not None and twice.isdisjoint(f[1].tolist())}
+        lasers = np.concatenate([np.empty(0, np.intp), *(f[0] for f in told.values())])
+        dealt = np.concatenate([np.empty(0, np.intp), *(f[1] for f in told.values())])
+        untold = [self.sensor.ids[i] for axis, all_ in self._axes.items() if axis not in told for i in all_]
+        notes = self._what_is_left(pairs, len(spots), tuple(axis for axis in self._axes if axis not in told))
+        return Dealt(lasers, dealt, pairs.chosen(lasers, dealt), tuple(untold), notes)
+
+    def alone(self, laser_id: str, spots: Sequence[Spot]) -> Spot | None:
+        """The spot of a laser that was fired alone: the only one on its line; None if there is not one."""
         position, sd = spot_arrays(spots)
-        laser_ids = assign(self.sensor, position, sd)
-        if laser_ids is None:
-            seen, lasers = len(spots), len(self.sensor.ids)
-            note = f"{seen} spots of {lasers} lasers cannot be told apart: fire each laser alone"
-            return Reading(scene, "not_enough_points", notes=(note,))
-        return self.read_known(scene, len(self.sensor.ids), laser_ids, position, sd)
+        ranges = self.sensor.ranges([laser_id] * len(spots), position, sd)
+        on_line = np.flatnonzero((ranges.misfit_sd < MOST_MISFIT_SD) & (ranges.range_mm > 0))
+        return spots[int(on_line[0])] if len(on_line) == 1 else None
+
+    def _what_is_left(self, pairs: Pairs, spots: int, untold: tuple[Axis, ...]) -> tuple[str, ...]:
+        astray = int((pairs.misfit_sd >= MOST_MISFIT_SD).all(axis=0).sum())
+        notes = [f"{astray} of {spots} spots on no laser's line: other light"] if astray else []
+        if untold:
+            lines = " and ".join(f"{len(self._axes[axis])} {NAMES[axis]}" for axis in untold)
+            seen = f"{spots} spot{'s' * (spots != 1)}"
+            notes.append(f"{seen} of {lines} lasers cannot be told apart: fire each laser alone")
+        return tuple(notes)
+
+    def _answer(
+        self,
+        scene: str,
+        fired: int,
+        laser_ids: Sequence[str],
+        position_px: FloatArray,
+        ranges: Ranges,
+        notes: Sequence[str] = (),
+    ) -> Reading:
+        against = objections(position_px, ranges, self.size_px)
+        said = [
+            *notes,
+            *(f"{i}: {why}" for i, why in zip(laser_ids, against, strict=True) if why is not None),
+        ]
+        good = [n for n, why in enumerate(against) if why is None]
+        if not good:
+            return Reading(scene, "no_points", notes=tuple(said) or (NOTHING_SEEN,))
+        good.sort(key=lambda n: self.sensor.ids.index(laser_ids[n]))
+        ids, position = [laser_ids[n] for n in good], position_px[good]
+        ranges = ranges.only(np.array(good))
+        lasers = _records(ids, position, ranges, self.sensor.offset_mm)
+        status: Status = "done" if len(lasers) == fired else "not_enough_points"
+        lines = self._lines(ids, ranges)
+        nearest = min((line.shape for line in lines), key=lambda shape: shape.closest_mm)
+        said += outside_validity(lasers, self.calibration.laser_ranger.validity, self._fields)
+        return Reading(
+            scene,
+            status,
+            nearest.closest_mm,
+            nearest.closest_sigma_mm,
+            nearest.closest_interval_mm,
+            *mean_of_lines(lines, ranges, self.weights, self.size_px),
+            lasers,
+            lines,
+            *_flat_range(ranges),
+            tuple(said),
+        )
+
+    def _lines(self, ids: Sequence[str], ranges: Ranges) -> tuple[Line, ...]:
+        lines = []
+        for axis, lasers in self._axes.items():
+            names = {self.sensor.ids[i] for i in lasers}
+            if mine := [n for n, i in enumerate(ids) if i in names]:
+                lines.append(line_of(self.sensor, axis, ids, ranges, mine))
+        return tuple(lines)
 
     def _scanline(self, laser_id: str, nearest_mm: float) -> Scanline:
         near, far = self.sensor.spot_px(laser_id, np.array([nearest_mm, np.inf]))
@@ -128,29 +227,34 @@ def spot_arrays(spots: Sequence[Spot]) -> tuple[FloatArray, FloatArray]:
 
 
 def _records(
-    laser_ids: Sequence[str], position_px: FloatArray, ranges: Ranges, good: BoolArray
+    laser_ids: Sequence[str], position_px: FloatArray, ranges: Ranges, offset_mm: float
 ) -> tuple[LaserRange, ...]:
-    rows = zip(laser_ids, ranges.range_mm, ranges.sigma_mm, position_px, good, strict=True)
-    return tuple(
-        LaserRange(
-            laser_id=i,
-            range_mm=float(r),
-            sigma_mm=float(s),
-            u_px=None if np.isnan(p[0]) else float(p[0]),
-            v_px=None if np.isnan(p[1]) else float(p[1]),
-        )
-        for i, r, s, p, usable in rows
-        if usable
+    records = []
+    columns = zip(
+        laser_ids, ranges.range_mm.tolist(), ranges.sigma_mm.tolist(), position_px.tolist(), strict=True
     )
+    for laser_id, range_mm, sigma_mm, (u, v) in columns:
+        low, high = interval_mm(range_mm, sigma_mm, offset_mm)
+        records.append(
+            LaserRange(
+                laser_id=laser_id,
+                range_mm=range_mm,
+                sigma_mm=sigma_mm,
+                u_px=u if isfinite(u) else None,
+                v_px=v if isfinite(v) else None,
+                low_mm=low,
+                high_mm=high if isfinite(high) else None,
+            )
+        )
+    return tuple(records)
 
 
-def _flat_range(ranges: Ranges, good: BoolArray) -> tuple[float, float]:
+def _flat_range(ranges: Ranges) -> tuple[float, float]:
     """Mean weighted by the spots' variances; its sigma from the full covariance.
 
     The calibration's part is common to the lasers: weights by the full covariance would lean on differences
     of nearly equal numbers for a gain that no bench would show.
     """
-    weight = 1.0 / ranges.spot_sd_mm[good] ** 2
+    weight = 1.0 / ranges.spot_sd_mm**2
     weight = weight / weight.sum()
-    covariance = ranges.covariance_mm2[np.ix_(good, good)]
-    return float(weight @ ranges.range_mm[good]), float(np.sqrt(weight @ covariance @ weight))
+    return float(weight @ ranges.range_mm), float(np.sqrt(weight @ ranges.covariance_mm2 @ weight))

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.ranging.cylinder import CylinderFit, fit_cylinder
-from workbench.ranging.points import Points, interval_mm, probability
+from workbench.ranging.points import Closest, Points, interval_mm, probability
 from workbench.ranging.polynomial import PolynomialFit, fit_polynomial
 
+FloatArray = NDArray[np.float64]
 Kind = Literal["flat", "incline", "round", "cylinder", "unknown"]
 SIGNIFICANCE = 0.01
 """A shape is rejected when its residuals are less likely than this: one flat in a hundred is."""
@@ -44,6 +46,8 @@ class Shape:
     be told apart, it spans both of theirs."""
     closest_x_mm: float
     """Where on the front."""
+    closest_by_range: FloatArray
+    """(n,) derivatives of `closest_mm` by the ranges."""
     degree: int | None = None
     """Of the polynomial; 0 for a flat, 1 for an incline."""
     coefficients: tuple[float, ...] = ()
@@ -106,18 +110,14 @@ def _is_clear(circle: CylinderFit, parabola: PolynomialFit) -> bool:
 def _of_polynomial(
     points: Points, fit: PolynomialFit, circle: CylinderFit | None, front: tuple[float, float]
 ) -> Shape:
-    closest, sigma, x = fit.closest(front)
-    nearest, farthest = interval_mm(closest, sigma, points.offset_mm)
-    if circle is not None:
-        rival = interval_mm(*circle.closest(front)[:2], points.offset_mm)
-        nearest, farthest = min(nearest, rival[0]), max(farthest, rival[1])
     kinds: dict[int, Kind] = {0: "flat", 1: "incline"}
-    shape = Shape(
-        kind=kinds.get(fit.degree, "round"),
-        closest_mm=closest,
-        closest_sigma_mm=sigma,
-        closest_interval_mm=(nearest, farthest),
-        closest_x_mm=x,
+    shape = _shape(kinds.get(fit.degree, "round"), fit.closest(front), points)
+    if circle is not None:
+        nearest, farthest = shape.closest_interval_mm
+        rival = _shape("cylinder", circle.closest(front), points).closest_interval_mm
+        shape = replace(shape, closest_interval_mm=(min(nearest, rival[0]), max(farthest, rival[1])))
+    shape = replace(
+        shape,
         degree=fit.degree,
         coefficients=fit.per_mm(),
         cylinder=circle,
@@ -131,26 +131,27 @@ def _of_polynomial(
 
 
 def _of_cylinder(points: Points, circle: CylinderFit, front: tuple[float, float]) -> Shape:
-    closest, sigma, x = circle.closest(front)
-    return Shape(
-        kind="cylinder",
-        closest_mm=closest,
-        closest_sigma_mm=sigma,
-        closest_interval_mm=interval_mm(closest, sigma, points.offset_mm),
-        closest_x_mm=x,
-        cylinder=circle,
-        probability=probability(circle.chi2, circle.freedom),
-    )
+    shape = _shape("cylinder", circle.closest(front), points)
+    return replace(shape, cylinder=circle, probability=probability(circle.chi2, circle.freedom))
 
 
 def _unknown(points: Points, tried: tuple[Tried, ...]) -> Shape:
     nearest = int(np.argmin(points.range_mm))
-    closest, sigma = float(points.range_mm[nearest]), math.sqrt(points.covariance_mm2[nearest, nearest])
+    closest = Closest(
+        float(points.range_mm[nearest]),
+        math.sqrt(points.covariance_mm2[nearest, nearest]),
+        float(points.x_mm[nearest]),
+        np.eye(len(points))[nearest],
+    )
+    return replace(_shape("unknown", closest, points), tried=tried)
+
+
+def _shape(kind: Kind, closest: Closest, points: Points) -> Shape:
     return Shape(
-        kind="unknown",
-        closest_mm=closest,
-        closest_sigma_mm=sigma,
-        closest_interval_mm=interval_mm(closest, sigma, points.offset_mm),
-        closest_x_mm=float(points.x_mm[nearest]),
-        tried=tried,
+        kind=kind,
+        closest_mm=closest.range_mm,
+        closest_sigma_mm=closest.sigma_mm,
+        closest_interval_mm=interval_mm(closest.range_mm, closest.sigma_mm, points.offset_mm),
+        closest_x_mm=closest.x_mm,
+        closest_by_range=closest.by_range,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import floor, log10
+from math import degrees, floor, log10
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -18,6 +18,7 @@ from workbench.model.simulation import ClaimRow
 
 if TYPE_CHECKING:  # the ranger finds spots in images, a table of a fit does without
     from workbench.ranging.ranger import Reading
+    from workbench.ranging.shape import Shape
 
 DETERMINED_BY_WORDS = {"data": "data", "joint": "joint", "prior": "prior"}
 
@@ -132,12 +133,23 @@ def reading_table(readings: Iterable[Reading]) -> Table:
     table.add_column("scene", overflow="fold")
     table.add_column("status")
     table.add_column("closest", justify="right")
+    table.add_column("shape")
     table.add_column("lasers", no_wrap=True)
     for r in readings:
         closest = "-" if r.closest_mm is None or r.sigma_mm is None else _with_sd(r.closest_mm, r.sigma_mm)
+        shapes = "\n".join(shape_words(line.shape) for line in r.lines)
         lasers = "\n".join(f"{laser.laser_id} {laser.range_mm:.1f}" for laser in r.lasers)
-        table.add_row(r.scene, r.status, closest, lasers)
+        table.add_row(r.scene, r.status, closest, shapes, lasers)
     return table
+
+
+def shape_words(shape: Shape) -> str:
+    """A shape in a few words, 1 sigma."""
+    if shape.angle_rad is not None and shape.angle_sigma_rad is not None:
+        return f"incline {_with_sd(degrees(shape.angle_rad), degrees(shape.angle_sigma_rad))} deg"
+    if shape.kind == "cylinder" and shape.cylinder is not None:
+        return f"cylinder, radius {_with_sd(shape.cylinder.radius_mm, shape.cylinder.radius_sigma_mm)}"
+    return f"round, degree {shape.degree}" if shape.kind == "round" else shape.kind
 
 
 def trial_table(rows: Sequence[TrialRow]) -> Table:

@@ -227,6 +227,23 @@ def test_errors_of_the_places_count_by_the_slope() -> None:
     assert sliding.closest_sigma_mm < 0.1
 
 
+@pytest.mark.parametrize(
+    "surface", [flat(500.0), incline(500.0, 40.0), parabola(400.0), cylinder(300.0, 20.0)]
+)
+def test_derivatives_of_the_closest_range(surface: Surface) -> None:
+    """By differences; and with the covariance of the ranges they give its sigma."""
+    points = seen(X, surface(X))
+    shape = fit_shape(points)
+    for n, step in enumerate(1e-4 * np.eye(4)):
+        ahead, back = (
+            fit_shape(Points(X, points.range_mm + sign * step, points.covariance_mm2)).closest_mm
+            for sign in (1, -1)
+        )
+        assert shape.closest_by_range[n] == pytest.approx((ahead - back) / 2e-4, abs=2e-3)
+    variance = shape.closest_by_range @ points.covariance_mm2 @ shape.closest_by_range
+    assert shape.closest_sigma_mm == pytest.approx(np.sqrt(variance), rel=1e-6)
+
+
 def test_three_two_and_one_laser() -> None:
     three = fit_shape(seen(X[:3], incline(500.0, 45.0)(X[:3])))
     assert (three.kind, three.tried[-1].freedom) == ("incline", 1)

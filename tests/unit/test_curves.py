@@ -1,0 +1,65 @@
+"""The tabulated inverse against the model that it was made from, inverted by the model's own derivatives."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from workbench.calibration import curves
+from workbench.calibration.curves import SpotCurves
+from workbench.optics.lens import Lens
+from workbench.optics.rays import Ray
+from workbench.optics.triangulate import DepthEstimate, Sighted, estimate_depth
+
+LENSES = {
+    "pinhole": np.array([533.0, 319.5, 239.5, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    "barrel": np.array([541.0, 350.0, 221.0, -0.25, 0.08, 1e-3, -2e-3, -0.01]),
+    "pincushion": np.array([520.0, 300.0, 260.0, 0.3, 0.2, -1e-3, 2e-3, 0.05]),
+}
+RAYS = np.array([[-60.0, 0.3, 0.004, -0.006], [30.0, -0.2, -0.003, 0.001], [0.2, 45.0, 0.002, 0.005]])
+
+
+def model(lens: np.ndarray, laser: np.ndarray, position: np.ndarray, sd: np.ndarray) -> DepthEstimate:
+    def one(ray: jax.Array, at: jax.Array, sd: jax.Array) -> DepthEstimate:
+        return estimate_depth(Lens(*lens), Ray(*ray), Sighted(at[0], at[1], sd[0], sd[1]))
+
+    return jax.vmap(one)(jnp.asarray(RAYS[laser]), jnp.asarray(position), jnp.asarray(sd))
+
+
+@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("depth_mm", [100.0, 400.0, 3000.0, 30_000.0])
+def test_against_the_model(name: str, depth_mm: float) -> None:
+    lens, laser = LENSES[name], np.array([0, 1, 2, 1])
+    rng = np.random.default_rng(4)
+    unit = np.hypot(RAYS[laser, 0], RAYS[laser, 1])
+    x, y = (RAYS[laser, 2 + k] + RAYS[laser, k] / depth_mm for k in (0, 1))
+    position = lens[1:3] + lens[0] * np.stack((x, y), axis=1) + rng.normal(0.0, 0.05, (4, 2))
+    sd = np.array([[0.05, 0.05], [0.05, 0.2], [0.1, 0.05], [0.05, np.inf]])
+    found = SpotCurves(lens, RAYS).invert(laser, position, 1.0 / sd)
+    expected = model(lens, laser, position, sd)
+    w = np.asarray(expected.inverse_depth_per_mm)
+    # 1e-9 of the range: some 1e-10 of the inverse depth at which the spot stands 45 degrees off the axis.
+    np.testing.assert_allclose(found.inverse_depth_per_mm, w, rtol=1e-9, atol=1e-13 / unit.min())
+    np.testing.assert_allclose(found.z_sd_of_spot_mm, expected.z_sd_of_spot_mm, rtol=1e-7)
+    np.testing.assert_allclose(found.across_sd, expected.across_sd, atol=1e-7)
+    for ours, lens_part, ray_part in (
+        (found.dz, expected.dz_dlens, expected.dz_dray),
+        (found.dacross, expected.dacross_dlens, expected.dacross_dray),
+    ):
+        theirs = np.concatenate((lens_part, ray_part), axis=1)
+        np.testing.assert_allclose(ours, theirs, rtol=1e-7, atol=1e-9 * np.abs(theirs).max())
+
+
+def test_no_spots() -> None:
+    none = np.empty((0, 2))
+    found = SpotCurves(LENSES["barrel"], RAYS).invert(np.empty(0, np.intp), none, none)
+    assert found.dz.shape == (0, 12)
+
+
+def test_a_model_that_is_no_polynomial_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer terms than the lens has stand for a lens with more than there are terms."""
+    monkeypatch.setattr(curves, "TERMS", 6)
+    with pytest.raises(ValueError, match="no polynomial of degree 5"):
+        SpotCurves(LENSES["barrel"], RAYS)

@@ -1,0 +1,77 @@
+"""A reading of the ranger as a line of JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from workbench.ranging.lines import NAMES, Line
+from workbench.ranging.ranger import Reading
+from workbench.ranging.shape import Shape
+
+
+def plain(reading: Reading) -> dict[str, Any]:
+    """Plain numbers and words; millimetres, degrees, 1 sigma, intervals of 95 % (null: no upper end)."""
+    shapes = [line.shape for line in reading.lines]
+    nearest = min(shapes, key=lambda shape: shape.closest_mm) if shapes else None
+    return {
+        "scene": reading.scene,
+        "status": reading.status,
+        "closest_mm": reading.closest_mm,
+        "sigma_mm": reading.sigma_mm,
+        "interval_mm": _interval(reading.interval_mm),
+        "mean_mm": reading.mean_mm,
+        "mean_sigma_mm": reading.mean_sigma_mm,
+        "shape": {"kind": "unknown"} if nearest is None else _shape(nearest),
+        "lines": [_line(line, reading) for line in reading.lines],
+        "lasers": [
+            {
+                "id": laser.laser_id,
+                "range_mm": laser.range_mm,
+                "sigma_mm": laser.sigma_mm,
+                "interval_mm": [laser.low_mm, laser.high_mm],
+                "u_px": laser.u_px,
+                "v_px": laser.v_px,
+            }
+            for laser in reading.lasers
+        ],
+        "notes": list(reading.notes),
+    }
+
+
+def _line(line: Line, reading: Reading) -> dict[str, Any]:
+    return {
+        "line": NAMES[line.axis],
+        "lasers": [reading.lasers[i].laser_id for i in line.indices],
+        "closest_mm": line.shape.closest_mm,
+        "sigma_mm": line.shape.closest_sigma_mm,
+        "interval_mm": _interval(line.shape.closest_interval_mm),
+        "shape": _shape(line.shape),
+    }
+
+
+def _shape(shape: Shape) -> dict[str, Any]:
+    told: dict[str, Any] = {"kind": shape.kind}
+    if shape.kind != "unknown":
+        told["probability"] = shape.probability
+    if shape.degree is not None:
+        told |= {"degree": shape.degree, "coefficients": list(shape.coefficients)}
+    if shape.angle_rad is not None and shape.angle_sigma_rad is not None:
+        told |= {
+            "angle_deg": math.degrees(shape.angle_rad),
+            "angle_sigma_deg": math.degrees(shape.angle_sigma_rad),
+        }
+    if shape.cylinder is not None:
+        told["cylinder"] = {
+            "radius_mm": shape.cylinder.radius_mm,
+            "radius_sigma_mm": shape.cylinder.radius_sigma_mm,
+            "axis_x_mm": shape.cylinder.axis_x_mm,
+            "axis_range_mm": shape.cylinder.axis_range_mm,
+        }
+    return told
+
+
+def _interval(interval_mm: tuple[float, float] | None) -> list[float | None] | None:
+    if interval_mm is None:
+        return None
+    return [end if math.isfinite(end) else None for end in interval_mm]
