@@ -164,14 +164,31 @@ def compare(
 
 @app.command(name="range")
 def range_(
-    captures: Annotated[Path, typer.Argument(help="Captures file (CSV).")],
     calibration: Annotated[Path, typer.Option(help="Calibration file (YAML).")],
+    captures: Annotated[Path | None, typer.Argument(help="Captures file (CSV).")] = None,
+    rig: Annotated[Path | None, typer.Option(help="Rig file: range live on its bench instead.")] = None,
+    readings: Annotated[
+        int | None, typer.Option(min=1, help="Live: stop after so many; else by a signal (Ctrl-C).")
+    ] = None,
+    standoff: Annotated[
+        float | None, typer.Option(metavar="MM", min=1, help="Live: have the bench's target placed there.")
+    ] = None,
+    stats: Annotated[bool, typer.Option("--stats", help="Live: print the latency at the end.")] = False,
     json: Json = False,
 ) -> None:
-    """Range the scenes of a captures file with a calibration."""
-    from workbench.cli.range import range_captures
+    """Range the scenes of a captures file, or live on a rig's bench, with a calibration."""
+    if (captures is None) == (rig is None):
+        raise typer.BadParameter("expected either a captures file, or --rig for live ranging")
+    if captures is not None:
+        if readings is not None or standoff is not None or stats:
+            raise typer.BadParameter("--readings, --standoff and --stats are for live ranging, with --rig")
+        from workbench.cli.range import range_captures
 
-    range_captures(captures, calibration, json)
+        range_captures(captures, calibration, json)
+    if rig is not None:
+        from workbench.cli.live import LiveRequest, range_live
+
+        range_live(LiveRequest(rig, calibration, readings, standoff, stats), json)
 
 
 @app.command()

@@ -143,6 +143,15 @@ def reading_table(readings: Iterable[Reading]) -> Table:
     return table
 
 
+def reading_line(r: Reading) -> str:
+    """One reading in one line."""
+    if r.closest_mm is None or r.sigma_mm is None or r.interval_mm is None:
+        return f"{r.scene}  {r.status}  {'; '.join(r.notes)}"
+    shapes = ", ".join(shape_words(line.shape) for line in r.lines)
+    lasers = " ".join(f"{laser.laser_id} {laser.range_mm:.1f}" for laser in r.lasers)
+    return f"{r.scene}  {r.status}  {_with_sd(r.closest_mm, r.sigma_mm)} mm  {shapes}  {lasers}"
+
+
 def shape_words(shape: Shape) -> str:
     """A shape in a few words, 1 sigma."""
     if shape.angle_rad is not None and shape.angle_sigma_rad is not None:

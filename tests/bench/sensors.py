@@ -1,0 +1,28 @@
+"""Calibrations of virtual rigs without a session: fitted to positions that their truth would show."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from tests.unit.rigs import World
+from tests.unit.test_calibration_file import PROVENANCE
+from workbench.calibration.export import calibrate
+from workbench.calibration.fit import fit
+from workbench.emulator.spec import emulator_spec
+from workbench.emulator.truth import draw_truth
+from workbench.model.acceptance import Acceptance
+from workbench.model.calibration import Calibration
+from workbench.model.rig import Rig
+
+
+def calibration_of(rig: Rig) -> Calibration:
+    """What a calibration of the virtual bench of `rig` would have found, noise and placements included."""
+    truth = asdict(draw_truth(rig, emulator_spec(rig)))
+    world = World(rig, 1)
+    world.values = {name: value for name, value in truth.items() if isinstance(value, float)}
+    for laser_id, ray in truth["lasers"].items():
+        world.values |= {f"{laser_id}.{name}": value for name, value in ray.items()}
+    provenance = PROVENANCE.model_copy(update={"rig": rig.rig, "serial": rig.serial})
+    calibration, assessment = calibrate(fit(rig, world.sightings()), Acceptance(), provenance)
+    assert assessment.verdict == "accepted", assessment.reasons
+    return calibration

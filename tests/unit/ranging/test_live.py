@@ -1,0 +1,254 @@
+"""`workbench range --rig` on the virtual bench: readings, how it ends, and the lasers off after every end."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from tests.bench.sensors import calibration_of
+from workbench import emulator
+from workbench.calibration.export import write_calibration
+from workbench.cli.main import main
+from workbench.cli.stopping import SIGNALS
+from workbench.devices.protocols import Frame
+from workbench.devices.watched import WatchedCamera
+from workbench.emulator.bench import EmulatedBench
+from workbench.emulator.camera import EmulatedCamera
+from workbench.emulator.controller import Controller
+from workbench.model.errors import RigNotReadyError
+from workbench.model.rig import Rig, load_rig
+
+ROOT = Path(__file__).parents[3]
+RIG = ROOT / "rigs/thesis-emulated.yaml"
+Grab = Callable[[EmulatedCamera], Frame]
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("live") / "calibration.yaml"
+    write_calibration(path, calibration_of(load_rig(RIG)))
+    return path
+
+
+@dataclass
+class Ended:
+    code: int
+    out: list[str]
+    err: str
+    after_s: float
+
+
+@dataclass
+class Live:
+    """The command in this process, with a look behind the port of the virtual bench that it opens."""
+
+    calibration: Path
+    monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str]
+    controllers: list[Controller] = field(default_factory=list)
+
+    def __call__(self, *arguments: object, rig: Path = RIG) -> Ended:
+        command = ["workbench", "range", "--rig", rig, "--calibration", self.calibration, *arguments]
+        self.monkeypatch.setattr(sys, "argv", [str(word) for word in command])
+        began, code = time.monotonic(), 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = stop.code if isinstance(stop.code, int) else 0
+        said = self.capsys.readouterr()
+        assert "Traceback" not in said.err
+        return Ended(code, said.out.splitlines(), " ".join(said.err.split()), time.monotonic() - began)
+
+    def dark(self) -> bool:
+        return bool(self.controllers) and all(c.lit() == () for c in self.controllers)
+
+
+@pytest.fixture
+def live(
+    calibration: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Iterator[Live]:
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    live = Live(calibration, monkeypatch, capsys)
+    really_open = emulator.open_bench
+
+    def look(rig: Rig, folder: Path) -> EmulatedBench:
+        bench = really_open(rig, folder)
+        live.controllers.append(bench.controller)
+        return bench
+
+    monkeypatch.setattr(emulator, "open_bench", look)
+    yield live
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def from_the(nth: int, instead: Grab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The camera's n-th frame and those after it are asked of `instead`."""
+    really_grab, count = EmulatedCamera.grab, iter(range(1, 10_000))
+
+    def grab(camera: EmulatedCamera) -> Frame:
+        return really_grab(camera) if next(count) < nth else instead(camera)
+
+    monkeypatch.setattr(EmulatedCamera, "grab", grab)
+
+
+def test_as_many_readings_as_asked_for(live: Live) -> None:
+    ended = live("--readings", 3, "--standoff", 600, "--json", "--stats")
+    assert ended.code == 0
+    readings = [json.loads(line) for line in ended.out]
+    assert [(r["scene"], r["status"]) for r in readings] == [("0", "done"), ("1", "done"), ("2", "done")]
+    for r in readings:
+        nearest, farthest = r["interval_mm"]
+        # Placed with 0.3 mm, by a ruler that is 0.05 % wrong: 1.3 mm beyond the interval is 4 sigma of that.
+        assert nearest - 1.3 < 600.0 < farthest + 1.3
+        assert r["shape"]["kind"] in {"flat", "incline"}
+        assert len(r["lasers"]) == 4
+    assert "3 readings in" in ended.err
+    assert "p50" in ended.err
+    assert "p99" in ended.err
+    assert "of 3 readings only" in ended.err
+    assert live.dark()
+
+
+def test_a_line_of_words_for_each(live: Live) -> None:
+    ended = live("--readings", 1, "--standoff", 600)
+    (line,) = ended.out
+    assert line.startswith("0  done  ")
+    assert "mm  flat  L1 " in line or "mm  incline" in line
+
+
+def test_nothing_before_the_sensor(live: Live) -> None:
+    ended = live("--readings", 1)
+    assert (ended.code, ended.out) == (0, ["0  no_points  no spot was seen"])
+
+
+def test_a_camera_that_hangs_ends_it_within_two_seconds(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It hangs at the fifth frame, which is one with the lasers lit."""
+    released, hung_at = threading.Event(), list[float]()
+
+    def hang(camera: EmulatedCamera) -> Frame:
+        hung_at.append(time.monotonic())
+        released.wait(30)
+        raise RigNotReadyError("released")
+
+    from_the(5, hang, monkeypatch)
+    ended = live("--standoff", 600, "--stats")
+    after = time.monotonic() - hung_at[0]
+    released.set()
+    assert (ended.code, len(ended.out)) == (4, 2)
+    assert "camera: expected an answer within 1 s" in ended.err
+    assert "2 readings in" in ended.err
+    assert after < 2.0
+    assert live.dark()
+
+
+def test_a_camera_that_fails_ends_it(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(camera: EmulatedCamera) -> Frame:
+        raise RigNotReadyError("camera: unplugged")
+
+    from_the(3, fail, monkeypatch)
+    ended = live("--standoff", 600)
+    assert (ended.code, len(ended.out)) == (4, 1)
+    assert "camera: unplugged" in ended.err
+    assert live.dark()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_after_the_reading(
+    live: Live, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    really_grab = EmulatedCamera.grab
+
+    def stop(camera: EmulatedCamera) -> Frame:
+        os.kill(os.getpid(), number)
+        monkeypatch.setattr(EmulatedCamera, "grab", really_grab)
+        return really_grab(camera)
+
+    from_the(3, stop, monkeypatch)
+    ended = live("--standoff", 600, "--stats")
+    assert (ended.code, len(ended.out)) == (5, 2)
+    assert f"stopped by {number.name}" in ended.err
+    assert "2 readings in" in ended.err
+    assert live.dark()
+
+
+def test_a_driver_s_own_defect_leaves_no_laser_on(
+    live: Live, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stumble(camera: EmulatedCamera) -> Frame:
+        raise ZeroDivisionError
+
+    from_the(1, stumble, monkeypatch)
+    with pytest.raises(AssertionError, match="Traceback"):  # a defect shows as one
+        live("--standoff", 600)
+    assert live.dark()
+
+
+def test_a_beam_that_stays_on_is_seen(live: Live, tmp_path: Path) -> None:
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(RIG.read_text() + "  controller: {fault: hides_stuck_beam}\n")
+    ended = live("--standoff", 600, rig=rig)
+    assert ended.code == 7
+    assert "A beam may be on" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "words"),
+    [
+        ("rig: thesis-emulated", "rig: another", "its rig is another, the calibration's is thesis-emulated"),
+        ("serial: emulated-1", "serial: emulated-9", "its serial is emulated-9"),
+        ("width_px: 640", "width_px: 320", "its image size is (320, 480), the calibration's is (640, 480)"),
+        ("  - id: L4", "  - id: L5", "its lasers is"),
+    ],
+)
+def test_the_calibration_of_another_sensor(
+    live: Live, tmp_path: Path, was: str, becomes: str, words: str
+) -> None:
+    text = RIG.read_text()
+    assert was in text
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(text.replace(was, becomes))
+    ended = live(rig=rig)
+    assert (ended.code, ended.out) == (2, [])
+    assert words in ended.err
+    assert live.controllers == []
+
+
+def test_usage(live: Live, tmp_path: Path) -> None:
+    captures = tmp_path / "c.csv"
+    assert live(captures).code == 2
+    for arguments in (["--readings", "0"], ["--standoff", "-3"]):
+        assert live(*arguments).code == 2
+    assert live.controllers == []
+
+
+def test_a_watched_camera_hands_on_what_the_camera_says() -> None:
+    class Camera:
+        closed = False
+
+        def grab(self) -> Frame:
+            raise RigNotReadyError("dark")
+
+        def grab_ambient(self) -> Frame:
+            raise KeyError("a defect")
+
+        def close(self) -> None:
+            self.closed = True
+
+    camera = Camera()
+    watched = WatchedCamera(camera)
+    with pytest.raises(RigNotReadyError, match="dark"):
+        watched.grab()
+    with pytest.raises(KeyError, match="defect"):
+        watched.grab_ambient()
+    watched.close()
+    assert camera.closed

@@ -1,0 +1,84 @@
+"""`workbench range --rig`: readings from a bench, until as many as asked for or a signal."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+
+from rich.console import Console
+
+from workbench.cli.range import usable
+from workbench.cli.reading import plain
+from workbench.cli.stopping import StopAfterShot
+from workbench.devices.protocols import Bench
+from workbench.devices.registry import open_bench
+from workbench.devices.watched import watched
+from workbench.model.errors import StoppedError
+from workbench.model.rig import load_rig
+from workbench.model.target import Placement
+from workbench.ranging.live import LiveRanger, check_same_sensor, latency_words
+from workbench.ranging.ranger import Ranger, Reading
+from workbench.report.tables import reading_line
+
+
+@dataclass(frozen=True)
+class LiveRequest:
+    """What the user asked for."""
+
+    rig: Path
+    calibration: Path
+    readings: int | None
+    """None: until a signal."""
+    standoff_mm: float | None
+    """Have the bench's target placed there first."""
+    stats: bool
+
+
+def range_live(request: LiveRequest, as_json: bool) -> None:
+    """Range until the end; a line each on standard output.
+
+    Raises:
+        BadInputError: a file is wrong, or the calibration is another sensor's.
+        RigNotReadyError: a device does not answer.
+        StoppedError: a signal came.
+        LaserOffNotConfirmedError: a beam may be on.
+    """
+    rig, calibration = load_rig(request.rig), usable(request.calibration)
+    check_same_sensor(rig, calibration)
+    stopping = StopAfterShot()
+    # A bench keeps what it must beside its session; live ranging keeps none.
+    with (
+        tempfile.TemporaryDirectory(prefix="workbench-range-") as folder,
+        watched(open_bench(rig, Path(folder) / "live")) as bench,
+    ):
+        _read_all(bench, Ranger(calibration), request, as_json, stopping)
+
+
+def _read_all(
+    bench: Bench, ranger: Ranger, request: LiveRequest, as_json: bool, stopping: StopAfterShot
+) -> None:
+    live = LiveRanger(ranger, bench)
+    live.warm_up()
+    if request.standoff_mm is not None:
+        bench.target.place(Placement(key="live", standoff_mm=request.standoff_mm))
+    began = time.monotonic()
+    try:
+        for number in count() if request.readings is None else range(request.readings):
+            if stopping.reason is not None:
+                raise StoppedError(stopping.reason)
+            _show(live.read(f"{number}"), as_json)
+    finally:
+        if request.stats:
+            words = latency_words(live.latencies_s, time.monotonic() - began)
+            Console(stderr=True).print(words, highlight=False)
+
+
+def _show(reading: Reading, as_json: bool) -> None:
+    try:
+        print(json.dumps(plain(reading)) if as_json else reading_line(reading), flush=True)
+    except BrokenPipeError:
+        raise StoppedError("nobody reads the readings any more") from None

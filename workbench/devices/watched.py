@@ -1,0 +1,78 @@
+"""A camera that is not waited for longer than agreed."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+from workbench.devices.protocols import Bench, Camera, Frame
+from workbench.model.errors import RigNotReadyError
+
+T = TypeVar("T")
+B = TypeVar("B", bound=Bench)
+PATIENCE_S = 1.0
+"""For one frame. A camera of 1 Hz is slower than any that a ranger can use."""
+
+
+@dataclass
+class WatchedCamera:
+    """Asks the camera in a thread of its own and gives up on it when it does not answer.
+
+    A driver that hangs cannot be called back; its thread is left behind and dies with the program.
+    """
+
+    camera: Camera
+    patience_s: float = PATIENCE_S
+    _asked: queue.SimpleQueue[Callable[[], object]] = field(default_factory=queue.SimpleQueue)
+    _answers: queue.SimpleQueue[object] = field(default_factory=queue.SimpleQueue)
+    _gone: bool = False
+
+    def __post_init__(self) -> None:
+        threading.Thread(target=self._serve, name="camera", daemon=True).start()
+
+    def grab(self) -> Frame:
+        """As the camera's; see `protocols.Camera`.
+
+        Raises:
+            RigNotReadyError: no frame within `patience_s`.
+        """
+        return self._ask(self.camera.grab)
+
+    def grab_ambient(self) -> Frame:
+        """As the camera's; the errors of `grab`."""
+        return self._ask(self.camera.grab_ambient)
+
+    def close(self) -> None:
+        """Release the camera; one that hangs is left to the end of the program."""
+        if not self._gone:
+            self._ask(self.camera.close)
+
+    def _ask(self, call: Callable[[], T]) -> T:
+        self._asked.put(call)
+        try:
+            answer = self._answers.get(timeout=self.patience_s)
+        except queue.Empty:
+            self._gone = True
+            raise RigNotReadyError(
+                f"camera: expected an answer within {self.patience_s:g} s, got none: it stopped delivering;"
+                " check its cable and whether another program holds it"
+            ) from None
+        if isinstance(answer, BaseException):
+            raise answer
+        return answer  # type: ignore[return-value] # of the call that was put just before
+
+    def _serve(self) -> None:
+        while True:
+            call = self._asked.get()
+            try:
+                self._answers.put(call())
+            except BaseException as error:
+                self._answers.put(error)
+
+
+def watched(bench: B) -> B:
+    """The bench with its camera watched."""
+    return replace(bench, camera=WatchedCamera(bench.camera))

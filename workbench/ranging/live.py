@@ -1,0 +1,121 @@
+"""Ranging on a bench, reading after reading, as fast as its camera delivers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from workbench.devices.protocols import Bench
+from workbench.model.calibration import Calibration
+from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
+from workbench.model.rig import Rig
+from workbench.ranging.acquire import acquire
+from workbench.ranging.ranger import Ranger, Reading
+from workbench.spots import Finding, Image, SpotFinder
+
+LEASE_S = 2.0
+"""Longest time that a laser stays lit for one frame."""
+FEWEST_TO_TELL_P99 = 100
+
+
+def check_same_sensor(rig: Rig, calibration: Calibration) -> None:
+    """Refuse a calibration that was made of another sensor than the rig's.
+
+    Raises:
+        BadInputError: image size, lasers, name or serial number differ.
+    """
+    ours, made = calibration.laser_ranger, calibration.laser_ranger.provenance
+    for what, of_rig, of_file in (
+        ("rig", rig.rig, made.rig),
+        ("serial", rig.serial, made.serial),
+        ("image size", (rig.camera.width_px, rig.camera.height_px), _size(calibration)),
+        ("lasers", [(s.id, s.axis) for s in rig.lasers], [(s.id, s.axis) for s in ours.lasers]),
+    ):
+        if of_rig != of_file:
+            raise BadInputError(
+                f"calibration: expected one of rig {rig.rig}: its {what} is {of_rig}, the calibration's is"
+                f" {of_file}; calibrate this rig, or give its own calibration"
+            )
+
+
+def _size(calibration: Calibration) -> tuple[int, int]:
+    return calibration.image_width, calibration.image_height
+
+
+@dataclass
+class LiveRanger:
+    """Fires, grabs and ranges; keeps the time from the second frame of the last pair to the answer."""
+
+    ranger: Ranger
+    bench: Bench
+    latencies_s: list[float] = field(default_factory=list)
+    _finders: dict[tuple[str, ...], SpotFinder] = field(default_factory=dict)
+    _second_frame_at: float = 0.0
+
+    def warm_up(self) -> None:
+        """Go once through everything that a reading needs, without firing: the first time, code is loaded."""
+        width, height = self.ranger.size_px
+        rows, columns = np.mgrid[0:height, 0:width]
+        dark = np.random.default_rng(0).integers(5, 9, (height, width), dtype=np.uint8)
+        lit = dark.astype(np.float64)
+        nearest, farthest = self.ranger.calibration.laser_ranger.validity.standoff_mm
+        for laser_id in self.ranger.sensor.ids:
+            (u, v) = self.ranger.sensor.spot_px(laser_id, np.array([np.sqrt(nearest * farthest)]))[0]
+            lit += 120.0 * np.exp(-((columns - u) ** 2 + (rows - v) ** 2) / (2 * 1.5**2))
+        on = np.clip(lit, 0, 255).astype(np.uint8)
+        acquire(self.ranger, "warm-up", lambda ids: self._find(ids, on, dark))
+
+    def read(self, scene: str) -> Reading:
+        """One reading.
+
+        Raises:
+            RigNotReadyError: a device does not answer.
+            LaserOffNotConfirmedError: a beam stays on.
+            BadInputError: the frames are not of the calibration's size.
+        """
+        reading = acquire(self.ranger, scene, lambda ids: self._shoot(scene, ids))
+        self.latencies_s.append(time.perf_counter() - self._second_frame_at)
+        return reading
+
+    def _shoot(self, scene: str, ids: tuple[str, ...]) -> Finding:
+        self.bench.mark(f"{scene}/{ids[0] if len(ids) == 1 else 'all'}")
+        with self.bench.lasers.lit(ids, for_s=LEASE_S):
+            on = self.bench.camera.grab()
+        off = self.bench.camera.grab()
+        self._second_frame_at = time.perf_counter()
+        finding = self._find(ids, on.image, off.image)
+        if not finding.spots and (stuck := self._find(ids, off.image, None).spots):
+            raise LaserOffNotConfirmedError(
+                f"reading {scene}: the frame with all lasers off shows a spot at u = {stuck[0].u_px:.0f},"
+                f" v = {stuck[0].v_px:.0f} px. A beam may be on although the controller says that it is off:"
+                " cut the lasers' supply and keep out of the beams. If a lamp stands there, cover it"
+            )
+        return finding
+
+    def _find(self, ids: tuple[str, ...], on: Image, off: Image | None) -> Finding:
+        width, height = self.ranger.size_px
+        if on.shape != (height, width):
+            raise BadInputError(
+                f"frame: expected {width} x {height} pixels as in the calibration,"
+                f" got {' x '.join(map(str, on.shape[::-1]))}; is the camera in another mode?"
+            )
+        if ids not in self._finders:
+            lines = [self.ranger.scanlines[self.ranger.sensor.ids.index(i)] for i in ids]
+            self._finders[ids] = SpotFinder((height, width), lines, expected=len(ids))
+        return self._finders[ids].find(on, off)
+
+
+def latency_words(latencies_s: Sequence[float], elapsed_s: float) -> str:
+    """What `--stats` prints."""
+    if not latencies_s:
+        return "no reading"
+    p50, p99 = np.percentile(np.array(latencies_s) * 1e3, [50, 99])
+    n = len(latencies_s)
+    few = f" (of {n} readings only)" if n < FEWEST_TO_TELL_P99 else ""
+    return (
+        f"{n} readings in {elapsed_s:.1f} s, {n / elapsed_s:.1f} a second, camera included; from the second"
+        f" frame to the answer: p50 {p50:.2f} ms, p99 {p99:.2f} ms{few}"
+    )
