@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.viewer.readback import Contents
 from workbench.model.rig import load_rig
 from workbench.session.journal import read_journal
 from workbench.viewer.recording import rebuild
@@ -201,7 +202,14 @@ def test_the_figures_are_pictures(simulation: Simulation) -> None:
 def test_the_recording_can_be_made_again(simulation: Simulation, tmp_path: Path) -> None:
     records = read_journal(simulation.folder)
     rebuild(simulation.folder, load_rig(ROOT / "rigs/thesis-simulated.yaml"), records, tmp_path / "again.rrd")
-    assert (tmp_path / "again.rrd").stat().st_size > 10_000
+    first, again = Contents(simulation.folder / "recording.rrd"), Contents(tmp_path / "again.rrd")
+    assert first.everything() == again.everything()
+    logged = again.values("/simulation/incline-30/thesis", "Scalars:scalars", "standoff_mm")
+    errors = [value for _, (value,) in logged]
+    assert 0.02 < max(map(abs, errors)) / 100 < 0.065
+    assert len(errors) > POINTS / 2
+    ((_, (table,)),) = again.values("/trial/summary", "TextDocument:text")[-1:]
+    assert "| round-3-shifted | shape, 165 to 5000 mm | 600 |" in table
 
 
 def test_another_rig_is_refused(tmp_path: Path) -> None:

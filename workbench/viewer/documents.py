@@ -7,6 +7,7 @@ from math import floor, log10
 
 from workbench.model.calibration import TERM_VERDICTS, TermSummary
 from workbench.model.event import FitFinished, ParameterRecord, ReadingTaken, TrialFinished, TrialRow
+from workbench.model.simulation import ClaimRow, SimulationFinished
 
 
 def fit_summary(fit: FitFinished) -> str:
@@ -62,6 +63,25 @@ def trial_table(trial: TrialFinished, readings: Sequence[ReadingTaken]) -> str:
     rows = [_trial_row(row) for row in trial.rows]
     parts = [f"# Trial {trial.trial}", "Errors are measured - true, in mm.", _table(head, rows)]
     return "\n\n".join([*parts, *_without_range(readings)])
+
+
+def claim_table(finished: SimulationFinished) -> str:
+    """What the thesis states of its simulation, what its chain reaches, and ours without and with noise."""
+    head = ("scene", "what", "stated", "thesis", "ours", "noise")
+    rows = [
+        (
+            row.scene,
+            f"{row.quantity}, {row.nearest_mm:g} to {row.farthest_mm:g} mm",
+            *(_claimed(row, value) for value in (row.stated, row.thesis, row.ours, row.noisy)),
+        )
+        for row in finished.rows
+    ]
+    legend = "range, angle: largest error; shape: farthest distance with the right one, mm; readings: number."
+    return "\n\n".join([f"# Simulation {finished.trial}", legend, _table(head, rows)])
+
+
+def _claimed(row: ClaimRow, value: float | None) -> str:
+    return _number(value, ".2%" if row.quantity in {"range", "angle"} else ".0f")
 
 
 def _trial_row(row: TrialRow) -> tuple[str, ...]:

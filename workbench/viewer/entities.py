@@ -44,6 +44,8 @@ FIT_CHART = "fit/chart"
 TRIAL_SUMMARY = "trial/summary"
 TRIAL_ERRORS = "trial/errors"
 TRIAL_CHART = "trial/chart"
+SIMULATION = "simulation"
+"""Below it a series for each scene and chain."""
 SENSOR = "sensor"
 """Series of the readings themselves, beside those of the single lasers."""
 

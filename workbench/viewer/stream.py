@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,6 +55,15 @@ class Stream:
     def log(self, entity: str, *what: rr.AsComponents, static: bool = False) -> None:
         """Log archetypes at one entity."""
         self._recording.log(entity, *what, static=static)
+
+    def curve(self, entity: str, values: Mapping[int, float]) -> None:
+        """Log a series over the timeline of standoffs alone, from whole millimetres to values."""
+        if values:
+            self._recording.send_columns(
+                entity,
+                indexes=[rr.TimeColumn(STANDOFF, sequence=list(values))],
+                columns=rr.Scalars.columns(scalars=list(values.values())),
+            )
 
     def describe(self, name: str, **values: str | int) -> None:
         """Properties of the recording as a whole."""
