@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.spots.pixels import peaks_of
 from workbench.spots.strip import Strip
 from workbench.spots.types import Floats
 
@@ -22,20 +23,18 @@ FINE_PX, COARSE_PX = 1.0, 3.0
 _NO_MASK: Final = np.zeros((0, 0), bool)
 
 
-@dataclass(frozen=True, slots=True)
-class Peaks:
+class Peaks(NamedTuple):
     """Local maxima of the smoothed signal, highest first."""
 
     rows: Ints
     cols: Ints
-    height_sd: Floats
     height_dn: Floats
     scale_px: float
 
 
 def smoothed_sd(variance: float, scale_px: float) -> float:
     """Standard deviation of white noise of `variance` after a Gaussian of `scale_px`."""
-    return float(np.sqrt(variance / (4.0 * np.pi))) / scale_px
+    return math.sqrt(variance / (4.0 * math.pi)) / scale_px
 
 
 @lru_cache(maxsize=8)
@@ -61,12 +60,7 @@ def find_peaks(
         scale_px: Width of the smoothing.
         threshold_sd: In standard deviations of the smoothed noise.
     """
-    from workbench.spots.pixels import smoothed, tops_of  # loads the compiler, which only a search needs
-
-    image = smoothed(signal, _taps(scale_px))
     sd = smoothed_sd(variance, scale_px)
     mask = _NO_MASK if strip.mask is None else strip.mask
-    tops = tops_of(image, mask, threshold_sd * sd, sd)
-    rows, cols = tops[:, 0], tops[:, 1]
-    heights = image[rows, cols].astype(np.float64)
-    return Peaks(rows + strip.rows.start, cols + strip.cols.start, heights / sd, heights, scale_px)
+    rows, cols, heights = peaks_of(signal, _taps(scale_px), mask, threshold_sd * sd, sd)
+    return Peaks(rows + strip.rows.start, cols + strip.cols.start, heights, scale_px)

@@ -1,26 +1,15 @@
-"""From a pair of frames to spots: the public search."""
+"""From a pair of frames to spots: the door to the search."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
 from workbench.model.errors import BadInputError
-from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
 from workbench.spots.frames import check_pair, default_saturation_dn
-from workbench.spots.measure import Trace, measure
-from workbench.spots.pair import Pair, Scene, look
-from workbench.spots.resolve import are_apart, clusters, fitted_together, grown, split, without_duplicates
-from workbench.spots.strip import Strip, check_line, is_on, strip_of
-from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
-
-# A peak of the smoothed signal between this and the threshold is named: too dim to be told from noise.
-_DIM_SD: Final = 4.2
-# A spot whose peak is this many sd of a pixel is clear; one that is not has to give way when there are too
-# many.
-_CLEAR_SD: Final = 5.0
+from workbench.spots.strip import check_line
+from workbench.spots.types import Finding, Image, Scanline
 
 
 class SpotFinder:
@@ -45,14 +34,15 @@ class SpotFinder:
         expected: int | None = None,
         saturation_dn: int | None = None,
     ) -> None:
+        from workbench.spots.search import (
+            Search,
+        )  # loads the compiler: half a second that only a search needs
+
         for line in scanlines:
             check_line(line)
         self._shape = shape
-        self._lines = tuple(scanlines)
-        self._expected = expected
         self._saturation_dn = saturation_dn
-        self._everywhere = Strip(slice(0, shape[0]), slice(0, shape[1]), None)
-        self._strips = tuple(strip_of(line, shape) for line in scanlines) or (self._everywhere,)
+        self._search = Search(shape, tuple(scanlines), expected)
 
     def find(self, on: Image, off: Image | None = None) -> Finding:
         """Spots of one capture.
@@ -65,93 +55,8 @@ class SpotFinder:
             raise BadInputError(
                 f"frame 'on': expected shape {self._shape}, got {on.shape}; make a SpotFinder for this size"
             )
-        clip = default_saturation_dn(on) if self._saturation_dn is None else self._saturation_dn
-        pair = Pair(on, off, float(clip))
-        scenes = [
-            look(pair, s) for s in self._strips if s.rows.stop > s.rows.start and s.cols.stop > s.cols.start
-        ]
-        traces = self._search(scenes)
-        spots = self._in_order([t.spot for t in traces if self._on_a_line(t.spot)])
-        return Finding(tuple(spots), self._failures(pair, scenes, traces, spots))
-
-    def _search(self, scenes: list[Scene]) -> list[Trace]:
-        traces: list[Trace] = []
-        for scale in (FINE_PX, COARSE_PX):
-            for scene in scenes:
-                peaks = find_peaks(scene.signal, scene.strip, scene.variance, scale)
-                traces = without_duplicates(traces + measure(scene, _new_ones(peaks, traces)))
-            if len(traces) == self._expected:
-                break
-        if not traces or (len(traces) == self._expected and are_apart(traces)):
-            return traces
-        groups = [fitted_together(scenes[0], group) for group in clusters(traces)]
-        if self._expected is None or sum(map(len, groups)) < self._expected:
-            groups = [split(scenes[0], g[0]) if len(g) == 1 else g for g in groups]
-            groups = [grown(scenes[0], group) for group in groups]
-        return self._as_many_as_lasers([trace for group in groups for trace in group], scenes)
-
-    def _as_many_as_lasers(self, traces: list[Trace], scenes: list[Scene]) -> list[Trace]:
-        """The traces without the dim ones that are more than there are lasers."""
-        if self._expected is None or len(traces) <= self._expected:
-            return traces
-        clear = _CLEAR_SD * min(scene.variance for scene in scenes) ** 0.5
-        ranked = sorted(traces, key=lambda t: -t.spot.peak_dn)
-        return [t for i, t in enumerate(ranked) if i < self._expected or t.spot.peak_dn > clear]
-
-    def _on_a_line(self, spot: Spot) -> bool:
-        return not self._lines or any(is_on(line, spot.u_px, spot.v_px) for line in self._lines)
-
-    def _in_order(self, spots: list[Spot]) -> list[Spot]:
-        du, dv = (self._lines[0].du, self._lines[0].dv) if self._lines else (1.0, 0.0)
-        return sorted(spots, key=lambda s: (s.u_px * du + s.v_px * dv, s.v_px))
-
-    def _failures(
-        self, pair: Pair, scenes: list[Scene], traces: list[Trace], spots: list[Spot]
-    ) -> tuple[Failure, ...]:
-        failures = [Failure.AMBIENT_CHANGED] if any(s.ambient_changed for s in scenes) else []
-        if len(spots) < len(traces):
-            failures.append(Failure.OFF_SCANLINE)
-        if not spots or (self._expected is not None and len(spots) < self._expected):
-            failures.append(Failure.TOO_FEW if spots else Failure.NO_SPOT)
-            failures += self._reasons(pair, scenes, spots)
-        if self._expected is not None and len(spots) > self._expected:
-            failures.append(Failure.TOO_MANY)
-        flags = set[Failure]().union(*(s.flags for s in spots))
-        failures += [f for f in Failure if f in flags]
-        return tuple(dict.fromkeys(failures))
-
-    def _reasons(self, pair: Pair, scenes: list[Scene], spots: list[Spot]) -> list[Failure]:
-        """Why spots are missing: too dim, or outside the band (then the whole frame is read)."""
-        reasons = []
-        for scene in scenes:
-            dim = find_peaks(scene.signal, scene.strip, scene.variance, threshold_sd=_DIM_SD)
-            near = np.array(
-                [
-                    [np.hypot(s.u_px - c, s.v_px - r) < 5 * s.width_px + 2 for s in spots]
-                    for r, c in zip(dim.rows, dim.cols, strict=True)
-                ],
-                bool,
-            )
-            if dim.rows.size and not near.reshape(dim.rows.size, -1).any(axis=1).all():
-                reasons.append(Failure.TOO_DIM)
-        if self._lines:
-            scene = look(pair, self._everywhere)
-            elsewhere = measure(scene, find_peaks(scene.signal, scene.strip, scene.variance))
-            if any(not self._on_a_line(t.spot) for t in elsewhere):
-                reasons.append(Failure.OFF_SCANLINE)
-        return reasons
-
-
-def _new_ones(peaks: Peaks, traces: list[Trace]) -> Peaks:
-    """Peaks that no measured spot explains."""
-    if not traces or peaks.rows.size == 0:
-        return peaks
-    u = np.array([t.spot.u_px for t in traces])
-    v = np.array([t.spot.v_px for t in traces])
-    reach = np.array([3.0 * t.reach_px + 2.0 * peaks.scale_px for t in traces])
-    apart = np.hypot(peaks.cols[:, None] - u, peaks.rows[:, None] - v)
-    new = (apart > reach).all(axis=1)
-    return Peaks(peaks.rows[new], peaks.cols[new], peaks.height_sd[new], peaks.height_dn[new], peaks.scale_px)
+        clip_dn = default_saturation_dn(on) if self._saturation_dn is None else self._saturation_dn
+        return self._search.find(on, off, float(clip_dn))
 
 
 def find_spots(

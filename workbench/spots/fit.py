@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from workbench.spots.noise import Noise
+from workbench.spots.scoring import score
 from workbench.spots.types import Bools, Floats
 
 
-@dataclass(frozen=True, slots=True)
-class Windows:
+class Windows(NamedTuple):
     """Equal windows of the signal, one spot each, all arrays (n, height, width)."""
 
     data: Floats
@@ -77,8 +78,6 @@ def fit_spots(win: Windows, start: Floats, noise: Noise) -> Fit:
         start: (n, k) first guesses in the order of `gaussian`; k is 6 for upright ellipses, 7 for any.
         noise: Floor (trusted) and slope (a first guess).
     """
-    from workbench.spots.scoring import score  # loads the compiler, which only a fit needs
-
     n, k = start.shape
     shape = win.data.shape
     fit = Fit(

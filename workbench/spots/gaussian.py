@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from workbench.spots.shapes import profile, sheared_rows, upright_rows
 from workbench.spots.types import Floats
 
 BACKGROUND, FLUX, U, V, LN_SU, LN_SV, SHEAR = range(7)
@@ -25,8 +26,6 @@ def axis_profiles(centre_px: float, ln_sd: float, n: int) -> Floats:
     Returns:
         (3, n): the share, its derivative by the centre, its derivative by the logarithm of the width.
     """
-    from workbench.spots.scoring import profile  # loads the compiler, which only a fit needs
-
     profiles = np.empty((4, n))
     profile(centre_px, ln_sd, profiles)
     return profiles[:3]
@@ -41,8 +40,6 @@ def derivatives(params: Floats, shape: tuple[int, int]) -> Floats:
             its centre moves by SHEAR pixels per row and LN_SU is the width along u at a fixed row.
         shape: Height and width of the window.
     """
-    from workbench.spots.scoring import sheared_rows, upright_rows  # loads the compiler, as above
-
     rows = np.empty((*params.shape, *shape))
     fill = upright_rows if params.shape[1] == SHEAR else sheared_rows
     for one, out in zip(params, rows, strict=True):

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.spots.pixels import level_of
+from workbench.spots.transfer import transfer_slope
 from workbench.spots.types import Floats
 
 _SAMPLES = 1200
@@ -31,8 +33,6 @@ def level_and_variance(values: NDArray[np.float32]) -> tuple[float, float]:
     Quantiles first, then mean and variance of what lies within 4 sd of them: the former resist the spots, the
     latter are efficient and free of the rounding to whole numbers.
     """
-    from workbench.spots.pixels import level_of  # loads the compiler, which only a search needs
-
     return level_of(values, _SAMPLES, _CLIP_SD, ROUNDING_DN2)
 
 
@@ -55,6 +55,4 @@ def photon_transfer_slope(
         leverage: (n, height, width) variance of the fitted value, DN^2.
         noise: Floor, and the slope assumed so far.
     """
-    from workbench.spots.transfer import transfer_slope  # loads the compiler, which only a fit needs
-
     return transfer_slope(signal, residual, weight, leverage, noise.floor_dn2, noise.slope_dn)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.spots.cutting import cut
 from workbench.spots.fit import Windows
 from workbench.spots.noise import level_and_variance
 from workbench.spots.strip import Strip
@@ -22,8 +23,7 @@ _LEVEL_CHANGE_SD = 0.25
 _MIN_OFF_SPREAD_DN = 2.0
 
 
-@dataclass(frozen=True, slots=True)
-class Pair:
+class Pair(NamedTuple):
     """Frames with the lasers on and off; `signal = on - off_share * off - level`."""
 
     on: Image
@@ -43,16 +43,16 @@ class Pair:
         out = cv2.addWeighted(on, 1.0, self.off[strip.at], -self.off_share, -self.level_dn, dtype=cv2.CV_32F)
         return np.asarray(out, np.float32)
 
-    def cut(self, rows: Ints, cols: Ints, half: int) -> Windows:
-        """Square windows of 2 half + 1 pixels around pixels (n,); none outside the image is usable."""
-        from workbench.spots.pixels import cut  # loads the compiler, which only a fit needs
+    def cut(self, rows: Ints, cols: Ints, group: Ints, half: int) -> Windows:
+        """Square windows of 2 half + 1 pixels around the peaks `group` (n,) of all, at `rows` and `cols`.
 
+        No pixel outside the image is usable, and none that lies nearer to another peak.
+        """
         off, share = (self.on, 0.0) if self.off is None else (self.off, self.off_share)
-        return Windows(*cut(self.on, off, share, self.level_dn, self.clip_dn, rows, cols, half))
+        return Windows(*cut(self.on, off, share, self.level_dn, self.clip_dn, rows, cols, group, half))
 
 
-@dataclass(frozen=True, slots=True)
-class Scene:
+class Scene(NamedTuple):
     """A strip of a pair, with its level taken off and its noise measured."""
 
     pair: Pair
@@ -77,9 +77,9 @@ def look(pair: Pair, strip: Strip) -> Scene:
         return Scene(pair, strip, signal, variance, ambient_changed=False)
     if pair.off is not None:
         share = _share_of_off(pair.on[strip.at].astype(np.float64), pair.off[strip.at].astype(np.float64))
-        pair = replace(pair, off_share=share)
+        pair = pair._replace(off_share=share)
         level, variance = level_and_variance(pair.signal(strip))
-    pair = replace(pair, level_dn=level)
+    pair = pair._replace(level_dn=level)
     return Scene(pair, strip, pair.signal(strip), variance, ambient_changed=pair.off is not None)
 
 

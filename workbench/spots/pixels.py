@@ -1,4 +1,4 @@
-"""Compiled loops around the fit: peaks of a strip, windows cut out of the frames, first guesses."""
+"""Compiled loops over a strip of the image: its level and noise, and the peaks of its smoothed signal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.spots.compiled import compiled
-from workbench.spots.types import Bools, Floats, Image
+from workbench.spots.types import Bools, Floats
 
 Floats32 = NDArray[np.float32]
 Ints = NDArray[np.intp]
@@ -20,7 +20,6 @@ _NEAR_PX: Final = 16
 _VALLEY_SD: Final = 3.0
 _VALLEY_SHARE: Final = 0.08
 _BINS: Final = 2000
-_PER_HALF_HEIGHT: Final = 1.0 / (2.0 * math.pi * math.log(2.0))
 
 
 @compiled
@@ -60,15 +59,8 @@ def _is_ripple(image: Floats32, top: Ints, tops: Ints, sd: float) -> bool:
 
 
 @compiled
-def tops_of(image: Floats32, mask: Bools, threshold: float, sd: float) -> Ints:
-    """(n, 2) rows and columns of local maxima above `threshold`, highest first, ripples left out.
-
-    Args:
-        image: The smoothed strip, DN.
-        mask: (height, width) where maxima count; of any other shape: everywhere.
-        threshold: DN.
-        sd: Of the smoothed noise, DN.
-    """
+def _tops_of(image: Floats32, mask: Bools, threshold: np.float32, sd: float) -> Ints:
+    """(n, 2) rows and columns of local maxima above `threshold`, highest first, ripples left out."""
     everywhere = mask.shape != image.shape
     rows, cols, heights = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
     for y in range(image.shape[0]):
@@ -133,7 +125,7 @@ def level_of(values: Floats32, samples: int, clip_sd: float, least_variance: flo
 
 
 @compiled
-def smoothed(signal: Floats32, taps: Floats32) -> Floats32:
+def _smoothed(signal: Floats32, taps: Floats32) -> Floats32:
     """A strip after a separable filter with an odd number of taps; beyond the rim its last pixels repeat."""
     height, width = signal.shape
     half = taps.size // 2
@@ -156,89 +148,21 @@ def smoothed(signal: Floats32, taps: Floats32) -> Floats32:
 
 
 @compiled
-def cut(
-    on: Image, off: Image, share: float, level: float, clip_dn: float, rows: Ints, cols: Ints, half: int
-) -> tuple[Floats, Bools, Floats]:
-    """Data, usable pixels and clipping values of square windows, as in `Windows`."""
-    n, side = len(rows), 2 * half + 1
-    data, clip = np.empty((n, side, side)), np.full((n, side, side), math.inf)
-    usable = np.empty((n, side, side), np.bool_)
-    clipped = False
-    for i in range(n):
-        for y in range(side):
-            v = rows[i] - half + y
-            row = min(max(v, 0), on.shape[0] - 1)
-            for x in range(side):
-                u = cols[i] - half + x
-                col = min(max(u, 0), on.shape[1] - 1)
-                raw = float(on[row, col])
-                data[i, y, x] = raw - share * float(off[row, col]) - level
-                usable[i, y, x] = u == col and v == row and raw < clip_dn
-                clipped = clipped or raw >= clip_dn
-    if clipped:
-        for i in range(n):
-            for y in range(side):
-                row = min(max(rows[i] - half + y, 0), on.shape[0] - 1)
-                for x in range(side):
-                    col = min(max(cols[i] - half + x, 0), on.shape[1] - 1)
-                    clip[i, y, x] = data[i, y, x] + (clip_dn - float(on[row, col]))
-    return data, usable, clip
+def peaks_of(
+    signal: Floats32, taps: Floats32, mask: Bools, threshold: float, sd: float
+) -> tuple[Ints, Ints, Floats]:
+    """Rows, columns and smoothed heights (DN) of local maxima, highest first, ripples left out.
 
-
-@compiled
-def part(usable: Bools, rows: Ints, cols: Ints, group: Ints) -> None:
-    """Make the pixels unusable that lie nearer to another peak than to the window's own."""
-    half = usable.shape[1] // 2
-    for i in range(len(group)):
-        for k in range(len(rows)):
-            dv, du = rows[k] - rows[group[i]], cols[k] - cols[group[i]]
-            square = dv * dv + du * du
-            if square == 0 or square > (2 * half) ** 2:
-                continue
-            for y in range(usable.shape[1]):
-                for x in range(usable.shape[2]):
-                    if 2 * ((y - half) * dv + (x - half) * du) > square:
-                        usable[i, y, x] = False
-
-
-@compiled
-def guess(data: Floats, usable: Bools) -> Floats:
-    """(n, 6) start: width from the number of pixels above half the peak (2 pi ln 2 widths squared)."""
-    start = np.zeros((len(data), 6))
-    for i in range(len(data)):
-        height = -math.inf
-        for y in range(data.shape[1]):
-            for x in range(data.shape[2]):
-                height = max(height, data[i, y, x] if usable[i, y, x] else 0.0)
-        mass = of_u = of_v = 0.0
-        count = 0
-        for y in range(data.shape[1]):
-            for x in range(data.shape[2]):
-                above = (data[i, y, x] if usable[i, y, x] else 0.0) - 0.5 * height
-                if above > 0.0:
-                    count += 1
-                    mass, of_u, of_v = mass + above, of_u + above * x, of_v + above * y
-        square = count * _PER_HALF_HEIGHT
-        start[i, 1] = height * (2.0 * math.pi) * (square + 0.08)
-        start[i, 2], start[i, 3] = of_u / max(mass, 1e-9), of_v / max(mass, 1e-9)
-        start[i, 4] = start[i, 5] = 0.5 * math.log(max(square, 0.1))
-    return start
-
-
-@compiled
-def is_clipped(on: Image, clip_dn: float, params: Floats) -> Bools:
-    """(n,) whether a pixel within two widths of a spot (n, 6 or 7, in pixels of the image) is clipped."""
-    clipped = np.zeros(len(params), np.bool_)
-    for i in range(len(params)):
-        u, v, reach_u, reach_v = (
-            params[i, 2],
-            params[i, 3],
-            2 * math.exp(params[i, 4]),
-            2 * math.exp(params[i, 5]),
-        )
-        first_row, last_row = int(np.rint(v - reach_v)), int(np.rint(v + reach_v))
-        first_col, last_col = int(np.rint(u - reach_u)), int(np.rint(u + reach_u))
-        for y in range(max(first_row, 0), min(last_row + 1, on.shape[0])):
-            for x in range(max(first_col, 0), min(last_col + 1, on.shape[1])):
-                clipped[i] = clipped[i] or float(on[y, x]) >= clip_dn
-    return clipped
+    Args:
+        signal: A strip, DN.
+        taps: Of the separable filter that smooths it.
+        mask: (height, width) where maxima count; of any other shape: everywhere.
+        threshold: Of the smoothed signal, DN.
+        sd: Of the smoothed noise, DN.
+    """
+    image = _smoothed(signal, taps)
+    tops = _tops_of(image, mask, np.float32(threshold), sd)
+    heights = np.empty(len(tops))
+    for i in range(len(tops)):
+        heights[i] = np.float64(image[tops[i, 0], tops[i, 1]])
+    return tops[:, 0].copy(), tops[:, 1].copy(), heights

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 
 import cv2
 import numpy as np
 
+from workbench.spots.cutting import half_for
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, U, principal_axes
 from workbench.spots.joint import Joint, evidence, fit_joint, halves, hidden_spot
-from workbench.spots.measure import Trace, half_for, spot_flags, without_outliers
+from workbench.spots.judging import without_outliers
+from workbench.spots.measure import Trace, spot_flags
 from workbench.spots.noise import Noise
 from workbench.spots.pair import Scene
 from workbench.spots.types import Bools, Failure, Floats, Spot
@@ -29,6 +31,9 @@ _MIN_SHARE = 0.08
 _MIN_FLUX_SD = 5.0
 _ELONGATED = 1.12
 _LONGISH = 1.3
+# A spot whose flux is known better than this is no spike of noise; a rival covers it within two widths.
+CLEAR_SD = 7.0
+_RIVAL_WIDTHS = 2.0
 _MAX_HALF_PX = 30
 _MAX_HIDDEN = 4
 
@@ -56,6 +61,21 @@ def without_duplicates(traces: list[Trace]) -> list[Trace]:
     return kept
 
 
+def clearest(old: list[Trace], new: list[Trace]) -> list[Trace]:
+    """Old and new traces; of a faint old one and a new one at the same place only the clearer.
+
+    A narrow fit may have settled on a spike of noise upon a wide faint spot, which is another maximum of the
+    likelihood.
+    """
+    rivals = [
+        (o, n)
+        for o, n in product(old, new)
+        if o.clarity < CLEAR_SD and _apart_px(o, n) < _RIVAL_WIDTHS * max(o.reach_px, n.reach_px)
+    ]
+    worse = {id(min(pair, key=lambda t: t.clarity)) for pair in rivals}
+    return [t for t in (*old, *new) if id(t) not in worse]
+
+
 def _disturbs(one: Trace, other: Trace) -> bool:
     """Whether light of one spot falls into the window of the other."""
     reach = max(one.reach_px, other.reach_px)
@@ -77,7 +97,7 @@ def _window(scene: Scene, points: Floats, reach_px: float) -> tuple[Windows, int
     u, v = 0.5 * (points.min(axis=0) + points.max(axis=0))
     half = min(half_for(reach_px) + int(np.ceil(0.5 * np.ptp(points, axis=0).max())), _MAX_HALF_PX)
     row0, col0 = round(float(v)) - half, round(float(u)) - half
-    win = scene.pair.cut(np.array([row0 + half]), np.array([col0 + half]), half)
+    win = scene.pair.cut(np.array([row0 + half]), np.array([col0 + half]), np.array([0]), half)
     # What lies off the scanline is not explained by spots on it.
     size = 2 * int(np.ceil(_TAIL_WIDTHS * reach_px)) + 1
     allowed = _allowed(scene, win, row0, col0).astype(np.uint8)
@@ -115,14 +135,15 @@ def _as_traces(scene: Scene, joint: Joint, row0: int, col0: int) -> list[Trace]:
         zip(absolute, joint.sd, spot_flags(scene, absolute), strict=True)
     ):
         _, flux, u, v, ln_su, ln_sv = params.tolist()
+        reach = math.exp(max(ln_su, ln_sv))
         others = np.delete(absolute, i, axis=0)[:, U:LN_SU]
         apart = float(np.hypot(*(others - params[U:LN_SU]).T).min())
-        if apart < _OVERLAP_WIDTHS * math.exp(max(ln_su, ln_sv)):
+        if apart < _OVERLAP_WIDTHS * reach:
             flags |= {Failure.MERGED}
         width = math.exp(0.5 * (ln_su + ln_sv))
         peak = flux / (2.0 * math.pi * (width**2 + 1.0 / 12.0))
         spot = Spot(u, v, float(sd[1]), float(sd[2]), flux, width, peak, flags)
-        traces.append(Trace(spot, params, float(joint.noise.slope_dn[0])))
+        traces.append(Trace(spot, params, float(joint.noise.slope_dn[0]), reach, flux / float(sd[0])))
     return traces
 
 
@@ -209,9 +230,10 @@ def split(scene: Scene, trace: Trace) -> list[Trace]:
     start[0, : trace.params.size] = trace.params - (0, 0, col0, row0, 0, 0, 0)[: trace.params.size]
     noise = _noise(scene, [trace])
     whole = fit_spots(win, start, noise)
-    cleaned = without_outliers(win, whole)
-    if cleaned is not None:
-        win, whole = cleaned, fit_spots(cleaned, start, noise)
+    usable, changed = without_outliers(win.usable, whole.signal, whole.residual, whole.weight, whole.judged)
+    if changed:
+        win = win._replace(usable=usable)
+        whole = fit_spots(win, start, noise)
     short, long = principal_axes(whole.params[0])[0]
     if not whole.converged[0] or long < _ELONGATED * short:
         return [trace]

@@ -1,7 +1,4 @@
-"""Fisher scoring over all windows as one compiled program, and the model that it needs, row by row.
-
-Order of the parameters as in `gaussian`. Derivation: docs/spots.md.
-"""
+"""Fisher scoring over all windows as one compiled program. Derivation: docs/spots.md."""
 
 from __future__ import annotations
 
@@ -11,6 +8,8 @@ from typing import Final
 import numpy as np
 
 from workbench.spots.compiled import compiled
+from workbench.spots.shapes import profile, sheared_rows, upright_rows
+from workbench.spots.sums import dense_sums, fill_leverage, invert, separable_sums
 from workbench.spots.transfer import transfer_slope
 from workbench.spots.types import Bools, Floats
 
@@ -30,175 +29,6 @@ _STEPS_TO_SETTLE: Final = 6
 # A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would
 # choose.
 _CLIP_MARGIN_SD: Final = 2.0
-_INV_SQRT_2: Final = 1.0 / math.sqrt(2.0)
-_INV_SQRT_2PI: Final = 1.0 / math.sqrt(2.0 * math.pi)
-# Three nodes of Gauss and Legendre integrate a pixel of the narrowest spot to 1e-4 of its peak.
-_NODES: Final = 0.5 * np.polynomial.legendre.leggauss(3)[0]
-_NODE_WEIGHTS: Final = 0.5 * np.polynomial.legendre.leggauss(3)[1]
-
-# Which factor each parameter's derivative has along v and along u: 0 share, 1 by centre, 2 by width, 3
-# constant.
-_ALONG_V: Final = np.array([3, 0, 0, 1, 0, 2])
-_ALONG_U: Final = np.array([3, 0, 1, 0, 2, 0])
-# Products of two of the four factors, numbered.
-_PAIR: Final = np.array([[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]])
-_PAIRS: Final = 10
-
-
-@compiled
-def profile(centre: float, ln_sd: float, out: Floats) -> None:
-    """Fill (4, n): share of a unit Gaussian in each of n pixels, by centre, by ln of its width, and ones."""
-    sd = math.exp(ln_sd)
-    z = (-0.5 - centre) / sd
-    below, density = 0.5 * math.erf(z * _INV_SQRT_2), _INV_SQRT_2PI * math.exp(-0.5 * z * z)
-    for i in range(out.shape[1]):
-        next_z = (i + 0.5 - centre) / sd
-        next_below = 0.5 * math.erf(next_z * _INV_SQRT_2)
-        next_density = _INV_SQRT_2PI * math.exp(-0.5 * next_z * next_z)
-        out[0, i] = next_below - below
-        out[1, i] = (density - next_density) / sd
-        out[2, i] = z * density - next_z * next_density
-        out[3, i] = 1.0
-        z, below, density = next_z, next_below, next_density
-
-
-@compiled
-def upright_rows(params: Floats, rows: Floats) -> None:
-    """Fill (6, height, width): derivatives of the pixels of one upright ellipse (6,)."""
-    along_u, along_v = np.empty((4, rows.shape[2])), np.empty((4, rows.shape[1]))
-    profile(params[2], params[4], along_u)
-    profile(params[3], params[5], along_v)
-    for k in range(6):
-        of_u, of_v = along_u[_ALONG_U[k]], along_v[_ALONG_V[k]]
-        for y in range(rows.shape[1]):
-            for x in range(rows.shape[2]):
-                rows[k, y, x] = of_v[y] * of_u[x]
-
-
-@compiled
-def sheared_rows(params: Floats, rows: Floats) -> None:
-    """Fill (7, height, width): derivatives of one ellipse (7,) at any angle.
-
-    Rows are integrated by quadrature, columns exactly.
-    """
-    sd_v, shear = math.exp(params[5]), params[6]
-    along_u = np.empty((4, rows.shape[2]))
-    rows[:] = 0.0
-    rows[0] = 1.0
-    for y in range(rows.shape[1]):
-        for node in range(3):
-            dv = y + _NODES[node] - params[3]
-            z = dv / sd_v
-            mass = _NODE_WEIGHTS[node] * _INV_SQRT_2PI / sd_v * math.exp(-0.5 * z * z)
-            profile(params[2] + shear * dv, params[4], along_u)
-            for x in range(rows.shape[2]):
-                share, by_u = mass * along_u[0, x], mass * along_u[1, x]
-                rows[1, y, x] += share
-                rows[2, y, x] += by_u
-                rows[3, y, x] += z / sd_v * share - shear * by_u
-                rows[4, y, x] += mass * along_u[2, x]
-                rows[5, y, x] += (z * z - 1.0) * share
-                rows[6, y, x] += dv * by_u
-
-
-@compiled
-def invert(matrix: Floats, out: Floats) -> None:
-    """Inverse of an information matrix (k, k), by elimination with pivots; `matrix` is used up.
-
-    A ridge that only a singular one feels keeps the result finite.
-    """
-    k = matrix.shape[0]
-    out[:] = 0.0
-    for i in range(k):
-        matrix[i, i] = matrix[i, i] * (1.0 + 1e-10) + 1e-12
-        out[i, i] = 1.0
-    for i in range(k):
-        best = i
-        for r in range(i + 1, k):
-            if abs(matrix[r, i]) > abs(matrix[best, i]):
-                best = r
-        if best != i:
-            for c in range(k):
-                matrix[i, c], matrix[best, c] = matrix[best, c], matrix[i, c]
-                out[i, c], out[best, c] = out[best, c], out[i, c]
-        inverse = 1.0 / matrix[i, i]
-        for c in range(k):
-            matrix[i, c] *= inverse
-            out[i, c] *= inverse
-        for r in range(k):
-            factor = matrix[r, i]
-            if r != i and factor != 0.0:
-                for c in range(k):
-                    matrix[r, c] -= factor * matrix[i, c]
-                    out[r, c] -= factor * out[i, c]
-
-
-@compiled
-def _summed_along_v(along_v: Floats, weight: Floats, residual: Floats) -> tuple[Floats, Floats]:
-    """Columns' sums of weight times products of profiles (10, width), of weighted residuals (4, width)."""
-    height, width = weight.shape
-    squares, weighted = np.zeros((_PAIRS, width)), np.zeros((4, width))
-    row = np.empty(width)
-    for y in range(height):
-        for x in range(width):
-            row[x] = weight[y, x] * residual[y, x]
-        for a in range(4):
-            of_a = along_v[a, y]
-            for x in range(width):
-                weighted[a, x] += of_a * row[x]
-            for b in range(a, 4):
-                factor, p = of_a * along_v[b, y], _PAIR[a, b]
-                for x in range(width):
-                    squares[p, x] += factor * weight[y, x]
-    return squares, weighted
-
-
-@compiled
-def _separable_sums(
-    along_u: Floats, along_v: Floats, weight: Floats, residual: Floats, information: Floats, gradient: Floats
-) -> None:
-    """Sums over the pixels of an upright window: information (6, 6) and gradient (6,).
-
-    Every derivative is a product of a profile along v and one along u. Sums are therefore taken along v first
-    and along u then, and the derivatives themselves are never written out: a tenth of the work.
-    """
-    squares, weighted = _summed_along_v(along_v, weight, residual)
-    for i in range(6):
-        iu, iv = _ALONG_U[i], _ALONG_V[i]
-        total = 0.0
-        for x in range(along_u.shape[1]):
-            total += along_u[iu, x] * weighted[iv, x]
-        gradient[i] = total
-        for j in range(i, 6):
-            ju, p = _ALONG_U[j], _PAIR[iv, _ALONG_V[j]]
-            total = 0.0
-            for x in range(along_u.shape[1]):
-                total += along_u[iu, x] * along_u[ju, x] * squares[p, x]
-            information[i, j] = information[j, i] = total
-
-
-@compiled
-def _dense_sums(
-    rows: Floats, weight: Floats, residual: Floats, information: Floats, gradient: Floats
-) -> None:
-    """The same sums from derivatives (k, height, width) that are written out."""
-    for i in range(rows.shape[0]):
-        weighted = rows[i] * weight
-        gradient[i] = (weighted * residual).sum()
-        for j in range(i + 1):
-            information[i, j] = information[j, i] = (weighted * rows[j]).sum()
-
-
-@compiled
-def _leverage(rows: Floats, cov: Floats, out: Floats) -> None:
-    """Fill (height, width): variance of the fitted pixel values, from that of the parameters (k, k)."""
-    out[:] = 0.0
-    for i in range(rows.shape[0]):
-        for j in range(i + 1):
-            factor = cov[i, j] if i == j else 2.0 * cov[i, j]
-            for y in range(out.shape[0]):
-                for x in range(out.shape[1]):
-                    out[y, x] += factor * rows[i, y, x] * rows[j, y, x]
 
 
 @compiled
@@ -276,9 +106,9 @@ def _solve(
     """Fill the covariance (k, k) and the step (k,) of one window."""
     information, gradient = np.empty_like(cov), np.empty_like(delta)
     if delta.size == 7:
-        _dense_sums(rows, weight, residual, information, gradient)
+        dense_sums(rows, weight, residual, information, gradient)
     else:
-        _separable_sums(along_u, along_v, weight, residual, information, gradient)
+        separable_sums(along_u, along_v, weight, residual, information, gradient)
     invert(information, cov)
     delta[:] = 0.0
     for a in range(delta.size):
@@ -298,7 +128,7 @@ def _leverages(params: Floats, cov: Floats, data: Floats) -> Floats:
             sheared_rows(params[i], rows)
         else:
             upright_rows(params[i], rows)
-        _leverage(rows, cov[i], leverage[i])
+        fill_leverage(rows, cov[i], leverage[i])
     return leverage
 
 

@@ -1,0 +1,146 @@
+"""Compiled loops around a fit: windows cut out of the frames, first guesses, what a spot's place tells."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.spots.compiled import compiled
+from workbench.spots.types import Bools, Floats, Image
+
+Ints = NDArray[np.intp]
+_PER_HALF_HEIGHT: Final = 1.0 / (2.0 * math.pi * math.log(2.0))
+_EDGE_WIDTHS: Final = 2.5
+# Half-widths of windows; each holds spots whose width is up to (half - 0.5) / 3: what lies beyond 3 widths
+# tells next to nothing about the position.
+HALVES_PX: Final = (5, 8, 13, 19)
+_REACH_WIDTHS: Final = 3.0
+
+
+@compiled
+def half_for(width_px: float) -> int:
+    """Half-width of the window for a spot."""
+    for half in HALVES_PX:
+        if half >= _REACH_WIDTHS * width_px + 0.5:
+            return half
+    return HALVES_PX[-1]
+
+
+@compiled
+def _part(usable: Bools, rows: Ints, cols: Ints, group: Ints) -> None:
+    """Make the pixels unusable that lie nearer to another peak than to the window's own."""
+    half = usable.shape[1] // 2
+    for i in range(len(group)):
+        for k in range(len(rows)):
+            dv, du = rows[k] - rows[group[i]], cols[k] - cols[group[i]]
+            square = dv * dv + du * du
+            if square == 0 or square > (2 * half) ** 2:
+                continue
+            for y in range(usable.shape[1]):
+                for x in range(usable.shape[2]):
+                    if 2 * ((y - half) * dv + (x - half) * du) > square:
+                        usable[i, y, x] = False
+
+
+@compiled
+def cut(
+    on: Image,
+    off: Image,
+    share: float,
+    level: float,
+    clip_dn: float,
+    rows: Ints,
+    cols: Ints,
+    group: Ints,
+    half: int,
+) -> tuple[Floats, Bools, Floats]:
+    """Data, usable pixels and clipping values (see `Windows`) around the peaks `group` (n,) of all."""
+    n, side = len(group), 2 * half + 1
+    data, clip = np.empty((n, side, side)), np.full((n, side, side), math.inf)
+    usable = np.empty((n, side, side), np.bool_)
+    clipped = False
+    for i in range(n):
+        for y in range(side):
+            v = rows[group[i]] - half + y
+            row = min(max(v, 0), on.shape[0] - 1)
+            for x in range(side):
+                u = cols[group[i]] - half + x
+                col = min(max(u, 0), on.shape[1] - 1)
+                raw = float(on[row, col])
+                data[i, y, x] = raw - share * float(off[row, col]) - level
+                usable[i, y, x] = u == col and v == row and raw < clip_dn
+                clipped = clipped or raw >= clip_dn
+    if clipped:
+        for i in range(n):
+            for y in range(side):
+                row = min(max(rows[group[i]] - half + y, 0), on.shape[0] - 1)
+                for x in range(side):
+                    col = min(max(cols[group[i]] - half + x, 0), on.shape[1] - 1)
+                    clip[i, y, x] = data[i, y, x] + (clip_dn - float(on[row, col]))
+    _part(usable, rows, cols, group)
+    return data, usable, clip
+
+
+@compiled
+def guess(data: Floats, usable: Bools, rows: Ints, cols: Ints) -> Floats:
+    """(n, 6) start in pixels of the image, from windows around pixels (n,).
+
+    The width is that of a spot with as many pixels above half the peak (2 pi ln 2 widths squared).
+    """
+    start = np.zeros((len(data), 6))
+    half = data.shape[1] // 2
+    for i in range(len(data)):
+        height = -math.inf
+        for y in range(data.shape[1]):
+            for x in range(data.shape[2]):
+                height = max(height, data[i, y, x] if usable[i, y, x] else 0.0)
+        mass = of_u = of_v = 0.0
+        count = 0
+        for y in range(data.shape[1]):
+            for x in range(data.shape[2]):
+                above = (data[i, y, x] if usable[i, y, x] else 0.0) - 0.5 * height
+                if above > 0.0:
+                    count += 1
+                    mass, of_u, of_v = mass + above, of_u + above * x, of_v + above * y
+        square = count * _PER_HALF_HEIGHT
+        start[i, 1] = height * (2.0 * math.pi) * (square + 0.08)
+        start[i, 2] = of_u / max(mass, 1e-9) + cols[i] - half
+        start[i, 3] = of_v / max(mass, 1e-9) + rows[i] - half
+        start[i, 4] = start[i, 5] = 0.5 * math.log(max(square, 0.1))
+    return start
+
+
+@compiled
+def is_near_edge(params: Floats, height: int, width: int) -> bool:
+    """Whether the border of the image cuts a spot (6 or more, in pixels of the image)."""
+    along_u, along_v = min(params[2], width - 1 - params[2]), min(params[3], height - 1 - params[3])
+    cut_off: bool = along_u < _EDGE_WIDTHS * math.exp(params[4]) or along_v < _EDGE_WIDTHS * math.exp(
+        params[5]
+    )
+    return cut_off
+
+
+@compiled
+def is_clipped(on: Image, clip_dn: float, params: Floats) -> bool:
+    """Whether a pixel within two widths of a spot (6 or more, in pixels of the image) is clipped."""
+    u, v, reach_u, reach_v = params[2], params[3], 2 * math.exp(params[4]), 2 * math.exp(params[5])
+    first_row, last_row = int(np.rint(v - reach_v)), int(np.rint(v + reach_v))
+    first_col, last_col = int(np.rint(u - reach_u)), int(np.rint(u + reach_u))
+    for y in range(max(first_row, 0), min(last_row + 1, on.shape[0])):
+        for x in range(max(first_col, 0), min(last_col + 1, on.shape[1])):
+            if float(on[y, x]) >= clip_dn:
+                return True
+    return False
+
+
+@compiled
+def flag_codes(on: Image, clip_dn: float, params: Floats) -> Ints:
+    """(n,) 1 for a spot (n, 6 or more) that the border cuts, plus 2 for one that is clipped."""
+    codes = np.zeros(len(params), np.intp)
+    for i in range(len(params)):
+        cut_off = is_near_edge(params[i], on.shape[0], on.shape[1])
+        codes[i] = int(cut_off) + 2 * int(is_clipped(on, clip_dn, params[i]))
+    return codes
