@@ -30,7 +30,7 @@ def half_for(width_px: float) -> int:
 
 
 @compiled
-def _part(usable: Bools, rows: Ints, cols: Ints, group: Ints) -> None:
+def _part(usable: Bools, rows: Floats, cols: Floats, group: Ints) -> None:
     """Make the pixels unusable that lie nearer to another peak than to the window's own."""
     half = usable.shape[1] // 2
     for i in range(len(group)):
@@ -52,45 +52,44 @@ def cut(
     share: float,
     level: float,
     clip_dn: float,
-    rows: Ints,
-    cols: Ints,
+    rows: Floats,
+    cols: Floats,
     group: Ints,
-    half: int,
-) -> tuple[Floats, Bools, Floats]:
-    """Data, usable pixels and clipping values (see `Windows`) around the peaks `group` (n,) of all."""
-    n, side = len(group), 2 * half + 1
-    data, clip = np.empty((n, side, side)), np.full((n, side, side), math.inf)
-    usable = np.empty((n, side, side), np.bool_)
+    data: Floats,
+    usable: Bools,
+    clip: Floats,
+) -> None:
+    """Fill data, usable pixels and clipping values (see `Windows`) around the peaks `group` (n,) of all."""
+    n, side = len(group), data.shape[1]
+    clip[:] = math.inf
     clipped = False
     for i in range(n):
+        row0, col0 = int(rows[group[i]]) - side // 2, int(cols[group[i]]) - side // 2
         for y in range(side):
-            v = rows[group[i]] - half + y
-            row = min(max(v, 0), on.shape[0] - 1)
+            row = min(max(row0 + y, 0), on.shape[0] - 1)
             for x in range(side):
-                u = cols[group[i]] - half + x
-                col = min(max(u, 0), on.shape[1] - 1)
+                col = min(max(col0 + x, 0), on.shape[1] - 1)
                 raw = float(on[row, col])
                 data[i, y, x] = raw - share * float(off[row, col]) - level
-                usable[i, y, x] = u == col and v == row and raw < clip_dn
+                usable[i, y, x] = col0 + x == col and row0 + y == row and raw < clip_dn
                 clipped = clipped or raw >= clip_dn
     if clipped:
         for i in range(n):
+            row0, col0 = int(rows[group[i]]) - side // 2, int(cols[group[i]]) - side // 2
             for y in range(side):
-                row = min(max(rows[group[i]] - half + y, 0), on.shape[0] - 1)
+                row = min(max(row0 + y, 0), on.shape[0] - 1)
                 for x in range(side):
-                    col = min(max(cols[group[i]] - half + x, 0), on.shape[1] - 1)
+                    col = min(max(col0 + x, 0), on.shape[1] - 1)
                     clip[i, y, x] = data[i, y, x] + (clip_dn - float(on[row, col]))
     _part(usable, rows, cols, group)
-    return data, usable, clip
 
 
 @compiled
-def guess(data: Floats, usable: Bools, rows: Ints, cols: Ints) -> Floats:
-    """(n, 6) start in pixels of the image, from windows around pixels (n,).
+def guess(data: Floats, usable: Bools, rows: Floats, cols: Floats, start: Floats) -> None:
+    """Fill a start (n, 6) in pixels of the image, from windows around pixels (n,).
 
     The width is that of a spot with as many pixels above half the peak (2 pi ln 2 widths squared).
     """
-    start = np.zeros((len(data), 6))
     half = data.shape[1] // 2
     for i in range(len(data)):
         height = -math.inf
@@ -106,11 +105,10 @@ def guess(data: Floats, usable: Bools, rows: Ints, cols: Ints) -> Floats:
                     count += 1
                     mass, of_u, of_v = mass + above, of_u + above * x, of_v + above * y
         square = count * _PER_HALF_HEIGHT
-        start[i, 1] = height * (2.0 * math.pi) * (square + 0.08)
+        start[i, 0], start[i, 1] = 0.0, height * (2.0 * math.pi) * (square + 0.08)
         start[i, 2] = of_u / max(mass, 1e-9) + cols[i] - half
         start[i, 3] = of_v / max(mass, 1e-9) + rows[i] - half
         start[i, 4] = start[i, 5] = 0.5 * math.log(max(square, 0.1))
-    return start
 
 
 @compiled
@@ -137,10 +135,15 @@ def is_clipped(on: Image, clip_dn: float, params: Floats) -> bool:
 
 
 @compiled
-def flag_codes(on: Image, clip_dn: float, params: Floats) -> Ints:
-    """(n,) 1 for a spot (n, 6 or more) that the border cuts, plus 2 for one that is clipped."""
-    codes = np.zeros(len(params), np.intp)
+def flag_codes(on: Image, clip_dn: float, params: Floats, codes: Ints) -> None:
+    """Fill (n,) codes: 1 for a spot (n, 6 or more) that the border cuts, plus 2 for one that is clipped."""
     for i in range(len(params)):
         cut_off = is_near_edge(params[i], on.shape[0], on.shape[1])
         codes[i] = int(cut_off) + 2 * int(is_clipped(on, clip_dn, params[i]))
-    return codes
+
+
+@compiled
+def halves_for(params: Floats, scale: float, halves: Ints) -> None:
+    """Fill (n,) half-widths of windows for spots (n, 6) whose widths are to be multiplied by `scale`."""
+    for i in range(len(params)):
+        halves[i] = half_for(scale * math.exp(params[i, 4]))

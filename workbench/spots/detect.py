@@ -14,8 +14,6 @@ from workbench.spots.pixels import peaks_of
 from workbench.spots.strip import Strip
 from workbench.spots.types import Floats
 
-Ints = NDArray[np.intp]
-
 # White noise passes 5.5 sd once in 5e7 looks.
 PEAK_SD: Final = 5.5
 # Widths that the two searches are matched to: sharp spots, and spots so wide that no pixel stands out.
@@ -26,8 +24,8 @@ _NO_MASK: Final = np.zeros((0, 0), bool)
 class Peaks(NamedTuple):
     """Local maxima of the smoothed signal, highest first."""
 
-    rows: Ints
-    cols: Ints
+    rows: Floats
+    cols: Floats
     height_dn: Floats
     scale_px: float
 
@@ -62,5 +60,6 @@ def find_peaks(
     """
     sd = smoothed_sd(variance, scale_px)
     mask = _NO_MASK if strip.mask is None else strip.mask
-    rows, cols, heights = peaks_of(signal, _taps(scale_px), mask, threshold_sd * sd, sd)
-    return Peaks(rows + strip.rows.start, cols + strip.cols.start, heights, scale_px)
+    row0, col0 = strip.rows.start, strip.cols.start
+    peaks = peaks_of(signal, _taps(scale_px), mask, threshold_sd * sd, sd, row0, col0)
+    return Peaks(peaks[:, 0].copy(), peaks[:, 1].copy(), peaks[:, 2], scale_px)

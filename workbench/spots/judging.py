@@ -120,13 +120,15 @@ def _note(params: Floats, judged: Floats, slope: float, row: Floats) -> None:
 
 
 @compiled
-def _ask_for_another_window(params: Floats, half: int, rows: Ints, cols: Ints, k: int, found: Floats) -> None:
+def _ask_for_another_window(
+    params: Floats, half: int, rows: Floats, cols: Floats, k: int, found: Floats
+) -> None:
     """Note that spot k needs another window, and where, if it outgrows its own or lies off its middle."""
     margin = _WIDTH_SD * found[k, FLUX_SD] / params[1]
     wanted = half_for(_OUTGROWN * math.exp(max(params[4], params[5]) + margin))
     if wanted > half or max(abs(params[2] - cols[k]), abs(params[3] - rows[k])) > _OFF_CENTRE_PX:
         found[k, NEXT_HALF] = max(wanted, half)
-        rows[k], cols[k] = int(np.rint(params[3])), int(np.rint(params[2]))
+        rows[k], cols[k] = np.rint(params[3]), np.rint(params[2])
 
 
 @compiled
@@ -135,8 +137,8 @@ def fit_group(
     usable: Bools,
     clip: Floats,
     group: Ints,
-    rows: Ints,
-    cols: Ints,
+    rows: Floats,
+    cols: Floats,
     start: Floats,
     variance: float,
     slope_dn: float,

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.spots.cutting import HALVES_PX, flag_codes, guess, half_for
+from workbench.spots.cutting import HALVES_PX, flag_codes, guess, halves_for
 from workbench.spots.detect import FINE_PX, Peaks
 from workbench.spots.fit import Windows
 from workbench.spots.gaussian import FLUX, LN_SU, U, V
@@ -47,7 +47,9 @@ class Trace(NamedTuple):
 
 def spot_flags(scene: Scene, params: Floats) -> list[frozenset[Failure]]:
     """What the places of n spots (n, 6 or more) in the image tell: cut by its border, clipped."""
-    return [_FLAGS[code] for code in flag_codes(scene.pair.on, scene.pair.clip_dn, params).tolist()]
+    codes = np.empty(len(params), np.intp)
+    flag_codes(scene.pair.on, scene.pair.clip_dn, params, codes)
+    return [_FLAGS[code] for code in codes.tolist()]
 
 
 def measure(scene: Scene, peaks: Peaks) -> list[Trace]:
@@ -58,7 +60,9 @@ def measure(scene: Scene, peaks: Peaks) -> list[Trace]:
     rows, cols, found = peaks.rows.copy(), peaks.cols.copy(), np.zeros((n, COLUMNS))
     win = scene.pair.cut(rows, cols, np.arange(n), _SMALLEST)
     start, scatter = first_guess(win, peaks)
-    halves = [half_for(scatter * math.exp(ln_su)) for ln_su in start[:, LN_SU].tolist()]
+    sizes = np.empty(n, np.intp)
+    halves_for(start, scatter, sizes)
+    halves = sizes.tolist()
     slope_dn, shape = scene.pair.clip_dn / _FULL_WELL_ELECTRONS, scene.pair.on.shape
     for turn in range(_MAX_CUTS):
         # Small windows first: a spot that outgrows its window is fitted again with those of its new size.
@@ -82,9 +86,10 @@ def first_guess(win: Windows, peaks: Peaks) -> tuple[Floats, float]:
 
     From the shape of a sharp peak, from what the search was matched to for a wide one.
     """
-    if peaks.scale_px == FINE_PX:
-        return guess(win.data, win.usable, peaks.rows, peaks.cols), _GUESSED
     start = np.zeros((peaks.rows.size, 6))
+    if peaks.scale_px == FINE_PX:
+        guess(win.data, win.usable, peaks.rows, peaks.cols, start)
+        return start, _GUESSED
     start[:, U], start[:, V] = peaks.cols, peaks.rows
     start[:, FLUX] = peaks.height_dn * (4.0 * np.pi * peaks.scale_px**2)
     start[:, LN_SU:] = np.log(peaks.scale_px)

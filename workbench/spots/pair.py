@@ -43,13 +43,16 @@ class Pair(NamedTuple):
         out = cv2.addWeighted(on, 1.0, self.off[strip.at], -self.off_share, -self.level_dn, dtype=cv2.CV_32F)
         return np.asarray(out, np.float32)
 
-    def cut(self, rows: Ints, cols: Ints, group: Ints, half: int) -> Windows:
+    def cut(self, rows: Floats, cols: Floats, group: Ints, half: int) -> Windows:
         """Square windows of 2 half + 1 pixels around the peaks `group` (n,) of all, at `rows` and `cols`.
 
         No pixel outside the image is usable, and none that lies nearer to another peak.
         """
         off, share = (self.on, 0.0) if self.off is None else (self.off, self.off_share)
-        return Windows(*cut(self.on, off, share, self.level_dn, self.clip_dn, rows, cols, group, half))
+        shape = (group.size, 2 * half + 1, 2 * half + 1)
+        win = Windows(np.empty(shape), np.empty(shape, bool), np.empty(shape))
+        cut(self.on, off, share, self.level_dn, self.clip_dn, rows, cols, group, *win)
+        return win
 
 
 class Scene(NamedTuple):

@@ -149,9 +149,9 @@ def _smoothed(signal: Floats32, taps: Floats32) -> Floats32:
 
 @compiled
 def peaks_of(
-    signal: Floats32, taps: Floats32, mask: Bools, threshold: float, sd: float
-) -> tuple[Ints, Ints, Floats]:
-    """Rows, columns and smoothed heights (DN) of local maxima, highest first, ripples left out.
+    signal: Floats32, taps: Floats32, mask: Bools, threshold: float, sd: float, row0: int, col0: int
+) -> Floats:
+    """(n, 3) row, column and smoothed height (DN) of local maxima, highest first, ripples left out.
 
     Args:
         signal: A strip, DN.
@@ -159,10 +159,13 @@ def peaks_of(
         mask: (height, width) where maxima count; of any other shape: everywhere.
         threshold: Of the smoothed signal, DN.
         sd: Of the smoothed noise, DN.
+        row0: The strip's first row.
+        col0: The strip's first column.
     """
     image = _smoothed(signal, taps)
     tops = _tops_of(image, mask, np.float32(threshold), sd)
-    heights = np.empty(len(tops))
+    peaks = np.empty((len(tops), 3))
     for i in range(len(tops)):
-        heights[i] = np.float64(image[tops[i, 0], tops[i, 1]])
-    return tops[:, 0].copy(), tops[:, 1].copy(), heights
+        peaks[i, 0], peaks[i, 1] = row0 + tops[i, 0], col0 + tops[i, 1]
+        peaks[i, 2] = np.float64(image[tops[i, 0], tops[i, 1]])
+    return peaks

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import combinations, product, starmap
 
 import cv2
 import numpy as np
@@ -47,13 +47,11 @@ def are_apart(traces: list[Trace]) -> bool:
     reach = max(t.reach_px for t in traces)
     limit = half_for(reach) + _TAIL_WIDTHS * reach
     places = [(t.spot.u_px, t.spot.v_px) for t in traces]
-    return all(math.dist(one, other) >= limit for one, other in combinations(places, 2))
+    return min(starmap(math.dist, combinations(places, 2)), default=limit) >= limit
 
 
 def without_duplicates(traces: list[Trace]) -> list[Trace]:
     """Peaks whose fits ended on the same spot count once."""
-    if not traces or are_apart(traces):
-        return traces
     kept: list[Trace] = []
     for trace in sorted(traces, key=lambda t: -t.spot.flux_dn):
         if all(_apart_px(trace, k) > max(_SAME_WIDTHS * min(trace.reach_px, k.reach_px), 0.5) for k in kept):
@@ -67,6 +65,8 @@ def clearest(old: list[Trace], new: list[Trace]) -> list[Trace]:
     A narrow fit may have settled on a spike of noise upon a wide faint spot, which is another maximum of the
     likelihood.
     """
+    if not old:
+        return new
     rivals = [
         (o, n)
         for o, n in product(old, new)
@@ -97,7 +97,7 @@ def _window(scene: Scene, points: Floats, reach_px: float) -> tuple[Windows, int
     u, v = 0.5 * (points.min(axis=0) + points.max(axis=0))
     half = min(half_for(reach_px) + int(np.ceil(0.5 * np.ptp(points, axis=0).max())), _MAX_HALF_PX)
     row0, col0 = round(float(v)) - half, round(float(u)) - half
-    win = scene.pair.cut(np.array([row0 + half]), np.array([col0 + half]), np.array([0]), half)
+    win = scene.pair.cut(np.array([row0 + half], float), np.array([col0 + half], float), np.array([0]), half)
     # What lies off the scanline is not explained by spots on it.
     size = 2 * int(np.ceil(_TAIL_WIDTHS * reach_px)) + 1
     allowed = _allowed(scene, win, row0, col0).astype(np.uint8)

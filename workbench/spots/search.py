@@ -20,7 +20,7 @@ from workbench.spots.resolve import (
     without_duplicates,
 )
 from workbench.spots.strip import Strip, is_on, strip_of
-from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
+from workbench.spots.types import NO_FLAGS, Failure, Finding, Image, Scanline, Spot
 
 # A peak of the smoothed signal between this and the threshold is named: too dim to be told from noise.
 _DIM_SD: Final = 4.2
@@ -53,9 +53,11 @@ class Search:
             for scene in scenes:
                 peaks = find_peaks(scene.signal, scene.strip, scene.variance, scale)
                 clear = [t for t in traces if t.clarity >= CLEAR_SD]
-                new = measure(scene, _new_ones(peaks, clear))
-                traces = without_duplicates(clearest(traces, new))
-            if len(traces) == self._expected == sum(t.clarity >= CLEAR_SD for t in traces):
+                traces = clearest(traces, measure(scene, _new_ones(peaks, clear)))
+            if self._is_complete(traces) and are_apart(traces):
+                return traces
+            traces = without_duplicates(traces)
+            if self._is_complete(traces):
                 break
         if not traces or (len(traces) == self._expected and are_apart(traces)):
             return traces
@@ -64,6 +66,10 @@ class Search:
             groups = [split(scenes[0], g[0]) if len(g) == 1 else g for g in groups]
             groups = [grown(scenes[0], group) for group in groups]
         return self._as_many_as_lasers([trace for group in groups for trace in group], scenes)
+
+    def _is_complete(self, traces: list[Trace]) -> bool:
+        """Whether every laser has a spot that is no spike of noise."""
+        return len(traces) == self._expected and all(t.clarity >= CLEAR_SD for t in traces)
 
     def _as_many_as_lasers(self, traces: list[Trace], scenes: list[Scene]) -> list[Trace]:
         """The traces without the dim ones that are more than there are lasers."""
@@ -91,8 +97,8 @@ class Search:
             failures += self._reasons(pair, scenes, spots)
         if self._expected is not None and len(spots) > self._expected:
             failures.append(Failure.TOO_MANY)
-        flags = set[Failure]().union(*(s.flags for s in spots))
-        failures += [f for f in Failure if f in flags]
+        if flags := NO_FLAGS.union(*(s.flags for s in spots)):
+            failures += [f for f in Failure if f in flags]
         return tuple(dict.fromkeys(failures))
 
     def _reasons(self, pair: Pair, scenes: list[Scene], spots: list[Spot]) -> list[Failure]:
