@@ -17,7 +17,7 @@ _FAST: Final = {"reassoc", "contract", "arcp", "nsz"}
 def compiled(function: F) -> F:
     """`function` as machine code, kept beside its source between runs.
 
-    It is renewed when that source changes, but not when another file does that it calls: whoever changes
-    `transfer` touches `scoring`, too.
+    It is renewed when that source changes, but not when another file does that it calls: whoever changes one
+    of these files removes `__pycache__`.
     """
     return cast(F, numba.njit(function, cache=True, fastmath=_FAST, error_model="numpy"))

@@ -17,8 +17,8 @@ _WORDS: Final[dict[Failure, str]] = {
         "Do: check where each beam ends, or capture each laser alone."
     ),
     Failure.TOO_MANY: (
-        "More spots than lasers lit. Cause: a reflection on the scanline, or a lamp that came on "
-        "between the frames. "
+        "More spots than lasers lit. Cause: a reflection on the scanline, which one capture cannot tell from "
+        "a laser, or a lamp that came on between the frames. "
         "Do: cover shiny surfaces, keep the light steady, or capture each laser alone."
     ),
     Failure.TOO_DIM: (

@@ -28,10 +28,6 @@ class Windows(NamedTuple):
         """Height and width."""
         return self.data.shape[1], self.data.shape[2]
 
-    def only(self, index: slice) -> Windows:
-        """Some of the windows."""
-        return Windows(self.data[index], self.usable[index], self.clip_dn[index])
-
 
 @dataclass(frozen=True, slots=True)
 class Fit:
