@@ -44,7 +44,7 @@ def _apart_px(one: Trace, other: Trace) -> float:
 
 def are_apart(traces: list[Trace]) -> bool:
     """Whether no spot is a duplicate of another or disturbs it: the common case, told at once."""
-    reach = max(t.reach_px for t in traces)
+    reach = max((t.reach_px for t in traces), default=0.0)
     limit = half_for(reach) + _TAIL_WIDTHS * reach
     places = [(t.spot.u_px, t.spot.v_px) for t in traces]
     return min(starmap(math.dist, combinations(places, 2)), default=limit) >= limit
