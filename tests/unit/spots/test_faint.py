@@ -22,7 +22,7 @@ def linearised(params: Floats) -> tuple[Floats, Floats, Floats]:
     rows = derivatives(params, SHAPE).reshape(*params.shape, -1)
     signal = params[:, FLUX, None] * rows[:, FLUX]
     rows[:, U:] *= params[:, FLUX, None, None]
-    return signal, rows, np.linalg.inv(rows @ rows.transpose(0, 2, 1))
+    return signal, rows, np.asarray(np.linalg.inv(rows @ rows.transpose(0, 2, 1)), np.float64)
 
 
 def fitted(data: Floats, start: Floats) -> Floats:
