@@ -58,20 +58,20 @@ class Assessment:
 
 
 def determined_by(fit: Fit) -> tuple[DeterminedBy, ...]:
-    """For each parameter, what it rests on.
+    """For each parameter, what it rests on."""
+    columns = zip(fit.data_share.tolist(), fit.sd.tolist(), fit.table.prior_sd.tolist(), strict=True)
+    return tuple(basis(share, sd, prior_sd) for share, sd, prior_sd in columns)
+
+
+def basis(data_share: float, sd: float, prior_sd: float) -> DeterminedBy:
+    """What a parameter rests on.
 
     `data`: on the data alone. `prior`: on its own prior, hardly narrowed. `joint`: the data tie it to other
     parameters and those parameters' priors do the rest.
     """
-    prior_sd = fit.table.prior_sd
-    return tuple(
-        "data"
-        if share >= DATA_SHARE_DETERMINED
-        else "prior"
-        if prior == 0 or sd > PRIOR_UNMOVED * prior
-        else "joint"
-        for share, sd, prior in zip(fit.data_share, fit.sd, prior_sd, strict=True)
-    )
+    if data_share >= DATA_SHARE_DETERMINED:
+        return "data"
+    return "prior" if prior_sd == 0 or sd > PRIOR_UNMOVED * prior_sd else "joint"
 
 
 def derive(fit: Fit) -> tuple[Derived, ...]:

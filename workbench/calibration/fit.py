@@ -170,10 +170,15 @@ def data_share(jacobian: FloatArray, table: ParameterTable) -> FloatArray:
     noise = np.eye(len(jacobian)) + by_placement @ by_placement.T
     information = by_sensor.T @ np.linalg.solve(noise, by_sensor)
     share = np.zeros(len(sensor))
-    # Every prior widened to (almost) none; the parameter's own is then put back by the formula.
-    variance = np.diag(np.linalg.inv(information + np.eye(len(information)) / FLAT_PRIOR_SD**2))
-    share[sensor] = np.where(table.prior_sd[sensor] > 0, 1.0 / (1.0 + variance), 0.0)
+    share[sensor] = np.where(table.prior_sd[sensor] > 0, share_of(information), 0.0)
     return share
+
+
+def share_of(information: FloatArray) -> FloatArray:
+    """(..., F) `data_share` by the data's information (..., F, F), in units of the priors."""
+    # Every prior widened to (almost) none; the parameter's own is then put back by the formula.
+    flat = np.linalg.inv(information + np.eye(information.shape[-1]) / FLAT_PRIOR_SD**2)
+    return np.asarray(1.0 / (1.0 + np.diagonal(flat, axis1=-2, axis2=-1)))
 
 
 def table_of(

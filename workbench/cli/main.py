@@ -151,6 +151,22 @@ def fit(
 
 
 @app.command()
+def design(
+    rig: Annotated[Path, typer.Option(help="Rig file.")],
+    standoffs: Annotated[
+        str | None, typer.Option(metavar="MM,MM,...", help="Without them the best ones are proposed.")
+    ] = None,
+    count: Annotated[int | None, typer.Option(help="How many to propose (11).")] = None,
+    repeats: Annotated[int, typer.Option(help="Readings of each laser at each standoff.")] = 10,
+    json: Json = False,
+) -> None:
+    """Predict, before any data, what a calibration will determine; propose standoffs."""
+    from workbench.cli.design import design_calibration
+
+    design_calibration(rig, standoffs, count, repeats, json)
+
+
+@app.command()
 def compare(
     a: Annotated[Path, typer.Argument(help="Calibration file (YAML).")],
     b: Annotated[Path, typer.Argument(help="Another of the same sensor.")],

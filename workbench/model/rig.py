@@ -102,10 +102,19 @@ class BenchSpec(FileModel):
     placement_sd_mm: NonNegativeFloat = 0.0
     tilt_sd_deg: NonNegativeFloat = 0.0
     """Tilt of a flat target about each of its two axes, anew at every placement."""
+    reach_mm: tuple[PositiveFloat, PositiveFloat] = (100.0, 5000.0)
+    """Nearest and farthest standoff at which the target can stand with its spots not saturated."""
     print_scale: Prior = Prior(value=0.0, sd=0.002)
     """Relative error of the printed board: true length = printed length by the file x (1 + print_scale)."""
     board_flatness_sd_mm: NonNegativeFloat = 0.1
     """How far the board's paper may lie off its plane at 100 mm from its middle."""
+
+    @field_validator("reach_mm")
+    @classmethod
+    def _is_a_span(cls, reach_mm: tuple[float, float]) -> tuple[float, float]:
+        if not reach_mm[0] < reach_mm[1] <= LARGEST:
+            raise ValueError(f"expected [nearest, farthest] in mm, got {list(reach_mm)}")
+        return reach_mm
 
 
 class NoiseSpec(FileModel):

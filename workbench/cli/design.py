@@ -1,0 +1,85 @@
+"""`workbench design`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+
+from workbench.calibration.design import best_standoffs
+from workbench.calibration.forecast import Forecast, forecast
+from workbench.calibration.observability import direction_lines
+from workbench.model.errors import BadInputError
+from workbench.model.rig import Rig, load_rig
+from workbench.report.forecast_tables import parameter_forecast_table, range_forecast_table
+
+COUNT = 11
+"""As many as procedures/calibrate-flat.yaml has."""
+
+
+def design_calibration(
+    rig_path: Path, standoffs: str | None, count: int | None, repeats: int, as_json: bool
+) -> None:
+    """Print what a calibration would determine; JSON on standard output, tables on standard error.
+
+    Raises:
+        BadInputError: the rig file or an option is wrong.
+    """
+    rig = load_rig(rig_path)
+    if repeats < 1:
+        raise BadInputError(f"--repeats: expected at least 1, got {repeats}")
+    if standoffs is not None and count is not None:
+        raise BadInputError("--count: expected --standoffs or --count, not both: they are counted already")
+    if standoffs is None:
+        chosen = best_standoffs(rig, COUNT if count is None else count, repeats)
+    else:
+        chosen = _given(rig, standoffs)
+    result = forecast(rig, chosen, repeats)
+    if as_json:
+        print(json.dumps(asdict(result)))
+    _print(rig, result, proposed=standoffs is None)
+
+
+def _given(rig: Rig, text: str) -> tuple[float, ...]:
+    """Standoffs separated by commas."""
+    nearest, farthest = rig.bench.reach_mm
+    found: list[float] = []
+    for part in text.split(","):
+        try:
+            standoff = float(part)
+        except ValueError:
+            raise BadInputError(
+                f"--standoffs: expected millimetres separated by commas, such as 125,160,210, got {part!r}"
+            ) from None
+        if not nearest <= standoff <= farthest:
+            raise BadInputError(
+                f"--standoffs: expected {nearest:g} to {farthest:g} mm (bench.reach_mm of the rig file),"
+                f" got {part.strip()}"
+            )
+        if standoff in found:
+            raise BadInputError(
+                f"--standoffs: expected every standoff once, got {standoff:g} twice; give more --repeats"
+            )
+        found.append(standoff)
+    return tuple(found)
+
+
+def _print(rig: Rig, result: Forecast, proposed: bool) -> None:
+    console = Console(stderr=True)
+    standoffs = ", ".join(f"{s:g}" for s in result.standoffs_mm)
+    console.print(
+        f"{'proposed standoffs' if proposed else 'standoffs'} (mm): {standoffs};"
+        f" {result.repeats} readings of each laser",
+        highlight=False,
+    )
+    console.print(parameter_forecast_table(result.parameters))
+    console.print(range_forecast_table(rig.laser_ids, result.ranges))
+    console.print(
+        f"worst range from 0.1 to 5 m: {100 * result.worst_relative_sd:.2f} %,"
+        f" {100 * result.worst_relative_sd_of_calibration:.2f} % by the calibration alone (1 sigma)",
+        highlight=False,
+    )
+    for note in (*result.notes, *direction_lines(result.directions)):
+        console.print(f"note: {note}", highlight=False)
