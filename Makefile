@@ -1,6 +1,8 @@
 # Every target works on a fresh clone: the first one called creates .venv from the lock file.
 PYTHON ?= python3
 VENV := .venv
+# Our matrices are small: threads of the linear algebra wait for each other longer than they work.
+export OPENBLAS_NUM_THREADS ?= 1
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
