@@ -97,7 +97,9 @@ def test_fit_prints_one_object_and_writes_the_calibration(workbench: Run, tmp_pa
         "null_directions",
         "verdict",
         "reasons",
+        "faults",
         "left_out",
+        "residual_tests",
         "terms",
     ]
     assert set(result["parameters"][0]) >= {"name", "unit", "value", "sd", "prior_sd", "data_share"}

@@ -89,3 +89,42 @@ def test_a_coordinate_never_measured_stays_unknown() -> None:
     assert np.isnan(cells.position_px[0, 0])
     assert cells.position_px[0, 1] == pytest.approx(10.0)
     assert rejected == []
+
+
+def many(rng: np.random.Generator, cells: int, repeats: int, sd: float) -> list[Sighting]:
+    """Honest repeats of one laser at several placements."""
+    spots = rng.normal(0.0, sd, (cells, repeats, 2)) + 10.0 * np.arange(cells)[:, None, None]
+    return [
+        Sighting(f"{c} {k}", "1", f"{c}", 500.0 + c, k, u, v)
+        for c, repeats_of_one in enumerate(spots.tolist())
+        for k, (u, v) in enumerate(repeats_of_one)
+    ]
+
+
+@pytest.mark.parametrize("repeats", [3, 5, 9])
+@pytest.mark.parametrize("scale", [1.0, 10.0])
+def test_one_wrong_of_few_repeats_is_found_by_what_others_scatter(repeats: int, scale: float) -> None:
+    """Whether the deviation was stated rightly or ten times too small."""
+    rows = many(np.random.default_rng(3), 20, repeats, 0.1 * scale)
+    rows[7] = replace(rows[7], u_px=rows[7].u_px + 20.0 * scale)
+    cells, rejected = group(rows, ["1"], NOISE)
+    assert [r.source for r in rejected] == [rows[7].source]
+    assert rejected[0].stray == rows[7]
+    assert cells.repeat_scale == pytest.approx(scale, rel=0.35)
+
+
+def test_two_repeats_that_disagree_weigh_little_and_spoil_no_others() -> None:
+    rows = many(np.random.default_rng(4), 20, 2, 0.1)
+    rows[6] = replace(rows[6], v_px=rows[6].v_px + 30.0)
+    cells, rejected = group(rows, ["1"], NOISE)
+    assert (rejected, cells.torn, cells.repeat_scale) == ([], (3,), 1.0)
+    assert cells.sd_px[3, 1] > 5.0
+    assert np.delete(cells.sd_px, 3, axis=0).max() < 0.1
+
+
+@pytest.mark.parametrize("repeats", [3, 5, 9])
+def test_few_honest_repeats_are_not_rejected(repeats: int) -> None:
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        cells, rejected = group(many(rng, 40, repeats, 0.1), ["1"], NOISE)
+        assert (rejected, cells.torn) == ([], ())

@@ -13,10 +13,13 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from workbench.calibration.faults import Fault, find_faults
 from workbench.calibration.fit import Fit
 from workbench.calibration.observability import NullDirection, direction_lines
 from workbench.calibration.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.programs import kept
+from workbench.calibration.residuals import ResidualTest, explain, residual_tests
+from workbench.calibration.residuals import alarms as residual_alarms
 from workbench.calibration.validation import LeftOut, alarms, leave_each_out
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import DeterminedBy
@@ -53,6 +56,8 @@ class Assessment:
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...] = ()
     """Cross-validation, a placement each."""
+    faults: tuple[Fault, ...] = ()
+    residual_tests: tuple[ResidualTest, ...] = ()
     directions: tuple[NullDirection, ...] = ()
     """What the data leave open."""
 
@@ -93,9 +98,16 @@ def judge(
     reasons = _too_few_standoffs(fit, limits)
     if not fit.converged:
         reasons.append("the solver did not converge; check the standoffs and the laser ids")
-    reasons += _contradictions(fit)
     left_out = leave_each_out(fit)
-    reasons += [_alarm(one) for one in alarms(left_out)]
+    faults = find_faults(fit, left_out)
+    tests = residual_tests(fit)
+    named = [fault.message for fault in faults if fault.refuses]
+    warnings = [*(fault.message for fault in faults if not fault.refuses), *_warnings(fit)]
+    # What has a name needs no list of its consequences.
+    reasons = (
+        [*named, *reasons] if named else reasons + _contradictions(fit) + [*map(_alarm, alarms(left_out))]
+    )
+    warnings += [] if named else [explain(test) for test in residual_alarms(tests)]
     if not fit.rms_px <= limits.max_rms_px:
         reasons.append(f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px")
     if not max_relative_range_sd <= limits.max_relative_range_sd:
@@ -106,8 +118,10 @@ def judge(
     return Assessment(
         verdict="refused" if reasons else "accepted",
         reasons=tuple(reasons),
-        warnings=(*direction_lines(directions), *_warnings(fit)),
+        warnings=(*direction_lines(directions), *warnings),
         left_out=left_out,
+        faults=faults,
+        residual_tests=tests,
         directions=tuple(directions),
     )
 
@@ -152,12 +166,13 @@ def _sd(fit: Fit, gradient: NDArray[np.float64]) -> float:
 
 def _too_few_standoffs(fit: Fit, limits: Acceptance) -> list[str]:
     seen: dict[str, set[float]] = defaultdict(set)
+    captured = {s.laser_id for s in fit.cells.captures}
     for s in fit.used:
         seen[s.laser_id].add(s.standoff_mm)
     return [
         f"laser {i} was seen at {len(seen[i])} standoffs, expected at least {limits.min_standoffs}"
         for i in fit.rig.laser_ids
-        if len(seen[i]) < limits.min_standoffs
+        if len(seen[i]) < limits.min_standoffs and (seen[i] or i in captured)  # never lit: a fault by name
     ]
 
 

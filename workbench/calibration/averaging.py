@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc, chdtri
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -12,6 +15,12 @@ STRAY_SD = 6.0
 far out when their deviation is stated rightly; stated far too small, 1 in 250 of ten (their own median
 absolute deviation is then the measure, and a rough one)."""
 FEWEST_FOR_MEDIAN = 10
+STRAY_SD_OF_FEW = 8.0
+"""The same for 3 to 9 repeats, measured by what other spots' repeats scatter: hardly 1 in 1e9 of three."""
+FEWEST_SPOTS = 8
+"""Whose repeats tell what repeats usually scatter."""
+TORN = 1e-9
+"""Repeats that scatter together as improbably as this do not show one spot."""
 
 
 def weighted_mean(position: FloatArray, sd: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -42,6 +51,38 @@ def strays(position: FloatArray, sd: FloatArray) -> BoolArray:
         scatter = 1.4826 * np.median(distance)
         stray[seen, axis] = distance > STRAY_SD * np.maximum(scatter, sd[seen, axis])
     return np.asarray(stray.any(axis=1))
+
+
+def strays_of_few(position: FloatArray, sd: FloatArray) -> BoolArray:
+    """(n,) as `strays`, of 3 to 9 repeats whose deviation `sd` other spots have confirmed."""
+    measured = np.isfinite(position)
+    stray = np.zeros(position.shape, bool)
+    count = measured.sum(axis=0)
+    for axis in np.flatnonzero((count >= 3) & (count < FEWEST_FOR_MEDIAN)):
+        seen = measured[:, axis]
+        distance = np.abs(position[seen, axis] - np.median(position[seen, axis]))
+        stray[seen, axis] = distance > STRAY_SD_OF_FEW * sd[seen, axis]
+    return np.asarray(stray.any(axis=1))
+
+
+def usual_scale(scatter: Sequence[tuple[float, int]]) -> float:
+    """What repeats usually scatter over what is stated, at least 1; NaN where too few spots tell.
+
+    The median over spots: up to half of them may be spoilt.
+
+    Args:
+        scatter: `scatter_chi2` of each spot.
+    """
+    chi2, free = np.array([s for s in scatter if s[1] > 0]).reshape(-1, 2).T
+    if len(chi2) < FEWEST_SPOTS:
+        return float("nan")
+    return max(1.0, float(np.sqrt(np.median(chi2 / chdtri(free, 0.5)))))
+
+
+def is_torn(scatter: tuple[float, int], usual: float) -> bool:
+    """Whether the repeats of a spot scatter far more than those of others do."""
+    chi2, free = scatter
+    return free > 0 and bool(chdtrc(free, chi2 / usual**2) < TORN)  # NaN: nothing to compare with
 
 
 def scatter_chi2(position: FloatArray, sd: FloatArray) -> tuple[float, int]:

@@ -10,7 +10,14 @@ from math import isnan
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.averaging import scatter_chi2, strays, weighted_mean
+from workbench.calibration.averaging import (
+    is_torn,
+    scatter_chi2,
+    strays,
+    strays_of_few,
+    usual_scale,
+    weighted_mean,
+)
 from workbench.calibration.scatter import scale_called_for
 from workbench.model.errors import BadInputError
 from workbench.model.rig import NoiseSpec
@@ -36,6 +43,8 @@ class Sighting:
     standoff_sd_mm: float = float("nan")
     yaw_deg: float = 0.0
     """Tilt of the target about the vertical, as it was set."""
+    saturated: bool = False
+    """The middle of the spot was clipped."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +55,8 @@ class Rejected:
     reason: str
     missing: Sighting | None = None
     """Where a spot was expected and none was seen: its laser and standoff."""
+    stray: Sighting | None = None
+    """What was seen, where it was left out for lying apart from the other repeats."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +107,10 @@ class Cells:
     """The sightings behind each mean."""
     repeat_scale: float = 1.0
     """Factor on the stated deviations that the scatter of the repeats called for."""
+    captures: tuple[Sighting, ...] = ()
+    """Every sighting in the order of the captures, those rejected as strays among them."""
+    torn: tuple[int, ...] = ()
+    """Cells whose repeats scatter far more than all others: they have the deviation that they show."""
 
 
 def group(
@@ -104,23 +119,33 @@ def group(
     """Average the repeats of each laser at each placement; repeats far from their fellows are rejected.
 
     Where the repeats scatter significantly more than their stated deviations, all of these are enlarged to
-    match (`Cells.repeat_scale`).
+    match (`Cells.repeat_scale`). A spot whose repeats alone do (`Cells.torn`) has its own deviation enlarged
+    and leaves the others' alone: so it weighs as little as it should.
 
     Raises:
         BadInputError: sightings of one placement disagree about where the target stood.
     """
     buckets: dict[tuple[str, str], list[Sighting]] = defaultdict(list)
     placements: dict[str, PlacementInfo] = {}
-    for s in sightings:
+    seen = list(sightings)
+    for s in seen:
         buckets[s.placement, s.laser_id].append(s)
         _check_placement(placements.setdefault(s.placement, PlacementInfo.of(s)), s)
     kept: dict[tuple[str, str], list[Sighting]] = {}
     rejected: list[Rejected] = []
+    usual = usual_scale([_scatter(members, noise) for members in buckets.values()])
     for key, members in buckets.items():
-        kept[key], dropped = _without_strays(members, noise)
+        kept[key], dropped = _without_strays(members, noise, usual)
         rejected += dropped
-    scale = _repeat_scale(kept.values(), noise)
-    means = [weighted_mean(positions(m), scale * stated_sd(m, noise)) for m in kept.values()]
+    scatter = [_scatter(members, noise) for members in kept.values()]
+    torn = [n for n, one in enumerate(scatter) if is_torn(one, usual)]
+    alike = [one for n, one in enumerate(scatter) if n not in torn]
+    scale = float(scale_called_for(sum(chi2 for chi2, _ in alike), sum(free for _, free in alike)))
+    scales = [(chi2 / free) ** 0.5 if n in torn else scale for n, (chi2, free) in enumerate(scatter)]
+    means = [
+        weighted_mean(positions(m), own * stated_sd(m, noise))
+        for m, own in zip(kept.values(), scales, strict=True)
+    ]
     order = list(placements)
     return (
         Cells(
@@ -131,6 +156,8 @@ def group(
             sd_px=np.array([np.hypot(sd, noise.speckle_sd_px) for _, sd in means]).reshape(-1, 2),
             members=tuple(tuple(m) for m in kept.values()),
             repeat_scale=scale,
+            captures=tuple(seen),
+            torn=tuple(torn),
         ),
         rejected,
     )
@@ -156,9 +183,11 @@ def _check_placement(first: PlacementInfo, sighting: Sighting) -> None:
         )
 
 
-def _without_strays(members: Sequence[Sighting], noise: NoiseSpec) -> tuple[list[Sighting], list[Rejected]]:
-    position = positions(members)
-    stray = strays(position, stated_sd(members, noise))
+def _without_strays(
+    members: Sequence[Sighting], noise: NoiseSpec, usual: float
+) -> tuple[list[Sighting], list[Rejected]]:
+    position, sd = positions(members), stated_sd(members, noise)
+    stray = strays(position, sd) | strays_of_few(position, usual * sd)
     kept = [s for s, out in zip(members, stray.tolist(), strict=True) if not out]
     median = np.nanmedian(position, axis=0) if stray.any() else np.zeros(2)
     dropped = [
@@ -166,6 +195,7 @@ def _without_strays(members: Sequence[Sighting], noise: NoiseSpec) -> tuple[list
             s.source,
             f"laser {s.laser_id} at {s.standoff_mm:g} mm:"
             f" {np.nanmax(np.abs(p - median)):.2f} px from its other repeats",
+            stray=s,
         )
         for s, p, out in zip(members, position, stray.tolist(), strict=True)
         if out
@@ -173,6 +203,5 @@ def _without_strays(members: Sequence[Sighting], noise: NoiseSpec) -> tuple[list
     return kept, dropped
 
 
-def _repeat_scale(groups: Iterable[Sequence[Sighting]], noise: NoiseSpec) -> float:
-    parts = [scatter_chi2(positions(members), stated_sd(members, noise)) for members in groups]
-    return float(scale_called_for(sum(chi2 for chi2, _ in parts), sum(free for _, free in parts)))
+def _scatter(members: Sequence[Sighting], noise: NoiseSpec) -> tuple[float, int]:
+    return scatter_chi2(positions(members), stated_sd(members, noise))

@@ -9,12 +9,14 @@ from workbench.calibration.fit import Fit
 from workbench.calibration.validation import alarms
 from workbench.model.calibration import TermSummary
 from workbench.model.event import (
+    FaultRecord,
     FitFinished,
     LaserErrorRecord,
     LeftOutRecord,
     ParameterRecord,
     RejectedRecord,
     ResidualRecord,
+    ResidualTestRecord,
 )
 
 
@@ -62,6 +64,8 @@ def fit_finished(fit: Fit, assessment: Assessment) -> FitFinished:
         warnings=assessment.warnings,
         terms=term_summaries(fit),
         left_out=left_out_records(assessment),
+        faults=tuple(FaultRecord(name=f.name, message=f.message) for f in assessment.faults),
+        residual_tests=tuple(ResidualTestRecord(name=t.name, p=t.p) for t in assessment.residual_tests),
     )
 
 

@@ -54,7 +54,14 @@ def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | 
     # Cut by the border or grown together with another, its centre is not the laser's.
     if bad := [flag for flag in (Failure.AT_EDGE, Failure.MERGED) if flag in spot.flags]:
         return Rejected(source, f"{where}: {bad[0]}: {explain(bad[0])}")
-    return replace(sighting, u_px=spot.u_px, v_px=spot.v_px, u_sd_px=spot.u_sd_px, v_sd_px=spot.v_sd_px)
+    return replace(
+        sighting,
+        u_px=spot.u_px,
+        v_px=spot.v_px,
+        u_sd_px=spot.u_sd_px,
+        v_sd_px=spot.v_sd_px,
+        saturated=Failure.SATURATED in spot.flags,
+    )
 
 
 def _in_picture(rig: Rig, sighting: Sighting) -> Sighting | Rejected:

@@ -102,7 +102,8 @@ def leave_each_out(fit: Fit) -> tuple[LeftOut, ...]:
         return ()
     problem, start = problem_of(fit), optimum_of(fit)
     seen = sorted(set(fit.cells.placement.tolist()))
-    return tuple(_leave_out(fit, problem, start, index) for index in seen)
+    folds = (_leave_out(fit, problem, start, index) for index in seen)
+    return tuple(fold for fold in folds if fold is not None)
 
 
 def alarms(folds: tuple[LeftOut, ...]) -> tuple[LeftOut, ...]:
@@ -111,7 +112,7 @@ def alarms(folds: tuple[LeftOut, ...]) -> tuple[LeftOut, ...]:
     return tuple(fold for fold in folds if min(fold.range_p, fold.spots_p) < limit)
 
 
-def _leave_out(fit: Fit, problem: Problem, start: FloatArray, index: int) -> LeftOut:
+def _leave_out(fit: Fit, problem: Problem, start: FloatArray, index: int) -> LeftOut | None:
     cells = fit.cells.placement == index
     spots = rows_of(cells, problem) & measured(problem)
     info = fit.cells.placements[index]
@@ -119,6 +120,8 @@ def _leave_out(fit: Fit, problem: Problem, start: FloatArray, index: int) -> Lef
     solve = refit_with_scale if fit.noise_scale > 1 else refit
     left = solve(problem, others, _without(start, fit, info.key))
     w = by_standoff(left)
+    if not (w[spots] ** 2).sum() > 0:  # no coordinate that a range moves
+        return None
     error, sd = range_error(left, spots, w)
     lasers = []
     for laser, laser_id in enumerate(fit.rig.laser_ids):

@@ -15,9 +15,9 @@ from workbench.calibration.assess import Assessment, derive
 from workbench.calibration.boards import BoardView
 from workbench.calibration.export import calibrate, kept_because, write_calibration
 from workbench.calibration.fit import Fit
-from workbench.calibration.fit import fit as fit_sightings
 from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.records import left_out_records, parameter_records, term_summaries
+from workbench.calibration.robust import fit_without_outliers
 from workbench.calibration.sightings import sight_rows
 from workbench.calibration.significance import choose
 from workbench.cli.call import command_line, now, operator
@@ -64,7 +64,7 @@ def fit_captures(request: Request, as_json: bool) -> None:
     captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
     content = read_captures_file(captures)
     data = _sightings(rig, parse_captures(captures, content), request)
-    fitted = choose(lambda model: fit_sightings(model, *data), rig, request.kept)
+    fitted = choose(lambda model: fit_without_outliers(model, *data), rig, request.kept)
     calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))
@@ -134,7 +134,9 @@ def _as_json(fitted: Fit, assessment: Assessment) -> dict[str, Any]:
         "null_directions": [asdict(direction) for direction in assessment.directions],
         "verdict": assessment.verdict,
         "reasons": list(assessment.reasons),
+        "faults": [asdict(fault) for fault in assessment.faults],
         "left_out": [record.model_dump() for record in left_out_records(assessment)],
+        "residual_tests": [asdict(test) for test in assessment.residual_tests],
         "terms": [asdict(term) for term in fitted.terms],
     }
 

@@ -237,6 +237,20 @@ class LeftOutRecord(FileModel):
     """Farther off than promised; one sound fit in 1000 has any."""
 
 
+class FaultRecord(FileModel):
+    """Something wrong with a fit's data, by name; docs/validation.md lists the names."""
+
+    name: str
+    message: str
+
+
+class ResidualTestRecord(FileModel):
+    """A test of a fit's residuals, and the chance of a value as far out if nothing is wrong."""
+
+    name: str
+    p: float
+
+
 class FitFinished(FileModel):
     """A calibration has been fitted, accepted or not."""
 
@@ -252,6 +266,8 @@ class FitFinished(FileModel):
     terms: tuple[TermSummary, ...] = ()
     left_out: tuple[LeftOutRecord, ...] = ()
     """Cross-validation, a placement each."""
+    faults: tuple[FaultRecord, ...] = ()
+    residual_tests: tuple[ResidualTestRecord, ...] = ()
 
 
 class CalibrationExported(FileModel):

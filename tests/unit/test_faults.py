@@ -1,0 +1,172 @@
+"""Faults put into simulated calibrations are named, each by its own name, and sound ones name none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.unit.rigs import World, prior, thesis_rig
+from tests.unit.spoilt import exchanged, mirrored, moved, shifted, told_as
+from workbench.calibration.assess import Assessment, judge
+from workbench.calibration.faults import Fault, find_faults
+from workbench.calibration.hypotheses import explain_misfit
+from workbench.calibration.observations import Rejected, Sighting
+from workbench.calibration.robust import fit_without_outliers
+from workbench.calibration.validation import leave_each_out
+from workbench.model.acceptance import Acceptance
+from workbench.model.rig import Rig
+
+RIG = thesis_rig()
+SEEDS = (1, 2, 3)
+SOUND = 40
+
+
+def named(sightings: list[Sighting], rejected: list[Rejected] | None = None, rig: Rig = RIG) -> list[Fault]:
+    fit = fit_without_outliers(rig, sightings, rejected or [])
+    return list(find_faults(fit, leave_each_out(fit)))
+
+
+def judged(sightings: list[Sighting]) -> Assessment:
+    return judge(fit_without_outliers(RIG, sightings), Acceptance(), 0.01)
+
+
+def the(faults: list[Fault], name: str) -> str:
+    assert [fault.name for fault in faults] == [name]
+    return faults[0].message
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+class TestFaults:
+    @pytest.mark.parametrize(("a", "b"), [("L1", "L2"), ("L1", "L4")])
+    def test_two_lasers_exchanged(self, seed: int, a: str, b: str) -> None:
+        message = the(named(exchanged(World(RIG, seed).sightings(), a, b)), "lasers_swapped")
+        assert f"lasers {a} and {b} are exchanged" in message
+
+    def test_a_mirrored_picture(self, seed: int) -> None:
+        world = World(RIG, seed)
+        assert "left to right" in the(named(mirrored(world, world.sightings())), "mirrored")
+
+    @pytest.mark.parametrize(
+        ("standoff_mm", "told_mm", "slip"),
+        [(600.0, 6000.0, "a digit too many"), (160.0, 1600.0, "too many"), (400.0, 40.0, "a digit too few")],
+    )
+    def test_a_standoff_mistyped(self, seed: int, standoff_mm: float, told_mm: float, slip: str) -> None:
+        message = the(named(told_as(World(RIG, seed).sightings(), standoff_mm, told_mm)), "standoff")
+        assert f"the captures at {told_mm:g} mm fit a standoff of" in message
+        assert slip in message
+        fitted = float(message.split("standoff of ")[1].split(" mm")[0])
+        assert fitted == pytest.approx(standoff_mm, abs=5 * RIG.bench.placement_sd_mm + 0.005 * standoff_mm)
+
+    @pytest.mark.parametrize("standoff_mm", [125.0, 400.0, 900.0])
+    def test_a_standoff_ten_millimetres_off(self, seed: int, standoff_mm: float) -> None:
+        message = the(named(told_as(World(RIG, seed).sightings(), standoff_mm, standoff_mm + 10)), "standoff")
+        assert f"at {standoff_mm + 10:g} mm" in message
+
+    @pytest.mark.parametrize(
+        ("standoff_mm", "after", "step_mm"),
+        [(160.0, 8, 2.0), (400.0, 12, -5.0), (600.0, 7, 8.0), (900.0, 4, 20.0)],
+    )
+    def test_a_target_that_moved(self, seed: int, standoff_mm: float, after: int, step_mm: float) -> None:
+        world = World(RIG, seed)
+        sightings = moved(world, world.sightings(), standoff_mm, after, step_mm)
+        message = the(named(sightings), "moved")
+        assert f"the target at {standoff_mm:g} mm moved by {step_mm:+.2g}"[:30] in message
+        of_it = [s.source for s in sightings if s.standoff_mm == standoff_mm]
+        assert f"after {after} of its {len(of_it)} captures" in message
+        assert f"between {of_it[after - 1]} and {of_it[after]}" in message
+
+    @pytest.mark.parametrize("by_px", [2.0, -100.0])
+    @pytest.mark.parametrize("repeats", [range(5), (1, 3), (1, 3, 4)])
+    def test_a_reflection(self, seed: int, by_px: float, repeats: range | tuple[int, ...]) -> None:
+        sightings = shifted(World(RIG, seed).sightings(), "L2", 600.0, by_px, repeats)
+        fit = fit_without_outliers(RIG, sightings)
+        message = the(list(find_faults(fit, leave_each_out(fit))), "reflection")
+        assert f"laser L2 at 600 mm: {len(repeats)} of its captures" in message
+        assert {r.source for r in fit.rejected} == {f"L2 600 {k}" for k in repeats}
+        assert fit.noise_scale == 1.0
+
+    def test_a_laser_that_never_lit(self, seed: int) -> None:
+        sightings = World(RIG, seed).sightings()
+        dark = [s for s in sightings if s.laser_id == "L3"]
+        missing = [Rejected(s.source, "no spot", s) for s in dark]
+        message = the(named([s for s in sightings if s not in dark], missing), "never_lit")
+        assert f"laser L3 never lit: none of its {len(dark)} captures" in message
+
+    def test_spots_saturated(self, seed: int) -> None:
+        sightings = [replace(s, saturated=s.standoff_mm < 300) for s in World(RIG, seed).sightings()]
+        assert "at 125, 160, 210, 280 mm" in the(named(sightings), "saturated")
+
+    def test_all_standoffs_far(self, seed: int) -> None:
+        message = the(named(World(RIG, seed).sightings((1400.0, 2200.0, 3200.0, 4500.0))), "all_far")
+        assert "from 1400 mm on" in message
+
+
+@pytest.mark.parametrize("seed", SEEDS[:2])
+def test_two_standoffs_mistyped(seed: int) -> None:
+    sightings = told_as(told_as(World(RIG, seed).sightings(), 600.0, 6000.0), 160.0, 170.0)
+    faults = named(sightings)
+    assert {fault.name for fault in faults} == {"standoff"}
+    assert {fault.message.split(" mm")[0] for fault in faults} == {
+        "the captures at 6000",
+        "the captures at 170",
+    }
+
+
+def test_a_camera_on_its_head_where_lasers_stand_above_and_below() -> None:
+    upright = tuple(
+        laser.model_copy(
+            update={"axis": "v", "x_mm": prior(0.0, 0.2), "y_mm": prior(0.5 * laser.x_mm.value + 8, 0.2)}
+        )
+        for laser in RIG.lasers
+    )
+    rig = RIG.model_copy(update={"lasers": upright})
+    sightings = [replace(s, v_px=479 - s.v_px) for s in World(rig, 1).sightings()]
+    assert "top to bottom" in the(named(sightings, rig=rig), "upside_down")
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda world, s: exchanged(s, "L1", "L2"),
+        mirrored,
+        lambda world, s: told_as(s, 600.0, 6000.0),
+        lambda world, s: moved(world, s, 160.0, 8, 2.0),
+    ],
+)
+def test_a_fault_that_spoils_everything_refuses(
+    spoil: Callable[[World, list[Sighting]], list[Sighting]],
+) -> None:
+    world = World(RIG, 4)
+    assessment = judged(spoil(world, world.sightings()))
+    assert assessment.verdict == "refused"
+    assert assessment.reasons[0] == assessment.faults[0].message
+    assert not any("contradict the others" in reason for reason in assessment.reasons)
+
+
+def test_a_reflection_left_out_does_not_refuse() -> None:
+    assessment = judged(shifted(World(RIG, 4).sightings(), "L2", 600.0, 12.0))
+    assert (assessment.verdict, [f.name for f in assessment.faults]) == ("accepted", ["reflection"])
+    assert assessment.faults[0].message in assessment.warnings
+
+
+def test_sound_calibrations_name_no_fault_and_lose_no_spot() -> None:
+    """2000 are tried by `python -m tests.proofs.validation`."""
+    for seed in range(700, 700 + SOUND):
+        fit = fit_without_outliers(RIG, World(RIG, seed).sightings())
+        assert fit.rejected == ()
+        assert find_faults(fit, ()) == ()
+
+
+def test_noise_that_nobody_stated_rightly_is_no_fault() -> None:
+    """Noise and speckle three times the stated: the fit scales its deviations, and nothing is named."""
+    for seed in range(5):
+        sightings = World(thesis_rig(0.09, 0.12), seed).sightings()
+        fit = fit_without_outliers(RIG, sightings)
+        assert fit.noise_scale > 1.5
+        assert fit.rejected == ()
+        assert find_faults(fit, leave_each_out(fit)) == ()
+        assert explain_misfit(fit) == ()
+    assert np.isfinite(fit.values).all()

@@ -1,0 +1,208 @@
+"""What is wrong with a fit's data, by name: cause, and what to do."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.special import chdtrc
+
+from workbench.calibration.averaging import scatter_chi2
+from workbench.calibration.fit import Fit
+from workbench.calibration.hypotheses import Hypothesis, explain_misfit
+from workbench.calibration.moved import Movement, find_movements
+from workbench.calibration.observations import positions, stated_sd
+from workbench.calibration.validation import LeftOut
+
+FaultName = Literal[
+    "lasers_swapped",
+    "mirrored",
+    "upside_down",
+    "turned",
+    "standoff",
+    "moved",
+    "reflection",
+    "never_lit",
+    "saturated",
+    "all_far",
+]
+REFUSING = ("lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "moved", "never_lit")
+"""With any other the calibration may still be what it says of itself."""
+SUSPECT = 1e-3
+"""Captures of a placement less likely than this are looked at one by one."""
+SATURATED_SHARE = 0.2
+LEAST_TRAVEL = 0.05
+"""Of the picture: spots that all move less between nearest and farthest standoff were seen from afar only."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing that is wrong."""
+
+    name: FaultName
+    message: str
+
+    @property
+    def refuses(self) -> bool:
+        """Whether no calibration can come of it."""
+        return self.name in REFUSING
+
+
+def find_faults(fit: Fit, left_out: Sequence[LeftOut]) -> tuple[Fault, ...]:
+    """Everything that can be named, in the order in which to look at it."""
+    found = [*_never_lit(fit), *_by_hypothesis(fit, left_out)]
+    if not any(fault.name == "moved" for fault in found):  # its captures agree with one another as well
+        found += _reflections(fit)
+    return (*found, *_saturated(fit), *_all_far(fit))
+
+
+def _by_hypothesis(fit: Fit, left_out: Sequence[LeftOut]) -> Iterator[Fault]:
+    hypotheses = explain_misfit(fit)
+    wiring = [h for h in hypotheses if h.kind not in {"standoff", "spot"}]
+    for h in wiring:
+        yield _name_wiring(fit, h)
+    movements = () if wiring else find_movements(fit, _suspects(fit, left_out))
+    for movement in movements:
+        yield _name_movement(fit, movement)
+    for h in hypotheses:
+        if h.kind == "standoff" and h.subject[0] not in {m.placement for m in movements}:
+            yield _name_standoff(fit, h)
+
+
+def _suspects(fit: Fit, left_out: Sequence[LeftOut]) -> list[int]:
+    """Placements whose captures disagree with one another or with what the others say of them."""
+    cells, noise = fit.cells, fit.rig.noise
+    odd = {one.placement for one in left_out if one.spots_p < SUSPECT}
+    used = {s.source for s in fit.used}
+    odd |= {s.placement for s in cells.captures if s.source not in used}
+    chi2, free = defaultdict[str, float](float), Counter[str]()
+    for members in cells.members:
+        apart, degrees = scatter_chi2(positions(members), stated_sd(members, noise))
+        chi2[members[0].placement] += apart
+        free[members[0].placement] += degrees
+    odd |= {key for key, count in free.items() if count and chdtrc(count, chi2[key]) < SUSPECT}
+    return [index for index, info in enumerate(cells.placements) if info.key in odd]
+
+
+def _name_wiring(fit: Fit, h: Hypothesis) -> Fault:
+    if h.kind == "lasers_swapped":
+        a, b = (fit.rig.laser_ids[i] for i in h.subject)
+        text = (
+            f"lasers {a} and {b} are exchanged: with the spots of one taken for the other's everything fits."
+            " Cause: wired the wrong way round, or their ids exchanged in the captures or the rig file."
+            " Do: exchange the plugs (or laser_id) and capture or fit again"
+        )
+        return Fault("lasers_swapped", text)
+    how, instead = {
+        "mirrored": ("mirrored left to right", " or turned by 180 degrees"),
+        "upside_down": ("mirrored top to bottom", " or turned by 180 degrees"),
+        "turned": ("turned by 180 degrees", ""),
+    }[h.kind]
+    return Fault(
+        h.kind,  # type: ignore[arg-type]
+        f"the picture is {how}: turned back, everything fits. Cause: the camera's flip setting, a camera"
+        " mounted"
+        f" by way of a mirror{instead}, or every laser's sign wrong in the rig file. Do: switch the flip"
+        " off, or correct the baselines' signs, and capture again",
+    )
+
+
+def _name_standoff(fit: Fit, h: Hypothesis) -> Fault:
+    info = fit.cells.placements[h.subject[0]]
+    fitted = float(np.asarray(h.state.problem.data.standoff_mm)[h.subject[0]])
+    slip = _slip(info.standoff_mm, fitted)
+    return Fault(
+        "standoff",
+        f"the captures at {info.standoff_mm:g} mm fit a standoff of {fitted:.4g} mm, and nothing else"
+        f" explains them{slip}. Do: correct the standoff where it was written down, or leave it out"
+        f" (--without-standoff {info.standoff_mm:g})",
+    )
+
+
+def _slip(told_mm: float, fitted_mm: float) -> str:
+    """The commonest mistypings."""
+    for factor, words in ((10.0, "a digit too many"), (0.1, "a digit too few")):
+        if abs(told_mm / fitted_mm / factor - 1) < 0.05:
+            return f": {words}"
+    return ""
+
+
+def _name_movement(fit: Fit, movement: Movement) -> Fault:
+    info = fit.cells.placements[movement.placement]
+    return Fault(
+        "moved",
+        f"the target at {info.standoff_mm:g} mm moved by {movement.step_mm:+.2g} mm after {movement.before}"
+        f" of its {movement.captures} captures, between {movement.last_before} and {movement.first_after}."
+        f" Do: fix the target, and capture that standoff again or leave it out (--without-standoff"
+        f" {info.standoff_mm:g})",
+    )
+
+
+def _reflections(fit: Fit) -> Iterator[Fault]:
+    """Spots that were rejected and agree with one another: something shines there."""
+    away = defaultdict(list)
+    for r in fit.rejected:
+        if r.stray is not None:
+            away[r.stray.laser_id, r.stray.standoff_mm].append(r.stray)
+    for (laser, standoff), strays in away.items():
+        sd = stated_sd(strays, fit.rig.noise)
+        apart = np.abs(positions(strays) - np.median(positions(strays), axis=0))
+        if len(strays) > 1 and (np.nan_to_num(apart) < 10 * sd * fit.cells.repeat_scale).all():
+            yield Fault(
+                "reflection",
+                f"laser {laser} at {standoff:g} mm: {len(strays)} of its captures agree on a spot where it"
+                " cannot"
+                " be; they are left out. Cause: a reflection, or another laser lit in its place. Do: cover"
+                " what shines, look at the frames listed as not used, and capture again",
+            )
+
+
+def _never_lit(fit: Fit) -> Iterator[Fault]:
+    seen = {s.laser_id for s in fit.cells.captures}
+    dark = Counter(r.missing.laser_id for r in fit.rejected if r.missing is not None)
+    for laser in fit.rig.laser_ids:
+        if laser not in seen:
+            shown = (
+                f"none of its {dark[laser]} captures shows a spot" if dark[laser] else "no capture is of it"
+            )
+            yield Fault(
+                "never_lit",
+                f"laser {laser} never lit: {shown}. Do: check its supply, its plug and its shutter, and that"
+                " its id is that of the rig file",
+            )
+
+
+def _saturated(fit: Fit) -> Iterator[Fault]:
+    clipped = Counter(s.standoff_mm for s in fit.used if s.saturated)
+    if clipped.total() > SATURATED_SHARE * len(fit.used):
+        where = ", ".join(f"{mm:g}" for mm in sorted(clipped))
+        yield Fault(
+            "saturated",
+            f"{clipped.total()} of {len(fit.used)} spots are saturated (at {where} mm): their centres rest"
+            " on the"
+            " rim alone. Do: shorten the exposure or lower the gain until the peak stays below full scale",
+        )
+
+
+def _all_far(fit: Fit) -> Iterator[Fault]:
+    cells, camera = fit.cells, fit.rig.camera
+    size = np.array([camera.width_px, camera.height_px])
+    position = cells.position_px - fit.residual_px
+    travel = 0.0
+    for laser in set(cells.laser.tolist()):
+        mine = position[cells.laser == laser]
+        axis = "uv".index(fit.rig.lasers[laser].axis)
+        if np.isfinite(mine[:, axis]).any():
+            travel = max(travel, float(np.nanmax(mine[:, axis]) - np.nanmin(mine[:, axis])) / size[axis])
+    if travel < LEAST_TRAVEL:
+        nearest = min(p.standoff_mm for p in cells.placements)
+        yield Fault(
+            "all_far",
+            f"all standoffs are far: from {nearest:g} mm on no spot moves by more than {100 * travel:.1f} %"
+            " of the"
+            " picture, too little to tell lens, offset and pointing apart. Do: add standoffs nearer to the"
+            " sensor, down to where the outermost spot leaves the picture",
+        )
