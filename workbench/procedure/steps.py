@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable
 from functools import singledispatch
 from math import nan
+from zlib import crc32
 
 import numpy as np
 
@@ -40,6 +41,7 @@ from workbench.trials.accuracy import accuracy_csv, accuracy_row
 from workbench.trials.thesis_simulation import claim_rows, claims_csv, readings_csv, simulate
 
 SIMULATION_SEED = 2001
+"""With a scene's name it draws the scene's noise: adding a scene leaves the others as they were."""
 
 
 @singledispatch
@@ -236,9 +238,9 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
 @run_step.register
 def _(step: pr.ThesisSimulationStep, context: Context, name: str) -> str:
     simulated, rows = [], []
-    for number, scene in enumerate(step.scenes):
+    for scene in step.scenes:
         context.check_stop()
-        rng = np.random.default_rng([SIMULATION_SEED, number])
+        rng = np.random.default_rng([SIMULATION_SEED, crc32(scene.name.encode())])
         simulated.append(simulate(name, scene, context.rig, scene.points or step.points, rng))
         rows += claim_rows(simulated[-1])
         context.emit(simulated[-1])

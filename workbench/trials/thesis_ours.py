@@ -23,9 +23,8 @@ from workbench.model.calibration import (
     Validity,
 )
 from workbench.ranging.acquire import acquire
-from workbench.ranging.points import Points
 from workbench.ranging.ranger import Ranger, Reading
-from workbench.ranging.shape import Shape, fit_shape
+from workbench.ranging.shape import Shape
 from workbench.spots import Finding, SpotFinder
 from workbench.trials.thesis_camera import BAND_PX, expose
 from workbench.trials.thesis_scene import BoolArray, FloatArray, Line, Outcome
@@ -54,7 +53,7 @@ class Chain:
             on, off = expose(self.line, depths_mm, spots, fired, rng if self.noisy else None)
             return self._finders[ids].find(on, off)
 
-        return _outcome(self.line, acquire(self.ranger, "simulated", shoot))
+        return _outcome(acquire(self.ranger, "simulated", shoot))
 
     @cached_property
     def ranger(self) -> Ranger:
@@ -69,18 +68,10 @@ class Chain:
         return {ids: SpotFinder(size, [lines[i] for i in ids], expected=len(ids)) for ids in sets}
 
 
-def _outcome(line: Line, reading: Reading) -> Outcome:
-    if not reading.lasers:
+def _outcome(reading: Reading) -> Outcome:
+    if not reading.lines:
         return Outcome(None, "none")
-    # An exact calibration has nothing that two ranges share: their covariance is diagonal.
-    shape = fit_shape(
-        Points(
-            x_mm=np.array([line.front_mm[line.ids.index(one.laser_id)] for one in reading.lasers]),
-            range_mm=np.array([one.range_mm for one in reading.lasers]),
-            covariance_mm2=np.diag([one.sigma_mm**2 for one in reading.lasers]),
-        ),
-        front_mm=(0.0, float(line.front_mm[-1])),
-    )
+    shape = reading.lines[0].shape
     angle = None if shape.angle_rad is None else degrees(shape.angle_rad)
     return Outcome(shape.closest_mm, _name(shape), angle, shape.closest_sigma_mm)
 
