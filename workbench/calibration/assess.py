@@ -104,17 +104,15 @@ def judge(
     named = [fault.message for fault in faults if fault.refuses]
     warnings = [*(fault.message for fault in faults if not fault.refuses), *_warnings(fit)]
     # What has a name needs no list of its consequences.
-    reasons = (
-        [*named, *reasons] if named else reasons + _contradictions(fit) + [*map(_alarm, alarms(left_out))]
-    )
-    warnings += [] if named else [explain(test) for test in residual_alarms(tests)]
-    if not fit.rms_px <= limits.max_rms_px:
-        reasons.append(f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px")
-    if not max_relative_range_sd <= limits.max_relative_range_sd:
-        reasons.append(
-            f"standard deviation of a range up to {100 * max_relative_range_sd:.2g} % of it,"
-            f" expected at most {100 * limits.max_relative_range_sd:g} %"
-        )
+    if named:
+        reasons = [*named, *reasons]
+    else:
+        reasons += [
+            *_contradictions(fit),
+            *map(_alarm, alarms(left_out)),
+            *_beyond(fit, limits, max_relative_range_sd),
+        ]
+        warnings += [explain(test) for test in residual_alarms(tests)]
     return Assessment(
         verdict="refused" if reasons else "accepted",
         reasons=tuple(reasons),
@@ -124,6 +122,19 @@ def judge(
         residual_tests=tests,
         directions=tuple(directions),
     )
+
+
+def _beyond(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> list[str]:
+    """The limits' own figures that are not met."""
+    reasons = []
+    if not fit.rms_px <= limits.max_rms_px:
+        reasons.append(f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px")
+    if not max_relative_range_sd <= limits.max_relative_range_sd:
+        reasons.append(
+            f"standard deviation of a range up to {100 * max_relative_range_sd:.2g} % of it,"
+            f" expected at most {100 * limits.max_relative_range_sd:g} %"
+        )
+    return reasons
 
 
 def _derive_one(fit: Fit, index: int) -> Derived:
