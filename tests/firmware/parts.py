@@ -1,0 +1,86 @@
+"""The laser controller's firmware, run: in a simulated ATmega328P, and as a program of this computer."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import pytest
+
+FIRMWARE = Path(__file__).parents[2] / "rigs" / "firmware"
+Kind = Literal["chip", "host"]
+KINDS: tuple[Kind, ...] = ("chip", "host")
+REQUIRED = "WORKBENCH_REQUIRE_SIMAVR"
+"""Set to 1, a missing simulator is a failure; otherwise the tests on the chip are skipped."""
+
+
+def build(kind: Kind | Literal["core", "hanging"], folder: Path) -> None:
+    """Build into `folder` what `kind` needs, or skip the test where that cannot be done here."""
+    targets = {"chip": ["avr", "sim"], "host": ["host"], "core": ["core"], "hanging": ["hanging", "sim"]}[
+        kind
+    ]
+    tools = ["make", "cc", *(["avr-gcc"] if kind in {"chip", "hanging"} else [])]
+    missing = [tool for tool in tools if shutil.which(tool) is None]
+    if "sim" in targets and not Path("/usr/include/simavr/sim_avr.h").exists():
+        missing.append("libsimavr-dev")
+    if missing:
+        message = f"the firmware's {kind} build needs {', '.join(missing)} (Debian: see .ci/run)"
+        if os.environ.get(REQUIRED) == "1":
+            pytest.fail(message)
+        pytest.skip(message)
+    subprocess.run(["make", "-s", "-C", FIRMWARE, f"BUILD={folder}", *targets], check=True)
+
+
+@dataclass(frozen=True)
+class Change:
+    """The pins from a moment on: bit 0 is line 1; time of CLOCK_MONOTONIC, as `time.monotonic_ns`."""
+
+    time_ns: int
+    lines: int
+
+
+class Running:
+    """A controller that runs in a process of its own."""
+
+    def __init__(self, kind: Kind, folder: Path, log: Path, elf: str = "laser_controller.elf") -> None:
+        self._log = log
+        program = (
+            [folder / "sim_controller", folder / elf] if kind == "chip" else [folder / "host_controller"]
+        )
+        self._process = subprocess.Popen([*program, log], stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None
+        self.port = next(line[5:].strip() for line in self._process.stdout if line.startswith("port "))
+
+    def toggle_interlock(self) -> None:
+        self._process.send_signal(signal.SIGUSR1)
+
+    def changes(self) -> list[Change]:
+        """All changes so far, the state at boot first; a line that is being written is left out."""
+        whole = self._log.read_text().rpartition("\n")[0].split("\n")
+        return [Change(int(time_ns), int(lines)) for time_ns, lines in (line.split() for line in whole)]
+
+    def lines(self) -> int:
+        """What the pins do now."""
+        return self.changes()[-1].lines
+
+    def wait_for(self, lines: int, within_s: float = 10.0) -> Change:
+        """The change that brought the pins to `lines`, once they are there."""
+        deadline = time.monotonic() + within_s
+        while (last := self.changes()[-1]).lines != lines:
+            assert time.monotonic() < deadline, f"lines {lines} did not come, but {self.changes()}"
+            time.sleep(0.001)
+        return last
+
+    def stop(self) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+
+Start = Callable[[], Running]
