@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -46,6 +47,27 @@ class Change:
     lines: int
 
 
+def hurry(pid: int, before: int = 20) -> None:
+    """Let a process (0: this one) run before others, where that is allowed; before those of a lower number.
+
+    What is measured at the pins is how the parts work together, not for how long an overloaded computer keeps
+    the instruments, or a process that was told to end, from running at all.
+    """
+    with contextlib.suppress(AttributeError, OSError):
+        os.sched_setscheduler(pid, os.SCHED_FIFO, os.sched_param(before))
+
+
+@contextlib.contextmanager
+def hurried() -> Iterator[None]:
+    """As `hurry` for this process, for a while: nobody else gets a turn between time and deed."""
+    hurry(0, before=30)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(AttributeError, OSError):
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
 class Running:
     """A controller that runs in a process of its own."""
 
@@ -55,6 +77,7 @@ class Running:
             [folder / "sim_controller", folder / elf] if kind == "chip" else [folder / "host_controller"]
         )
         self._process = subprocess.Popen([*program, log], stdout=subprocess.PIPE, text=True)
+        hurry(self._process.pid)
         assert self._process.stdout is not None
         self.port = next(line[5:].strip() for line in self._process.stdout if line.startswith("port "))
 

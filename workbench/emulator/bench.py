@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.devices.protocols import Bench
-from workbench.devices.serial_lasers import SerialLaserBank
+from workbench.devices.serial_lasers import LONGEST_LEASE_S, SerialLaserBank
 from workbench.emulator.camera import EmulatedCamera
 from workbench.emulator.controller import Controller
 from workbench.emulator.operator import EmulatedOperator
@@ -55,7 +55,8 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
     camera = EmulatedCamera(spec, scene, sensor, controller.lit)
     server = PtyServer(controller.receive)
     try:
-        lasers = SerialLaserBank(server.port, rig.laser_ids)
+        # A frame of this bench is computed, which takes as long as it takes. Nobody stands in its beams.
+        lasers = SerialLaserBank(server.port, rig.laser_ids, hang_s=LONGEST_LEASE_S)
     except BaseException:
         server.close()
         raise

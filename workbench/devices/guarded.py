@@ -1,0 +1,106 @@
+"""The workbench's end of its guardian: starts it, talks to it, passes on what signals the workbench gets."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+from workbench.model import errors
+from workbench.model.errors import LaserOffNotConfirmedError, WorkbenchError
+
+ANSWER_S = 10.0
+"""Longer than the guardian takes for anything: twice two requests of half a second, and a busy computer."""
+
+
+class Guarded:
+    """A guardian process, see `guardian.py`. It holds the port until this is closed, or its process ends."""
+
+    def __init__(self, port: str, baud: int, boot_s: float, hang_s: float) -> None:
+        """Start it, and wait until every laser is off.
+
+        Raises:
+            RigNotReadyError: no such port, another program holds it, or nobody answers as expected.
+            LaserOffNotConfirmedError: the controller answers, but not that all are off.
+        """
+        commands, self._commands = os.pipe()
+        self._answers, answers = os.pipe()
+        signals, self._signals = os.pipe()
+        os.set_blocking(self._signals, False)
+        call = [port, str(baud), str(boot_s), str(hang_s), str(signals)]
+        # -P: what lies in the current folder is not imported. A session of its own: no terminal reaches it.
+        self._process = subprocess.Popen(  # noqa: S603 - this very program
+            [sys.executable, "-P", "-m", "workbench.devices.guardian", *call],
+            stdin=commands,
+            stdout=answers,
+            pass_fds=[signals],
+            start_new_session=True,
+        )
+        for theirs in (commands, answers, signals):
+            os.close(theirs)
+        self.is_open = True
+        self._heard = b""
+        self._before: int | None = None
+        try:
+            self.identity = str(self._answer(ANSWER_S + boot_s))
+        except BaseException:
+            self.close()
+            raise
+        if threading.current_thread() is threading.main_thread():
+            # The interpreter's C-level handler writes a signal's number there, whatever Python code is at.
+            self._before = signal.set_wakeup_fd(self._signals, warn_on_full_buffer=False)
+
+    def ask(self, command: str) -> object:
+        """The answer to a command.
+
+        Raises:
+            WorkbenchError: what the guardian could not do, by its name.
+            LaserOffNotConfirmedError: the guardian does not answer.
+        """
+        self.tell(command)
+        return self._answer(ANSWER_S)
+
+    def tell(self, command: str) -> None:
+        """A command without an answer. A guardian that is gone shows at the next `ask`."""
+        with contextlib.suppress(BrokenPipeError):
+            os.write(self._commands, f"{command}\n".encode())
+
+    def close(self) -> None:
+        """Let it go: it puts everything off and ends."""
+        if not self.is_open:
+            return
+        self.is_open = False
+        if self._before is not None:
+            signal.set_wakeup_fd(self._before)
+        for ours in (self._signals, self._commands, self._answers):
+            os.close(ours)
+        try:
+            self._process.wait(ANSWER_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _answer(self, wait_s: float) -> object:
+        deadline = time.monotonic() + wait_s
+        while b"\n" not in self._heard:
+            ready, _, _ = select.select([self._answers], [], [], max(0.0, deadline - time.monotonic()))
+            came = os.read(self._answers, 4096) if ready else b""
+            if not came:
+                raise LaserOffNotConfirmedError(
+                    f"the guardian of the laser controller {'does not answer' if not ready else 'is gone'};"
+                    " a lease still running ends by itself, but nobody verified it: treat the beams as on,"
+                    " then run `workbench lasers off`"
+                )
+            self._heard += came
+        line, _, self._heard = self._heard.partition(b"\n")
+        answer = json.loads(line)
+        if "error" in answer:
+            kind: type[WorkbenchError] = getattr(errors, answer["error"])
+            raise kind(answer["text"])
+        return answer["value"]

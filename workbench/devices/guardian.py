@@ -1,0 +1,248 @@
+"""The guardian: a process of its own that holds the laser controller's port for the workbench.
+
+It takes commands on standard input, one a line, and answers on standard output, one JSON object a line:
+
+    LIT <mask> <ms>   light these lasers, for a lease
+    BEAT              the workbench is at work; no answer
+    OFF               all off, verified; tells what went wrong since LIT
+    STATE             what is lit, and the interlock
+
+The first answer, unasked, is who the controller is. A second descriptor brings the numbers of signals that
+the workbench got, one byte each, written by its C-level signal handler.
+
+It puts everything off when the workbench ends in whatever way, when it is told to end (SIGTERM, SIGHUP), and
+when no beat came for `hang_s` while something was lit. The last it leaves to nobody's clock but the
+controller's: that is never given a lease longer than `hang_s`, and each beat renews it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+from workbench.devices.controller_line import ControllerLine
+from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError, WorkbenchError
+
+LOOK_S = 0.02
+"""Between two looks at whether the workbench lives, while something is lit: it sees what a pipe that a stray
+child holds open does not."""
+TRY_ALONE_S = 1.0
+"""How long it goes on trying to put off when there is nobody left to tell: twice the longest lease."""
+RENEW = 5
+"""A lease is renewed when a fifth of it has gone."""
+AT_ONCE = {int(signal.SIGTERM), int(signal.SIGHUP)}
+
+
+class Workbench:
+    """The process that started the guardian, as the guardian sees it."""
+
+    def __init__(self, commands: int, signals: int) -> None:
+        self._commands, self._signals = commands, signals
+        self._pid = os.getppid()
+        self._heard = b""
+        self.gone = False
+        self.told_to_end: str | None = None
+        """The signal that told it to."""
+
+    def alarm(self) -> bool:
+        """Whether the lasers have to go off at once."""
+        self._look(0.0)
+        return self.gone or self.told_to_end is not None
+
+    def command(self, wait_s: float | None) -> str | None:
+        """The next command; None when something else came, or nothing in `wait_s` (None: however long)."""
+        if b"\n" not in self._heard:
+            self._look(wait_s)
+        line, found, rest = self._heard.partition(b"\n")
+        if not found:
+            return None
+        self._heard = rest
+        return line.decode()
+
+    def _look(self, wait_s: float | None) -> None:
+        ready, _, _ = select.select([self._commands, self._signals], [], [], wait_s)
+        if self._signals in ready:
+            for number in AT_ONCE & set(os.read(self._signals, 64)):
+                self.told_to_end = signal.Signals(number).name
+        if self._commands in ready:
+            came = os.read(self._commands, 4096)
+            self._heard += came
+            self.gone = self.gone or not came
+        self.gone = self.gone or os.getppid() != self._pid
+
+
+@dataclass
+class Lease:
+    """What is lit. Times are of the monotonic clock, s."""
+
+    mask: int
+    ends: float
+    """As the workbench asked."""
+    renewed: float = 0.0
+    held_until: float = 0.0
+    """The controller puts off by itself then."""
+
+
+class Guardian:
+    """Serves one workbench on one controller."""
+
+    def __init__(self, workbench: Workbench, line: ControllerLine, hang_s: float) -> None:
+        self._workbench, self._line, self._hang_s = workbench, line, hang_s
+        self._lease: Lease | None = None
+        self._failure: WorkbenchError | None = None
+        """Why lasers went off that the workbench takes for lit."""
+
+    def serve(self) -> int:
+        """Serve until the workbench is gone; returns the exit code."""
+        while not self._workbench.gone:
+            command = self._workbench.command(self._wait_s())
+            if self._lease is not None and self._workbench.told_to_end is not None:
+                self._put_off(self._stopped())
+            if command is not None:
+                self._obey(command)
+            elif self._lease is not None and time.monotonic() >= self._lease.held_until:
+                self._end_of_lease(self._lease)
+        return self._leave()
+
+    def _wait_s(self) -> float | None:
+        """Until something has to be looked at; None: nothing is lit."""
+        if self._lease is None:
+            return None
+        return min(LOOK_S, max(0.0, self._lease.held_until - time.monotonic()))
+
+    def _obey(self, command: str) -> None:
+        match command.split(" "):
+            case ["BEAT"]:
+                self._beat()
+            case ["LIT", mask, lease_ms]:
+                self._answer(lambda: self._light(int(mask), int(lease_ms)))
+            case ["OFF"]:
+                self._answer(self._off)
+            case ["STATE"]:
+                self._answer(self._line.state)
+            case _:
+                raise ValueError(f"no such command: {command}")
+
+    def _answer(self, act: Callable[[], object]) -> None:
+        try:
+            say({"value": act()})
+        except WorkbenchError as error:
+            say_error(error)
+
+    def _light(self, mask: int, lease_ms: int) -> None:
+        if self._workbench.told_to_end is not None:
+            raise self._stopped()
+        self._lease = Lease(mask, time.monotonic() + lease_ms / 1000)
+        try:
+            self._renew(self._lease)
+        except RigNotReadyError:
+            if self._workbench.told_to_end is not None:
+                raise self._stopped() from None
+            raise
+
+    def _beat(self) -> None:
+        lease, now = self._lease, time.monotonic()
+        if lease is None or lease.held_until >= lease.ends:
+            return
+        if now >= lease.held_until:
+            self._end_of_lease(lease)  # what has gone off is not lit again
+        elif now >= lease.renewed + self._hang_s / RENEW:
+            try:
+                self._renew(lease)
+            except RigNotReadyError as error:
+                self._put_off(error)
+
+    def _renew(self, lease: Lease) -> None:
+        lease.renewed = time.monotonic()
+        hold_s = min(self._hang_s, lease.ends - lease.renewed)
+        lease.held_until = lease.renewed + hold_s
+        # A hair less than a whole millisecond is not one more.
+        self._line.light(lease.mask, max(1, math.ceil(hold_s * 1000 - 1e-3)))
+
+    def _end_of_lease(self, lease: Lease) -> None:
+        hung = lease.held_until < lease.ends
+        self._put_off(
+            RigNotReadyError(
+                f"the lasers were put off: the workbench was silent for {self._hang_s:g} s while they were"
+                " lit. Was it suspended, or the computer too busy? Take this capture anew"
+            )
+            if hung
+            else None
+        )
+
+    def _put_off(self, why: WorkbenchError | None) -> None:
+        self._failure = why
+        try:
+            self._lease = None
+            self._line.all_off()
+        except LaserOffNotConfirmedError as error:
+            self._failure = error
+
+    def _off(self) -> None:
+        self._lease = None
+        failure, self._failure = self._failure, None
+        self._line.all_off()
+        if failure is not None:
+            raise failure
+
+    def _stopped(self) -> StoppedError:
+        return StoppedError(f"stopped by {self._workbench.told_to_end}; the lasers were put off at once")
+
+    def _leave(self) -> int:
+        """Off, and tried again for a while: there is nobody left who would."""
+        deadline = time.monotonic() + TRY_ALONE_S
+        while True:
+            try:
+                self._line.all_off()
+            except LaserOffNotConfirmedError as error:
+                if time.monotonic() >= deadline:
+                    with suppress(OSError):
+                        os.write(sys.stderr.fileno(), f"error: {error}\n".encode())
+                    return error.exit_code
+                time.sleep(LOOK_S)
+            else:
+                return 0
+
+
+def say(answer: dict[str, object]) -> None:
+    """One answer to the workbench, which may be gone."""
+    with suppress(OSError):
+        os.write(sys.stdout.fileno(), json.dumps(answer).encode() + b"\n")
+
+
+def say_error(error: WorkbenchError) -> None:
+    """A failure, by the name of its kind."""
+    say({"error": type(error).__name__, "text": str(error)})
+
+
+def main(port: str, baud: int, boot_s: float, hang_s: float, signals: int) -> int:
+    """Hold the port until the workbench is gone."""
+    # What a terminal, or a system that goes down, sends to everybody. The workbench's end is what counts.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
+        signal.signal(number, signal.SIG_IGN)
+    # Before all else that a busy computer runs, where it is allowed to. It sleeps nearly all the time.
+    with suppress(AttributeError, OSError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+    workbench = Workbench(sys.stdin.fileno(), signals)
+    try:
+        line = ControllerLine(port, baud, workbench.alarm)
+        identity = line.identify(boot_s)
+        line.all_off()
+    except WorkbenchError as error:
+        say_error(error)
+        return error.exit_code
+    say({"value": identity})
+    return Guardian(workbench, line, hang_s).serve()
+
+
+if __name__ == "__main__":
+    _, port, baud, boot_s, hang_s, signals = sys.argv
+    sys.exit(main(port, int(baud), float(boot_s), float(hang_s), int(signals)))
