@@ -26,6 +26,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+lasers = typer.Typer(help="The rig's lasers, without a session.", no_args_is_help=True)
+app.add_typer(lasers, name="lasers")
+
 INTERNAL_ERROR = 1
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 
@@ -226,6 +229,22 @@ def view(
     from workbench.cli.view import view_session
 
     raise typer.Exit(view_session(session))
+
+
+@lasers.command(name="off")
+def lasers_off(rig: Annotated[Path, typer.Option(help="Rig file.")]) -> None:
+    """Put every laser off: exit 0 when the controller confirms it, 7 when not."""
+    from workbench.cli.lasers import lasers_off
+
+    typer.echo(lasers_off(rig))
+
+
+@lasers.command(name="state")
+def lasers_state(rig: Annotated[Path, typer.Option(help="Rig file.")]) -> None:
+    """Tell who the controller is, and its interlock. Opening its port puts every laser off."""
+    from workbench.cli.lasers import lasers_state
+
+    typer.echo(lasers_state(rig))
 
 
 def main() -> None:

@@ -126,6 +126,49 @@ class NoiseSpec(FileModel):
     """Shared by all repeats of one laser at one placement: the speckle pattern stands still."""
 
 
+class CameraDevice(FileModel):
+    """How the camera is reached. Settings are in its driver's own units, and are read back."""
+
+    source: Name
+    """Number of a device, its path, the URL of a stream, or a video file."""
+    pixel_format: Annotated[str, Field(pattern=r"^[ -~]{4}$")] | None = None
+    """Four letters, as YUYV or GREY."""
+    exposure: float | None = None
+    ambient_exposure: float | None = None
+    """For frames of room light alone, as of the printed board; without it they are exposed as all others."""
+    gain: float | None = None
+    buffer_frames: Annotated[int, Field(ge=1)] | None = None
+    latency_frames: Annotated[int, Field(ge=0)] = 2
+    """Frames that are under way, or being exposed, when something is switched: they are discarded."""
+
+    @model_validator(mode="after")
+    def _has_an_exposure_to_go_back_to(self) -> CameraDevice:
+        if self.ambient_exposure is not None and self.exposure is None:
+            raise ValueError("ambient_exposure needs an exposure to go back to")
+        return self
+
+
+class LaserDevice(FileModel):
+    """How the laser controller is reached."""
+
+    port: str
+    baud: Annotated[int, Field(gt=0)] = 115_200
+
+
+class DeviceSpec(FileModel):
+    """What the driver `opencv+serial` opens."""
+
+    camera: CameraDevice
+    lasers: LaserDevice
+
+
+LaserClass = Annotated[
+    Literal["1", "1M", "2", "2M", "3R", "3B", "4"],
+    BeforeValidator(lambda v: str(v) if isinstance(v, int) and not isinstance(v, bool) else v),
+]
+"""IEC 60825-1."""
+
+
 class Rig(FileModel):
     """A rig file, format 1."""
 
@@ -134,6 +177,10 @@ class Rig(FileModel):
     serial: Name = "unknown"
     driver: str | None = None
     """Entry point in the group `workbench.benches`; without one the rig can be fitted but not run."""
+    laser_class: LaserClass | None = None
+    """Of the most dangerous of its lasers; the operator is asked to protect against it."""
+    devices: DeviceSpec | None = None
+    """Read by the driver `opencv+serial`."""
     camera: CameraSpec
     lasers: Annotated[tuple[LaserSpec, ...], Field(min_length=1)]
     bench: BenchSpec = BenchSpec()

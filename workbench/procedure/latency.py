@@ -19,10 +19,14 @@ def count_latency(lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_fra
         RigNotReadyError: none of `most_frames` frames shows it.
     """
     lasers.all_off()
-    # Longer than the latency: whatever a laser lit before this call has passed.
-    dark = [camera.read() for _ in range(most_frames + 1)][-1].image
     first = rig.lasers[0]
     scanlines = [prior_scanline(rig, first)]
+    # The first search in a process takes a second: a laser lit meanwhile would be put off as forgotten.
+    some = camera.grab().image
+    find_spots(some, some, scanlines=scanlines, expected=1)
+    # Drops what has piled up, then longer than the latency: whatever a laser lit before this call has passed.
+    camera.grab()
+    dark = [camera.read() for _ in range(most_frames + 1)][-1].image
     with lasers.lit([first.id], for_s=LEASE_S):
         for frames in range(most_frames + 1):
             if find_spots(camera.read().image, dark, scanlines=scanlines, expected=1).spots:

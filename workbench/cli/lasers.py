@@ -1,0 +1,43 @@
+"""`workbench lasers off` and `workbench lasers state`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from workbench.devices.real_bench import open_lasers
+from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
+from workbench.model.rig import load_rig
+
+
+def lasers_off(rig_path: Path) -> str:
+    """Put every laser off; returns who confirmed it.
+
+    Raises:
+        BadInputError: the rig file is wrong, or names no controller.
+        LaserOffNotConfirmedError: nobody confirmed it, for whatever reason.
+    """
+    rig = load_rig(rig_path)
+    try:
+        lasers = open_lasers(rig)
+        lasers.close()
+    except RigNotReadyError as error:
+        raise LaserOffNotConfirmedError(
+            f"the lasers may be on: {error}. Treat the beams as on, cut the lasers' supply"
+        ) from None
+    return f"all lasers are off, confirmed by {lasers.identity}"
+
+
+def lasers_state(rig_path: Path) -> str:
+    """What the controller tells, once its port is open; that puts every laser off.
+
+    Raises:
+        WorkbenchError: the rig file is wrong, or the controller does not answer.
+    """
+    lasers = open_lasers(load_rig(rig_path))
+    try:
+        state = lasers.state()
+    finally:
+        lasers.close()
+    interlock = "closed" if state.interlock_closed else "open: nothing can be lit"
+    lit = ", ".join(state.lit) or "none (opening the port puts all off)"
+    return f"controller: {lasers.identity}\ninterlock:  {interlock}\nlit:        {lit}"

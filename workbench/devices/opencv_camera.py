@@ -1,0 +1,226 @@
+"""A camera that OpenCV can open: a device, a network stream, or a file."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from workbench.devices.protocols import Frame, Image
+from workbench.model.errors import RigNotReadyError
+from workbench.model.rig import CameraDevice, CameraSpec
+
+SILENT_S = 1.5
+"""A camera that has sent nothing for so long is not going to. It leaves time to say so within two seconds."""
+LOOK_S = 0.05
+"""Between two beats while a frame is waited for."""
+BACKLOG = 32
+"""Frames kept for whoever reads them one by one."""
+MANUAL_EXPOSURE = 1.0
+"""Of V4L2's `exposure_auto`."""
+SAME = 0.005
+"""Relative difference below which a setting was taken as asked."""
+
+
+class OpenCvCamera:
+    """See `protocols.StreamingCamera`.
+
+    A thread of its own takes the frames as they come, so that none is older than it need be; from a file it
+    takes one when the one before has been read.
+    """
+
+    def __init__(
+        self, device: CameraDevice, camera: CameraSpec, beat: Callable[[], None] = lambda: None
+    ) -> None:
+        """Open it, make its settings and check that they were taken, and look at a first frame.
+
+        Args:
+            device: what to open, and the settings.
+            camera: the format that the frames must have.
+            beat: called by `grab` and `read`, in the thread that calls these, at least every 0.1 s.
+
+        Raises:
+            RigNotReadyError: no such camera, it does not deliver, or a setting or the format is another.
+        """
+        self.discard_frames = device.latency_frames
+        self._device, self._format, self._beat = device, camera, beat
+        self._is_file = Path(device.source).is_file()
+        self._exposure = device.exposure
+        self._frames: deque[Frame] = deque(maxlen=BACKLOG)
+        self._changed = threading.Condition()
+        self._ended: str | None = None
+        """Why no more frames come."""
+        self._closing = False
+        self._capture = _open(device, camera)
+        self._thread = threading.Thread(target=self._take, name="camera", daemon=True)
+        self._thread.start()
+        try:
+            self._check_format(self.read().image)
+        except BaseException:
+            self.close()
+            raise
+
+    def grab(self) -> Frame:
+        """A frame whose exposure began after this call: what came before, and `discard_frames`, are dropped.
+
+        Raises:
+            RigNotReadyError: the camera does not deliver.
+        """
+        with self._changed:
+            if not self._is_file:
+                self._frames.clear()
+        for _ in range(self.discard_frames):
+            self.read()
+        return self.read()
+
+    def grab_ambient(self) -> Frame:
+        """As `grab`, with `ambient_exposure` where the rig file has one."""
+        if self._device.ambient_exposure is None:
+            return self.grab()
+        self._exposure = self._device.ambient_exposure
+        try:
+            self.read()  # the frame under way when the setting is made
+            return self.grab()
+        finally:
+            self._exposure = self._device.exposure
+            self.read()
+
+    def read(self) -> Frame:
+        """The next frame of the stream, with the wall clock when it arrived.
+
+        Raises:
+            RigNotReadyError: the camera does not deliver.
+        """
+        deadline = time.monotonic() + SILENT_S
+        self._beat()
+        while True:
+            with self._changed:
+                if self._frames:
+                    self._changed.notify_all()
+                    return self._frames.popleft()
+                if self._ended is not None:
+                    raise RigNotReadyError(self._ended)
+                if time.monotonic() >= deadline:
+                    raise RigNotReadyError(self._silent(f"nothing for {SILENT_S:g} s"))
+                self._changed.wait(LOOK_S)
+            self._beat()
+
+    def close(self) -> None:
+        """Release the device. One that hangs in its driver is left to the end of the program."""
+        self._closing = True
+        with self._changed:
+            self._changed.notify_all()
+        self._thread.join(LOOK_S * 10)
+        if not self._thread.is_alive():
+            self._capture.release()
+
+    def _take(self) -> None:
+        """Frames, until the camera ends or is closed; only this thread touches the device."""
+        made = self._exposure
+        while not self._closing:
+            try:
+                if self._exposure != made:
+                    made = self._exposure
+                    _set(self._capture, self._device.source, cv2.CAP_PROP_EXPOSURE, "exposure", made)
+                came, image = self._capture.read()
+                frame = Frame(_grey(image), time.time_ns()) if came else None
+            except (RigNotReadyError, cv2.error) as error:
+                self._end(str(error))
+                return
+            if frame is None:
+                self._end(self._silent("the end of the file" if self._is_file else "the end of the stream"))
+                return
+            with self._changed:
+                self._frames.append(frame)
+                self._changed.notify_all()
+                if self._is_file:
+                    self._changed.wait_for(lambda: not self._frames or self._closing)
+
+    def _end(self, why: str) -> None:
+        with self._changed:
+            self._ended = why
+            self._changed.notify_all()
+
+    def _silent(self, came: str) -> str:
+        return (
+            f"camera {self._device.source}: expected a frame, got {came};"
+            " check its cable, and whether another program holds it"
+        )
+
+    def _check_format(self, image: Image) -> None:
+        asked = (self._format.height_px, self._format.width_px, "8" if self._format.bits == 8 else "16")
+        came = (*image.shape, str(8 * image.dtype.itemsize))
+        if asked != came:
+            raise RigNotReadyError(
+                f"camera {self._device.source}: expected frames of {asked[1]} x {asked[0]} px in {asked[2]}"
+                f" bits, as in the rig file, got {came[1]} x {came[0]} in {came[2]}"
+            )
+
+
+def _open(device: CameraDevice, camera: CameraSpec) -> cv2.VideoCapture:
+    source = device.source
+    is_device = source.isdigit() or source.startswith("/dev/")
+    if is_device:
+        capture = cv2.VideoCapture(int(source) if source.isdigit() else source, cv2.CAP_ANY)
+    else:
+        patience_ms = int(SILENT_S * 1000)
+        limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, patience_ms, cv2.CAP_PROP_READ_TIMEOUT_MSEC, patience_ms]
+        capture = cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)
+    if not capture.isOpened():
+        raise RigNotReadyError(
+            f"camera {source}: expected a device, a stream or a video file, could not open it;"
+            " check its cable, its address, and whether another program holds it"
+        )
+    try:
+        _make_settings(capture, device, camera, is_device)
+    except BaseException:
+        capture.release()
+        raise
+    return capture
+
+
+def _make_settings(
+    capture: cv2.VideoCapture, device: CameraDevice, camera: CameraSpec, is_device: bool
+) -> None:
+    """Every setting is read back. The picture's size is asked of a device; streams and files have one."""
+    fourcc = device.pixel_format
+    automatic = MANUAL_EXPOSURE if device.exposure is not None else None
+    settings: list[tuple[int, str, float | None]] = [
+        (cv2.CAP_PROP_FOURCC, "pixel_format", cv2.VideoWriter.fourcc(*fourcc) if fourcc else None),
+        (cv2.CAP_PROP_FRAME_WIDTH, "width_px", camera.width_px if is_device else None),
+        (cv2.CAP_PROP_FRAME_HEIGHT, "height_px", camera.height_px if is_device else None),
+        (cv2.CAP_PROP_CONVERT_RGB, "raw frames (bits above 8)", 0.0 if camera.bits > 8 else None),
+        (cv2.CAP_PROP_BUFFERSIZE, "buffer_frames", device.buffer_frames),
+        (cv2.CAP_PROP_AUTO_EXPOSURE, "manual exposure", automatic),
+        (cv2.CAP_PROP_EXPOSURE, "exposure", device.exposure),
+        (cv2.CAP_PROP_GAIN, "gain", device.gain),
+    ]
+    for number, name, value in settings:
+        _set(capture, device.source, number, name, value)
+
+
+def _set(capture: cv2.VideoCapture, source: str, number: int, name: str, value: float | None) -> None:
+    """Make one setting, unless it is None, and read it back."""
+    if value is None:
+        return
+    capture.set(number, value)
+    came = capture.get(number)
+    if abs(came - value) > SAME * abs(value):
+        raise RigNotReadyError(
+            f"camera {source}: {name}: asked for {value:g}, the camera says {came:g}; put a value into the"
+            " rig file that it takes, or leave the setting out"
+        )
+
+
+def _grey(image: np.ndarray[Any, Any]) -> Image:
+    if image.ndim == 2:
+        return image
+    if image.shape[2] == 1:
+        return image[:, :, 0]
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=image.dtype)
