@@ -136,7 +136,8 @@ def test_what_a_terminal_sends_does_not_end_the_guardian(controller: Running) ->
 @pytest.fixture
 def bank(controller: Running) -> Iterator[SerialLaserBank]:
     bank = SerialLaserBank(controller.port, IDS)
-    yield bank
+    with hurried():  # half a second without a turn is a hang, and here it would be no finding
+        yield bank
     bank.close()
 
 
