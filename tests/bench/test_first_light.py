@@ -19,7 +19,14 @@ from tests.viewer.harness import distinct_colors, headless_viewer
 from tests.viewer.readback import Contents
 from workbench.calibration.sensor import Sensor
 from workbench.model.calibration import load_calibration
-from workbench.model.event import CaptureTaken, ReadingTaken, SessionFinished, StepStarted, TrialFinished
+from workbench.model.event import (
+    CaptureTaken,
+    ReadingTaken,
+    SessionFinished,
+    StandoffAdvised,
+    StepStarted,
+    TrialFinished,
+)
 from workbench.model.rig import load_rig
 from workbench.session.journal import read_journal
 from workbench.viewer.recording import rebuild
@@ -166,6 +173,18 @@ def test_fit_and_range_on_the_session_s_images_give_the_session_s_results(demo: 
         assert ours == pytest.approx({laser.laser_id: laser.range_mm for laser in reading.lasers}, rel=1e-9)
         compared += 1
     assert compared == 55
+
+
+def test_each_placement_tells_how_far_the_captures_have_come(demo: Demo) -> None:
+    """From the second on; the last says of the ranges what the fit then does."""
+    told = [r.event for r in read_journal(demo.folder) if isinstance(r.event, StandoffAdvised)]
+    assert [one.placements for one in told] == list(range(2, 12))
+    assert told[0].relative_range_sd > told[0].limit == 0.03 > told[-1].relative_range_sd
+    stated = load_calibration(demo.folder / "calibration.yaml").laser_ranger.validity.max_relative_range_sd
+    assert told[-1].relative_range_sd == pytest.approx(stated, rel=0.05)
+    assert all(one.then_relative_range_sd < one.relative_range_sd for one in told)
+    assert all(100 <= one.next_standoff_mm <= 5000 for one in told)
+    assert told[-1].text in " ".join(demo.terminal.split())
 
 
 def test_the_recording_is_a_view_that_can_be_made_again(demo: Demo, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from tests.proofs import bound, simulate, study
 from tests.unit.rigs import STANDOFFS_MM, World, thesis_rig
 from tests.unit.test_calibration_file import PROVENANCE
-from workbench.calibration.batch import fit_batch
+from workbench.calibration.batch import as_grid, fit_batch
 from workbench.calibration.design import (
     DRAWS,
     Aim,
@@ -25,6 +25,7 @@ from workbench.calibration.export import calibrate
 from workbench.calibration.fit import fit
 from workbench.calibration.forecast import RANGES_MM, forecast
 from workbench.calibration.next_standoff import advise
+from workbench.calibration.observations import group
 from workbench.calibration.sensor import Sensor
 from workbench.model.acceptance import Acceptance
 from workbench.model.errors import BadInputError
@@ -253,6 +254,35 @@ class TestAdvice:
         after = advise(RIG, world.sightings(further, 10), SHIPPED)
         assert after is not None
         assert after.relative_range_sd == pytest.approx(before.then_relative_range_sd, rel=0.15)
+
+    @pytest.mark.parametrize(("seed", "noise"), [(1, 1.0), (2, 1.0), (4, 3.0)])
+    def test_it_fits_as_the_fit_does(self, seed: int, noise: float) -> None:
+        """With noise three times what is stated the deviations grow as much."""
+        stated = RIG.noise
+        louder = stated.model_copy(
+            update={name: noise * getattr(stated, name) for name in ("spot_sd_px", "speckle_sd_px")}
+        )
+        sightings = World(RIG.model_copy(update={"noise": louder}), seed).sightings(SHIPPED[::2], 10)
+        advice = advise(RIG, sightings, SHIPPED)
+        assert advice is not None
+        cells, _ = group(sightings, RIG.laser_ids, RIG.noise)
+        position, sd = as_grid(cells, 4)
+        fitted = fit_batch(RIG, cells.placements, position[None], sd[None])
+        scale = float(fitted.noise_scale[0])
+        assert (scale > 2) == (noise == 3.0)
+        sensors = Expectation(RIG, fitted.sensor)
+        free, prior_sd = sensors.table.free, sensors.table.prior_sd[sensors.table.free]
+        covariance = fitted.sensor_covariance[:, free[:, None], free] / np.outer(prior_sd, prior_sd)
+        spot = RIG.noise.model_copy(
+            update={
+                "spot_sd_px": RIG.noise.spot_sd_px * scale * cells.repeat_scale,
+                "speckle_sd_px": RIG.noise.speckle_sd_px * scale,
+            }
+        )
+        aim = Aim.of(sensors, np.geomspace(125.0, 4500.0, 18), spot)
+        worst = np.sqrt((aim.variance(covariance) + aim.spot_sd**2).max())
+        # The fit estimates the noise with the placements' errors fitted, the advice with them as noise.
+        assert advice.relative_range_sd == pytest.approx(worst, rel=0.02 if noise == 1.0 else 0.1)
 
     def test_too_little_is_no_advice(self) -> None:
         world = World(RIG, 3)

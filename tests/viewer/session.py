@@ -76,6 +76,15 @@ class MadeUpSession:
                 for repeat in range(REPEATS):
                     yield from self._capture("calibration", (laser,), f"p{i}", standoff, repeat)
             yield self._record(ev.StepFinished(procedure=name, index=i, outcome="8 captures"))
+        yield self._record(
+            ev.StandoffAdvised(
+                placements=4,
+                relative_range_sd=0.021,
+                limit=0.03,
+                next_standoff_mm=4500.0,
+                then_relative_range_sd=0.018,
+            )
+        )
         yield from self._step(name, 5, "Fit", 0)
         yield self._record(a_fit())
         yield self._record(ev.StepFinished(procedure=name, index=5, outcome="accepted"))

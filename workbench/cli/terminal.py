@@ -82,6 +82,8 @@ class Terminal:
                 self._print(f"captured again: {e.reason}", style="yellow")
             case ev.SessionResumed() as e:
                 self._print(f"resumed, {len(e.changes)} changes accepted" if e.changes else "resumed", 2)
+            case ev.StandoffAdvised() as e:
+                self._print(e.text)
             case ev.StepFinished() as e:
                 self._end_step(e.outcome)
             case ev.FitFinished() as e:

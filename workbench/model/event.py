@@ -251,6 +251,32 @@ class ResidualTestRecord(FileModel):
     p: float
 
 
+class StandoffAdvised(FileModel):
+    """How good ranges are by the captures so far, and where the target would help most next.
+
+    Relative standard deviations of a single range (1 sigma), the largest from the nearest to the farthest
+    standoff of the procedure.
+    """
+
+    kind: Literal["standoff_advised"] = "standoff_advised"
+    placements: int
+    relative_range_sd: float
+    limit: float
+    """What the fit step to come demands."""
+    next_standoff_mm: float
+    then_relative_range_sd: float
+    """With a placement there."""
+
+    @property
+    def text(self) -> str:
+        """For people, one line."""
+        met = "met" if self.relative_range_sd <= self.limit else "not met"
+        return (
+            f"target {met}: ranges to {100 * self.relative_range_sd:.2g} % (limit {100 * self.limit:g} %);"
+            f" best next {self.next_standoff_mm:g} mm: to {100 * self.then_relative_range_sd:.2g} %"
+        )
+
+
 class FitFinished(FileModel):
     """A calibration has been fitted, accepted or not."""
 
@@ -353,6 +379,7 @@ Event = Annotated[
     | SpotsFound
     | LimitChecked
     | LatencyMeasured
+    | StandoffAdvised
     | FitFinished
     | CalibrationExported
     | ReadingTaken

@@ -41,6 +41,16 @@ class _LeftOutError(Exception):
         self.answer = answer
 
 
+@dataclass(frozen=True)
+class Ahead:
+    """The fit to come in this procedure."""
+
+    planned_mm: tuple[float, ...]
+    """Standoffs of all capture_grid steps before it."""
+    limit: float
+    """On the relative sd of ranges."""
+
+
 @dataclass
 class Context:
     """The bench, the session and the results so far."""
@@ -58,6 +68,8 @@ class Context:
     """By the capture's key."""
     boards: dict[str, BoardView | Rejected] = field(default_factory=dict)
     """By the placement's key."""
+    ahead: Ahead | None = None
+    """What the captures of the present step are for; None where no fit follows in its procedure."""
     accepted: Calibration | None = None
     """What the last fit amounts to."""
     calibration: Calibration | None = None

@@ -13,9 +13,9 @@ from workbench.devices.registry import check_driver, open_bench
 from workbench.model import event as ev
 from workbench.model.calibration import Provenance
 from workbench.model.errors import BadInputError, StoppedError, WorkbenchError
-from workbench.model.procedure import Procedure, load_procedure
+from workbench.model.procedure import CaptureGridStep, FitStep, Procedure, Step, load_procedure
 from workbench.model.rig import Rig, load_rig
-from workbench.procedure.context import Context
+from workbench.procedure.context import Ahead, Context
 from workbench.procedure.operator import Nobody
 from workbench.procedure.recorder import Recorder
 from workbench.procedure.steps import run_step, shots
@@ -176,6 +176,16 @@ def open_context(
     return Context(session_dir, plan.rig, bench, bench.operator or operator, recorder, provenance, stopping)
 
 
+def _ahead(steps: Sequence[Step], index: int) -> Ahead | None:
+    """The next fit from a step on, and what is planned before it."""
+    for number, fit in enumerate(steps[index:], start=index):
+        if isinstance(fit, FitStep):
+            before = [step for step in steps[:number] if isinstance(step, CaptureGridStep)]
+            planned = tuple(standoff for step in before for standoff in step.standoffs_mm)
+            return Ahead(planned, fit.limits.max_relative_range_sd)
+    return None
+
+
 def _ending(error: BaseException) -> ev.SessionFinished:
     if isinstance(error, WorkbenchError):
         return ev.SessionFinished(exit_code=error.exit_code, message=str(error))
@@ -201,5 +211,6 @@ def _run_all(plan: Plan, context: Context) -> None:
                     shots=shots(step, plan.rig),
                 )
             )
+            context.ahead = _ahead(procedure.steps, index - 1)
             outcome = run_step(step, context, f"{procedure.procedure}.{index}")
             context.emit(ev.StepFinished(procedure=procedure.procedure, index=index, outcome=outcome))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import asdict
 from functools import singledispatch
 from math import nan
 from zlib import crc32
@@ -17,6 +18,7 @@ import numpy as np
 
 from workbench.calibration.boards import BoardView, on_boards, see_board
 from workbench.calibration.export import calibrate, render
+from workbench.calibration.next_standoff import advise
 from workbench.calibration.observations import PlacementInfo, Rejected, Sighting
 from workbench.calibration.records import fit_finished
 from workbench.calibration.robust import fit_without_outliers
@@ -126,6 +128,7 @@ def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
     def work(placement: Placement) -> int:
         pairs = _capture_lasers(context, placement, step.repeats)
         check_captures(context, name, placement, step.limits, retries)
+        _advise(context)
         return pairs
 
     return f"{sum(context.visit(placements, work))} pairs"
@@ -280,6 +283,17 @@ def _capture_lasers(context: Context, placement: Placement, repeats: int) -> int
             key = f"{placement.key}/{laser.id}/{repeat:02d}"
             context.capture(key, [laser.id], placement, repeat, [scanline])
     return repeats * len(context.rig.lasers)
+
+
+def _advise(context: Context) -> None:
+    """Tell how far the captures have come; not where the board was seen: its corners would not count."""
+    if context.ahead is None or context.boards:
+        return
+    captures = [c for c in context.captures if c.purpose == "calibration"]
+    found = [_sight(context, capture) for capture in captures]
+    sightings = [f for f in found if isinstance(f, Sighting)]
+    if (advice := advise(context.rig, sightings, context.ahead.planned_mm)) is not None:
+        context.emit(ev.StandoffAdvised(limit=context.ahead.limit, **asdict(advice)))
 
 
 def _shooter(

@@ -206,6 +206,10 @@ class _OpenRecording:
         steps.say(self.stream, f"Camera latency: {event.frames} frames")
 
     @_log.register
+    def _(self, event: ev.StandoffAdvised, moment: Moment) -> None:
+        steps.say(self.stream, f"After {event.placements} placements, {event.text}")
+
+    @_log.register
     def _(self, event: ev.FitFinished, moment: Moment) -> None:
         self._geometry = self._geometry.fitted(event.parameters)
         scene.log_sensor(self.stream, self._rig.camera, self._geometry, self._colors)
