@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from workbench.model import event as ev
+from workbench.model.calibration import TermSummary
 from workbench.model.rig import CameraSpec, LaserSpec, Prior, Rig
 from workbench.model.target import FlatTarget, Placement
 
@@ -201,6 +202,21 @@ def a_fit() -> ev.FitFinished:
         verdict="accepted",
         reasons=("range uncertainty stays below 1 % up to 2 m",),
         warnings=("f_px is determined by the prior: the data know only its product with the baselines",),
+        terms=(
+            TermSummary(
+                name="k2", verdict="open", p_value=0.91, log10_bayes_factor=-0.9, range_shift_sd=0.02
+            ),
+        ),
+        left_out=(
+            ev.LeftOutRecord(
+                placement="P2",
+                standoff_mm=BAD[1],
+                error_mm=2.5,
+                sd_mm=0.5,
+                lasers=(ev.LaserErrorRecord(laser_id=BAD[0], error_mm=4.25, sd_mm=0.6),),
+                alarm=True,
+            ),
+        ),
     )
 
 

@@ -22,7 +22,7 @@ VIEWS_OF_TAB = {
         "Residual u against standoff [mm], bars 1 sigma",
         "Residual v against standoff [mm], bars 1 sigma",
         "Verdict",
-        "Parameters",
+        "Checks",
     },
     "Trial": {
         "Error of every reading against true range [mm], bars stated 1 sigma",

@@ -132,6 +132,9 @@ def test_the_fit_is_summed_up_in_words(contents: Contents) -> None:
     assert "f_px is determined by the prior" in texts[-1]
     table = contents.values("/fit/parameter_table", "TextDocument:text")[-1][1][0]
     assert "| cx_px | 358.2 ± 2.1 | px | 320 ± 40 | 100 % | data |" in table
+    checks = contents.values("/fit/checks", "TextDocument:text")[-1][1][0]
+    assert f"| {BAD[1]:g} | +2.50 | 0.50 | +5.0 | **farther off than promised** | +4.25 |" in checks
+    assert "| k2 | 0.91 | -0.9 | 0.02 | kept: the data cannot tell |" in checks
 
 
 def test_readings_and_the_trial_table(recorded: Recorded, contents: Contents) -> None:

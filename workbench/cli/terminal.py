@@ -17,7 +17,14 @@ from workbench.model.errors import StoppedError
 from workbench.model.simulation import SceneSimulated, SimulationFinished
 from workbench.procedure.outline import Forecast
 from workbench.procedure.quality import Quality, quality_of
-from workbench.report.tables import claim_table, parameter_table, rejected_lines, term_table, trial_table
+from workbench.report.tables import (
+    claim_table,
+    left_out_table,
+    parameter_table,
+    rejected_lines,
+    term_table,
+    trial_table,
+)
 
 
 class Terminal:
@@ -90,6 +97,8 @@ class Terminal:
                 self._console.print(parameter_table(e.parameters))
                 if e.terms:
                     self._console.print(term_table(e.terms))
+                if e.left_out:
+                    self._console.print(left_out_table(e.left_out))
                 for line in rejected_lines(e.rejected):
                     self._print(f"not used: {line}")
                 for warning in e.warnings:

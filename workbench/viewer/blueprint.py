@@ -52,7 +52,10 @@ def _fit() -> rrb.Container:
     )
     words = rrb.Vertical(
         rrb.TextDocumentView(origin=at.FIT_SUMMARY, name="Verdict"),
-        rrb.TextDocumentView(origin=at.FIT_TABLE, name="Parameters"),
+        rrb.Tabs(
+            rrb.TextDocumentView(origin=at.FIT_CHECKS, name="Checks"),
+            rrb.TextDocumentView(origin=at.FIT_TABLE, name="Parameters"),
+        ),
         row_shares=[1, 2],
     )
     return rrb.Horizontal(charts, words, column_shares=[3, 2], name="Fit")

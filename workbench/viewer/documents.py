@@ -6,7 +6,14 @@ from collections.abc import Iterable, Sequence
 from math import floor, log10
 
 from workbench.model.calibration import TERM_VERDICTS, TermSummary
-from workbench.model.event import FitFinished, ParameterRecord, ReadingTaken, TrialFinished, TrialRow
+from workbench.model.event import (
+    FitFinished,
+    LeftOutRecord,
+    ParameterRecord,
+    ReadingTaken,
+    TrialFinished,
+    TrialRow,
+)
 from workbench.model.simulation import ClaimRow, SimulationFinished
 
 
@@ -39,10 +46,35 @@ def parameter_table(parameters: Sequence[ParameterRecord]) -> str:
     return "\n\n".join(["# Parameters (one sigma)", _table(head, rows)])
 
 
-def term_table(terms: Sequence[TermSummary]) -> str:
-    """The evidence on each term of the model; nothing for sessions recorded before it was weighed."""
-    if not terms:
-        return ""
+def checks(fit: FitFinished) -> str:
+    """Which standoff is bad, and which terms of the model the data need, as far as the fit looked."""
+    parts = [
+        _left_out_table(fit.left_out) if fit.left_out else "",
+        _term_table(fit.terms) if fit.terms else "",
+    ]
+    return "\n\n".join(part for part in parts if part) or "# Nothing was checked"
+
+
+def _left_out_table(left_out: Sequence[LeftOutRecord]) -> str:
+    ids = list(dict.fromkeys(laser.laser_id for one in left_out for laser in one.lasers))
+    rows = []
+    for one in left_out:
+        errors = {laser.laser_id: laser.error_mm for laser in one.lasers}
+        rows.append(
+            (
+                f"{one.standoff_mm:g}",
+                f"{one.error_mm:+.2f}",
+                f"{one.sd_mm:.2f}",
+                f"{one.error_mm / one.sd_mm:+.1f}",
+                "**farther off than promised**" if one.alarm else "",
+                *(_number(errors.get(i), "+.2f") for i in ids),
+            )
+        )
+    head = ("standoff mm", "error mm", "promised sd", "error / sd", "alarm", *(f"{i} mm" for i in ids))
+    return "# Each standoff ranged by the fit without it\n\n" + _table(head, rows)
+
+
+def _term_table(terms: Sequence[TermSummary]) -> str:
     head = ("term", "p without it", "log10 Bayes factor", "shift of ranges without it, sd", "verdict")
     rows = [
         (
@@ -54,7 +86,7 @@ def term_table(terms: Sequence[TermSummary]) -> str:
         )
         for one in terms
     ]
-    return "\n\n".join(["", "# Terms of the model", _table(head, rows)])
+    return "# Terms of the model\n\n" + _table(head, rows)
 
 
 def trial_table(trial: TrialFinished, readings: Sequence[ReadingTaken]) -> str:

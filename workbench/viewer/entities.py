@@ -37,6 +37,7 @@ LANE_LASER = f"{LANES}/laser"
 
 FIT_SUMMARY = "fit/summary"
 FIT_TABLE = "fit/parameter_table"
+FIT_CHECKS = "fit/checks"
 FIT_PARAMETERS = "fit/parameters"
 FIT_RESIDUALS = "fit/residuals"
 FIT_CHART = "fit/chart"

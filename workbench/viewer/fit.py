@@ -22,6 +22,7 @@ def log_no_fit_yet(stream: Stream, colors: Mapping[str, at.Rgb]) -> None:
     for axis in AXES:
         log_chart(stream, f"{at.FIT_CHART}/{axis}", Chart("px", (), colors), "no fit yet")
     _document(stream, at.FIT_SUMMARY, "# No fit yet")
+    _document(stream, at.FIT_CHECKS, "# Nothing to check yet")
     _document(stream, at.FIT_TABLE, "# No parameters yet")
 
 
@@ -33,9 +34,8 @@ def log_fit(stream: Stream, fit: FitFinished, moment: Moment, colors: Mapping[st
         chart = Chart("px", residual_marks(fit, axis), colors)
         log_chart(stream, f"{at.FIT_CHART}/{axis}", chart, f"{axis} was not measured")
     _document(stream, at.FIT_SUMMARY, documents.fit_summary(fit))
-    _document(
-        stream, at.FIT_TABLE, documents.parameter_table(fit.parameters) + documents.term_table(fit.terms)
-    )
+    _document(stream, at.FIT_CHECKS, documents.checks(fit))
+    _document(stream, at.FIT_TABLE, documents.parameter_table(fit.parameters))
     for residual in fit.residuals:
         stream.at(Moment(moment.capture, moment.step, moment.time_ns, residual.standoff_mm))
         _log_residual(stream, residual)
