@@ -184,7 +184,7 @@ def compare(
 @app.command(name="range")
 def range_(
     calibration: Annotated[Path, typer.Option(help="Calibration file (YAML).")],
-    captures: Annotated[Path | None, typer.Argument(help="Captures file (CSV).")] = None,
+    captures: Annotated[Path | None, typer.Argument(help="Captures file (CSV), or a session.")] = None,
     rig: Annotated[Path | None, typer.Option(help="Rig file: range live on its bench instead.")] = None,
     readings: Annotated[
         int | None, typer.Option(min=1, help="Live: stop after so many; else by a signal (Ctrl-C).")

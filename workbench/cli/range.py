@@ -14,6 +14,7 @@ from workbench.model.errors import BadInputError
 from workbench.ranging.captures import read_captures
 from workbench.ranging.ranger import Ranger
 from workbench.report.tables import reading_table
+from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE
 
 
 def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
@@ -24,7 +25,7 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
     """
     ranger = Ranger(usable(calibration))
     readings = []
-    for reading in read_captures(ranger, load_captures(captures)):
+    for reading in read_captures(ranger, load_captures(_table(captures))):
         readings.append(reading)
         if as_json:
             print(json.dumps(plain(reading)), flush=True)
@@ -33,6 +34,20 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
     for reading in readings:
         for note in reading.notes:
             console.print(f"{reading.scene}: {note}", highlight=False)
+
+
+def _table(captures: Path) -> Path:
+    """The captures file, or that of a session folder: its trial's before its calibration's."""
+    if not captures.is_dir():
+        return captures
+    tables = [captures / name for name in (TRIAL_TABLE, CALIBRATION_TABLE)]
+    found = next((table for table in tables if table.is_file()), None)
+    if found is None:
+        raise BadInputError(
+            f"{captures}: expected a captures file, or a session folder with {TRIAL_TABLE} or"
+            f" {CALIBRATION_TABLE} in it, got a folder without; give the file itself"
+        )
+    return found
 
 
 def usable(path: Path) -> Calibration:

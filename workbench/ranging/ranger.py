@@ -166,6 +166,8 @@ class Ranger:
             lines = " and ".join(f"{len(self._axes[axis])} {NAMES[axis]}" for axis in untold)
             seen = f"{spots} spot{'s' * (spots != 1)}"
             notes.append(f"{seen} of {lines} lasers cannot be told apart: fire each laser alone")
+        if spots - astray > len(self.sensor.ids):
+            notes.append("more spots than lasers: is this the calibration of this sensor?")
         return tuple(notes)
 
     def _answer(
