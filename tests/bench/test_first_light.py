@@ -23,6 +23,7 @@ from workbench.model.event import (
     CaptureTaken,
     ReadingTaken,
     SessionFinished,
+    SpotsFound,
     StandoffAdvised,
     StepStarted,
     TrialFinished,
@@ -185,6 +186,26 @@ def test_each_placement_tells_how_far_the_captures_have_come(demo: Demo) -> None
     assert all(one.then_relative_range_sd < one.relative_range_sd for one in told)
     assert all(100 <= one.next_standoff_mm <= 5000 for one in told)
     assert told[-1].text in " ".join(demo.terminal.split())
+
+
+def test_a_reader_written_from_the_format_s_description_ranges_alike(demo: Demo, tmp_path: Path) -> None:
+    """`docs/examples/read_calibration.py`: PyYAML and numpy, nothing of the workbench."""
+    records = [r.event for r in read_journal(demo.folder)]
+    found = [s for event in records if isinstance(event, SpotsFound) for s in event.spots]
+    spots = {(s.u_px, s.v_px): f"{s.u_px!r},{s.v_px!r},{s.u_sd_px!r},{s.v_sd_px!r}" for s in found}
+    lasers = [laser for event in records if isinstance(event, ReadingTaken) for laser in event.lasers]
+    rows = [f"{laser.laser_id},{spots[laser.u_px or 0.0, laser.v_px or 0.0]}" for laser in lasers]
+    table = tmp_path / "spots.csv"
+    table.write_text("\n".join(["laser_id,u_px,v_px,u_sd_px,v_sd_px", *rows]) + "\n")
+    script = ROOT / "docs/examples/read_calibration.py"
+    command = [sys.executable, str(script), str(demo.folder / "calibration.yaml"), str(table)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
+    theirs = [line.split() for line in done.stdout.splitlines()]
+    assert [laser_id for laser_id, _, _ in theirs] == [laser.laser_id for laser in lasers]
+    assert len(lasers) >= 200
+    for (_, range_mm, sigma_mm), laser in zip(theirs, lasers, strict=True):
+        assert float(range_mm) == pytest.approx(laser.range_mm, rel=1e-6)
+        assert float(sigma_mm) == pytest.approx(laser.sigma_mm, rel=1e-6)
 
 
 def test_the_recording_is_a_view_that_can_be_made_again(demo: Demo, tmp_path: Path) -> None:

@@ -18,8 +18,9 @@ from workbench.model.errors import BadInputError
 from workbench.ranging.acquire import NEXT, State, acquire
 from workbench.ranging.assignment import assign, pair_up
 from workbench.ranging.captures import read_captures, scenes
-from workbench.ranging.ranger import Ranger
-from workbench.spots import Finding, Spot
+from workbench.ranging.lines import Axis
+from workbench.ranging.ranger import Ranger, band
+from workbench.spots import Finding, Scanline, Spot
 
 IDS = ("L1", "L2", "L3", "L4")
 
@@ -178,7 +179,28 @@ def test_not_as_many_spots_as_lasers(coplanar: Ranger, count: int) -> None:
     assert reading.status == ("not_enough_points" if count else "no_points")
     assert reading.closest_mm is None
     assert reading.lasers == ()
-    assert len(reading.notes) == 1
+    too_many = ["more spots than lasers: is this the calibration of this sensor?"] if count == 5 else []
+    assert list(reading.notes[1:]) == too_many
+
+
+@pytest.mark.parametrize("axis", ["u", "v"])
+def test_one_band_holds_the_scanlines_of_a_line(axis: Axis) -> None:
+    rng = np.random.default_rng(3)
+    lines = []
+    for along in (-200.0, -90.0, 100.0, 210.0):
+        aside = rng.uniform(-4.0, 4.0, 2)
+        far, near = (350.0, 240.0 + aside[0]), (350.0 + along, 240.0 + aside[1])
+        if axis == "v":
+            far, near = far[::-1], near[::-1]
+        lines.append(Scanline(*far, near[0] - far[0], near[1] - far[1], 8.0))
+    found = band(lines, axis)
+    assert found.half_width_px < 8.0 + 8.0
+    for line in lines:
+        for share in (0.0, 0.5, 1.0):
+            u, v = line.u0_px + share * line.du, line.v0_px + share * line.dv
+            across = (u - found.u0_px) * found.dv - (v - found.v0_px) * found.du
+            assert abs(across) / np.hypot(found.du, found.dv) <= found.half_width_px - 8.0 + 1e-9
+    assert abs(found.du if axis == "u" else found.dv) == 1.0
 
 
 def test_lasers_fired_alone_with_one_missing(ranger: Ranger) -> None:

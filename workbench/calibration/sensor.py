@@ -140,8 +140,11 @@ class Sensor:
             sd_px: (n, 2) 1 sigma of the spot's own noise; NaN where not known: the calibration's is used.
                 The speckle's is added here.
         """
+        return self.ranges_of(np.array([self.ids.index(i) for i in laser_ids], np.intp), position_px, sd_px)
+
+    def ranges_of(self, laser: NDArray[np.intp], position_px: FloatArray, sd_px: FloatArray) -> Ranges:
+        """As `ranges`, of lasers by their indices (n,) in the order of `ids`."""
         noise = self.calibration.laser_ranger.noise
-        laser = np.array([self.ids.index(i) for i in laser_ids], np.intp)
         measured = np.isfinite(position_px)
         own_sd = np.where(np.isfinite(sd_px), sd_px, noise.spot_sd_px)
         inverse_sd = measured / np.hypot(own_sd, noise.speckle_sd_px)

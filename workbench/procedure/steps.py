@@ -302,7 +302,7 @@ def _shooter(
     def shoot(ids: tuple[str, ...]) -> Finding:
         alone = len(ids) == 1
         key = f"{scene}/{ids[0] if alone else 'all'}"
-        scanlines = [ranger.scanlines[ranger.sensor.ids.index(i)] for i in ids]
+        scanlines = ranger.searched(ids)
         shown = f"{scene}/alone" if alone else scene
         return context.capture(key, ids, placement, number, scanlines, scene=shown)
 

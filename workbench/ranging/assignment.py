@@ -52,8 +52,8 @@ def pair_up(sensor: Sensor, position_px: FloatArray, sd_px: FloatArray) -> Pairs
         sd_px: (S, 2) their 1 sigma.
     """
     lasers, spots = len(sensor.ids), len(position_px)
-    every_laser = [i for i in sensor.ids for _ in range(spots)]
-    ranges = sensor.ranges(every_laser, np.tile(position_px, (lasers, 1)), np.tile(sd_px, (lasers, 1)))
+    laser, spot = np.divmod(np.arange(lasers * spots), max(spots, 1))
+    ranges = sensor.ranges_of(laser, position_px[spot], sd_px[spot])
     inverse_depth = (1.0 / (ranges.range_mm + sensor.offset_mm)).reshape(lasers, spots)
     possible = (inverse_depth > 0) & (ranges.range_mm.reshape(lasers, spots) > 0)
     misfit = ranges.misfit_sd.reshape(lasers, spots)

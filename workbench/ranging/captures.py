@@ -50,7 +50,9 @@ def read_captures(ranger: Ranger, rows: Sequence[CaptureRow]) -> Iterator[Readin
             )
     for scene, members in scenes(rows).items():
         if members[0].laser_id == ALL_LASERS:
-            finding = find_row_spots(members[0], ranger.size_px, ranger.scanlines, len(ranger.sensor.ids))
+            finding = find_row_spots(
+                members[0], ranger.size_px, ranger.searched(ranger.sensor.ids), len(ranger.sensor.ids)
+            )
             yield ranger.read_lit(scene, finding.spots)
         else:
             yield _read_alone(ranger, scene, members)

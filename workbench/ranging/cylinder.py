@@ -14,6 +14,8 @@ FloatArray = NDArray[np.float64]
 STEPS = 12
 MOST_RELATIVE_SIGMA = 0.5
 """A radius known worse tells nothing that a parabola does not."""
+LARGEST_MM = 1e6
+"""Of axis and radius: a circle that runs beyond is none."""
 GRAZING = 0.1
 """Cosine of the steepest incidence at which a spot is believed to lie on a circle."""
 
@@ -53,32 +55,17 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
     None too where a spot would lie at grazing incidence or the radius would hardly be known: with as many
     parameters as a parabola, a circle is worth telling only where it differs from one.
     """
-    circle = _start(points)
-    if circle is None:
+    from workbench.ranging.kernels import circle  # loads the compiler, which only a fit needs
+
+    start = _start(points)
+    if start is None:
         return None
-    for _ in range(STEPS):
-        along, cosine, distance = _seen_from(circle, points)
-        if not (cosine < -GRAZING).all():
-            return None
-        weight = np.linalg.inv(points.residual_covariance(cosine, along))
-        by = np.column_stack((-along, -cosine, -np.ones(len(points))))
-        weighted = by.T @ weight
-        covariance = np.linalg.inv(weighted @ by)
-        gain = covariance @ weighted
-        step = gain @ (distance - circle[2])
-        circle = circle - step
-        if not np.abs(circle).max() < 1e6:
-            return None
-        if (np.abs(step) < 1e-6 * np.sqrt(np.diag(covariance))).all():
-            break
-    along, cosine, distance = _seen_from(circle, points)
-    residual = distance - circle[2]
-    x, z, radius = circle.tolist()
-    chi2 = float(residual @ weight @ residual)
-    by_range = np.asarray(-gain * cosine, np.float64)
-    fit = CylinderFit(x, z, radius, np.asarray(covariance, np.float64), by_range, chi2, len(points) - 3)
-    believed = (cosine < -GRAZING).all() and 0 < fit.radius_sigma_mm < MOST_RELATIVE_SIGMA * radius
-    return fit if believed else None
+    found = circle(start, points.x_mm, points.range_mm, *points.covariances(), STEPS, GRAZING, LARGEST_MM)
+    (x, z, radius), covariance, by_range, chi2 = found
+    if not math.isfinite(chi2):
+        return None
+    fit = CylinderFit(float(x), float(z), float(radius), covariance, by_range, chi2, len(points) - 3)
+    return fit if 0 < fit.radius_sigma_mm < MOST_RELATIVE_SIGMA * radius else None
 
 
 def _start(points: Points) -> FloatArray | None:
@@ -91,10 +78,3 @@ def _start(points: Points) -> FloatArray | None:
     if not (square > 0 and b > 0):
         return None
     return np.array([a, b + middle, math.sqrt(square)])
-
-
-def _seen_from(circle: FloatArray, points: Points) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Direction from the axis to each spot (its x and its range component), and distance; each (n,)."""
-    x, r = points.x_mm - circle[0], points.range_mm - circle[1]
-    distance = np.hypot(x, r)
-    return x / distance, r / distance, distance

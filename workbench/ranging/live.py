@@ -103,7 +103,7 @@ class LiveRanger:
                 f" got {' x '.join(map(str, on.shape[::-1]))}; is the camera in another mode?"
             )
         if ids not in self._finders:
-            lines = [self.ranger.scanlines[self.ranger.sensor.ids.index(i)] for i in ids]
+            lines = self.ranger.searched(ids)
             self._finders[ids] = SpotFinder((height, width), lines, expected=len(ids))
         return self._finders[ids].find(on, off)
 

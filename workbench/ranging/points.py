@@ -38,7 +38,7 @@ class Points:
 
     def __post_init__(self) -> None:
         n = len(self.x_mm)
-        if n < 1 or len(np.unique(self.x_mm)) < n:
+        if n < 1 or len(set(self.x_mm.tolist())) < n:
             raise ValueError(f"expected spots at places that all differ, got {self.x_mm}")
         if np.shape(self.range_mm) != (n,) or np.shape(self.covariance_mm2) != (n, n):
             raise ValueError(f"expected {n} ranges and their covariance for {n} places")
@@ -48,15 +48,14 @@ class Points:
     def __len__(self) -> int:
         return len(self.x_mm)
 
-    def residual_covariance(self, by_range: FloatArray, by_x: FloatArray) -> FloatArray:
-        """(n, n) covariance of by_range[i] range[i] + by_x[i] x[i], to first order."""
-        total = by_range[:, None] * self.covariance_mm2 * by_range
-        if self.cross_mm2 is not None:
-            mixed = by_range[:, None] * self.cross_mm2 * by_x
-            total = total + mixed + mixed.T
-        if self.x_covariance_mm2 is not None:
-            total = total + by_x[:, None] * self.x_covariance_mm2 * by_x
-        return total
+    def covariances(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(n, n) of ranges, of places, and of range i with place j; zeros for what is exact."""
+        none = np.zeros_like(self.covariance_mm2)
+        return (
+            np.ascontiguousarray(self.covariance_mm2),
+            none if self.x_covariance_mm2 is None else np.ascontiguousarray(self.x_covariance_mm2),
+            none if self.cross_mm2 is None else np.ascontiguousarray(self.cross_mm2),
+        )
 
 
 class Closest(NamedTuple):

@@ -67,40 +67,19 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
     the same wherever a spot lies: in ranges, the spots that noise put too near would get too much weight. An
     error of a place counts by the slope of the polynomial there.
     """
+    from workbench.ranging.kernels import polynomial  # loads the compiler, which only a fit needs
+
     scale = float(np.abs(points.x_mm).max()) or 1.0
-    t = points.x_mm / scale
-    powers = _powers(t, degree)
-    measured = 1.0 / (points.range_mm + points.offset_mm)
-    weight = np.linalg.inv(points.covariance_mm2)
-    coefficients = np.linalg.solve(powers.T @ weight @ powers, powers.T @ weight @ points.range_mm)
-    for _ in range(STEPS):
-        fitted = 1.0 / (powers @ coefficients + points.offset_mm)
-        slope = powers[:, :-1] @ (coefficients[1:] * np.arange(1, degree + 1)) / scale
-        weight = np.linalg.inv(points.residual_covariance(measured**2, -slope * measured**2))
-        by = powers * (fitted**2)[:, None]  # d(1 / z) = -dz / z^2
-        weighted = by.T @ weight
-        covariance = np.linalg.inv(weighted @ by)
-        gain = covariance @ weighted
-        coefficients = coefficients + gain @ (fitted - measured)
-    depth = powers @ coefficients + points.offset_mm
-    if not (depth > 0).all():
+    powers = _powers(points.x_mm / scale, degree)
+    slopes = np.zeros_like(powers)
+    slopes[:, 1:] = powers[:, :-1] * (np.arange(1, degree + 1) / scale)
+    fitted = polynomial(powers, slopes, points.range_mm, points.offset_mm, *points.covariances(), STEPS)
+    coefficients, covariance, by_range, chi2 = fitted
+    if not math.isfinite(chi2):
         return None
-    residual = 1.0 / depth - measured
-    chi2 = float(residual @ weight @ residual)
-    return PolynomialFit(
-        _floats(coefficients),
-        _floats(covariance),
-        _floats(gain * measured**2),
-        scale,
-        chi2,
-        len(points) - degree - 1,
-    )
+    return PolynomialFit(coefficients, covariance, by_range, scale, chi2, len(points) - degree - 1)
 
 
 def _powers(t: FloatArray, degree: int) -> FloatArray:
     """(n, degree + 1) t^0, t^1, ..."""
-    return np.vander(t, degree + 1, increasing=True)
-
-
-def _floats(array: NDArray[np.floating]) -> FloatArray:
-    return np.asarray(array, np.float64)
+    return np.ascontiguousarray(np.vander(t, degree + 1, increasing=True))

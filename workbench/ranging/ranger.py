@@ -93,6 +93,20 @@ class Ranger:
         nearest, _ = self.calibration.laser_ranger.validity.standoff_mm
         return tuple(self._scanline(i, nearest) for i in self.sensor.ids)
 
+    def searched(self, laser_ids: Sequence[str]) -> list[Scanline]:
+        """Where the spots of lasers that are lit together may lie: one band for each line of lasers.
+
+        The lines of lasers side by side all but coincide; to search each by itself would be the same work
+        several times over.
+        """
+        if len(laser_ids) == 1:
+            return [self._fields[laser_ids[0]]]
+        return [
+            band([self._fields[i] for i in mine], axis)
+            for axis, lasers in self._axes.items()
+            if (mine := [i for i in laser_ids if self.sensor.ids.index(i) in lasers])
+        ]
+
     @cached_property
     def _fields(self) -> dict[str, Scanline]:
         return dict(zip(self.sensor.ids, self.scanlines, strict=True))
@@ -219,6 +233,18 @@ class Ranger:
     def _scanline(self, laser_id: str, nearest_mm: float) -> Scanline:
         near, far = self.sensor.spot_px(laser_id, np.array([nearest_mm, np.inf]))
         return Scanline(far[0], far[1], near[0] - far[0], near[1] - far[1], SCANLINE_HALF_WIDTH_PX)
+
+
+def band(lines: Sequence[Scanline], axis: Axis) -> Scanline:
+    """The narrowest band about a straight line through the ends of some scanlines that holds them all."""
+    ends = np.array([(s.u0_px + k * s.du, s.v0_px + k * s.dv) for s in lines for k in (0.0, 1.0)])
+    along, aside = (ends[:, 0], ends[:, 1]) if axis == "u" else (ends[:, 1], ends[:, 0])
+    slope, at_0 = np.polyfit(along, aside, 1).tolist()
+    reach = float(np.abs(aside - at_0 - slope * along).max()) / np.hypot(1.0, slope)
+    half_width = max(line.half_width_px for line in lines) + float(reach)
+    if axis == "u":
+        return Scanline(0.0, at_0, 1.0, slope, half_width)
+    return Scanline(at_0, 0.0, slope, 1.0, half_width)
 
 
 def spot_arrays(spots: Sequence[Spot]) -> tuple[FloatArray, FloatArray]:
