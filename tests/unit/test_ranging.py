@@ -17,9 +17,10 @@ from workbench.model.captures import load_captures
 from workbench.model.errors import BadInputError
 from workbench.ranging.acquire import NEXT, State, acquire
 from workbench.ranging.assignment import assign, pair_up
+from workbench.ranging.bands import band
 from workbench.ranging.captures import read_captures, scenes
 from workbench.ranging.lines import Axis
-from workbench.ranging.ranger import Ranger, band
+from workbench.ranging.ranger import Ranger
 from workbench.spots import Finding, Scanline, Spot
 
 IDS = ("L1", "L2", "L3", "L4")
@@ -372,3 +373,25 @@ def test_a_laser_that_the_calibration_does_not_have(ranger: Ranger, tmp_path: Pa
     path = captures(tmp_path, "L9,,0,1,2,s")
     with pytest.raises(BadInputError, match="row 2, column laser_id: expected all or one of"):
         list(read_captures(ranger, load_captures(path)))
+
+
+def test_angle_and_closest_range_lie_where_stated_whatever_the_calibration() -> None:
+    """50 rigs, calibrated once each, before a wall turned by 30 degrees: pointing and lens are in sigma."""
+    angle, closest = [], []
+    for seed in range(300, 350):
+        world = World(thesis_rig(), seed)
+        ranger = Ranger(calibrate(fit(world.rig, world.sightings()), Acceptance(), PROVENANCE)[0])
+        yaw, z0 = np.radians(30.0), 600.0 + world.values["offset_mm"]
+        noise = np.random.default_rng([seed, 5]).normal(0.0, 0.05, (4, 2))  # 0.03 px and the speckle's 0.04
+        pixels = np.array([world.pixel(i, z0, yaw) for i in IDS]) + noise
+        reading = ranger.read_known("s", 4, IDS, pixels, np.full((4, 2), 0.03))
+        shape = reading.lines[0].shape
+        if shape.kind == "incline" and shape.angle_rad is not None and shape.angle_sigma_rad is not None:
+            angle.append((shape.angle_rad - yaw) / shape.angle_sigma_rad)
+            true = 600.0 + np.tan(yaw) * world.values["L1.x_mm"]
+            closest.append((shape.closest_mm - true) / shape.closest_sigma_mm)
+    assert len(angle) >= 46
+    for z in (np.array(angle), np.array(closest)):
+        # Of n standard normals the mean is known to 1 / sqrt(n), that of their squares to sqrt(2 / n).
+        assert (z**2).mean() == pytest.approx(1.0, abs=3.5 * np.sqrt(2 / len(z)))
+        assert abs(z.mean()) < 3.5 / np.sqrt(len(z))

@@ -13,8 +13,10 @@ from workbench.model.errors import RigNotReadyError
 
 T = TypeVar("T")
 B = TypeVar("B", bound=Bench)
-PATIENCE_S = 1.0
-"""For one frame. A camera of 1 Hz is slower than any that a ranger can use."""
+PATIENCE_S = 0.75
+"""For one frame: with what it takes to end, less than two seconds."""
+FIRST_PATIENCE_S = 5.0
+"""For the first: cameras take their time to start."""
 
 
 @dataclass
@@ -25,7 +27,7 @@ class WatchedCamera:
     """
 
     camera: Camera
-    patience_s: float = PATIENCE_S
+    _patience_s: float = FIRST_PATIENCE_S
     _asked: queue.SimpleQueue[Callable[[], object]] = field(default_factory=queue.SimpleQueue)
     _answers: queue.SimpleQueue[object] = field(default_factory=queue.SimpleQueue)
     _gone: bool = False
@@ -37,7 +39,7 @@ class WatchedCamera:
         """As the camera's; see `protocols.Camera`.
 
         Raises:
-            RigNotReadyError: no frame within `patience_s`.
+            RigNotReadyError: no frame within `FIRST_PATIENCE_S`, after the first within `PATIENCE_S`.
         """
         return self._ask(self.camera.grab)
 
@@ -53,15 +55,16 @@ class WatchedCamera:
     def _ask(self, call: Callable[[], T]) -> T:
         self._asked.put(call)
         try:
-            answer = self._answers.get(timeout=self.patience_s)
+            answer = self._answers.get(timeout=self._patience_s)
         except queue.Empty:
             self._gone = True
             raise RigNotReadyError(
-                f"camera: expected an answer within {self.patience_s:g} s, got none: it stopped delivering;"
+                f"camera: expected an answer within {self._patience_s:g} s, got none: it stopped delivering;"
                 " check its cable and whether another program holds it"
             ) from None
         if isinstance(answer, BaseException):
             raise answer
+        self._patience_s = PATIENCE_S
         return answer  # type: ignore[return-value] # of the call that was put just before
 
     def _serve(self) -> None:

@@ -55,6 +55,10 @@ class LiveRanger:
     _finders: dict[tuple[str, ...], SpotFinder] = field(default_factory=dict)
     _second_frame_at: float = 0.0
 
+    def get_ready(self) -> None:
+        """See that frames come, of the right size, before anything is fired; the errors of `read`."""
+        self._find(self.ranger.sensor.ids, self.bench.camera.grab().image, None)
+
     def warm_up(self) -> None:
         """Go once through everything that a reading needs, without firing: the first time, code is loaded."""
         width, height = self.ranger.size_px

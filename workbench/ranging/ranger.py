@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
 from typing import Literal
 
 import numpy as np
@@ -15,9 +14,10 @@ from workbench.calibration.sensor import Ranges, Sensor
 from workbench.model.calibration import Calibration
 from workbench.model.event import LaserRange
 from workbench.ranging.assignment import MOST_MISFIT_SD, Pairs, assign, pair_up
+from workbench.ranging.bands import band
 from workbench.ranging.lines import NAMES, Axis, Line, Weights, line_of, mean_of_lines
 from workbench.ranging.objections import objections, outside_validity
-from workbench.ranging.points import interval_mm
+from workbench.ranging.records import flat_range, laser_ranges
 from workbench.spots import Scanline, Spot
 
 FloatArray = NDArray[np.float64]
@@ -204,7 +204,7 @@ class Ranger:
         good.sort(key=lambda n: self.sensor.ids.index(laser_ids[n]))
         ids, position = [laser_ids[n] for n in good], position_px[good]
         ranges = ranges.only(np.array(good))
-        lasers = _records(ids, position, ranges, self.sensor.offset_mm)
+        lasers = laser_ranges(ids, position, ranges, self.sensor.offset_mm)
         status: Status = "done" if len(lasers) == fired else "not_enough_points"
         lines = self._lines(ids, ranges)
         nearest = min((line.shape for line in lines), key=lambda shape: shape.closest_mm)
@@ -218,7 +218,7 @@ class Ranger:
             *mean_of_lines(lines, ranges, self.weights, self.size_px),
             lasers,
             lines,
-            *_flat_range(ranges),
+            *flat_range(ranges),
             tuple(said),
         )
 
@@ -235,54 +235,8 @@ class Ranger:
         return Scanline(far[0], far[1], near[0] - far[0], near[1] - far[1], SCANLINE_HALF_WIDTH_PX)
 
 
-def band(lines: Sequence[Scanline], axis: Axis) -> Scanline:
-    """The narrowest band about a straight line through the ends of some scanlines that holds them all."""
-    ends = np.array([(s.u0_px + k * s.du, s.v0_px + k * s.dv) for s in lines for k in (0.0, 1.0)])
-    along, aside = (ends[:, 0], ends[:, 1]) if axis == "u" else (ends[:, 1], ends[:, 0])
-    slope, at_0 = np.polyfit(along, aside, 1).tolist()
-    reach = float(np.abs(aside - at_0 - slope * along).max()) / np.hypot(1.0, slope)
-    half_width = max(line.half_width_px for line in lines) + float(reach)
-    if axis == "u":
-        return Scanline(0.0, at_0, 1.0, slope, half_width)
-    return Scanline(at_0, 0.0, slope, 1.0, half_width)
-
-
 def spot_arrays(spots: Sequence[Spot]) -> tuple[FloatArray, FloatArray]:
     """(n, 2) positions and (n, 2) standard deviations."""
     position = np.array([(s.u_px, s.v_px) for s in spots]).reshape(-1, 2)
     sd = np.array([(s.u_sd_px, s.v_sd_px) for s in spots]).reshape(-1, 2)
     return position, sd
-
-
-def _records(
-    laser_ids: Sequence[str], position_px: FloatArray, ranges: Ranges, offset_mm: float
-) -> tuple[LaserRange, ...]:
-    records = []
-    columns = zip(
-        laser_ids, ranges.range_mm.tolist(), ranges.sigma_mm.tolist(), position_px.tolist(), strict=True
-    )
-    for laser_id, range_mm, sigma_mm, (u, v) in columns:
-        low, high = interval_mm(range_mm, sigma_mm, offset_mm)
-        records.append(
-            LaserRange(
-                laser_id=laser_id,
-                range_mm=range_mm,
-                sigma_mm=sigma_mm,
-                u_px=u if isfinite(u) else None,
-                v_px=v if isfinite(v) else None,
-                low_mm=low,
-                high_mm=high if isfinite(high) else None,
-            )
-        )
-    return tuple(records)
-
-
-def _flat_range(ranges: Ranges) -> tuple[float, float]:
-    """Mean weighted by the spots' variances; its sigma from the full covariance.
-
-    The calibration's part is common to the lasers: weights by the full covariance would lean on differences
-    of nearly equal numbers for a gain that no bench would show.
-    """
-    weight = 1.0 / ranges.spot_sd_mm**2
-    weight = weight / weight.sum()
-    return float(weight @ ranges.range_mm), float(np.sqrt(weight @ ranges.covariance_mm2 @ weight))

@@ -20,7 +20,7 @@ from workbench.calibration.export import write_calibration
 from workbench.cli.main import main
 from workbench.cli.stopping import SIGNALS
 from workbench.devices.protocols import Frame
-from workbench.devices.watched import WatchedCamera
+from workbench.devices.watched import PATIENCE_S, WatchedCamera
 from workbench.emulator.bench import EmulatedBench
 from workbench.emulator.camera import EmulatedCamera
 from workbench.emulator.controller import Controller
@@ -132,7 +132,7 @@ def test_nothing_before_the_sensor(live: Live) -> None:
 
 
 def test_a_camera_that_hangs_ends_it_within_two_seconds(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It hangs at the fifth frame, which is one with the lasers lit."""
+    """It hangs at the sixth frame, with the lasers lit: a dark one comes before the first pair."""
     released, hung_at = threading.Event(), list[float]()
 
     def hang(camera: EmulatedCamera) -> Frame:
@@ -140,32 +140,51 @@ def test_a_camera_that_hangs_ends_it_within_two_seconds(live: Live, monkeypatch:
         released.wait(30)
         raise RigNotReadyError("released")
 
-    from_the(5, hang, monkeypatch)
+    from_the(6, hang, monkeypatch)
     ended = live("--standoff", 600, "--stats")
     after = time.monotonic() - hung_at[0]
     released.set()
     assert (ended.code, len(ended.out)) == (4, 2)
-    assert "camera: expected an answer within 1 s" in ended.err
+    assert f"camera: expected an answer within {PATIENCE_S:g} s" in ended.err
     assert "2 readings in" in ended.err
     assert after < 2.0
     assert live.dark()
+
+
+def test_a_camera_that_never_starts_fires_nothing(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(camera: EmulatedCamera) -> Frame:
+        raise RigNotReadyError("camera: no such device")
+
+    asked = list[bytes]()
+    really_receive = Controller.receive
+
+    def receive(controller: Controller, data: bytes) -> bytes:
+        asked.append(data)
+        return really_receive(controller, data)
+
+    monkeypatch.setattr(Controller, "receive", receive)
+    from_the(1, fail, monkeypatch)
+    assert live("--standoff", 600).code == 4
+    assert asked
+    assert not any(b"MASK" in request or b"ON" in request for request in asked)
 
 
 def test_a_camera_that_fails_ends_it(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(camera: EmulatedCamera) -> Frame:
         raise RigNotReadyError("camera: unplugged")
 
-    from_the(3, fail, monkeypatch)
+    from_the(4, fail, monkeypatch)
     ended = live("--standoff", 600)
     assert (ended.code, len(ended.out)) == (4, 1)
     assert "camera: unplugged" in ended.err
     assert live.dark()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_after_the_reading(
-    live: Live, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+@pytest.mark.parametrize(("number", "readings"), [(signal.SIGINT, 2), (signal.SIGTERM, 1)])
+def test_a_signal_ends_it(
+    live: Live, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, readings: int
 ) -> None:
+    """Amid the second reading: Ctrl-C lets it end, SIGTERM does not."""
     really_grab = EmulatedCamera.grab
 
     def stop(camera: EmulatedCamera) -> Frame:
@@ -173,11 +192,11 @@ def test_a_signal_ends_it_after_the_reading(
         monkeypatch.setattr(EmulatedCamera, "grab", really_grab)
         return really_grab(camera)
 
-    from_the(3, stop, monkeypatch)
+    from_the(4, stop, monkeypatch)
     ended = live("--standoff", 600, "--stats")
-    assert (ended.code, len(ended.out)) == (5, 2)
+    assert (ended.code, len(ended.out)) == (5, readings)
     assert f"stopped by {number.name}" in ended.err
-    assert "2 readings in" in ended.err
+    assert f"{readings} readings in" in ended.err
     assert live.dark()
 
 

@@ -1,0 +1,50 @@
+"""Ranges as records of a reading, and as one number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.calibration.sensor import Ranges
+from workbench.model.event import LaserRange
+from workbench.ranging.points import interval_mm
+
+FloatArray = NDArray[np.float64]
+
+
+def laser_ranges(
+    laser_ids: Sequence[str], position_px: FloatArray, ranges: Ranges, offset_mm: float
+) -> tuple[LaserRange, ...]:
+    """A record for each of n ranges; positions (n, 2), NaN where a coordinate was not measured."""
+    records = []
+    columns = zip(
+        laser_ids, ranges.range_mm.tolist(), ranges.sigma_mm.tolist(), position_px.tolist(), strict=True
+    )
+    for laser_id, range_mm, sigma_mm, (u, v) in columns:
+        low, high = interval_mm(range_mm, sigma_mm, offset_mm)
+        records.append(
+            LaserRange(
+                laser_id=laser_id,
+                range_mm=range_mm,
+                sigma_mm=sigma_mm,
+                u_px=u if isfinite(u) else None,
+                v_px=v if isfinite(v) else None,
+                low_mm=low,
+                high_mm=high if isfinite(high) else None,
+            )
+        )
+    return tuple(records)
+
+
+def flat_range(ranges: Ranges) -> tuple[float, float]:
+    """Mean weighted by the spots' variances; its sigma from the full covariance.
+
+    The calibration's part is common to the lasers: weights by the full covariance would lean on differences
+    of nearly equal numbers for a gain that no bench would show.
+    """
+    weight = 1.0 / ranges.spot_sd_mm**2
+    weight = weight / weight.sum()
+    return float(weight @ ranges.range_mm), float(np.sqrt(weight @ ranges.covariance_mm2 @ weight))
