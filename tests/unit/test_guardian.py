@@ -102,6 +102,11 @@ def test_off_when_the_workbench_is_ended(controller: Running, number: signal.Sig
     measure(controller, number.name, work, lambda it: it.process.send_signal(number), END_MS)
 
 
+def test_off_when_a_workbench_with_all_its_libraries_is_killed(controller: Running) -> None:
+    """The kernel gives back the memory of what it ends before it closes the pipe."""
+    measure(controller, "SIGKILL", "loaded", lambda it: it.process.send_signal(signal.SIGKILL), END_MS)
+
+
 def test_off_when_its_terminal_closes(controller: Running) -> None:
     def close(at_work: AtWork) -> None:
         os.close(at_work.terminal)

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from workbench.calibration.boards import BoardView
 from workbench.calibration.observations import Rejected
+from workbench.calibration.sightings import prior_scanline
 from workbench.devices.protocols import Bench, Operator, StreamingCamera
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration, Provenance
@@ -76,6 +77,8 @@ class Context:
     """The exported one: what a trial ranges with."""
     _served: Group | None = None
     """What is on disk already of the present placement."""
+    _dark: Image | None = None
+    """The last frame at the present placement with all lasers off."""
     _safe: bool = False
     """Whether somebody has confirmed that the beams may be switched on."""
 
@@ -144,6 +147,7 @@ class Context:
                 del began[asked.key]
                 self._tell_skipped(asked, left_out.answer)
             else:
+                self._look_for_stuck_beam(asked.key)
                 self.emit(ev.PlacementFinished(key=asked.key))
             self._served = None
         return list(results.values())
@@ -203,6 +207,7 @@ class Context:
         self.emit(_spots_found(key, finding, laser_ids))
         if not finding.spots:
             self._check_dark(key, off, scanlines)
+        self._dark = off
         self.captures.append(taken)
         self.findings[key] = finding
         return finding
@@ -364,6 +369,16 @@ class Context:
                 f"{path}: the frame has changed since it was captured; restore it from a copy"
             )
         return image
+
+    def _look_for_stuck_beam(self, key: str) -> None:
+        """Look for any beam in the last dark frame of a group: another laser's pairs do not show it.
+
+        Raises:
+            LaserOffNotConfirmedError: see `_check_dark`.
+        """
+        dark, self._dark = self._dark, None
+        if dark is not None:
+            self._check_dark(key, dark, [prior_scanline(self.rig, laser) for laser in self.rig.lasers])
 
     def _check_dark(self, key: str, off: Image, scanlines: Sequence[Scanline]) -> None:
         """Look for a beam that burns in both frames of a pair: it leaves no spot in their difference.
