@@ -13,7 +13,7 @@ from workbench.devices.serial_lasers import SerialLaserBank
 from workbench.emulator.controller import IDENTITY, Controller
 from workbench.emulator.pty import PtyServer
 from workbench.emulator.spec import ControllerSpec, Fault
-from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError
+from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError, StoppedError
 
 IDS = ("L1", "L2", "L3", "L4")
 
@@ -202,6 +202,22 @@ def test_the_answer_to_an_earlier_question_confirms_nothing(
         pass
     with pytest.raises(LaserOffNotConfirmedError):
         bank.close()
+
+
+def test_an_answer_that_was_not_waited_for_confirms_nothing(
+    wired: Wired, bank: SerialLaserBank, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A signal raises while the answer to lighting is waited for; it comes when off is asked for."""
+    answer = bank._guardian._answer
+
+    def interrupted(number: int, wait_s: float) -> object:
+        monkeypatch.setattr(bank._guardian, "_answer", answer)
+        raise StoppedError("stopped by SIGINT")
+
+    monkeypatch.setattr(bank._guardian, "_answer", interrupted)
+    wired.controller.fault = "ignores_off"
+    with pytest.raises(LaserOffNotConfirmedError), bank.lit(["L1"], for_s=5.0):
+        pytest.fail("the block is not entered")
 
 
 def test_disconnect_in_mid_lease(wired: Wired) -> None:

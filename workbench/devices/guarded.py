@@ -46,9 +46,10 @@ class Guarded:
             os.close(theirs)
         self.is_open = True
         self._heard = b""
+        self._asked = 0
         self._before: int | None = None
         try:
-            self.identity = str(self._answer(ANSWER_S + boot_s))
+            self.identity = str(self._answer(0, ANSWER_S + boot_s))
         except BaseException:
             self.close()
             raise
@@ -63,11 +64,15 @@ class Guarded:
             WorkbenchError: what the guardian could not do, by its name.
             LaserOffNotConfirmedError: the guardian does not answer.
         """
-        self.tell(command)
-        return self._answer(ANSWER_S)
+        # Numbered: a signal may have raised while an earlier answer was waited for, which is still to come.
+        self._asked += 1
+        self.tell(f"{self._asked} {command}")
+        return self._answer(self._asked, ANSWER_S)
 
     def tell(self, command: str) -> None:
         """A command without an answer. A guardian that is gone shows at the next `ask`."""
+        if not self.is_open:
+            raise ValueError("the guardian was let go: its descriptors may be another's now")
         with contextlib.suppress(BrokenPipeError):
             os.write(self._commands, f"{command}\n".encode())
 
@@ -86,8 +91,16 @@ class Guarded:
             self._process.kill()
             self._process.wait()
 
-    def _answer(self, wait_s: float) -> object:
+    def _answer(self, number: int, wait_s: float) -> object:
         deadline = time.monotonic() + wait_s
+        while (answer := self._next_answer(deadline))["to"] != number:
+            pass
+        if "error" in answer:
+            kind: type[WorkbenchError] = getattr(errors, str(answer["error"]))
+            raise kind(answer["text"])
+        return answer["value"]
+
+    def _next_answer(self, deadline: float) -> dict[str, object]:
         while b"\n" not in self._heard:
             ready, _, _ = select.select([self._answers], [], [], max(0.0, deadline - time.monotonic()))
             came = os.read(self._answers, 4096) if ready else b""
@@ -99,8 +112,5 @@ class Guarded:
                 )
             self._heard += came
         line, _, self._heard = self._heard.partition(b"\n")
-        answer = json.loads(line)
-        if "error" in answer:
-            kind: type[WorkbenchError] = getattr(errors, answer["error"])
-            raise kind(answer["text"])
-        return answer["value"]
+        answer: dict[str, object] = json.loads(line)
+        return answer

@@ -1,14 +1,15 @@
 """The guardian: a process of its own that holds the laser controller's port for the workbench.
 
-It takes commands on standard input, one a line, and answers on standard output, one JSON object a line:
+It takes commands on standard input, one a line, and answers on standard output, one JSON object a line, which
+repeats the command's number:
 
-    LIT <mask> <ms>   light these lasers, for a lease
-    BEAT              the workbench is at work; no answer
-    OFF               all off, verified; tells what went wrong since LIT
-    STATE             what is lit, and the interlock
+    <n> LIT <mask> <ms>   light these lasers, for a lease
+    <n> OFF               all off, verified; tells what went wrong since LIT
+    <n> STATE             what is lit, and the interlock
+    BEAT                  the workbench is at work; no answer
 
-The first answer, unasked, is who the controller is. A second descriptor brings the numbers of signals that
-the workbench got, one byte each, written by its C-level signal handler.
+The first answer, number 0 and unasked, is who the controller is. A second descriptor brings the numbers of
+signals that the workbench got, one byte each, written by its C-level signal handler.
 
 It puts everything off when the workbench ends in whatever way, when it is told to end (SIGTERM, SIGHUP), and
 when no beat came for `hang_s` while something was lit. The last it leaves to nobody's clock but the
@@ -122,20 +123,14 @@ class Guardian:
         match command.split(" "):
             case ["BEAT"]:
                 self._beat()
-            case ["LIT", mask, lease_ms]:
-                self._answer(lambda: self._light(int(mask), int(lease_ms)))
-            case ["OFF"]:
-                self._answer(self._off)
-            case ["STATE"]:
-                self._answer(self._line.state)
+            case [number, "LIT", mask, lease_ms]:
+                answer(int(number), lambda: self._light(int(mask), int(lease_ms)))
+            case [number, "OFF"]:
+                answer(int(number), self._off)
+            case [number, "STATE"]:
+                answer(int(number), self._line.state)
             case _:
                 raise ValueError(f"no such command: {command}")
-
-    def _answer(self, act: Callable[[], object]) -> None:
-        try:
-            say({"value": act()})
-        except WorkbenchError as error:
-            say_error(error)
 
     def _light(self, mask: int, lease_ms: int) -> None:
         if self._workbench.told_to_end is not None:
@@ -158,7 +153,7 @@ class Guardian:
             try:
                 self._renew(lease)
             except RigNotReadyError as error:
-                self._put_off(error)
+                self._put_off(error if self._workbench.told_to_end is None else self._stopped())
 
     def _renew(self, lease: Lease) -> None:
         lease.renewed = time.monotonic()
@@ -212,15 +207,17 @@ class Guardian:
                 return 0
 
 
-def say(answer: dict[str, object]) -> None:
-    """One answer to the workbench, which may be gone."""
+def answer(number: int, act: Callable[[], object]) -> int:
+    """Do something and tell the workbench, which may be gone, what came of it; returns an exit code."""
+    code = 0
+    try:
+        said: dict[str, object] = {"to": number, "value": act()}
+    except WorkbenchError as error:
+        said = {"to": number, "error": type(error).__name__, "text": str(error)}
+        code = error.exit_code
     with suppress(OSError):
-        os.write(sys.stdout.fileno(), json.dumps(answer).encode() + b"\n")
-
-
-def say_error(error: WorkbenchError) -> None:
-    """A failure, by the name of its kind."""
-    say({"error": type(error).__name__, "text": str(error)})
+        os.write(sys.stdout.fileno(), json.dumps(said).encode() + b"\n")
+    return code
 
 
 def main(port: str, baud: int, boot_s: float, hang_s: float, signals: int) -> int:
@@ -232,15 +229,15 @@ def main(port: str, baud: int, boot_s: float, hang_s: float, signals: int) -> in
     with suppress(AttributeError, OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
     workbench = Workbench(sys.stdin.fileno(), signals)
-    try:
-        line = ControllerLine(port, baud, workbench.alarm)
-        identity = line.identify(boot_s)
-        line.all_off()
-    except WorkbenchError as error:
-        say_error(error)
-        return error.exit_code
-    say({"value": identity})
-    return Guardian(workbench, line, hang_s).serve()
+    opened: list[ControllerLine] = []
+
+    def connect() -> str:
+        opened.append(ControllerLine(port, baud, workbench.alarm))
+        identity = opened[0].identify(boot_s)
+        opened[0].all_off()
+        return identity
+
+    return answer(0, connect) or Guardian(workbench, opened[0], hang_s).serve()
 
 
 if __name__ == "__main__":
