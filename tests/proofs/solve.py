@@ -9,9 +9,8 @@ import numpy as np
 
 from tests.proofs.simulate import Calibrations, Floats
 from workbench.calibration.batch import fit_batch
-from workbench.calibration.fit import fit
 from workbench.calibration.observations import PlacementInfo, Sighting
-from workbench.calibration.significance import choose
+from workbench.calibration.significance import fit_chosen, without_idle
 from workbench.model.rig import Rig
 
 
@@ -39,11 +38,11 @@ def at_once(rig: Rig, placements: Sequence[PlacementInfo], data: Calibrations) -
 
 
 def one_by_one(rig: Rig, placements: Sequence[PlacementInfo], data: Calibrations) -> Solved:
-    """By the functions of `workbench fit`, with the terms of the model that each calibration chooses."""
+    """As `workbench fit` from the means of the repeats on: spots that lie apart rejected, terms chosen."""
     sensors, covariances, scales, converged = [], [], [], []
     for position, sd in zip(data.position_px, data.sd_px, strict=True):
         seen = _sightings(rig, placements, position, sd)
-        fitted = choose(lambda model, seen=seen: fit(model, seen), rig)  # type: ignore[misc]
+        fitted = without_idle(fit_chosen(rig, seen))
         sensors.append(fitted.values[fitted.sensor])
         covariances.append(fitted.covariance[fitted.sensor, fitted.sensor])
         scales.append(fitted.noise_scale)

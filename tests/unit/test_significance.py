@@ -10,11 +10,16 @@ from numpy.typing import NDArray
 from scipy.stats import kstest
 
 from tests.unit.rigs import World, prior, thesis_rig
+from tests.unit.test_calibration_file import PROVENANCE
 from workbench.calibration import significance
+from workbench.calibration.export import calibrate
 from workbench.calibration.fit import Fit, fit
 from workbench.calibration.problem import Problem
-from workbench.calibration.significance import choose
+from workbench.calibration.sensor import Sensor
+from workbench.calibration.significance import fit_chosen, without_idle
 from workbench.calibration.term import Term
+from workbench.model.acceptance import Acceptance
+from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 
 FloatArray = NDArray[np.float64]
@@ -28,8 +33,7 @@ def lens(rig: Rig, **priors: float) -> Rig:
 
 
 def chosen(rig: Rig, world: World, keep: tuple[str, ...] = ()) -> Fit:
-    sightings = world.sightings()
-    return choose(lambda model: fit(model, sightings), rig, keep)
+    return fit_chosen(rig, world.sightings(), keep=keep)
 
 
 def told(fitted: Fit) -> dict[str, Term]:
@@ -55,7 +59,7 @@ def log_likelihood(residual: FloatArray, jacobian: FloatArray) -> float:
 def test_the_bayes_factor_is_the_ratio_of_marginal_likelihoods(name: str) -> None:
     rig = lens(thesis_rig(), k3=0.3)
     fitted = fit(rig, World(rig, 3).sightings())
-    index = significance._indices(fitted, name)
+    index = significance._indices(fitted, [name])
     residual, jacobian, _ = linear(fitted)
     without = np.delete(jacobian, index, axis=1)
     expected = (log_likelihood(residual, jacobian) - log_likelihood(residual, without)) / log(10)
@@ -66,7 +70,7 @@ def test_what_is_carried_is_the_error_of_the_smaller_estimate() -> None:
     """Its gain applied to data whose k3 is as the prior says, against `_carried`."""
     rig = lens(thesis_rig(), k3=0.05)
     fitted = fit(rig, World(rig, 3).sightings())
-    index = significance._indices(fitted, "k3")
+    index = significance._indices(fitted, ["k3"])
     _, jacobian, free = linear(fitted)
     free[index] = False
     within, of_k3 = jacobian[:, free], jacobian[:, index]
@@ -88,7 +92,7 @@ def test_p_values_of_an_absent_term_are_uniform() -> None:
     p_values = []
     for world in worlds:
         fitted = fit(rig, [s for s in world.sightings() if s.standoff_mm > 150])
-        p_values.append(significance._compare(fitted, significance._indices(fitted, "k3")).p_value)
+        p_values.append(significance._compare(fitted, significance._indices(fitted, ["k3"])).p_value)
     assert kstest(p_values, "uniform").pvalue > 0.01
 
 
@@ -125,15 +129,18 @@ def test_a_k3_that_buys_nothing_is_left_out_and_stays_in_the_covariance(seed: in
     assert (term.verdict, abs(term.log10_bayes_factor) < 1) == ("idle", True)
     names = [p.name for p in fitted.table.parameters]
     k3 = names.index("k3")
-    assert (fitted.values[k3], fitted.sd[k3]) == (0.0, pytest.approx(0.1))
+    exported = without_idle(fitted)
+    assert (exported.values[k3], exported.sd[k3]) == (0.0, pytest.approx(0.1))
+    refitted = fit(lens(rig, k3=0.0), world.sightings())
+    free = refitted.sd > 0
+    np.testing.assert_allclose((exported.values - refitted.values)[free] / refitted.sd[free], 0.0, atol=0.05)
     full = chosen(rig, world, keep=("k3",))
     assert told(full)["k3"].verdict == "asked for"
-    assert full.sd[k3] > 0
+    np.testing.assert_array_equal(without_idle(full).values, full.values)
     others = np.flatnonzero((full.sd > 0) & (np.arange(len(names)) != k3))
-    np.testing.assert_allclose(fitted.sd[others], full.sd[others], rtol=0.03)
+    np.testing.assert_allclose(exported.sd[others], full.sd[others], rtol=0.03)
     # A fit that never knew of k3 claims too much.
-    never = fit(lens(rig, k3=0.0), world.sightings())
-    assert never.sd[names.index("k2")] < 0.9 * fitted.sd[names.index("k2")]
+    assert refitted.sd[names.index("k2")] < 0.9 * exported.sd[names.index("k2")]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -149,9 +156,61 @@ def test_a_term_that_the_rig_file_denies_is_called_for(seed: int) -> None:
     assert "k2" not in told(chosen(rig, world))
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_shift_of_a_range_is_that_of_two_fits(seed: int) -> None:
+    """Ranged with and without k2, spots of the model with it; differences of the fits themselves."""
+    world = World(thesis_rig(), seed)
+    world.values |= {"k2": 0.1}  # small, so that first order is enough
+    full = fit(thesis_rig(), world.sightings())
+    reduced = fit(lens(thesis_rig(), k2=0.0), world.sightings())
+    with_it, without = (Sensor(calibrate(f, Acceptance(), PROVENANCE)[0]) for f in (full, reduced))
+    standoffs = np.geomspace(125.0, 4500.0, significance.GRID)
+    shifts = []
+    for laser in with_it.ids:
+        seen = with_it.in_frame(laser, standoffs)
+        spots = with_it.spot_px(laser, standoffs[seen])
+        nothing = np.full(spots.shape, np.nan)
+        one = with_it.ranges([laser] * len(spots), spots, nothing)
+        other = without.ranges([laser] * len(spots), spots, nothing)
+        shifts.append(np.abs(other.range_mm - one.range_mm) / one.sigma_mm)
+    stated, _ = significance._effect_on_ranges(full, significance._indices(full, ["k2"]))
+    assert stated == pytest.approx(np.concatenate(shifts).max(), rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [4, 6, 7])
+def test_terms_that_can_replace_each_other_are_not_both_idle(seed: int) -> None:
+    rig = lens(thesis_rig(), k1=0.3, k2=1.0, k3=3.0)
+    world = World(thesis_rig(), seed)
+    sightings = [s for s in world.sightings() if s.standoff_mm > 150]
+    fitted = fit_chosen(rig, sightings)
+    idle = [t.name for t in fitted.terms if t.verdict == "idle"]
+    assert idle
+    shift, widening = significance._effect_on_ranges(fitted, significance._indices(fitted, idle))
+    assert shift <= significance.IDLE_SHIFT_SD
+    assert widening <= significance.IDLE_SD
+    both = significance._indices(fitted, ["k2", "k3"])
+    assert max(significance._effect_on_ranges(fitted, both)) > significance.IDLE_SD
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_spots_that_the_model_lacks_a_term_for_are_not_thrown_out(seed: int) -> None:
+    rig = lens(thesis_rig(), k2=0.0)
+    world = World(thesis_rig(), seed)
+    world.values |= {"k1": -0.2, "k2": 0.4}
+    fitted = chosen(rig, world)
+    assert len(fitted.used) == len(world.sightings())
+    assert told(fitted)["k2"].p_value < 1e-6
+
+
 def test_no_order_is_left_out_below_one_that_stays() -> None:
     world = World(thesis_rig(), 3)
     world.values |= {"k1": 0.0, "k2": 0.3}
-    for term in chosen(thesis_rig(), world).terms:
-        if term.name == "k1":
-            assert term.verdict in ("shown", "open", "below")
+    terms = told(chosen(thesis_rig(), world))
+    assert terms["k2"].verdict == "shown"
+    assert terms["k1"].verdict == "below"
+
+
+@pytest.mark.parametrize("name", ["k4", "L1.tx", "p1"])
+def test_a_term_to_keep_that_is_none_is_named(name: str) -> None:
+    with pytest.raises(BadInputError, match=f"--keep {name}: expected a term .* k2, k1, ruler_scale, tilts"):
+        chosen(thesis_rig(), World(thesis_rig(), 3), keep=(name,))

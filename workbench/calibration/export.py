@@ -18,6 +18,7 @@ from workbench.calibration.observability import Ranges, null_directions
 from workbench.calibration.observations import positions, stated_sd
 from workbench.calibration.records import term_summaries
 from workbench.calibration.sensor import Sensor
+from workbench.calibration.significance import without_idle
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import (
     Calibration,
@@ -39,8 +40,9 @@ NO_WRAPPING = 10**9
 
 def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Calibration, Assessment]:
     """The calibration that a fit amounts to, and the verdict on it."""
-    values = dict(zip((p.name for p in fit.table.parameters), fit.values.tolist(), strict=True))
-    provisional = _calibration(fit, values, provenance, Assessment("accepted", (), ()), 0.0)
+    exported = without_idle(fit)
+    values = dict(zip((p.name for p in fit.table.parameters), exported.values.tolist(), strict=True))
+    provisional = _calibration(exported, values, provenance, Assessment("accepted", (), ()), 0.0)
     ranges = _ranges(Sensor(provisional))
     worst = float(ranges.sd.max()) if len(ranges.sd) else float("inf")
     sensor = fit.sensor
@@ -52,7 +54,7 @@ def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Cal
         ranges,
     )
     assessment = judge(fit, limits, worst, directions)
-    return _calibration(fit, values, provenance, assessment, worst), assessment
+    return _calibration(exported, values, provenance, assessment, worst), assessment
 
 
 def kept_because(calibration: Calibration, reason: str) -> Calibration:

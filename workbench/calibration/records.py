@@ -6,6 +6,7 @@ from dataclasses import asdict
 
 from workbench.calibration.assess import Assessment, determined_by
 from workbench.calibration.fit import Fit
+from workbench.calibration.significance import without_idle
 from workbench.calibration.validation import alarms
 from workbench.model.calibration import TermSummary
 from workbench.model.event import (
@@ -22,11 +23,11 @@ from workbench.model.event import (
 
 def parameter_records(fit: Fit) -> tuple[ParameterRecord, ...]:
     """The sensor's parameters; constants (prior sd 0) are among them."""
-    sensor = fit.sensor
+    sensor, exported = fit.sensor, without_idle(fit)
     columns = zip(
         fit.table.parameters[sensor],
-        fit.values[sensor].tolist(),
-        fit.sd[sensor].tolist(),
+        exported.values[sensor].tolist(),
+        exported.sd[sensor].tolist(),
         fit.data_share[sensor].tolist(),
         determined_by(fit)[sensor],
         strict=True,

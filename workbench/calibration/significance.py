@@ -10,7 +10,7 @@ difference; what its prior says of it then stays in the covariance of the others
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import log
 from typing import NamedTuple
@@ -19,12 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from workbench.calibration.fit import Fit
-from workbench.calibration.parameters import LENS, RAY, REFERENCE, ParameterTable
+from workbench.calibration.boards import BoardView
+from workbench.calibration.expected import Expectation
+from workbench.calibration.fit import Fit, fit, table_of
+from workbench.calibration.observations import Rejected, Sighting
+from workbench.calibration.parameters import LENS
 from workbench.calibration.problem import Problem
-from workbench.calibration.sensor import spot_gradients, spots
+from workbench.calibration.robust import fit_without_outliers
 from workbench.calibration.term import Term
 from workbench.model.calibration import TermVerdict
+from workbench.model.errors import BadInputError
 from workbench.model.nested import TILTS, hold
 from workbench.model.rig import Prior, Rig
 
@@ -57,36 +61,99 @@ class _Comparison(NamedTuple):
     """(P,) of all parameters when the term goes."""
 
 
-def choose(refit: Callable[[Rig], Fit], rig: Rig, keep: Sequence[str] = ()) -> Fit:
-    """Fit with the terms that the data need; `terms` of the result has the evidence on each.
+def fit_chosen(
+    rig: Rig,
+    sightings: Sequence[Sighting],
+    rejected: Sequence[Rejected] = (),
+    boards: Sequence[BoardView] = (),
+    keep: Sequence[str] = (),
+) -> Fit:
+    """As `fit`, without spots that lie apart, and with the terms of the model that the data need.
+
+    `terms` of the result has the evidence on each. An idle one is still in the fit: `without_idle` is what is
+    exported.
 
     Args:
-        refit: the fit of the same data by a rig's priors.
         rig: the largest model. What it holds constant stays so, but is tried (`verdict` "called for").
+        sightings: as for `fit`.
+        rejected: as for `fit`.
+        boards: as for `fit`.
         keep: names of terms that stay whatever the data say.
+
+    Raises:
+        BadInputError: as `fit`, or the model has no such term.
+        LimitFailedError: as `fit`.
     """
-    fitted = refit(rig)
+    # Asked before anything is rejected: the spots that the model lacks a term for look like wrong ones.
+    missing = _called_for(fit(rig, sightings, rejected, boards))
+    sound = fit_without_outliers(_freed(rig, [t.name for t in missing]), sightings, rejected, boards)
+
+    def refit(model: Rig) -> Fit:
+        return fit(model, sound.used, sound.rejected, boards)
+
+    fitted = refit(rig) if missing else sound
+    missing = _called_for(fitted)
+    _check_names(fitted, keep)
     terms: list[Term] = []
     idle: list[str] = []
-    stays = False
     for name in _candidates(fitted):
-        index = _indices(fitted, name)
-        comparison = _compare(fitted, index)
-        shift, widening = _effect_on_ranges(fitted, index, comparison)
-        verdict = _verdict(comparison.log10_bayes_factor, shift, widening, name)
-        if name in keep:
-            verdict = "asked for"
-        if name in ORDERS and stays and verdict in LEFT_OUT:
-            verdict = "below"
-        stays = stays or (name in ORDERS and verdict not in LEFT_OUT)
-        terms.append(Term(name, comparison.p_value, comparison.log10_bayes_factor, shift, verdict))
-        if verdict == "absent":
+        term = _weigh(fitted, name, idle, any(t.name in ORDERS and t.verdict not in LEFT_OUT for t in terms))
+        if not {name, *name.split()}.isdisjoint(keep):
+            term = replace(term, verdict="asked for")
+        terms.append(term)
+        if term.verdict == "absent":
             fitted = refit(hold(fitted.rig, name.split()))
-        if verdict == "idle":
-            idle += name.split()
-    if idle:
-        fitted = _without_idle(fitted, refit(hold(fitted.rig, idle)), idle)
-    return replace(fitted, terms=(*terms, *_called_for(fitted, rig)))
+        if term.verdict == "idle":
+            idle.append(name)
+    return replace(fitted, terms=(*terms, *missing))
+
+
+def without_idle(fitted: Fit) -> Fit:
+    """The estimate with its idle terms at their priors' means, as it is exported.
+
+    Values and covariance alone differ, to first order: no range is to tell the difference. The covariance is
+    of the estimate's errors; it is no posterior.
+    """
+    idle = [t.name for t in fitted.terms if t.verdict == "idle"]
+    if not idle:
+        return fitted
+    index = _indices(fitted, idle)
+    comparison = _compare(fitted, index)
+    values = fitted.values + comparison.change
+    values[index] = fitted.table.prior_mean[index]
+    return replace(fitted, values=values, covariance=_carried(fitted, index, comparison.follow))
+
+
+def _weigh(fitted: Fit, name: str, idle: Sequence[str], higher_stays: bool) -> Term:
+    """A term against its absence; idle only if it is so together with those that are already."""
+    one = _compare(fitted, _indices(fitted, [name]))
+    shift, _ = _effect_on_ranges(fitted, _indices(fitted, [name]))
+    verdict: TermVerdict = "open"
+    if one.log10_bayes_factor >= STRONG:
+        verdict = "shown"
+    elif name in ORDERS and higher_stays:
+        verdict = "below"
+    elif one.log10_bayes_factor <= -STRONG:
+        verdict = "absent"
+    elif set(name.split()) <= set(LENS):
+        together, widening = _effect_on_ranges(fitted, _indices(fitted, [*idle, name]))
+        verdict = "idle" if together <= IDLE_SHIFT_SD and widening <= IDLE_SD else "open"
+    return Term(name, one.p_value, one.log10_bayes_factor, shift, verdict)
+
+
+def _check_names(fitted: Fit, keep: Sequence[str]) -> None:
+    known = _candidates(fitted)
+    if unknown := [name for name in keep if name not in {*known, *" ".join(known).split()}]:
+        raise BadInputError(
+            f"--keep {unknown[0]}: expected a term of the model that may be left out, one of"
+            f" {', '.join(known) or 'none: the rig file holds them all constant'}"
+        )
+
+
+def _freed(rig: Rig, names: Sequence[str]) -> Rig:
+    """The rig with terms of the lens made free, at the scale at which they are tried."""
+    priors = {name: Prior(value=getattr(rig.camera, name).value, sd=TRIAL_SD[name]) for name in names}
+    return rig.model_copy(update={"camera": rig.camera.model_copy(update=priors)})
 
 
 def _candidates(fitted: Fit) -> list[str]:
@@ -94,22 +161,17 @@ def _candidates(fitted: Fit) -> list[str]:
     names = {p.name for p in fitted.table.parameters if p.prior.sd > 0}
     tangential = " ".join(n for n in ("p1", "p2") if n in names)
     found = [n for n in ("k3", tangential, "k2", "k1", "ruler_scale") if n and n.split()[0] in names]
-    return [*found, TILTS] if len(_indices(fitted, TILTS)) else found
+    return [*found, TILTS] if len(_indices(fitted, [TILTS])) else found
 
 
-def _indices(fitted: Fit, name: str) -> NDArray[np.intp]:
-    """(T,) where a term's parameters stand among all."""
-    if name != TILTS:
-        wanted = {*name.split()}
-        return np.flatnonzero([p.name in wanted for p in fitted.table.parameters])
-    boards = {view.placement.key for view in fitted.boards}
-    tilts = {
-        f"{p.key}.{slope}"
-        for p in fitted.cells.placements
-        if p.key not in boards
-        for slope in ("slope_x", "slope_y")
-    }
-    return np.flatnonzero([p.name in tilts and p.prior.sd > 0 for p in fitted.table.parameters])
+def _indices(fitted: Fit, names: Sequence[str]) -> NDArray[np.intp]:
+    """(T,) where the parameters of terms stand among all."""
+    wanted = set(" ".join(names).split())
+    if TILTS in wanted:
+        boards = {view.placement.key for view in fitted.boards}
+        flat = [p.key for p in fitted.cells.placements if p.key not in boards]
+        wanted |= {f"{key}.{slope}" for key in flat for slope in ("slope_x", "slope_y")}
+    return np.flatnonzero([p.name in wanted and p.prior.sd > 0 for p in fitted.table.parameters])
 
 
 def _compare(fitted: Fit, index: NDArray[np.intp]) -> _Comparison:
@@ -136,15 +198,16 @@ def _p_value(score: FloatArray, information: FloatArray) -> float:
     return float(chdtrc(known.sum(), chi2)) if known.any() else 1.0
 
 
-def _effect_on_ranges(fitted: Fit, index: NDArray[np.intp], comparison: _Comparison) -> tuple[float, float]:
+def _effect_on_ranges(fitted: Fit, index: NDArray[np.intp]) -> tuple[float, float]:
     """Without a term: the largest shift of a range in its deviations, and the largest change of these.
 
     The deviation without it is of ranges whose covariance still carries the term's prior.
     """
-    gradient, spot_sd = _range_gradients(fitted)
-    with_sd = np.sqrt(np.einsum("np,pq,nq->n", gradient, fitted.covariance, gradient) + spot_sd**2)
+    comparison = _compare(fitted, index)
+    gradient, own_sd = _range_gradients(fitted)
+    with_sd = np.sqrt(np.einsum("np,pq,nq->n", gradient, fitted.covariance, gradient) + own_sd**2)
     carried = _carried(fitted, index, comparison.follow)
-    without_sd = np.sqrt(np.einsum("np,pq,nq->n", gradient, carried, gradient) + spot_sd**2)
+    without_sd = np.sqrt(np.einsum("np,pq,nq->n", gradient, carried, gradient) + own_sd**2)
     shift = np.abs(gradient @ comparison.change) / with_sd
     return float(shift.max(initial=0.0)), float(np.abs(without_sd / with_sd - 1).max(initial=0.0))
 
@@ -160,70 +223,36 @@ def _carried(fitted: Fit, index: NDArray[np.intp], follow: FloatArray) -> FloatA
 
 
 def _range_gradients(fitted: Fit) -> tuple[FloatArray, FloatArray]:
-    """(n, P) of ranges by all parameters, and (n,) what a spot's noise adds, over lasers and standoffs."""
-    lens, offset = fitted.values[: len(LENS)], len(LENS)
+    """(n, P) of ln(range) by all parameters, and (n,) what a spot's noise adds, over lasers and standoffs."""
     standoffs = [s.standoff_mm for s in fitted.used]
     grid = np.geomspace(min(standoffs), max(standoffs), GRID)
     noise = fitted.rig.noise
-    spot_px = np.hypot(noise.spot_sd_px, noise.speckle_sd_px) * fitted.noise_scale
-    size = np.array([fitted.rig.camera.width_px, fitted.rig.camera.height_px])
-    rows, sds = [], []
-    for i, laser in enumerate(fitted.rig.lasers):
-        start = len(LENS) + len(REFERENCE) + len(RAY) * i
-        ray = fitted.values[start : start + len(RAY)]
-        position = np.asarray(spots(lens, ray, 1.0 / (grid + fitted.values[offset])))
-        by = [np.asarray(part) for part in spot_gradients(lens, ray, fitted.values[offset], grid)]
-        axis = "uv".index(laser.axis)
-        by_lens, by_ray, by_range = (part[:, axis] for part in by)
-        gradient = np.zeros((GRID, len(fitted.values)))
-        gradient[:, : len(LENS)] = -by_lens / by_range[:, None]
-        gradient[:, start : start + len(RAY)] = -by_ray / by_range[:, None]
-        gradient[:, offset] = -1.0
-        seen = ((position >= 0) & (position <= size - 1)).all(axis=1)
-        rows.append(gradient[seen])
-        sds.append(np.abs(spot_px / by_range[seen]))
-    return np.concatenate(rows), np.concatenate(sds)
+    spot_px = float(np.hypot(noise.spot_sd_px, noise.speckle_sd_px)) * fitted.noise_scale
+    sensor = fitted.sensor
+    rows, own_sd = Expectation(fitted.rig, fitted.values[None, sensor]).range_rows(grid, spot_px)
+    seen = np.isfinite(own_sd)
+    by_prior_sd = rows[seen]
+    sd = fitted.table.prior_sd[sensor]
+    gradient = np.zeros((len(by_prior_sd), len(fitted.values)))
+    gradient[:, sensor] = np.divide(by_prior_sd, sd, out=np.zeros_like(by_prior_sd), where=sd > 0)
+    return gradient, own_sd[seen]
 
 
-def _verdict(log10_bayes_factor: float, shift: float, widening: float, name: str) -> TermVerdict:
-    if log10_bayes_factor >= STRONG:
-        return "shown"
-    if log10_bayes_factor <= -STRONG:
-        return "absent"
-    return (
-        "idle"
-        if set(name.split()) <= set(LENS) and shift <= IDLE_SHIFT_SD and widening <= IDLE_SD
-        else "open"
-    )
-
-
-def _without_idle(full: Fit, reduced: Fit, names: Sequence[str]) -> Fit:
-    """The values of the reduced fit, in whose covariance the idle terms are still what their priors say."""
-    index = np.flatnonzero([p.name in names for p in full.table.parameters])
-    carried = _carried(full, index, _compare(full, index).follow)
-    return replace(reduced, rig=full.rig, table=full.table, covariance=carried)
-
-
-def _called_for(fitted: Fit, rig: Rig) -> list[Term]:
+def _called_for(fitted: Fit) -> list[Term]:
     """Terms of the lens that the rig file holds constant and the data call for (a score test)."""
+    rig = fitted.rig
     tried = [name for name in TRIAL_SD if getattr(rig.camera, name).sd == 0]
-    parameters = tuple(
-        replace(p, prior=Prior(value=p.prior.value, sd=TRIAL_SD[p.name])) if p.name in tried else p
-        for p in fitted.table.parameters
-    )
-    table = ParameterTable(parameters)
-    index = [i for i, p in enumerate(parameters) if p.name in tried]
+    table = table_of(_freed(rig, tried), fitted.cells.placements, fitted.boards)
     problem = Problem.of(len(rig.lasers), table, fitted.cells, fitted.boards, rig.board)
     sd = table.prior_sd
-    offset = fitted.values - table.prior_mean
-    y = np.divide(offset, sd, out=np.zeros_like(sd), where=sd > 0)
+    y = np.divide(fitted.values - table.prior_mean, sd, out=np.zeros_like(sd), where=sd > 0)
     residual, jacobian = problem.linearise(y, fitted.noise_scale)
     free = fitted.table.prior_sd > 0
     within = jacobian[:, free]
     covariance = np.linalg.inv(within.T @ within + np.eye(free.sum()))
     found = []
-    for i in index:
-        name, column = parameters[i].name, jacobian[:, i]
+    for name in tried:
+        column = jacobian[:, [p.name for p in table.parameters].index(name)]
         along = within.T @ column
         information = column @ column - along @ covariance @ along
         score = -column @ residual

@@ -17,9 +17,8 @@ from workbench.calibration.export import calibrate, kept_because, write_calibrat
 from workbench.calibration.fit import Fit
 from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.records import left_out_records, parameter_records, term_summaries
-from workbench.calibration.robust import fit_without_outliers
 from workbench.calibration.sightings import sight_rows
-from workbench.calibration.significance import choose
+from workbench.calibration.significance import fit_chosen
 from workbench.cli.call import command_line, now, operator
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
@@ -64,7 +63,7 @@ def fit_captures(request: Request, as_json: bool) -> None:
     captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
     content = read_captures_file(captures)
     data = _sightings(rig, parse_captures(captures, content), request)
-    fitted = choose(lambda model: fit_without_outliers(model, *data), rig, request.kept)
+    fitted = fit_chosen(rig, *data, keep=request.kept)
     calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))

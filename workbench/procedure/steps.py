@@ -21,9 +21,8 @@ from workbench.calibration.export import calibrate, render
 from workbench.calibration.next_standoff import advise
 from workbench.calibration.observations import PlacementInfo, Rejected, Sighting
 from workbench.calibration.records import fit_finished
-from workbench.calibration.robust import fit_without_outliers
 from workbench.calibration.sightings import prior_scanline, sight
-from workbench.calibration.significance import choose
+from workbench.calibration.significance import fit_chosen
 from workbench.model import event as ev
 from workbench.model import procedure as pr
 from workbench.model.captures import BOARD
@@ -174,7 +173,7 @@ def _(step: pr.FitStep, context: Context, name: str) -> str:
     sightings = [f for f in found if isinstance(f, Sighting)]
     rejected = [f for f in (*found, *context.boards.values()) if isinstance(f, Rejected)]
     boards = [b for b in context.boards.values() if isinstance(b, BoardView)]
-    fitted = choose(lambda model: fit_without_outliers(model, sightings, rejected, boards), context.rig)
+    fitted = fit_chosen(context.rig, sightings, rejected, boards)
     provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
     calibration, assessment = calibrate(fitted, step.limits, provenance)
     context.emit(fit_finished(fitted, assessment))
