@@ -233,7 +233,7 @@ def view(
 
 @lasers.command(name="off")
 def lasers_off(rig: Annotated[Path, typer.Option(help="Rig file.")]) -> None:
-    """Put every laser off: exit 0 when the controller confirms it, 7 when not."""
+    """Put every laser off; exit 7 if nobody confirms it."""
     from workbench.cli.lasers import lasers_off
 
     typer.echo(lasers_off(rig))

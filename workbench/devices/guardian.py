@@ -105,6 +105,8 @@ class Guardian:
         """Serve until the workbench is gone; returns the exit code."""
         while not self._workbench.gone:
             command = self._workbench.command(self._wait_s())
+            if self._workbench.gone:
+                break  # what it asked for last is not done any more
             if self._lease is not None and self._workbench.told_to_end is not None:
                 self._put_off(self._stopped())
             if command is not None:
