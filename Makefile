@@ -6,13 +6,14 @@ export OPENBLAS_NUM_THREADS ?= 1
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: help demo test lint bench prove lock clean schema
+.PHONY: help demo test lint bench prove crash lock clean schema
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
 	@echo "make test   lint, type check and test everything"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
 	@echo "make prove  10 000 simulated calibrations against what is stated of them (a minute or two)"
+	@echo "make crash  a session of 10 000 shots with random faults; nothing may be lost (half an hour)"
 	@echo "make lint   only the linters and the type checker"
 	@echo "make lock   renew requirements.lock from pyproject.toml"
 
@@ -28,6 +29,9 @@ demo: $(INSTALLED)
 
 prove: $(INSTALLED)
 	$(BIN)/python -m tests.proofs
+
+crash: $(INSTALLED)
+	$(BIN)/python -m tests.crash.long
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -82,6 +82,6 @@ def results(session: Path) -> dict[str, bytes]:
         str(path.relative_to(session)): path.read_bytes()
         for path in sorted(session.rglob("*"))
         if path.is_file()
-        and path.name not in {"journal.jsonl", "session.yaml"}
+        and path.name not in {"journal.jsonl", "session.yaml", "recording.rrd"}
         and "set-aside" not in path.parts
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import sys
 import traceback
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from workbench.cli.leaving import leave
 from workbench.cli.stopping import stop_at_once
 from workbench.model.errors import WorkbenchError
 
@@ -121,6 +121,17 @@ def plan(
     from workbench.cli.plan import print_plan
 
     print_plan(procedures, rig, sessions)
+
+
+@app.command()
+def doctor(
+    rig: Annotated[Path, typer.Argument(help="Rig file.")],
+    no_input: NoInput = False,
+) -> None:
+    """Try a rig: camera, controller, interlock, each laser seen, exposure, latency."""
+    from workbench.cli.doctor import examine_rig
+
+    examine_rig(rig, no_input)
 
 
 @app.command()
@@ -256,13 +267,15 @@ def main() -> None:
     stop_at_once()
     try:
         app()
+    except SystemExit as ended:
+        leave(ended.code if isinstance(ended.code, int) else int(ended.code is not None))
     except WorkbenchError as error:
         _say(f"error: {error}")
-        sys.exit(error.exit_code)
+        leave(error.exit_code)
     except Exception:
         traceback.print_exc()
         _say("internal error: this is a defect of the workbench, please report it with the lines above")
-        sys.exit(INTERNAL_ERROR)
+        leave(INTERNAL_ERROR)
 
 
 def _say(message: str) -> None:

@@ -6,6 +6,7 @@ import os
 import select
 import sys
 import termios
+import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
@@ -98,6 +99,9 @@ class Person:
                 break
         typed = sys.stdin.readline()
         if not typed:
+            time.sleep(LOOK_S)  # where the terminal was closed, its signal may still be on the way
+            if (reason := self._stopping()) is not None:
+                raise StoppedError(reason)
             raise AnswerNeededError(f"prompt {prompt.key}: {prompt.do} -- the terminal was closed")
         return typed.strip()
 

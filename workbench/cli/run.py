@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from workbench.cli.background import Background
 from workbench.cli.call import command_line, now, operator
 from workbench.cli.person import whoever_is_there
 from workbench.cli.stopping import StopAfterShot
@@ -20,9 +21,8 @@ from workbench.procedure.operator import Scripted
 from workbench.procedure.outline import Forecast, learn_pace, outline
 from workbench.procedure.resume import plan_of, resume
 from workbench.procedure.run import Caller, Plan, run
-from workbench.report.thesis_figures import FigureWriter
 from workbench.session.manifest import MANIFEST, load_manifest
-from workbench.viewer.recording import RecordingConsumer
+from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
 
 
 @dataclass(frozen=True)
@@ -72,14 +72,12 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     asked = StopAfterShot()
     steps = outline(plan.procedures, plan.rig)
     forecast = Forecast(steps, learn_pace(session_dir.parent, plan.rig.rig))
-    with RecordingConsumer(session_dir, plan.rig) as recording, Terminal(console, forecast) as terminal:
+    recording = RecordingConsumer(session_dir, plan.rig)
+    file = session_dir / RECORDING_FILE
+    with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
         person = whoever_is_there(answers.no_input, console, lambda: asked.reason, terminal.quiet)
         operator = person if answers.file is None else Scripted.load(answers.file, person)
-        consumers = (
-            Guarded(terminal, "the progress", console),
-            Guarded(recording, "the recording", console),
-            Guarded(FigureWriter(session_dir), "drawing figures", console),
-        )
+        consumers = (Guarded(terminal, "the progress", console), beside)
         try:
             yield Screen(consumers, lambda: asked.reason, operator)
         except (RigNotReadyError, StoppedError, AnswerNeededError):

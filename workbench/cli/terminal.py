@@ -158,8 +158,7 @@ class Guarded:
             self._consumer = None
             with suppress(OSError):
                 self._console.print(
-                    f"[yellow]warning: {self._name} stops here: {error}[/yellow]\n"
-                    "Captures go on. `workbench view` makes it again where it is missing."
+                    f"[yellow]warning: {self._name} stops here: {error}[/yellow]\nCaptures go on."
                 )
 
 

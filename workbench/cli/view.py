@@ -6,6 +6,7 @@ from pathlib import Path
 
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_session_rig
+from workbench.session.state import effective
 from workbench.viewer.window import open_viewer
 
 
@@ -21,5 +22,5 @@ def view_session(session: Path) -> int:
     if not recording.exists():
         from workbench.viewer.recording import rebuild
 
-        rebuild(session, load_session_rig(session), read_journal(session), recording)
+        rebuild(session, load_session_rig(session), effective(read_journal(session)), recording)
     return open_viewer(recording)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -13,6 +13,7 @@ from workbench.model.rig import NonNegativeFloat, PositiveFloat
 from workbench.model.simulation import SimulatedScene
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
+LimitedStep = TypeVar("LimitedStep", "CheckLimitsStep", "ValidateStep")
 Standoffs = Annotated[tuple[PositiveFloat, ...], Field(min_length=1)]
 
 
@@ -181,6 +182,13 @@ class FitStep(FileModel):
         return "Fit the calibration"
 
 
+def _a_fit_is_not_retried(step: LimitedStep) -> LimitedStep:
+    for name, limit in step.limits:
+        if limit is not None and limit.on_fail == "retry":
+            raise ValueError(f"{name}: on_fail: retry would give the same fit again; expected ask or stop")
+    return step
+
+
 class FitLimits(FileModel):
     """Limits on a fit."""
 
@@ -197,19 +205,36 @@ class CheckLimitsStep(FileModel):
     step: Literal["check_limits"]
     limits: FitLimits
 
-    @model_validator(mode="after")
-    def _a_fit_is_not_retried(self) -> CheckLimitsStep:
-        for name, limit in self.limits:
-            if limit is not None and limit.on_fail == "retry":
-                raise ValueError(
-                    f"{name}: on_fail: retry would give the same fit again; expected ask or stop"
-                )
-        return self
+    _no_retry = model_validator(mode="after")(_a_fit_is_not_retried)
 
     @property
     def title(self) -> str:
         """For the progress line."""
         return "Check the fit's limits"
+
+
+class ValidationLimits(FileModel):
+    """Limits on what the fits without one placement each predict of it."""
+
+    worst_relative_error: Limit | None = None
+    """Largest |range - standoff| / standoff."""
+    worst_z: Limit | None = None
+    """Largest |range - standoff| in its promised standard deviations."""
+
+
+class ValidateStep(FileModel):
+    """Leave each placement of the last fit out in turn: is it ranged as well as promised?"""
+
+    needs: ClassVar = "fit"
+    step: Literal["validate"]
+    limits: ValidationLimits = ValidationLimits()
+
+    _no_retry = model_validator(mode="after")(_a_fit_is_not_retried)
+
+    @property
+    def title(self) -> str:
+        """For the progress line."""
+        return "Validate on standoffs left out"
 
 
 class ExportStep(FileModel):
@@ -269,6 +294,7 @@ Step = Annotated[
     | WarmUpStep
     | MeasureLatencyStep
     | CheckLimitsStep
+    | ValidateStep
     | CaptureGridStep
     | CaptureBoardStep
     | FitStep

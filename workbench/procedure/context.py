@@ -12,6 +12,7 @@ from typing import TypeVar
 from workbench.calibration.boards import BoardView
 from workbench.calibration.observations import Rejected
 from workbench.calibration.sightings import prior_scanline
+from workbench.calibration.validation import LeftOut
 from workbench.devices.protocols import Bench, Operator, StreamingCamera
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration, Provenance
@@ -73,6 +74,8 @@ class Context:
     """What the captures of the present step are for; None where no fit follows in its procedure."""
     accepted: Calibration | None = None
     """What the last fit amounts to."""
+    left_out: tuple[LeftOut, ...] = ()
+    """And what it says of each placement when it has not seen it."""
     calibration: Calibration | None = None
     """The exported one: what a trial ranges with."""
     _served: Group | None = None

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from workbench.model import event as ev
-from workbench.model.calibration import Calibration
 from workbench.model.errors import LimitFailedError
 from workbench.model.limit import Limit
-from workbench.model.procedure import FitLimits, GridLimits
+from workbench.model.procedure import GridLimits
 from workbench.model.prompt import Prompt
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
@@ -53,15 +52,13 @@ def check_captures(
                 raise LimitFailedError(failed)
 
 
-def check_fit(context: Context, step: str, calibration: Calibration, limits: FitLimits) -> str:
-    """Hold the fit against the limits; returns how it went.
+def check_fit(context: Context, step: str, values: Mapping[str, float], limits: FileModel) -> str:
+    """Hold what is known of a fit against limits of the same names; returns how it went.
 
     Raises:
         LimitFailedError: a limit failed, and the session ends.
         StoppedError: the operator, asked about it, stops.
     """
-    ranger = calibration.laser_ranger
-    values = ranger.fit.model_dump() | ranger.validity.model_dump()
     remarks = []
     for name, limit in _stated(limits):
         failed = _check(context, step, "fit", name, float(values[name]), limit)

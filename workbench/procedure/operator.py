@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pydantic import RootModel
 
-from workbench.devices.protocols import Operator
+from workbench.devices.protocols import Bench, Operator
 from workbench.model.errors import AnswerNeededError, BadInputError
 from workbench.model.prompt import Answer, Prompt
 from workbench.model.yamlfile import load_yaml_model
@@ -42,6 +42,8 @@ class Scripted:
     path: Path
     answers: dict[str, Answer]
     other: Operator
+    at_bench: bool = False
+    """Whether nobody can be hurt: on a virtual bench the file may say where the target stands."""
 
     @classmethod
     def load(cls, path: Path, other: Operator) -> Scripted:
@@ -60,7 +62,7 @@ class Scripted:
             BadInputError: it does not fit the question.
             AnswerNeededError: as `other` does.
         """
-        if prompt.at_bench or prompt.key not in self.answers:
+        if prompt.key not in self.answers or (prompt.at_bench and not self.at_bench):
             return self.other.ask(prompt)
         answer = self.answers[prompt.key]
         if (wrong := prompt.refuse(answer)) is not None:
@@ -73,3 +75,12 @@ def _answer(given: Answer | float | str | bool) -> Answer:
         return given.model_copy(update={"by": "answers file"})
     value = None if given is True else float(given) if isinstance(given, int | float) else given
     return Answer(value=value, by="answers file")
+
+
+def who_answers(bench: Bench, given: Operator) -> Operator:
+    """The bench's own operator where it has one, but an answers file comes first."""
+    if bench.operator is None:
+        return given
+    return (
+        replace(given, other=bench.operator, at_bench=True) if isinstance(given, Scripted) else bench.operator
+    )

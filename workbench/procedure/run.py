@@ -16,7 +16,7 @@ from workbench.model.errors import BadInputError, StoppedError, WorkbenchError
 from workbench.model.procedure import CaptureGridStep, FitStep, Procedure, Step, load_procedure
 from workbench.model.rig import Rig, load_rig
 from workbench.procedure.context import Ahead, Context
-from workbench.procedure.operator import Nobody
+from workbench.procedure.operator import Nobody, who_answers
 from workbench.procedure.recorder import Recorder
 from workbench.procedure.steps import run_step, shots
 from workbench.session.journal import Journal
@@ -173,7 +173,7 @@ def open_context(
         operator=caller.operator,
         created=caller.created,
     )
-    return Context(session_dir, plan.rig, bench, bench.operator or operator, recorder, provenance, stopping)
+    return Context(session_dir, plan.rig, bench, who_answers(bench, operator), recorder, provenance, stopping)
 
 
 def _ahead(steps: Sequence[Step], index: int) -> Ahead | None:

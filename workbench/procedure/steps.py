@@ -116,7 +116,22 @@ def _(step: pr.MeasureLatencyStep, context: Context, name: str) -> str:
 def _(step: pr.CheckLimitsStep, context: Context, name: str) -> str:
     if context.accepted is None:
         raise BadInputError(f"step {name}: nothing to check; expected a fit step before it")
-    return check_fit(context, name, context.accepted, step.limits)
+    ranger = context.accepted.laser_ranger
+    return check_fit(context, name, ranger.fit.model_dump() | ranger.validity.model_dump(), step.limits)
+
+
+@run_step.register
+def _(step: pr.ValidateStep, context: Context, name: str) -> str:
+    left_out = context.left_out
+    if not left_out:
+        raise BadInputError(f"step {name}: nothing to validate; expected a fit of 3 placements or more")
+    worst_error = max(abs(one.error_mm) / one.standoff_mm for one in left_out)
+    worst_z = max(abs(one.z) for one in left_out)
+    verdict = check_fit(context, name, {"worst_relative_error": worst_error, "worst_z": worst_z}, step.limits)
+    return (
+        f"{len(left_out)} placements, each ranged by a fit without it: to {100 * worst_error:.2g} % or"
+        f" better, {worst_z:.2g} sd of what was promised at worst; {verdict}"
+    )
 
 
 @run_step.register
@@ -179,7 +194,7 @@ def _(step: pr.FitStep, context: Context, name: str) -> str:
     context.emit(fit_finished(fitted, assessment))
     if assessment.verdict == "refused":
         raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
-    context.accepted = calibration
+    context.accepted, context.left_out = calibration, assessment.left_out
     worst = calibration.laser_ranger.validity.max_relative_range_sd
     return (
         f"accepted: rms {fitted.rms_px:.3f} px over {len(sightings)} spots, {len(fitted.rejected)} not used;"

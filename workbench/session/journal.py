@@ -27,7 +27,8 @@ class Journal:
     def __init__(self, session_dir: Path, flags: int = os.O_CREAT | os.O_EXCL) -> None:
         self._path = session_dir / JOURNAL
         self._file = os.open(self._path, os.O_RDWR | os.O_APPEND | flags, 0o644)
-        self._next = 0
+        self._next = self._size = 0
+        self._torn = False
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -47,7 +48,8 @@ class Journal:
         try:
             records = tuple(read_journal(session_dir))
             content = journal._path.read_bytes()
-            os.ftruncate(journal._file, content.rfind(b"\n") + 1)
+            journal._size = content.rfind(b"\n") + 1
+            os.ftruncate(journal._file, journal._size)
         except BaseException:
             os.close(journal._file)
             raise
@@ -62,6 +64,8 @@ class Journal:
         """
         record = Record(n=self._next, time_ns=time.time_ns(), event=event)
         line = (record.model_dump_json() + "\n").encode()
+        if self._torn:
+            raise StoppedError(f"{self._path}: the journal cannot be written any more")
         try:
             if os.write(self._file, line) != len(line):
                 raise OSError(errno.ENOSPC, "no space left on device")
@@ -69,9 +73,18 @@ class Journal:
             if not isinstance(event, SpotsFound):
                 os.fsync(self._file)
         except OSError as error:
+            self._cut_back()
             raise StoppedError(f"{self._path}: the journal cannot be written: {error.strerror}") from error
         self._next += 1
+        self._size += len(line)
         return record
+
+    def _cut_back(self) -> None:
+        """Take away what a failed write left: whatever came after it would be lost with it."""
+        try:
+            os.ftruncate(self._file, self._size)
+        except OSError:
+            self._torn = True
 
     def close(self) -> None:
         """Sync and close."""

@@ -1,0 +1,332 @@
+"""Sessions with an operator who does more than say yes, on the virtual bench with its own operator away."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.crash.short import CALLER, RESUMER, go_on, results, story, write_files
+from workbench.devices.protocols import Operator
+from workbench.devices.registry import open_bench
+from workbench.model import event as ev
+from workbench.model.errors import (
+    AnswerNeededError,
+    BadInputError,
+    LimitFailedError,
+    RigNotReadyError,
+    StoppedError,
+)
+from workbench.model.prompt import Answer, Prompt
+from workbench.model.rig import load_rig
+from workbench.model.target import Placement
+from workbench.procedure.doctor import examine
+from workbench.procedure.latency import count_latency
+from workbench.procedure.operator import Scripted
+from workbench.procedure.resume import resume
+from workbench.procedure.run import NOBODY, Plan, run
+from workbench.session.journal import Journal, read_journal
+from workbench.session.state import effective, standing
+
+HEAD = "format: 1\nprocedure: p\ntitle: P\nsteps:\n"
+GRID = """\
+  - step: capture_grid
+    standoffs_mm: [300, 600, 1500]
+    repeats: 2
+"""
+
+
+class Says:
+    """Answers as it was told, in order, and yes once that is over."""
+
+    def __init__(self, *answers: tuple[str, Answer]) -> None:
+        self.answers = list(answers)
+        self.asked: list[Prompt] = []
+
+    def ask(self, prompt: Prompt) -> Answer:
+        self.asked.append(prompt)
+        if self.answers and self.answers[0][0] == prompt.key:
+            answer = self.answers.pop(0)[1]
+        else:
+            answer = Answer(value=None if prompt.quantity is None else prompt.quantity.usual)
+        assert prompt.refuse(answer) is None
+        return answer
+
+
+def session(folder: Path, steps: str, operator: Operator, emulator: str = "") -> Path:
+    """Run a procedure; the bench's own operator is away."""
+    folder.mkdir(exist_ok=True)
+    rig, procedure = write_files(folder, HEAD + steps)
+    rig.write_text(rig.read_text() + "  answers: false\n" + emulator)
+    run(Plan.load(rig, [procedure]), folder / "s", (), CALLER, lambda: None, operator)
+    return folder / "s"
+
+
+def events(folder: Path, kind: type[ev.Event]) -> list[ev.Event]:
+    return [r.event for r in effective(read_journal(folder)) if isinstance(r.event, kind)]
+
+
+def test_each_prompt_comes_once_and_safety_first(tmp_path: Path) -> None:
+    operator = Says()
+    done = session(tmp_path, GRID, operator)
+    assert [p.key for p in operator.asked] == ["safety", "p.1/300mm", "p.1/600mm", "p.1/1500mm"]
+    assert all(p.at_bench and p.otherwise for p in operator.asked)
+    assert "class" in operator.asked[0].do
+    assert [e.by for e in events(done, ev.TargetPlaced) if isinstance(e, ev.TargetPlaced)] == ["person"] * 3
+
+
+def test_a_placement_captured_again_leaves_no_trace_in_the_result(tmp_path: Path) -> None:
+    plain = session(tmp_path / "plain", GRID, Says())
+    redo = Says(("p.1/600mm", Answer(action="redo", reason="it slipped")))
+    again = session(tmp_path / "again", GRID, redo)
+    assert [p.key for p in redo.asked][1:] == [f"p.1/{mm}mm" for mm in (300, 600, 300, 600, 1500)]
+    told = [e for e in events(again, ev.SetAside) if isinstance(e, ev.SetAside)]
+    assert [(e.key, e.reason) for e in told] == [("p.1/300mm", "it slipped")]
+    assert [e for e in story(again) if not isinstance(e, ev.SetAside)] == story(plain)
+    assert results(again) == results(plain)
+    assert len(list((again / "set-aside/1/p.1/300mm").rglob("*.png"))) == 8
+
+
+def test_a_placement_left_out_is_told_with_its_reason(tmp_path: Path) -> None:
+    done = session(tmp_path, GRID, Says(("p.1/600mm", Answer(action="skip", reason="no room"))))
+    placed = [
+        e.placement.standoff_mm for e in events(done, ev.TargetPlaced) if isinstance(e, ev.TargetPlaced)
+    ]
+    assert placed == [300.0, 1500.0]
+    skipped = [e for e in events(done, ev.Answered) if isinstance(e, ev.Answered) and e.key != "safety"]
+    assert [(e.key, e.answer.reason) for e in skipped] == [("p.1/600mm", "no room")]
+
+
+def test_a_measured_standoff_counts_as_measured(tmp_path: Path) -> None:
+    """The bench puts the target where the operator read it: the ranges found with it are those."""
+    read = Says(("p.1/600mm", Answer(value=612.5)))
+    steps = GRID + "  - step: fit\n    limits: {max_relative_range_sd: 0.5}\n"
+    done = session(tmp_path, steps, read)
+    table = (done / "captures.csv").read_text()
+    assert table.count(",612.5,") == 4
+    (fit,) = [e for e in events(done, ev.FitFinished) if isinstance(e, ev.FitFinished)]
+    assert fit.verdict == "accepted"
+    assert fit.rms_px < 0.3  # at 600 mm its spots would lie 1.1 px off
+
+
+def test_abort_says_who_and_why(tmp_path: Path) -> None:
+    with pytest.raises(StoppedError, match=r"aborted by the operator at p.1/600mm: fire drill"):
+        session(tmp_path, GRID, Says(("p.1/600mm", Answer(action="abort", reason="fire drill"))))
+    assert standing(tmp_path / "s").state == "stopped"
+
+
+def test_nobody_at_a_real_rig_and_then_somebody(tmp_path: Path) -> None:
+    answers = tmp_path / "answers.yaml"
+    answers.write_text("safety: true\np.1/300mm: 300\n")
+    with pytest.raises(AnswerNeededError, match="prompt safety"):
+        session(tmp_path, GRID, Scripted.load(answers, NOBODY))
+    assert not list((tmp_path / "s/frames").iterdir()), "nothing was lit"
+    operator = Says()
+    resume(tmp_path / "s", (), RESUMER, lambda: None, operator)
+    assert [p.key for p in operator.asked][:2] == ["safety", "p.1/300mm"]
+    assert standing(tmp_path / "s").state == "finished"
+
+
+def test_a_resumed_session_asks_for_safety_and_the_placement_under_way(tmp_path: Path) -> None:
+    with pytest.raises(StoppedError):
+        session(tmp_path, GRID, Says(("p.1/1500mm", Answer(action="abort", reason="lunch"))))
+    operator = Says()
+    resume(tmp_path / "s", (), RESUMER, lambda: None, operator)
+    assert [p.key for p in operator.asked] == ["safety", "p.1/1500mm"]
+
+
+QUESTIONS = """\
+  - {step: confirm, text: Close the door., expect: The lamp is green., otherwise: Call somebody.}
+  - {step: ask, text: Room temperature?, number: {unit: degC, in: [10, 40]}}
+  - {step: ask, text: Which card?, choices: [white, grey]}
+"""
+
+
+def test_questions_are_kept_and_not_asked_again(tmp_path: Path) -> None:
+    said = Says(
+        ("p.2", Answer(value=21.5)),
+        ("p.3", Answer(value="grey")),
+        ("p.4/300mm", Answer(action="abort", reason="lunch")),
+    )
+    with pytest.raises(StoppedError):
+        session(tmp_path, QUESTIONS + GRID, said)
+    operator = Says()
+    resume(tmp_path / "s", (), RESUMER, lambda: None, operator)
+    assert operator.asked[0].key == "safety"
+    kept = [e for e in events(tmp_path / "s", ev.Answered) if isinstance(e, ev.Answered)]
+    assert [e.answer.value for e in kept if e.key in {"p.1", "p.2", "p.3"}] == [None, 21.5, "grey"]
+
+
+def limited(quantity: str, limit: str) -> str:
+    return GRID + f"    limits:\n      {quantity}: {limit}\n"
+
+
+def test_retry_captures_again_twice_and_then_stops(tmp_path: Path) -> None:
+    with pytest.raises(LimitFailedError, match=r"p.1/300mm/L1: snr: expected at least 1e\+09, got"):
+        session(tmp_path, limited("snr", "{in: [1.0e9, null], on_fail: retry}"), Says())
+    every = [r.event for r in read_journal(tmp_path / "s")]
+    assert sum(isinstance(e, ev.SetAside) for e in every) == 2
+    assert sum(isinstance(e, ev.CaptureTaken) for e in every) == 3 * 4
+    assert sorted(p.name for p in (tmp_path / "s/set-aside").iterdir()) == ["1", "2"]
+
+
+def test_ask_lets_the_operator_keep_redo_or_leave_out(tmp_path: Path) -> None:
+    operator = Says(
+        ("p.1/300mm/L1/snr", Answer(action="redo", reason="wiped the lens")),
+        ("p.1/300mm/L1/snr", Answer()),
+        ("p.1/300mm/L4/snr", Answer()),
+        ("p.1/600mm/L1/snr", Answer(action="skip", reason="hopeless")),
+    )
+    done = session(tmp_path, limited("snr", "{in: [1.0e9, null], on_fail: ask}"), operator)
+    assert operator.answers == []
+    places = {e.placement_key for e in events(done, ev.CaptureTaken) if isinstance(e, ev.CaptureTaken)}
+    assert places == {"p.1/300mm", "p.1/1500mm"}
+    told = [e.reason for e in events(done, ev.SetAside) if isinstance(e, ev.SetAside)]
+    assert [reason.rpartition(": ")[2] for reason in told] == ["wiped the lens", "hopeless"]
+
+
+def test_a_marginal_value_is_told_and_gone_on_from(tmp_path: Path) -> None:
+    done = session(tmp_path, limited("snr", "{in: [1, null], marginal: [1.0e9, null]}"), Says())
+    verdicts = {e.verdict for e in events(done, ev.LimitChecked) if isinstance(e, ev.LimitChecked)}
+    assert verdicts == {"marginal"}
+    assert standing(done).state == "finished"
+
+
+FIT = GRID + "  - step: fit\n    limits: {max_relative_range_sd: 0.5}\n"
+
+
+@pytest.mark.parametrize(("step", "quantity"), [("check_limits", "rms_px"), ("validate", "worst_z")])
+def test_a_fit_is_held_against_limits(tmp_path: Path, step: str, quantity: str) -> None:
+    def with_limit(limit: str) -> str:
+        return FIT + f"  - {{step: {step}, limits: {{{quantity}: {limit}}}}}\n"
+
+    done = session(tmp_path / "good", with_limit("{in: [0, 6]}"), Says())
+    assert [e.verdict for e in events(done, ev.LimitChecked) if isinstance(e, ev.LimitChecked)] == ["pass"]
+    with pytest.raises(LimitFailedError, match=f"fit: {quantity}: expected 0 to 1e-09"):
+        session(tmp_path / "bad", with_limit("{in: [0, 1.0e-9]}"), Says())
+    operator = Says((f"p.3/{quantity}", Answer()))
+    done = session(tmp_path / "asked", with_limit("{in: [0, 1.0e-9], on_fail: ask}"), operator)
+    assert operator.answers == []
+    assert standing(done).state == "finished"
+
+
+LATENCY = "  - {step: place_target, standoff_mm: 500}\n  - step: measure_latency\n" + GRID
+
+
+def test_a_procedure_measures_the_latency(tmp_path: Path) -> None:
+    done = session(tmp_path, LATENCY, Says(), "  camera: {latency_frames: 3}\n")
+    assert events(done, ev.LatencyMeasured) == [ev.LatencyMeasured(frames=3)]
+
+
+@pytest.mark.parametrize("latency", [0, 1, 4])
+def test_latency_is_counted_whatever_the_driver_believes(tmp_path: Path, latency: int) -> None:
+    rig_file, _ = write_files(tmp_path)
+    rig_file.write_text(rig_file.read_text() + f"  camera: {{latency_frames: {latency}}}\n")
+    rig = load_rig(rig_file)
+    with open_bench(rig, tmp_path / "s") as bench:
+        bench.target.place(Placement(key="k", standoff_mm=500.0))
+        bench.mark("k")
+        assert count_latency(bench.lasers, bench.camera, rig, 10) == latency  # type: ignore[arg-type]
+        if latency > 1:
+            with pytest.raises(RigNotReadyError, match="at most 1 frames"):
+                count_latency(bench.lasers, bench.camera, rig, 1)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("emulator", "bad"),
+    [
+        ("", set()),
+        ("  camera: {exposure_s: 1.0e-5}\n", {"laser L1", "laser L4"}),
+        ("  camera: {exposure_s: 0.03}\n", {"laser L1", "laser L4"}),
+        ("  truth: {lasers: {L4: {x_mm: 400}}}\n", {"laser L4"}),
+    ],
+)
+def test_the_doctor_finds_what_is_wrong(tmp_path: Path, emulator: str, bad: set[str]) -> None:
+    rig_file, _ = write_files(tmp_path)
+    rig_file.write_text(rig_file.read_text() + emulator)
+    rig = load_rig(rig_file)
+    with open_bench(rig, tmp_path / "s") as bench:
+        found = list(examine(rig, bench, Says()))
+    assert {finding.part for finding in found if not finding.ok} == bad
+    assert [f.part for f in found] == ["controller", "interlock", "camera", "laser L1", "laser L4", "latency"]
+
+
+def stopped_session(folder: Path) -> Path:
+    with pytest.raises(StoppedError):
+        session(folder, GRID, Says(("p.1/600mm", Answer(action="abort", reason="lunch"))))
+    return folder / "s"
+
+
+def change(old: str, new: str) -> Callable[[Path], None]:
+    def edit(path: Path) -> None:
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new))
+
+    return edit
+
+
+def test_a_comment_is_no_change(tmp_path: Path) -> None:
+    stopped = stopped_session(tmp_path)
+    change("serial: emulated-1", "serial: emulated-1  # by the window")(tmp_path / "rig.yaml")
+    resume(stopped, (), RESUMER, lambda: None, Says())
+    assert standing(stopped).state == "finished"
+
+
+@pytest.mark.parametrize(
+    ("file", "edit"),
+    [
+        ("rig.yaml", change("sd: 26.7", "sd: 20.0")),
+        ("p.yaml", change("[300, 600, 1500]", "[300, 600, 1400]")),
+    ],
+)
+def test_a_change_is_refused_unless_it_is_accepted(
+    tmp_path: Path, file: str, edit: Callable[[Path], None]
+) -> None:
+    stopped = stopped_session(tmp_path)
+    edit(tmp_path / file)
+    before = (stopped / "journal.jsonl").read_bytes()
+    with pytest.raises(BadInputError, match=f"{file} has changed since.*\n.*accept-changes"):
+        resume(stopped, (), RESUMER, lambda: None, Says())
+    assert (stopped / "journal.jsonl").read_bytes() == before
+    resume(stopped, (), RESUMER, lambda: None, Says(), "a typing error")
+    (resumed,) = [e for e in events(stopped, ev.SessionResumed) if isinstance(e, ev.SessionResumed)]
+    assert resumed.accepted_because == "a typing error"
+    assert file in resumed.changes[0]
+    assert standing(stopped).state == "finished"
+    assert (tmp_path / file).read_text() in _texts(stopped / "session.yaml")
+    assert (tmp_path / file).read_text() not in _texts(stopped / "session-1.yaml")
+
+
+def _texts(manifest: Path) -> list[str]:
+    import yaml
+
+    data = yaml.safe_load(manifest.read_text())
+    return [data["rig"]["text"], *(p["text"] for p in data["procedures"])]
+
+
+def test_another_rig_is_another_session(tmp_path: Path) -> None:
+    stopped = stopped_session(tmp_path)
+    change("rig: thesis-emulated", "rig: other")(tmp_path / "rig.yaml")
+    with pytest.raises(BadInputError, match="run these anew"):
+        resume(stopped, (), RESUMER, lambda: None, Says(), "why not")
+
+
+def test_what_is_finished_or_running_is_not_resumed(tmp_path: Path) -> None:
+    done = session(tmp_path / "done", GRID, Says())
+    with pytest.raises(BadInputError, match="nothing to resume"):
+        go_on(done)
+    stopped = stopped_session(tmp_path / "stopped")
+    with Journal.reopen(stopped)[0]:
+        assert standing(stopped).state == "running"
+        with pytest.raises(BadInputError, match="another program"):
+            go_on(stopped)
+
+
+def test_a_frame_that_has_changed_is_not_taken(tmp_path: Path) -> None:
+    stopped = stopped_session(tmp_path)
+    frames = sorted((stopped / "frames/p.1/300mm").rglob("*.png"))
+    frames[0].write_bytes(frames[1].read_bytes())
+    with pytest.raises(BadInputError, match="has changed since it was captured"):
+        go_on(stopped)

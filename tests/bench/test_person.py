@@ -1,0 +1,189 @@
+"""The command line with a person at a real terminal, and without one."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from tests.crash.short import write_files
+from workbench.model import event as ev
+from workbench.session.journal import read_journal
+from workbench.session.state import effective
+
+SCRIPT = Path(sys.executable).with_name("workbench")
+STEPS = """\
+format: 1
+procedure: p
+title: P
+steps:
+  - {step: ask, text: Which card?, choices: [white, grey]}
+  - step: capture_grid
+    standoffs_mm: [300, 600]
+    repeats: 1
+"""
+
+
+AT_TERMINAL = """
+import os, sys
+tty = os.open(sys.argv[1], os.O_RDWR)  # the first that the leader of a session opens is its terminal
+for handle in range(3):
+    os.dup2(tty, handle)
+os.execv(sys.argv[2], sys.argv[2:])
+"""
+
+
+@dataclass
+class Terminal:
+    """A session at a pseudo-terminal of its own."""
+
+    process: subprocess.Popen[bytes]
+    master: int
+    text: str = field(default="")
+    seen: int = 0
+
+    def wait_for(self, words: str) -> None:
+        """Read on until these words come, after what was waited for before."""
+        deadline = time.monotonic() + 120
+        while words not in self.text[self.seen :]:
+            assert time.monotonic() < deadline, self.text
+            if select.select([self.master], [], [], 0.2)[0]:
+                self.text += os.read(self.master, 65536).decode()
+        self.seen = self.text.index(words, self.seen) + len(words)
+
+    def type(self, line: str) -> None:
+        """Answer a prompt, once it is there."""
+        self.wait_for("> ")
+        time.sleep(0.3)  # a hand is slower than the flush of what was typed ahead
+        os.write(self.master, line.encode() + b"\n")
+
+    def end(self) -> int:
+        """Wait for the end, and read the rest."""
+        deadline = time.monotonic() + 120
+        while self.process.poll() is None:
+            assert time.monotonic() < deadline, self.text
+            if select.select([self.master], [], [], 0.1)[0]:
+                try:
+                    self.text += os.read(self.master, 65536).decode()
+                except OSError:
+                    break
+        return self.process.wait(60)
+
+
+@pytest.fixture
+def terminal(tmp_path: Path) -> Iterator[Terminal]:
+    rig, _ = write_files(tmp_path, STEPS)
+    rig.write_text(rig.read_text() + "  answers: false\n")
+    master, slave = pty.openpty()
+    environment = {key: value for key, value in os.environ.items() if key != "CI"} | {"COLUMNS": "80"}
+    command = [str(SCRIPT), "run", "p.yaml", "--rig", "rig.yaml"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", AT_TERMINAL, os.ttyname(slave), *command],
+        cwd=tmp_path,
+        env=environment,
+        start_new_session=True,
+    )
+    yield Terminal(process, master)
+    os.close(slave)
+    if process.poll() is None:
+        process.kill()
+        process.wait()
+    with suppress(OSError):
+        os.close(master)
+
+
+def events(folder: Path) -> list[ev.Event]:
+    (session,) = [p for p in (folder / "sessions").iterdir() if p.is_dir()]
+    return [r.event for r in effective(read_journal(session))]
+
+
+def test_a_person_is_guided_through_a_session(terminal: Terminal, tmp_path: Path) -> None:
+    os.write(terminal.master, b"grey\nyes\n\n\n\n")  # typed ahead: answers nothing
+    terminal.wait_for("Which card?")
+    terminal.type("green")
+    terminal.wait_for("expected one of white, grey, got green")
+    terminal.type("white")
+    terminal.wait_for("about to be switched on")
+    terminal.type("")
+    terminal.wait_for("expected yes")
+    terminal.type("yes")
+    terminal.wait_for("Place the target at 300 mm")
+    terminal.type("400")
+    terminal.wait_for("expected 270 to 330 mm")
+    terminal.type("302.5 mm")
+    terminal.wait_for("Place the target at 600 mm")
+    terminal.type("redo")
+    terminal.wait_for("why redo?")
+    terminal.type("it slipped")
+    terminal.wait_for("Place the target at 300 mm")
+    terminal.type("")
+    terminal.wait_for("Place the target at 600 mm")
+    terminal.type("skip")
+    terminal.type("no room")
+    assert terminal.end() == 0, terminal.text
+    assert "Traceback" not in terminal.text
+    told = events(tmp_path)
+    answers = {e.key: e.answer for e in told if isinstance(e, ev.Answered)}
+    assert (answers["p.1"].value, answers["safety"].by) == ("white", "person")
+    assert (answers["p.2/600mm"].action, answers["p.2/600mm"].reason) == ("skip", "no room")
+    assert [e.placement.standoff_mm for e in told if isinstance(e, ev.TargetPlaced)] == [300.0]
+    assert [e.reason for e in told if isinstance(e, ev.SetAside)] == ["it slipped"]
+    for line in terminal.text.replace("\r", "\n").split("\n"):
+        assert "\x1b" in line or len(line) <= 80 or "sessions/" in line
+
+
+def test_control_c_at_a_prompt_pauses(terminal: Terminal, tmp_path: Path) -> None:
+    terminal.wait_for("> ")
+    os.write(terminal.master, b"\x03")
+    assert terminal.end() == 5
+    assert "stopped by SIGINT" in terminal.text
+    assert "workbench resume sessions/" in terminal.text
+    last = events(tmp_path)[-1]
+    assert isinstance(last, ev.SessionFinished)
+    assert last.exit_code == 5
+
+
+def test_the_end_of_input_is_no_answer(terminal: Terminal) -> None:
+    terminal.wait_for("> ")
+    time.sleep(0.3)
+    os.write(terminal.master, b"\x04")
+    assert terminal.end() == 6
+    assert "prompt p.1" in terminal.text
+
+
+def test_a_terminal_that_is_closed_stops_the_session_in_good_order(
+    terminal: Terminal, tmp_path: Path
+) -> None:
+    terminal.wait_for("> ")
+    os.close(terminal.master)
+    assert terminal.process.wait(60) == 5
+    last = events(tmp_path)[-1]
+    assert isinstance(last, ev.SessionFinished)
+    assert last.message == f"stopped by {signal.SIGHUP.name}"
+
+
+@pytest.mark.parametrize(
+    ("option", "why"), [([], "there is no terminal"), (["--no-input"], "--no-input was given")]
+)
+def test_without_a_terminal_an_open_prompt_ends_it(tmp_path: Path, option: list[str], why: str) -> None:
+    rig, _ = write_files(tmp_path, STEPS)
+    rig.write_text(rig.read_text() + "  answers: false\n")
+    (tmp_path / "answers.yaml").write_text("p.1: white\nsafety: true\n")
+    command = [str(SCRIPT), "run", "p.yaml", "--rig", "rig.yaml", "--answers", "answers.yaml", *option]
+    environment = {key: value for key, value in os.environ.items() if key != "CI"}
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=environment
+    )
+    assert done.returncode == 6
+    assert "prompt safety" in " ".join(done.stderr.split())
+    assert why in " ".join(done.stderr.split())

@@ -1,0 +1,40 @@
+"""`workbench doctor`."""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import nullcontext
+from pathlib import Path
+
+from rich.console import Console
+
+from workbench.cli.person import whoever_is_there
+from workbench.cli.stopping import StopAfterShot
+from workbench.devices.registry import open_bench
+from workbench.model.errors import RigNotReadyError
+from workbench.model.rig import load_rig
+from workbench.procedure.doctor import examine
+from workbench.procedure.operator import who_answers
+
+
+def examine_rig(rig_path: Path, no_input: bool) -> None:
+    """Print what is found of each part.
+
+    Raises:
+        RigNotReadyError: one of them is not well.
+        WorkbenchError: the rig file is wrong, nobody answers, or a beam stays on.
+    """
+    rig = load_rig(rig_path)
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    stopping = StopAfterShot()
+    bad = []
+    with tempfile.TemporaryDirectory() as folder, open_bench(rig, Path(folder) / "doctor") as bench:
+        person = whoever_is_there(no_input, console, lambda: stopping.reason, nullcontext)
+        for finding in examine(rig, bench, who_answers(bench, person)):
+            colour, word = ("green", "ok  ") if finding.ok else ("red", "FAIL")
+            console.print(f"[{colour}]{word}[/{colour}] {finding.part}: {finding.found}")
+            if not finding.ok:
+                bad.append(finding.part)
+    if bad:
+        raise RigNotReadyError(f"rig {rig.rig} is not ready: {', '.join(bad)}")
+    console.print(f"rig {rig.rig} is ready")
