@@ -23,7 +23,7 @@ from workbench.calibration.boards import BoardView
 from workbench.calibration.expected import Expectation
 from workbench.calibration.fit import Fit, fit, table_of
 from workbench.calibration.observations import Rejected, Sighting
-from workbench.calibration.parameters import LENS
+from workbench.calibration.parameters import LENS, sensor_parameters
 from workbench.calibration.problem import Problem
 from workbench.calibration.robust import fit_without_outliers
 from workbench.calibration.term import Term
@@ -228,7 +228,7 @@ def _range_gradients(fitted: Fit) -> tuple[FloatArray, FloatArray]:
     grid = np.geomspace(min(standoffs), max(standoffs), GRID)
     noise = fitted.rig.noise
     spot_px = float(np.hypot(noise.spot_sd_px, noise.speckle_sd_px)) * fitted.noise_scale
-    sensor = fitted.sensor
+    sensor = slice(0, len(sensor_parameters(fitted.rig)))  # a board's print scale moves no range
     rows, own_sd = Expectation(fitted.rig, fitted.values[None, sensor]).range_rows(grid, spot_px)
     seen = np.isfinite(own_sd)
     by_prior_sd = rows[seen]

@@ -15,6 +15,7 @@ from workbench.calibration.boards import BoardView, on_boards
 from workbench.calibration.export import calibrate, render
 from workbench.calibration.fit import Fit, fit
 from workbench.calibration.observations import Rejected, Sighting
+from workbench.calibration.significance import fit_chosen
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance, load_calibration
 from workbench.model.errors import BadInputError
@@ -195,3 +196,15 @@ SOMEWHERE = Provenance(
     operator="",
     created="",
 )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_terms_are_weighed_with_the_board_as_well(seed: int) -> None:
+    """With a board k1 and k2 are known to a thousandth: what is there is shown."""
+    rig = board_rig()
+    world = World(rig, seed)
+    sightings, views = BoardWorld(world).measure()
+    fitted = fit_chosen(rig, [*sightings, *world.sightings(FAR_MM)], (), views)
+    told = {term.name: term for term in fitted.terms}
+    assert told["k1"].verdict == "shown"
+    assert set(told) == {"k2", "k1", "ruler_scale", "tilts"}
