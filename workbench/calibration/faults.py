@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 from scipy.special import chdtrc
 
-from workbench.calibration.averaging import scatter_chi2
+from workbench.calibration.averaging import scatter_chi2, weighted_mean
 from workbench.calibration.fit import Fit
 from workbench.calibration.hypotheses import Hypothesis, explain_misfit
 from workbench.calibration.moved import Movement, find_movements
-from workbench.calibration.observations import positions, stated_sd
+from workbench.calibration.observations import Sighting, positions, stated_sd
 from workbench.calibration.validation import LeftOut
 
 FaultName = Literal[
@@ -78,9 +78,10 @@ def _suspects(fit: Fit, left_out: Sequence[LeftOut]) -> list[int]:
     odd = {one.placement for one in left_out if one.spots_p < SUSPECT}
     used = {s.source for s in fit.used}
     odd |= {s.placement for s in cells.captures if s.source not in used}
+    odd |= {cells.members[n][0].placement for n in cells.torn}
     chi2, free = defaultdict[str, float](float), Counter[str]()
     for members in cells.members:
-        apart, degrees = scatter_chi2(positions(members), stated_sd(members, noise))
+        apart, degrees = scatter_chi2(positions(members), cells.repeat_scale * stated_sd(members, noise))
         chi2[members[0].placement] += apart
         free[members[0].placement] += degrees
     odd |= {key for key, count in free.items() if count and chdtrc(count, chi2[key]) < SUSPECT}
@@ -146,18 +147,34 @@ def _reflections(fit: Fit) -> Iterator[Fault]:
     away = defaultdict(list)
     for r in fit.rejected:
         if r.stray is not None:
-            away[r.stray.laser_id, r.stray.standoff_mm].append(r.stray)
-    for (laser, standoff), strays in away.items():
-        sd = stated_sd(strays, fit.rig.noise)
-        apart = np.abs(positions(strays) - np.median(positions(strays), axis=0))
-        if len(strays) > 1 and (np.nan_to_num(apart) < 10 * sd * fit.cells.repeat_scale).all():
+            away[r.stray.laser_id, r.stray.placement].append(r.stray)
+    for (laser, placement), strays in away.items():
+        used = [s for s in fit.used if (s.laser_id, s.placement) == (laser, placement)]
+        if _is_another_spot(fit, strays, used):
             yield Fault(
                 "reflection",
-                f"laser {laser} at {standoff:g} mm: {len(strays)} of its captures agree on a spot where it"
-                " cannot"
-                " be; they are left out. Cause: a reflection, or another laser lit in its place. Do: cover"
-                " what shines, look at the frames listed as not used, and capture again",
+                f"laser {laser} at {strays[0].standoff_mm:g} mm: {len(strays)} of its captures agree on a"
+                " spot where it cannot be; they are left out. Cause: a reflection, or another laser lit in"
+                " its place. Do: cover what shines, look at the frames listed as not used, and capture again",
             )
+
+
+def _is_another_spot(fit: Fit, strays: Sequence[Sighting], used: Sequence[Sighting]) -> bool:
+    """Whether strays agree, in each coordinate that they have, and not with the repeats that are used."""
+    position = positions(strays)
+    count = np.isfinite(position).sum(axis=0)
+    if not count.any() or (count == 1).any():  # one alone agrees with nothing
+        return False
+    seen = count > 0
+    wide = 10 * fit.cells.repeat_scale * stated_sd(strays, fit.rig.noise)[:, seen]
+    middle = np.nanmedian(position[:, seen], axis=0)
+    apart = np.abs(position[:, seen] - middle)
+    if not (np.isnan(apart) | (apart < wide)).all():
+        return False
+    if not used:
+        return True
+    rest, _ = weighted_mean(positions(used), stated_sd(used, fit.rig.noise))
+    return bool((np.abs(middle - rest[seen]) > wide.max(axis=0)).any())
 
 
 def _never_lit(fit: Fit) -> Iterator[Fault]:

@@ -223,9 +223,7 @@ def _nearby(left: Refit, rows: BoolArray, index: int, at_mm: float) -> float:
 
 def _stands(left: Refit, index: int, standoff_mm: float) -> Refit:
     """The refit as it is, looking at a placement that stands elsewhere."""
-    problem = _problem_at(left.problem, index, standoff_mm)
-    residual, jacobian = problem.linearise(left.y, left.scale)
-    return replace(left, problem=problem, residual=residual, jacobian=jacobian)
+    return left.with_unused(_problem_at(left.problem, index, standoff_mm))
 
 
 def _problem_at(problem: Problem, index: int, standoff_mm: float) -> Problem:

@@ -16,6 +16,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.calibration.averaging import scatter_chi2
 from workbench.calibration.fit import Fit
 from workbench.calibration.hypotheses import DECISIVE, SPOT_COST
 from workbench.calibration.observations import Sighting, positions, stated_sd
@@ -73,6 +74,7 @@ class _Captures:
     """(n,) which cell of the fit it belongs to."""
     position_px: FloatArray
     sd_px: FloatArray
+    """(n,) as the repeats of the fit scatter; shared errors are apart from it."""
     stray: NDArray[np.bool_]
 
     @classmethod
@@ -85,15 +87,37 @@ class _Captures:
         used = {s.source for n in cells.values() for s in fit.cells.members[n]}
         position = positions(mine)
         capture, axis = np.nonzero(np.isfinite(position))
+        cell = np.array([cells[s.laser_id] for s in mine], np.intp)[capture]
+        scale = {int(n): _repeat_scale(fit, int(n)) for n in cells.values()}
         return cls(
             sightings=mine,
             capture=capture,
             axis=axis,
-            cell=np.array([cells[s.laser_id] for s in mine], np.intp)[capture],
+            cell=cell,
             position_px=position[capture, axis],
-            sd_px=stated_sd(mine, fit.rig.noise)[capture, axis],
+            sd_px=stated_sd(mine, fit.rig.noise)[capture, axis] * np.array([scale[n] for n in cell.tolist()]),
             stray=np.array([s.source not in used for s in mine], bool)[capture],
         )
+
+
+def _repeat_scale(fit: Fit, cell: int) -> float:
+    """Factor on the stated deviations of a spot's repeats.
+
+    Repeats that scatter more than all others (torn) are as noisy as they are to both sides of the split that
+    leaves the least: a step among them is then no noise, and noise is no step.
+    """
+    usual, members = fit.cells.repeat_scale, fit.cells.members[cell]
+    if cell not in fit.cells.torn:
+        return usual
+    position, sd = positions(members), stated_sd(members, fit.rig.noise)
+    split = [
+        [scatter_chi2(position[part], sd[part]) for part in (slice(m), slice(m, None))]
+        for m in range(1, len(members))
+    ]
+    chi2, free = (
+        sum(column) for column in zip(*min(split, key=lambda two: two[0][0] + two[1][0]), strict=True)
+    )
+    return max(usual, (chi2 / free) ** 0.5) if free else usual
 
 
 def _movement(fit: Fit, captures: _Captures, left: Refit, index: int) -> Movement | None:

@@ -61,6 +61,13 @@ class Refit:
         rows = self.jacobian[self.used]
         return float(self.used.sum() - np.einsum("ij,jk,ik->", rows, self.covariance, rows))
 
+    def with_unused(self, problem: Problem) -> Refit:
+        """The same refit, where only rows that it has not used have other numbers."""
+        residual, jacobian = problem.linearise(self.y, self.scale)
+        other = Refit(problem, self.used, self.y, self.scale, residual, jacobian)
+        vars(other)["covariance"] = self.covariance  # of the rows used: to invert it again is dear
+        return other
+
     def at(self, scale: float) -> Refit:
         """The same rows fitted at another noise."""
         return refit(self.problem, self.used, self.y, scale)
