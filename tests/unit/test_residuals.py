@@ -128,3 +128,57 @@ def test_noise_smaller_than_stated_is_no_lag_and_no_difference(repeats: int) -> 
     told = thesis_rig(noise_px=0.12)
     for seed in range(5):
         assert alarms(residual_tests(fit(told, World(RIG, seed).sightings(repeats=repeats)))) == ()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("rounded", [False, True])
+def test_repeats_that_do_not_scatter_as_noise_are_not_tested(seed: int, rounded: bool) -> None:
+    """Every row three times the same, or positions rounded to ten times their noise."""
+    world = World(thesis_rig(noise_px=0.01), seed)
+    if rounded:
+        sightings = [
+            replace(s, u_px=round(s.u_px, 1), v_px=round(s.v_px, 1)) for s in world.sightings(repeats=8)
+        ]
+    else:
+        sightings = [replace(s, repeat=n) for s in world.sightings(repeats=1) for n in range(3)]
+    tests = residual_tests(fit(world.rig, sightings))
+    assert not [test.name for test in tests if test.name.startswith("repeats")]
+    assert alarms(tests) == ()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_repeats_rounded_to_their_noise_are_tested(seed: int) -> None:
+    world = World(thesis_rig(noise_px=0.1), seed)
+    sightings = [replace(s, u_px=round(s.u_px, 1), v_px=round(s.v_px, 1)) for s in world.sightings(repeats=8)]
+    tests = residual_tests(fit(world.rig, sightings))
+    assert "repeats: order" in {test.name for test in tests}
+    assert alarms(tests) == ()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("lasers", "standoffs_mm"), [(1, (400.0,)), (1, (200.0, 800.0)), (4, (400.0,))])
+def test_hardly_any_data_are_tested_for_nothing(
+    seed: int, lasers: int, standoffs_mm: tuple[float, ...]
+) -> None:
+    rig = RIG.model_copy(update={"lasers": RIG.lasers[:lasers]})
+    for repeats in (1, 2):
+        tests = residual_tests(fit(rig, World(rig, seed).sightings(standoffs_mm, repeats)))
+        assert all(0 <= test.p <= 1 for test in tests)
+        assert alarms(tests) == ()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_unmeasured_coordinate_has_the_place_where_the_fit_puts_it(seed: int) -> None:
+    """One laser read in v alone: its u is off the middle of the picture all the same."""
+    camera = RIG.camera.model_copy(update={"cx_px": prior(200.0, 1.0)})
+    rig = RIG.model_copy(update={"camera": camera})
+    sightings = World(rig, seed).sightings()
+    blind = fit(rig, [replace(s, u_px=float("nan")) if s.laser_id == "L2" else s for s in sightings])
+    of_l2 = blind.cells.laser == rig.laser_ids.index("L2")
+    spots = residuals._Spots.of(blind)
+    seen = np.array([s.u_px for s in sightings if s.laser_id == "L2" and s.repeat == 0])
+    mine = spots.laser == rig.laser_ids.index("L2")
+    assert mine.sum() == of_l2.sum() == len(seen)
+    # The other lasers say where the lens is; the prior of the pointing where L2 goes: within some 15 px.
+    assert np.abs((spots.place[mine, 0] + 1) * 320 - seen).max() < 15
+    assert np.ptp(spots.place[mine, 0]) > 0.2

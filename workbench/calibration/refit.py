@@ -46,6 +46,14 @@ class Refit:
         return np.asarray(np.linalg.inv(rows.T @ rows + np.eye(len(self.y))), np.float64)
 
     @property
+    def predicted_px(self) -> FloatArray:
+        """(M, 2) positions, measured or not."""
+        data = self.problem.data
+        plain = data._replace(inverse_sd=np.ones_like(np.asarray(data.inverse_sd)))
+        residual, _ = Problem(self.problem.layout, plain).linearise(self.y)
+        return np.asarray(data.position_px + residual.reshape(-1, 2))
+
+    @property
     def chi2(self) -> float:
         """Of the rows used, at the noise of this refit."""
         return float(self.residual[self.used] @ self.residual[self.used])

@@ -40,7 +40,13 @@ FALSE_ALARM = 0.01
 ABSORBED = 0.02
 """Directions of a trend of which the parameters leave less than this cannot be tested."""
 SEEN_VARIANCE = 1e-3
-"""Of the lag: two repeats of each spot are always as much apart as they are."""
+"""Of a quadratic form, a degree of freedom, for it to be tested: two repeats of each spot, say, are always as
+much apart as they are and have no lag."""
+LEAST_NOISE = 1e-3
+"""Residuals smaller than this part of their stated deviation are no noise: numbers copied, or made up."""
+MOST_EQUAL = 0.5
+"""Share of pairs of repeats with equal numbers. More are equal where positions are rounded to more than twice
+their deviation: what is left of the noise then depends on where between two numbers a spot lies."""
 FEWEST_FREE = 20
 """Degrees of freedom among repeats below which their tests are not made."""
 
@@ -57,7 +63,8 @@ class ResidualTest:
 def residual_tests(fit: Fit) -> tuple[ResidualTest, ...]:
     """Every test that the fit has data for."""
     spots = _Spots.of(fit)
-    return (*_trends(spots, len(fit.rig.lasers)), *_of_spots(fit, spots), *_of_repeats(fit))
+    tests = (*_trends(spots, len(fit.rig.lasers)), *_of_spots(fit, spots), *_of_repeats(fit))
+    return tuple(test for test in tests if np.isfinite(test.p))
 
 
 def alarms(tests: tuple[ResidualTest, ...]) -> tuple[ResidualTest, ...]:
@@ -139,7 +146,7 @@ class _Spots:
             axis=axis,
             outward=np.where(along[laser] == axis, sign[laser], 0.0),
             distance=_spread(np.log(standoff))[rows // 2],
-            place=np.nan_to_num(2 * (cells.position_px - fit.residual_px) / size - 1)[rows // 2],
+            place=(2 * whole.predicted_px / size - 1)[rows // 2],
         )
 
     def trend_p(self, pixels: FloatArray) -> float:
@@ -153,14 +160,18 @@ class _Spots:
         return float(chdtrc(seen.sum(), (score**2 / left[seen]).sum())) if seen.any() else float("nan")
 
     def quadratic_p(self, weight: FloatArray) -> float:
-        """Two-sided chance of r^T B r with B (n, n), whatever the size of the noise."""
-        freedom = np.trace(self.covariance)
+        """Two-sided chance of r^T B r, B (n, n), whatever the size of the noise; NaN if it cannot vary."""
+        freedom = float(np.trace(self.covariance))
+        if freedom < 1 or self.residual @ self.residual < LEAST_NOISE**2 * freedom:
+            return float("nan")
         weight = weight - np.trace(weight @ self.covariance) / freedom * np.eye(len(weight))
         noise2 = float(self.residual @ self.residual) / freedom
         product = weight @ self.covariance
         square = product @ product
         moments = np.trace(product), 2 * np.trace(square), 8 * np.trace(square @ product)
         value = float(self.residual @ weight @ self.residual) / noise2
+        if moments[1] < SEEN_VARIANCE * freedom:
+            return float("nan")
         return _two_sided(value, *map(float, moments))
 
 
@@ -176,9 +187,7 @@ def _trends(spots: _Spots, lasers: int) -> Iterator[ResidualTest]:
         "v": _by_axis(axes, legvander(spots.place[:, 1], 3)[:, 1:]),
     }
     for name, pixels in trends.items():
-        p = spots.trend_p(pixels)
-        if np.isfinite(p):
-            yield ResidualTest(name, p)
+        yield ResidualTest(name, spots.trend_p(pixels))
 
 
 def _of_spots(fit: Fit, spots: _Spots) -> Iterator[ResidualTest]:
@@ -208,12 +217,17 @@ def _contrasts(
 
 def _of_repeats(fit: Fit) -> Iterator[ResidualTest]:
     """Deviations of the repeats from their means."""
-    groups = [_Repeats.of(fit, cell, axis) for cell in range(len(fit.cells.laser)) for axis in (0, 1)]
+    groups = [
+        _Repeats.of(fit, cell, axis)
+        for axis in (0, 1)
+        if _share_equal(fit, axis) <= MOST_EQUAL
+        for cell in range(len(fit.cells.laser))
+    ]
     groups = [g for g in groups if len(g.deviation) > 1]
     free = np.array([len(g.deviation) - 1 for g in groups])
-    if free.sum() < FEWEST_FREE:
-        return
     square = np.array([g.deviation @ g.deviation for g in groups])
+    if free.sum() < FEWEST_FREE or square.sum() < LEAST_NOISE**2 * free.sum():
+        return
     noise2 = square.sum() / free.sum()
     mean = sum(g.lag_mean() for g in groups) / free.sum()
     value, variance, third = np.array([g.lag(mean) for g in groups]).sum(axis=0)
@@ -228,6 +242,17 @@ def _of_repeats(fit: Fit) -> Iterator[ResidualTest]:
         moments = 2 * (centred**2 * free).sum(), 8 * (centred**3 * free).sum()
         p = _two_sided(float((centred * square).sum() / noise2), 0.0, *map(float, moments))
         yield ResidualTest(f"repeats: {words[kind]}" + (f": {which}" if which else ""), p)
+
+
+def _share_equal(fit: Fit, axis: int) -> float:
+    """Of all pairs of repeats of a spot, those whose coordinates are the same number; 0 where none are."""
+    equal = pairs = 0
+    for members in fit.cells.members:
+        value = positions(members)[:, axis]
+        count = np.unique(value[np.isfinite(value)], return_counts=True)[1]
+        equal += int((count * (count - 1)).sum())
+        pairs += int(count.sum() * (count.sum() - 1))
+    return equal / max(pairs, 1)
 
 
 @dataclass(frozen=True)
