@@ -26,7 +26,7 @@ def main() -> int:
     """Run, print, write; 1 if a figure is missed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--thousands", type=int, default=10, help="how many times 1000 calibrations at once")
-    parser.add_argument("--chosen", type=int, default=1, help="how many times 1000 one by one")
+    parser.add_argument("--chosen", type=int, default=2, help="how many times 1000 one by one")
     asked = parser.parse_args()
     rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
     today = dt.datetime.now(tz=dt.UTC).date().isoformat()
