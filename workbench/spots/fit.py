@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from workbench.spots.noise import Noise
-from workbench.spots.scoring import score
+from workbench.spots.scoring import JUDGED, score
 from workbench.spots.types import Bools, Floats
 
 
@@ -48,22 +47,10 @@ class Fit:
     slope_dn: Floats
     """(n,) measured photon-transfer slope."""
     judged: Floats
-    """(n, 8): largest squared residual over its variance; the mean of these at the window's rim; highest
-    value of the signal, DN; its square over the variance, summed; standard deviation of flux (DN), u and v
-    (pixels); square of the score by a shear over its variance, 0 if the model has a shear."""
-
-
-@lru_cache(maxsize=32)
-def _ridge(k: int) -> tuple[Floats, Floats]:
-    """Factor and addend of a matrix of k parameters that keep a singular one invertible."""
-    return 1.0 + 1e-10 * np.eye(k), 1e-12 * np.eye(k)
-
-
-def inverse(information: Floats) -> Floats:
-    """Inverse of (n, k, k) information matrices; a ridge that only a singular one feels keeps it finite."""
-    factor, addend = _ridge(information.shape[1])
-    inverted = np.linalg.inv(information * factor + addend)
-    return np.asarray(inverted, np.float64)
+    """(n, JUDGED): largest squared residual over its variance; the mean of these over the used pixels of the
+    window's rim; highest value of the signal, DN; its square over the variance, summed; standard deviation of
+    flux (DN), u and v (pixels); square of the score by a shear over its variance, 0 if the model has a shear;
+    number of the rim's used pixels."""
 
 
 def fit_spots(win: Windows, start: Floats, noise: Noise) -> Fit:
@@ -84,7 +71,7 @@ def fit_spots(win: Windows, start: Floats, noise: Noise) -> Fit:
         np.empty(shape),
         np.empty(n, bool),
         np.empty(n),
-        np.empty((n, 8)),
+        np.empty((n, JUDGED)),
     )
     score(
         win.data,

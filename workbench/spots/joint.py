@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from workbench.spots.fit import Windows, inverse
+from workbench.spots.fit import Windows
 from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, V, derivatives, principal_axes
 from workbench.spots.noise import Noise, photon_transfer_slope
+from workbench.spots.sums import invert
 from workbench.spots.types import Bools, Floats
 
 _MAX_STEPS = 30
@@ -19,6 +20,8 @@ _MAX_MOVE_PX = 0.7
 _MAX_STRETCH = 0.3
 _LN_WIDTH_RANGE = (float(np.log(0.3)), float(np.log(12.0)))
 _TOLERANCE_SD = 0.1
+# As in `judging`; less, for the widths are known from all spots together (docs/spots.md).
+_SECOND_ORDER = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +62,15 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
         residual = data - params[0, 0] - signal
         jacobian = _jacobian(params, rows)
         weighted = jacobian * used
-        cov = inverse((weighted @ jacobian.T)[None])[0]
+        cov = np.empty((len(jacobian), len(jacobian)))
+        invert(weighted @ jacobian.T, cov)
         delta = cov @ (weighted @ residual)
         converged = bool((np.abs(delta) <= _TOLERANCE_SD * np.sqrt(np.maximum(np.diag(cov), 0.0))).all())
         params = _moved(params, delta)
         if converged:
             break
     sd = np.sqrt(np.maximum(np.diag(cov)[3:], 0.0)).reshape(-1, 3)
+    sd[:, 1:] = _with_second_order(sd[:, 1:], np.exp(params[:, LN_SU:SHEAR]))
     leverage = ((cov @ jacobian) * jacobian).sum(axis=0)
     one = (1, *win.shape)
     slope = photon_transfer_slope(
@@ -73,6 +78,16 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
     )
     measured = Noise(noise.floor_dn2, slope)
     return Joint(params, sd, float(used @ residual**2), residual, used, measured, converged)
+
+
+def _with_second_order(sd_px: Floats, width_px: Floats) -> Floats:
+    """(k, 2) deviations of u and v, with the next term of their series in 1 / A, as in `judging`.
+
+    The variance of a spot alone in white noise is 2 width^2 / A; so A is taken from it, for a neighbour that
+    overlaps takes a part of what tells away.
+    """
+    widened: Floats = sd_px * np.sqrt(1.0 + 0.5 * _SECOND_ORDER * (sd_px / width_px) ** 2)
+    return widened
 
 
 def _weights(win: Windows, signal: Floats, noise: Noise) -> Floats:

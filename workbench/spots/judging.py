@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.spots.compiled import compiled
 from workbench.spots.cutting import half_for
-from workbench.spots.scoring import score
+from workbench.spots.scoring import JUDGED, score
 from workbench.spots.types import Bools, Floats
 
 Ints = NDArray[np.intp]
@@ -62,16 +62,15 @@ def without_outliers(
 
 
 @compiled
-def _raise_floor(floor: Floats, judged: Floats, half: int) -> bool:
+def _raise_floor(floor: Floats, judged: Floats) -> bool:
     """Raise the floor (n,) of windows whose rim is noisier than predicted; whether any is.
 
-    Clutter and bright surroundings do that. The threshold is 5 sd of the estimate, so that an even scene
-    keeps the strip's floor, which is known better.
+    Clutter and bright surroundings do that. The threshold is 5 sd of the estimate from those of
+    the rim's pixels that are used, so that an even scene keeps the strip's floor, which is known better.
     """
-    limit = 1.0 + _RIM_SD * math.sqrt(2.0 / (8 * half))
     raised = False
     for i in range(len(floor)):
-        if judged[i, 1] > limit:
+        if judged[i, 1] > 1.0 + _RIM_SD * math.sqrt(2.0 / max(judged[i, 8], 1.0)):
             floor[i] *= judged[i, 1]
             raised = True
     return raised
@@ -102,7 +101,7 @@ def _fit_tilted(
     `start` (6,) is that of an upright one, `tilted` (1, 7) is filled.
     """
     tilted[0, :6], tilted[0, 6] = start, 0.0
-    cov, judged, slope = np.empty((1, 7, 7)), np.empty((1, 8)), np.empty(1)
+    cov, judged, slope = np.empty((1, 7, 7)), np.empty((1, JUDGED)), np.empty(1)
     signal, residual, weight = np.empty_like(data), np.empty_like(data), np.empty_like(data)
     converged = np.empty(1, np.bool_)
     score(data, usable, clip, floor, guess, tilted, cov, signal, residual, weight, converged, slope, judged)
@@ -165,7 +164,7 @@ def fit_group(
     for i in range(n):
         origin[i, 2], origin[i, 3] = cols[group[i]] - half, rows[group[i]] - half
         params[i] = start[group[i]] - origin[i, :6]
-    cov, judged, slope = np.empty((n, 6, 6)), np.empty((n, 8)), np.empty(n)
+    cov, judged, slope = np.empty((n, 6, 6)), np.empty((n, JUDGED)), np.empty(n)
     signal, residual, weight = np.empty_like(data), np.empty_like(data), np.empty_like(data)
     floor, guess, converged = np.full(n, variance), np.full(n, slope_dn), np.empty(n, np.bool_)
     asked = True
@@ -189,7 +188,7 @@ def fit_group(
         if turn == 0:
             usable, asked = without_outliers(usable, signal, residual, weight, judged)
         elif turn == 1:
-            asked = _raise_floor(floor, judged, half)
+            asked = _raise_floor(floor, judged)
     for i in range(n):
         k = group[i]
         start[k] = params[i] + origin[i, :6]

@@ -13,6 +13,8 @@ from workbench.spots.sums import dense_sums, fill_leverage, invert, separable_su
 from workbench.spots.transfer import transfer_slope
 from workbench.spots.types import Bools, Floats
 
+# Columns of `Fit.judged`.
+JUDGED: Final = 9
 _MAX_STEPS: Final = 20
 _MAX_STEP: Final = np.array([math.inf, math.inf, 1.0, 1.0, 0.4, 0.4, 0.4])
 # Of both logarithms of the width, and of the shear.
@@ -146,20 +148,20 @@ def _tilt(along_u: Floats, along_v: Floats, weight: Floats, residual: Floats) ->
 
 @compiled
 def _judge(signal: Floats, residual: Floats, weight: Floats, cov: Floats, flux: float, out: Floats) -> None:
-    """Fill all but the last of a window's `Fit.judged`."""
+    """Fill a window's `Fit.judged`, all but the score by a shear."""
     height, width = signal.shape
-    worst = whole = inner = told = 0.0
-    peak = -math.inf
+    worst = at_rim = told = 0.0
+    peak, in_rim = -math.inf, 0
     for y in range(height):
         for x in range(width):
             excess = residual[y, x] * residual[y, x] * weight[y, x]
             worst = max(worst, excess)
             peak = max(peak, signal[y, x])
             told += weight[y, x] * signal[y, x] * signal[y, x]
-            whole += excess
-            if 0 < y < height - 1 and 0 < x < width - 1:
-                inner += excess
-    out[0], out[1], out[2], out[3] = worst, (whole - inner) / (2 * (height + width - 2)), peak, told
+            if y == 0 or y == height - 1 or x == 0 or x == width - 1:
+                at_rim += excess
+                in_rim += weight[y, x] > 0.0
+    out[0], out[1], out[2], out[3], out[8] = worst, at_rim / max(in_rim, 1), peak, told, in_rim
     out[4] = math.sqrt(max(cov[1, 1], 0.0))
     out[5] = math.sqrt(max(cov[2, 2], 0.0)) / max(flux, 1e-12)
     out[6] = math.sqrt(max(cov[3, 3], 0.0)) / max(flux, 1e-12)
