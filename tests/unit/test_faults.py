@@ -105,6 +105,18 @@ class TestFaults:
 
 
 @pytest.mark.parametrize("seed", SEEDS[:2])
+@pytest.mark.parametrize("standoffs_mm", [(200.0,), (200.0, 200.0), (200.0, 230.0)])
+def test_few_standoffs_that_are_near_are_not_called_far(seed: int, standoffs_mm: tuple[float, ...]) -> None:
+    fit = fit_without_outliers(RIG, World(RIG, seed).sightings(standoffs_mm))
+    assert find_faults(fit, ()) == ()
+
+
+def test_lasers_read_across_their_line_alone_are_not_called_far() -> None:
+    sightings = [replace(s, u_px=float("nan")) for s in World(RIG, 1).sightings()]
+    assert find_faults(fit_without_outliers(RIG, sightings), ()) == ()
+
+
+@pytest.mark.parametrize("seed", SEEDS[:2])
 def test_two_standoffs_mistyped(seed: int) -> None:
     sightings = told_as(told_as(World(RIG, seed).sightings(), 600.0, 6000.0), 160.0, 170.0)
     faults = named(sightings)

@@ -15,6 +15,8 @@ from workbench.calibration.fit import Fit
 from workbench.calibration.hypotheses import Hypothesis, explain_misfit
 from workbench.calibration.moved import Movement, find_movements
 from workbench.calibration.observations import Sighting, positions, stated_sd
+from workbench.calibration.parameters import LENS, RAY, REFERENCE
+from workbench.calibration.sensor import spots
 from workbench.calibration.validation import LeftOut
 
 FaultName = Literal[
@@ -35,7 +37,7 @@ SUSPECT = 1e-3
 """Captures of a placement less likely than this are looked at one by one."""
 SATURATED_SHARE = 0.2
 LEAST_TRAVEL = 0.05
-"""Of the picture: spots that all move less between nearest and farthest standoff were seen from afar only."""
+"""Of the picture: spots that all move less from the nearest standoff to infinity were seen from afar only."""
 
 
 @dataclass(frozen=True)
@@ -205,21 +207,28 @@ def _saturated(fit: Fit) -> Iterator[Fault]:
 
 
 def _all_far(fit: Fit) -> Iterator[Fault]:
-    cells, camera = fit.cells, fit.rig.camera
-    size = np.array([camera.width_px, camera.height_px])
-    position = cells.position_px - fit.residual_px
-    travel = 0.0
-    for laser in set(cells.laser.tolist()):
-        mine = position[cells.laser == laser]
-        axis = "uv".index(fit.rig.lasers[laser].axis)
-        if np.isfinite(mine[:, axis]).any():
-            travel = max(travel, float(np.nanmax(mine[:, axis]) - np.nanmin(mine[:, axis])) / size[axis])
-    if travel < LEAST_TRAVEL:
-        nearest = min(p.standoff_mm for p in cells.placements)
+    reaches = [_reach(fit, laser) for laser in range(len(fit.rig.lasers))]
+    known = [reach for reach in reaches if reach is not None]
+    if known and max(known) < LEAST_TRAVEL:
+        nearest = min(p.standoff_mm for p in fit.cells.placements)
         yield Fault(
             "all_far",
-            f"all standoffs are far: from {nearest:g} mm on no spot moves by more than {100 * travel:.1f} %"
-            " of the"
-            " picture, too little to tell lens, offset and pointing apart. Do: add standoffs nearer to the"
-            " sensor, down to where the outermost spot leaves the picture",
+            f"all standoffs are far: from {nearest:g} mm on no spot moves by more than"
+            f" {100 * max(known):.1f} % of the picture, too little to tell lens, offset and pointing apart."
+            " Do: add standoffs nearer to the sensor, down to where the outermost spot leaves the picture",
         )
+
+
+def _reach(fit: Fit, laser: int) -> float | None:
+    """Share of the picture from a laser's nearest spot to where it ends at infinity; None if hardly seen."""
+    cells, camera = fit.cells, fit.rig.camera
+    axis = "uv".index(fit.rig.lasers[laser].axis)
+    mine = np.flatnonzero((cells.laser == laser) & np.isfinite(cells.position_px[:, axis]))
+    standoff = np.array([cells.placements[n].standoff_mm for n in cells.placement[mine]])
+    if len(np.unique(standoff)) < 2:
+        return None
+    near = mine[np.argmin(standoff)]
+    start = len(LENS) + len(REFERENCE) + len(RAY) * laser
+    infinity = spots(fit.values[: len(LENS)], fit.values[start : start + len(RAY)], np.zeros(1))
+    away = cells.position_px[near, axis] - fit.residual_px[near, axis] - np.asarray(infinity)[0, axis]
+    return float(abs(away) / (camera.width_px, camera.height_px)[axis])

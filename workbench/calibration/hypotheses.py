@@ -22,7 +22,7 @@ from scipy.special import chdtrc, fdtrc
 from workbench.calibration.fit import Fit
 from workbench.calibration.problem import Problem
 from workbench.calibration.refit import Refit, measured, optimum_of, problem_of, refit, rows_of
-from workbench.calibration.validation import by_standoff, predictive, range_error
+from workbench.calibration.validation import by_standoff, predictive, range_error, rows_at
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -51,6 +51,8 @@ STUDENT_SQUARE = 9.0
 """Squared distance, in variances, at which a spot weighs half when spots are reweighted."""
 START_WEIGHT = 1e-4
 REWEIGHTINGS = 12
+UNTOLD = 1e-9
+"""Share of a prior's variance by which data narrow it; with less they say nothing of it."""
 
 
 @dataclass(frozen=True)
@@ -181,14 +183,26 @@ def _from_priors(problem: Problem, used: BoolArray) -> Refit:
 def _standoffs(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
     """Each placement's standoff free; the rest must be better off without the placement by what it takes."""
     cost = STANDOFF_COST + 2 * log(len(fit.cells.placements))
-    for index in range(len(fit.cells.placements)):
-        rows = rows_of(fit.cells.placement == index, state.problem) & state.used
+    boards = {view.placement.key for view in fit.boards}
+    for index, info in enumerate(fit.cells.placements):
+        rows = rows_at(state.problem, index) & state.used
         others = state.used & ~rows
+        on_board = info.key in boards
         if not rows.any() or not others.any():
             continue
+        # The noise of a board's corners would pass for a gain: there, what the standoff costs is the measure.
+        if on_board and _strain(fit, state, index) < cost + DECISIVE:
+            continue
         left = _from_priors(state.problem, others)
-        if state.cost - left.cost > cost + DECISIVE:
+        if on_board or state.cost - left.cost > cost + DECISIVE:
             yield _scored("standoff", (index,), state, _freed(fit, state, left, rows, index), cost)
+
+
+def _strain(fit: Fit, state: Refit, index: int) -> float:
+    """By how much the cost falls if a placement's error needs no prior, to first order."""
+    error = _error_index(fit, index)
+    told = 1.0 - state.covariance[error, error]
+    return float(state.y[error] ** 2 / told) if told > UNTOLD else 0.0
 
 
 def _freed(fit: Fit, state: Refit, left: Refit, rows: BoolArray, index: int) -> Refit:

@@ -72,6 +72,7 @@ class LeftOut:
     freedom: float
     """Of the noise, where it is the other placements'; infinite where it is the stated one."""
     lasers: tuple[LaserError, ...]
+    """None on the printed board: without its corners its tilt is anything, and one spot's range with it."""
 
     @property
     def z(self) -> float:
@@ -116,7 +117,7 @@ def _leave_out(fit: Fit, problem: Problem, start: FloatArray, index: int) -> Lef
     cells = fit.cells.placement == index
     spots = rows_of(cells, problem) & measured(problem)
     info = fit.cells.placements[index]
-    others = measured(problem) & ~_rows_at(problem, index)
+    others = measured(problem) & ~rows_at(problem, index)
     solve = refit_with_scale if fit.noise_scale > 1 else refit
     left = solve(problem, others, _without(start, fit, info.key))
     w = by_standoff(left)
@@ -124,9 +125,10 @@ def _leave_out(fit: Fit, problem: Problem, start: FloatArray, index: int) -> Lef
         return None
     error, sd = range_error(left, spots, w)
     lasers = []
+    on_board = any(view.placement.key == info.key for view in fit.boards)
     for laser, laser_id in enumerate(fit.rig.laser_ids):
         mine = spots & rows_of(cells & (fit.cells.laser == laser), problem)
-        if (w[mine] ** 2).sum() > 0:
+        if not on_board and (w[mine] ** 2).sum() > 0:
             lasers.append(LaserError(laser_id, *range_error(left, mine, w)))
     chi2 = deleted_chi2(left, spots)
     return LeftOut(
@@ -141,7 +143,7 @@ def _leave_out(fit: Fit, problem: Problem, start: FloatArray, index: int) -> Lef
     )
 
 
-def _rows_at(problem: Problem, index: int) -> NDArray[np.bool_]:
+def rows_at(problem: Problem, index: int) -> NDArray[np.bool_]:
     """(R,) rows of everything seen at a placement, corners of the board too."""
     placement = np.concatenate([problem.data.spots.placement, problem.data.corners.placement])
     return np.repeat(placement == index, 2)

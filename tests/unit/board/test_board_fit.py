@@ -16,6 +16,7 @@ from workbench.calibration.export import calibrate, render
 from workbench.calibration.fit import Fit, fit
 from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.significance import fit_chosen
+from workbench.calibration.validation import leave_each_out
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance, load_calibration
 from workbench.model.errors import BadInputError
@@ -208,3 +209,13 @@ def test_terms_are_weighed_with_the_board_as_well(seed: int) -> None:
     told = {term.name: term for term in fitted.terms}
     assert told["k1"].verdict == "shown"
     assert set(told) == {"k2", "k1", "ruler_scale", "tilts"}
+
+
+@pytest.mark.parametrize("seed", SEEDS[:2])
+def test_a_board_left_out_is_ranged_by_all_lasers_together_alone(seed: int) -> None:
+    """Its tilt is anything without its corners: one laser would be promised centimetres."""
+    folds = {fold.placement: fold for fold in leave_each_out(joint(board_rig(), seed)[0])}
+    assert {key for key, fold in folds.items() if not fold.lasers} == {f"B{n}" for n in range(7)}
+    for key in ("B0", "B1", "B2"):
+        assert abs(folds[key].z) < 4
+        assert folds[key].sd_mm < 0.02 * folds[key].standoff_mm
