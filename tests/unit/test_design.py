@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,22 +12,24 @@ import pytest
 from tests.proofs import bound, simulate, study
 from tests.unit.rigs import STANDOFFS_MM, World, thesis_rig
 from tests.unit.test_calibration_file import PROVENANCE
-from workbench.calibration.batch import as_grid, fit_batch
+from workbench.calibration.batch import fit_batch
 from workbench.calibration.design import (
     DRAWS,
+    SPARED,
     Aim,
     Choice,
     best_standoffs,
     candidates,
     drawn_sensors,
     posterior,
+    typical_of,
+    worst_of,
 )
 from workbench.calibration.expected import Expectation
 from workbench.calibration.export import calibrate
-from workbench.calibration.fit import fit
+from workbench.calibration.fit import Fit, fit
 from workbench.calibration.forecast import RANGES_MM, forecast
 from workbench.calibration.next_standoff import advise
-from workbench.calibration.observations import group
 from workbench.calibration.sensor import Sensor
 from workbench.model.acceptance import Acceptance
 from workbench.model.errors import BadInputError
@@ -141,8 +145,33 @@ class TestProposal:
         choice = Choice.of(sensors, np.array(standoffs), 10, aim)
         return choice.worst(range(len(standoffs)))
 
+    def test_the_criterion_is_the_worst_range_that_the_forecast_tells(self) -> None:
+        """Calibration and the noise of the spot that is ranged together."""
+        sensors = drawn_sensors(RIG)
+        aim = Aim.of(sensors, np.array(RANGES_MM), RIG.noise)
+        choice = Choice.of(sensors, np.array(SHIPPED), 10, aim)
+        told = forecast(RIG, SHIPPED, 10).worst_relative_sd
+        assert choice.worst(range(len(SHIPPED))) == pytest.approx(told, rel=1e-12)
+
+    def test_noise_that_another_laser_has_changes_the_choice(self) -> None:
+        """Two ranges: one hurt by the calibration, the other by its spot, which is the worst in all."""
+        by_parameter = np.eye(2)[None]
+        aim = Aim(by_parameter, np.array([[0.0, 10.0]]))
+        choice = Choice(np.array([1.0, 2.0]), 3.0 * np.eye(2)[None, :, None], aim)
+        assert choice.worst([0]) == pytest.approx(np.sqrt(1.0 + 100.0))
+        assert choice.worst([1]) == pytest.approx(np.sqrt(0.1 + 100.0))
+        assert choice.worst_with_one_more(np.eye(2)[None]).argmin() == 1
+
     def test_it_beats_the_shipped_procedure(self, proposed: tuple[float, ...]) -> None:
-        assert self.worst(proposed) < 0.8 * self.worst(SHIPPED)
+        assert self.worst(proposed) < 0.99 * self.worst(SHIPPED)
+
+    def test_near_ranges_are_not_given_away_for_the_worst(self, proposed: tuple[float, ...]) -> None:
+        """All far, the worst range would be 1 % better and those below 200 mm two or three times worse."""
+        near = [r for r in forecast(RIG, proposed, 10).ranges if r.range_mm <= 200]
+        shipped = [r for r in forecast(RIG, SHIPPED, 10).ranges if r.range_mm <= 200]
+        for ours, theirs in zip(near, shipped, strict=True):
+            if ours.relative_sd is not None and theirs.relative_sd is not None:
+                assert ours.relative_sd < 1.1 * theirs.relative_sd
 
     def test_no_random_design_of_its_size_beats_it(self, proposed: tuple[float, ...]) -> None:
         rng = np.random.default_rng(3)
@@ -152,17 +181,23 @@ class TestProposal:
             assert reached < self.worst(tuple(random.tolist()))
 
     def test_no_exchange_of_one_betters_it(self, proposed: tuple[float, ...]) -> None:
+        """Neither the worst range by more than was spared, nor, within that, all ranges."""
         sensors = drawn_sensors(RIG, 32)
         aim = Aim.of(sensors, np.geomspace(100.0, 5000.0, 18), RIG.noise)
         grid = candidates(RIG)
         choice = Choice.of(sensors, grid, 10, aim)
         chosen = [grid.tolist().index(s) for s in proposed]
         reached = choice.worst(chosen)
+        seen = aim.spot_sd > 0
+        typical = typical_of(aim.total(aim.variance(choice.covariance(chosen)))[:, None], seen)[0]
         for place in range(len(chosen)):
             rest = chosen[:place] + chosen[place + 1 :]
-            one_more = choice.worst_with_one_more(choice.covariance(rest))
-            others = [i for i in range(len(grid)) if i not in rest]
-            assert one_more[others].min() >= reached * (1 - 1e-3)
+            one_more = choice.with_one_more(choice.covariance(rest))[
+                :, [i for i in range(len(grid)) if i not in rest]
+            ]
+            assert worst_of(one_more).min() >= reached / (1 + SPARED)
+            as_good = worst_of(one_more) <= reached
+            assert (typical_of(one_more, seen)[as_good] >= typical * (1 - 1e-3)).all()
 
     def test_fits_of_simulated_data_agree(self, proposed: tuple[float, ...]) -> None:
         """The sd at 5 m that fits state: better by the proposal than by the shipped standoffs."""
@@ -177,7 +212,7 @@ class TestProposal:
             variance = Aim.of(sensors, np.array([5000.0]), RIG.noise).variance(covariance)
             return float(np.median(np.sqrt(variance.max(axis=-1))))
 
-        assert stated(proposed) < 0.8 * stated(SHIPPED)
+        assert stated(proposed) < 0.9 * stated(SHIPPED)
 
     def test_it_stays_within_reach(self) -> None:
         bench = RIG.bench.model_copy(update={"reach_mm": (300.0, 1500.0)})
@@ -265,24 +300,35 @@ class TestAdvice:
         sightings = World(RIG.model_copy(update={"noise": louder}), seed).sightings(SHIPPED[::2], 10)
         advice = advise(RIG, sightings, SHIPPED)
         assert advice is not None
-        cells, _ = group(sightings, RIG.laser_ids, RIG.noise)
-        position, sd = as_grid(cells, 4)
-        fitted = fit_batch(RIG, cells.placements, position[None], sd[None])
-        scale = float(fitted.noise_scale[0])
-        assert (scale > 2) == (noise == 3.0)
-        sensors = Expectation(RIG, fitted.sensor)
-        free, prior_sd = sensors.table.free, sensors.table.prior_sd[sensors.table.free]
-        covariance = fitted.sensor_covariance[:, free[:, None], free] / np.outer(prior_sd, prior_sd)
+        fitted = fit(RIG, sightings)
+        assert (fitted.noise_scale > 2) == (noise == 3.0)
+        assert advice.relative_range_sd == pytest.approx(self.worst_of_fit(fitted), rel=1e-3)
+
+    @pytest.mark.parametrize("told", [{"standoff_sd_mm": 5.0}, {"yaw_deg": 20.0}])
+    def test_what_captures_tell_of_their_placement_counts(self, told: dict[str, Any]) -> None:
+        plain = World(RIG, 3).sightings(SHIPPED[::2], 10)
+        sightings = [replace(s, **told) for s in plain]
+        advice, without = advise(RIG, sightings, SHIPPED), advise(RIG, plain, SHIPPED)
+        assert advice is not None
+        assert without is not None
+        assert advice.relative_range_sd == pytest.approx(self.worst_of_fit(fit(RIG, sightings)), rel=1e-3)
+        assert advice.relative_range_sd != pytest.approx(without.relative_range_sd, rel=0.01)
+
+    @staticmethod
+    def worst_of_fit(fitted: Fit) -> float:
+        """The worst range over the shipped procedure's span, the noise of its spot included."""
+        sensors = Expectation(RIG, fitted.values[None, fitted.sensor])
+        free = sensors.table.free
+        prior_sd = sensors.table.prior_sd[free]
+        covariance = fitted.covariance[np.ix_(free, free)] / np.outer(prior_sd, prior_sd)
         spot = RIG.noise.model_copy(
             update={
-                "spot_sd_px": RIG.noise.spot_sd_px * scale * cells.repeat_scale,
-                "speckle_sd_px": RIG.noise.speckle_sd_px * scale,
+                "spot_sd_px": RIG.noise.spot_sd_px * fitted.noise_scale * fitted.cells.repeat_scale,
+                "speckle_sd_px": RIG.noise.speckle_sd_px * fitted.noise_scale,
             }
         )
         aim = Aim.of(sensors, np.geomspace(125.0, 4500.0, 18), spot)
-        worst = np.sqrt((aim.variance(covariance) + aim.spot_sd**2).max())
-        # The fit estimates the noise with the placements' errors fitted, the advice with them as noise.
-        assert advice.relative_range_sd == pytest.approx(worst, rel=0.02 if noise == 1.0 else 0.1)
+        return float(np.sqrt((aim.variance(covariance[None]) + aim.spot_sd**2).max()))
 
     def test_too_little_is_no_advice(self) -> None:
         world = World(RIG, 3)

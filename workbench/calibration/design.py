@@ -4,13 +4,13 @@ To first order what spots tell of the parameters depends on the sensor, not on t
 which sensor it is: the more a lens bends, the better its centre shows. So everything is worked out for many
 sensors drawn from the rig's tolerances, and told of the median one.
 
-The criterion is the worst relative sd of a range that the calibration causes. The noise of the spot that is
-ranged adds to it, and is the same with every design.
+The criterion is the worst relative sd of a range, by the calibration and the noise of the spot that is ranged
+together. That noise is the same with every design, but it says which range is the worst.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -34,6 +34,10 @@ ROUNDS = 6
 """Of exchanges, at most; two or three do."""
 WORTH = 1e-4
 """Relative gain for which one standoff is exchanged for another."""
+SPARED = 0.01
+"""Of the worst range, for the sake of all others."""
+Cost = Callable[[FloatArray], FloatArray]
+"""(C,) from the relative variance of ranges (N, C, K)."""
 
 
 class Aim(NamedTuple):
@@ -50,6 +54,11 @@ class Aim(NamedTuple):
         rows, own = expectation.range_rows(range_mm, mean_sd_px(noise, 1))
         flat = rows[..., expectation.table.free].reshape(len(rows), own[0].size, -1)
         return cls(np.nan_to_num(flat), np.nan_to_num(own).reshape(len(rows), -1))
+
+    def total(self, by_calibration: FloatArray) -> FloatArray:
+        """(N, ..., K) relative variance of ranges, from that which the calibration causes."""
+        own = self.spot_sd.reshape(len(self.spot_sd), *(1,) * (by_calibration.ndim - 2), -1)
+        return np.asarray(by_calibration + own**2)
 
     def variance(self, covariance: FloatArray) -> FloatArray:
         """(N, K) relative variance of ranges that a calibration with covariance (N, F, F) causes."""
@@ -78,19 +87,23 @@ class Choice:
 
     def worst(self, chosen: Sequence[int]) -> float:
         """The criterion."""
-        return float(worst_of(self.aim.variance(self.covariance(chosen))))
+        return float(worst_of(self.aim.total(self.aim.variance(self.covariance(chosen)))))
 
     def worst_with_one_more(self, covariance: FloatArray) -> FloatArray:
-        """(C,) the criterion with a placement at each candidate more than gave the covariance (N, F, F).
+        """(C,) the criterion with a placement at each candidate more than gave the covariance (N, F, F)."""
+        return worst_of(self.with_one_more(covariance))
 
-        A rank-M update of the covariance (Sherman, Morrison and Woodbury) of which only the ranges are worked
-        out.
+    def with_one_more(self, covariance: FloatArray) -> FloatArray:
+        """(N, C, K) relative variance of ranges with a placement at each candidate more.
+
+        A rank-M update of the covariance (N, F, F) (Sherman, Morrison and Woodbury) of which only the ranges
+        are worked out.
         """
         told = self.rows @ covariance[:, None]
         noise = told @ np.swapaxes(self.rows, 2, 3) + np.eye(self.rows.shape[2])
         by_range = told @ np.swapaxes(self.aim.by_parameter, 1, 2)[:, None]
         gained = (np.linalg.solve(np.linalg.cholesky(noise), by_range) ** 2).sum(axis=2)
-        return worst_of(self.aim.variance(covariance)[:, None] - gained)
+        return self.aim.total(self.aim.variance(covariance)[:, None] - gained)
 
 
 def posterior(rows: FloatArray) -> FloatArray:
@@ -102,6 +115,12 @@ def posterior(rows: FloatArray) -> FloatArray:
 def worst_of(variance: FloatArray) -> FloatArray:
     """(...) of (N, ..., K): the largest relative sd over all ranges, of the median sensor."""
     return np.asarray(np.median(np.sqrt(np.maximum(variance, 0.0).max(axis=-1)), axis=0))
+
+
+def typical_of(variance: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
+    """(C,) of (N, C, K): geometric mean of the relative sd over all ranges that are seen (N, K)."""
+    logs = np.log(variance, out=np.zeros_like(variance), where=np.broadcast_to(seen[:, None], variance.shape))
+    return np.asarray(np.exp(0.5 * logs.sum(axis=(0, 2)) / max(int(seen.sum()), 1)))
 
 
 def mean_sd_px(noise: NoiseSpec, repeats: int) -> float:
@@ -137,6 +156,10 @@ def candidates(rig: Rig) -> FloatArray:
 def propose(choice: Choice, count: int) -> tuple[float, ...]:
     """Standoffs that make the criterion small: one after the other, then each exchanged while that helps.
 
+    Far away the noise of the spot that is ranged is most of the worst range, and many designs are as good as
+    the best. So standoffs are exchanged once more: of designs within `SPARED` of it the one whose ranges are
+    good everywhere.
+
     V. V. Fedorov, "Theory of Optimal Experiments" (1972), with another criterion. The optimum is a local one.
 
     Raises:
@@ -152,23 +175,34 @@ def propose(choice: Choice, count: int) -> tuple[float, ...]:
         )
     chosen: list[int] = []
     for _ in range(count):
-        chosen.append(_best(choice, chosen, seen)[0])
-    reached = choice.worst(chosen)
+        chosen.append(_best(choice, chosen, seen, worst_of)[0])
+    chosen = _exchanged(choice, chosen, seen, worst_of)
+    limit = choice.worst(chosen) * (1 + SPARED)
+
+    def typical(variance: FloatArray) -> FloatArray:
+        return np.where(worst_of(variance) <= limit, typical_of(variance, choice.aim.spot_sd > 0), np.inf)
+
+    return tuple(sorted(choice.standoff_mm[_exchanged(choice, chosen, seen, typical)].tolist()))
+
+
+def _exchanged(choice: Choice, chosen: list[int], allowed: NDArray[np.bool_], cost: Cost) -> list[int]:
+    """The chosen candidates, each exchanged for another while that lowers the cost."""
+    reached = np.inf
     for _ in range(ROUNDS):
         before = reached
-        for place in range(count):
+        for place in range(len(chosen)):
             rest = [*chosen[:place], *chosen[place + 1 :]]
-            best, worst = _best(choice, rest, seen)
-            if worst < reached * (1 - WORTH):
-                chosen, reached = [*rest[:place], best, *rest[place:]], worst
+            best, cheapest = _best(choice, rest, allowed, cost)
+            if cheapest < reached * (1 - WORTH):
+                chosen, reached = [*rest[:place], best, *rest[place:]], cheapest
         if reached == before:
             break
-    return tuple(sorted(choice.standoff_mm[chosen].tolist()))
+    return chosen
 
 
-def _best(choice: Choice, chosen: Sequence[int], allowed: NDArray[np.bool_]) -> tuple[int, float]:
-    """The candidate that helps most beside the chosen ones, and the criterion with it."""
-    worst = np.where(allowed, choice.worst_with_one_more(choice.covariance(chosen)), np.inf)
-    worst[list(chosen)] = np.inf
-    best = int(worst.argmin())
-    return best, float(worst[best])
+def _best(choice: Choice, chosen: Sequence[int], allowed: NDArray[np.bool_], cost: Cost) -> tuple[int, float]:
+    """The candidate beside the chosen ones with the least cost, and that cost."""
+    costs = np.where(allowed, cost(choice.with_one_more(choice.covariance(chosen))), np.inf)
+    costs[list(chosen)] = np.inf
+    best = int(costs.argmin())
+    return best, float(costs[best])

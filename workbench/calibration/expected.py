@@ -59,18 +59,14 @@ class Expectation:
             sd_px: 1 sigma of a mean position, in either coordinate.
         """
         _, slopes, seen = self._cells(standoff_mm)
-        return self._whitened(slopes, np.where(seen, 1.0 / sd_px, 0.0)[..., None], np.zeros(()))[0]
-
-    def fit_rows(
-        self, standoff_mm: FloatArray, position_px: FloatArray, sd_px: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """As `spot_rows`, for spots measured at (J, L, 2), NaN where not; and their residuals (N, J, 2 L).
-
-        Residuals are measured - expected, whitened like the rows.
-        """
-        spot, slopes, _ = self._cells(standoff_mm)
-        inverse_sd = np.where(np.isfinite(position_px), 1.0 / sd_px, 0.0)
-        return self._whitened(slopes, inverse_sd, np.nan_to_num(position_px) - spot)
+        slopes = slopes * np.where(seen, 1.0 / sd_px, 0.0)[..., None, None]
+        tilt = radians(self.rig.bench.tilt_sd_deg)
+        error_sd = np.array([self.rig.bench.placement_sd_mm, tilt, tilt])
+        shape = (*slopes.shape[:2], slopes.shape[2] * slopes.shape[3])
+        by_error = (slopes[..., SENSOR_INPUTS:] * error_sd).reshape(*shape, len(PLACEMENT))
+        noise = np.linalg.cholesky(np.eye(shape[2]) + by_error @ np.swapaxes(by_error, 2, 3))
+        by_sensor = self._spread(slopes[..., :SENSOR_INPUTS]).reshape(*shape, self.sensors.shape[1])
+        return np.asarray(np.linalg.solve(noise, by_sensor), float)
 
     def range_rows(self, range_mm: FloatArray, sd_px: float) -> tuple[FloatArray, FloatArray]:
         """How ranges (K,) of each laser depend on the parameters, relative to the range.
@@ -96,21 +92,6 @@ class Expectation:
     def in_frame(self, standoff_mm: FloatArray) -> BoolArray:
         """(N, J, L) whether the spot on a square target is in the picture of a lens that does not fold."""
         return self._cells(standoff_mm)[2]
-
-    def _whitened(
-        self, slopes: FloatArray, inverse_sd: FloatArray, residual_px: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """(N, J, 2 L, S) rows and (N, J, 2 L) residuals, free of the noise that a placement's spots share."""
-        slopes = slopes * inverse_sd[..., None]
-        tilt = radians(self.rig.bench.tilt_sd_deg)
-        error_sd = np.array([self.rig.bench.placement_sd_mm, tilt, tilt])
-        shape = (*slopes.shape[:2], slopes.shape[2] * slopes.shape[3])
-        by_error = (slopes[..., SENSOR_INPUTS:] * error_sd).reshape(*shape, len(PLACEMENT))
-        noise = np.linalg.cholesky(np.eye(shape[2]) + by_error @ np.swapaxes(by_error, 2, 3))
-        by_sensor = self._spread(slopes[..., :SENSOR_INPUTS]).reshape(*shape, self.sensors.shape[1])
-        residual = np.broadcast_to(residual_px * inverse_sd, slopes.shape[:4]).reshape(*shape, 1)
-        rows, left = (np.asarray(np.linalg.solve(noise, part), float) for part in (by_sensor, residual))
-        return rows, left[..., 0]
 
     def _cells(
         self, standoff_mm: FloatArray, ranging: bool = False

@@ -1,13 +1,13 @@
 """While captures are taken: how good ranges already are, and which standoff would help most next.
 
-The fit is `fit`'s to first order in the placements' errors, which makes them noise that their spots share. It
-needs no program of its own for every number of placements, and so no second of waiting at each.
+The fit is that of `fit`. What a placement more would tell is worked out to first order, of a square target
+placed as exactly as the rig file says.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from workbench.calibration.batch import as_grid
 from workbench.calibration.design import Aim, Choice, candidates
 from workbench.calibration.expected import Expectation
+from workbench.calibration.fit import table_of
 from workbench.calibration.observations import Cells, Sighting, group, positions, stated_sd
-from workbench.calibration.parameters import ParameterTable, sensor_parameters
+from workbench.calibration.problem import Problem
+from workbench.calibration.refit import measured, refit
 from workbench.calibration.scatter import scale_called_for
 from workbench.model.rig import NoiseSpec, Rig
 
@@ -24,11 +26,7 @@ FloatArray = NDArray[np.float64]
 FEWEST = 2
 """Placements before there is anything to say."""
 RANGES = 18
-STEPS = 30
-LONGEST_STEP = 2.0
-"""In prior sd."""
-DONE = 1e-6
-SCALE_ROUNDS = 3
+SCALE_ROUNDS = 10
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ def advise(rig: Rig, sightings: Sequence[Sighting], planned_mm: Sequence[float])
     cells, _ = group(sightings, rig.laser_ids, rig.noise)
     if len(cells.placements) < FEWEST:
         return None
-    if (fitted := _fit(rig, cells)) is None:
+    if (fitted := _fit(rig, cells, len(planned_mm))) is None:
         return None
     noise = _noise(rig, sightings, cells.repeat_scale, fitted.noise_scale)
     now = Expectation(rig.model_copy(update={"noise": noise}), fitted.sensor)
@@ -82,43 +80,40 @@ class _Fitted:
     covariance: FloatArray
     """(1, F, F) in prior sd."""
     noise_scale: float
-    """On the stated noise, of which this is the fit."""
-    scale_called_for: float
+    """On the stated noise."""
 
 
-def _fit(rig: Rig, cells: Cells) -> _Fitted | None:
-    """As `fit`, the noise scaled to the residuals where they are too large; None: no optimum was found."""
-    scale, fitted = 1.0, None
-    for _ in range(SCALE_ROUNDS):
-        fitted = _fit_at(rig, cells, scale)
-        if fitted is None or not fitted.scale_called_for > scale:
-            break
-        scale = fitted.scale_called_for
-    return fitted
+def _fit(rig: Rig, cells: Cells, planned: int) -> _Fitted | None:
+    """As `fit`, the noise scaled to the residuals where they are too large; None: no finite result."""
+    whole = _with_room(cells, len(rig.lasers), planned)
+    table = table_of(rig, whole.placements)
+    problem = Problem.of(len(rig.lasers), table, whole, (), rig.board)
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = refit(problem, measured(problem), np.zeros(len(table.prior_mean)))
+        for _ in range(SCALE_ROUNDS):
+            called_for = float(scale_called_for(found.chi2 * found.scale**2, found.freedom))
+            if not called_for > found.scale * 1.001:
+                break
+            found = found.at(called_for)
+    if not np.isfinite([*found.y, found.chi2]).all():
+        return None
+    sensor = int(table.is_sensor.sum())
+    free = table.free[table.free < sensor]
+    values = table.prior_mean + table.prior_sd * found.y
+    return _Fitted(values[None, :sensor], found.covariance[np.ix_(free, free)][None], found.scale)
 
 
-def _fit_at(rig: Rig, cells: Cells, scale: float) -> _Fitted | None:
-    """Maximum a posteriori by Gauss-Newton, with the noise `scale` times what was stated."""
-    table = ParameterTable(sensor_parameters(rig))
-    free, standoffs = table.free, np.array([p.standoff_mm for p in cells.placements])
-    position, sd = as_grid(cells, len(rig.lasers))
-    y = np.zeros(len(table.prior_mean))
-    for _ in range(STEPS):
-        sensor = (table.prior_mean + table.prior_sd * y)[None]
-        found = Expectation(rig, sensor).fit_rows(standoffs, position, scale * sd)
-        rows, residual = (part[0] for part in found)
-        flat, left = rows[..., free].reshape(-1, len(free)), residual.ravel()
-        if not (np.isfinite(flat).all() and np.isfinite(left).all()):
-            return None
-        information = flat.T @ flat
-        covariance = np.linalg.inv(information + np.eye(len(free)))
-        step = covariance @ (flat.T @ left - y[free])
-        y[free] += step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max(initial=0.0)), LONGEST_STEP))
-        if np.abs(step).max(initial=0.0) < DONE:
-            freedom = int(np.isfinite(position).sum()) - float(np.trace(information @ covariance))
-            called_for = scale_called_for(float(left @ left) * scale**2, freedom)
-            return _Fitted(sensor, np.asarray(covariance[None]), scale, float(called_for))
-    return None
+def _with_room(cells: Cells, lasers: int, planned: int) -> Cells:
+    """The cells with a place for every spot of the procedure, those not seen without a measurement.
+
+    So the fit after each placement is the same program, that of the fit at the end.
+    """
+    first = cells.placements[0]
+    room = range(planned - len(cells.placements))
+    placements = (*cells.placements, *(replace(first, key=f"ahead {n}") for n in room))
+    position, sd = as_grid(replace(cells, placements=placements), lasers)
+    placement, laser = np.indices(position.shape[:2]).reshape(2, -1)
+    return Cells(placements, laser, placement, position.reshape(-1, 2), sd.reshape(-1, 2), members=())
 
 
 def _worst(aim: Aim, covariance: FloatArray) -> float:
