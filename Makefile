@@ -12,7 +12,7 @@ help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
 	@echo "make test   lint, type check and test everything"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
-	@echo "make prove  10 000 simulated calibrations against what is stated of them (a minute or two)"
+	@echo "make prove  12 000 simulated calibrations against what is stated of them (a few minutes)"
 	@echo "make crash  a session of 10 000 shots with random faults; nothing may be lost (half an hour)"
 	@echo "make lint   only the linters and the type checker"
 	@echo "make lock   renew requirements.lock from pyproject.toml"
