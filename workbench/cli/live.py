@@ -65,7 +65,8 @@ def _read_all(
     live.warm_up()
     if request.standoff_mm is not None:
         bench.target.place(Placement(key="live", standoff_mm=request.standoff_mm))
-    live.get_ready()
+    for warning in live.get_ready():
+        Console(stderr=True).print(f"warning: {warning}", highlight=False)
     began = time.monotonic()
     try:
         for number in count() if request.readings is None else range(request.readings):

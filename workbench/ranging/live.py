@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import hypot
 
 import numpy as np
 
@@ -14,11 +15,13 @@ from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.rig import Rig
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
-from workbench.spots import Finding, Image, SpotFinder
+from workbench.spots import Finding, Image, Spot, SpotFinder
 
 LEASE_S = 2.0
 """Longest time that a laser stays lit for one frame."""
 FEWEST_TO_TELL_P99 = 100
+SAME_LIGHT_PX = 3.0
+"""A light in a dark frame that lies so near to one seen before anything was fired is the same."""
 
 
 def check_same_sensor(rig: Rig, calibration: Calibration) -> None:
@@ -54,10 +57,18 @@ class LiveRanger:
     latencies_s: list[float] = field(default_factory=list)
     _finders: dict[tuple[str, ...], SpotFinder] = field(default_factory=dict)
     _second_frame_at: float = 0.0
+    _dark: Image | None = None
+    _lamps: tuple[Spot, ...] = ()
+    """Lights on the lasers' lines before anything was fired."""
 
-    def get_ready(self) -> None:
-        """See that frames come, of the right size, before anything is fired; the errors of `read`."""
-        self._find(self.ranger.sensor.ids, self.bench.camera.grab().image, None)
+    def get_ready(self) -> tuple[str, ...]:
+        """See that frames come, of the right size, before anything is fired; the errors of `read`.
+
+        Returns:
+            What to warn of: lights that burn already.
+        """
+        self._lamps = self._find(self.ranger.sensor.ids, self.bench.camera.grab().image, None).spots
+        return tuple(_burned(lamp) for lamp in self._lamps)
 
     def warm_up(self) -> None:
         """Go once through everything that a reading needs, without firing: the first time, code is loaded."""
@@ -81,6 +92,8 @@ class LiveRanger:
             BadInputError: the frames are not of the calibration's size.
         """
         reading = acquire(self.ranger, scene, lambda ids: self._shoot(scene, ids))
+        if reading.status != "done":
+            reading = self._look_for_stuck_beam(reading)
         self.latencies_s.append(time.perf_counter() - self._second_frame_at)
         return reading
 
@@ -90,14 +103,27 @@ class LiveRanger:
             on = self.bench.camera.grab()
         off = self.bench.camera.grab()
         self._second_frame_at = time.perf_counter()
-        finding = self._find(ids, on.image, off.image)
-        if not finding.spots and (stuck := self._find(ids, off.image, None).spots):
+        self._dark = off.image
+        return self._find(ids, on.image, off.image)
+
+    def _look_for_stuck_beam(self, reading: Reading) -> Reading:
+        """Look for a beam in the last frame with all lasers off: the difference of a pair does not show it.
+
+        A light that burned before anything was fired is told in the notes: most likely it is a lamp.
+
+        Raises:
+            LaserOffNotConfirmedError: a light shows that did not burn before.
+        """
+        if self._dark is None:
+            return reading
+        lights = self._find(self.ranger.sensor.ids, self._dark, None).spots
+        if new := [light for light in lights if not any(_same(light, lamp) for lamp in self._lamps)]:
             raise LaserOffNotConfirmedError(
-                f"reading {scene}: the frame with all lasers off shows a spot at u = {stuck[0].u_px:.0f},"
-                f" v = {stuck[0].v_px:.0f} px. A beam may be on although the controller says that it is off:"
-                " cut the lasers' supply and keep out of the beams. If a lamp stands there, cover it"
+                f"reading {reading.scene}: the frame with all lasers off shows a spot at {_at(new[0])}. A"
+                " beam may be on although the controller says that it is off: cut the lasers' supply and keep"
+                " out of the beams. If a lamp stands there, cover it"
             )
-        return finding
+        return replace(reading, notes=(*reading.notes, *map(_burned, lights)))
 
     def _find(self, ids: tuple[str, ...], on: Image, off: Image | None) -> Finding:
         width, height = self.ranger.size_px
@@ -110,6 +136,18 @@ class LiveRanger:
             lines = self.ranger.searched(ids)
             self._finders[ids] = SpotFinder((height, width), lines, expected=len(ids))
         return self._finders[ids].find(on, off)
+
+
+def _same(light: Spot, lamp: Spot) -> bool:
+    return hypot(light.u_px - lamp.u_px, light.v_px - lamp.v_px) < SAME_LIGHT_PX
+
+
+def _at(light: Spot) -> str:
+    return f"u = {light.u_px:.0f}, v = {light.v_px:.0f} px"
+
+
+def _burned(light: Spot) -> str:
+    return f"a light at {_at(light)} burned before any laser was fired: a lamp, or a beam that was on"
 
 
 def latency_words(latencies_s: Sequence[float], elapsed_s: float) -> str:

@@ -9,9 +9,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.bench.sensors import calibration_of
@@ -24,8 +25,10 @@ from workbench.devices.watched import PATIENCE_S, WatchedCamera
 from workbench.emulator.bench import EmulatedBench
 from workbench.emulator.camera import EmulatedCamera
 from workbench.emulator.controller import Controller
+from workbench.model.calibration import load_calibration
 from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import Rig, load_rig
+from workbench.ranging.ranger import Ranger
 
 ROOT = Path(__file__).parents[3]
 RIG = ROOT / "rigs/thesis-emulated.yaml"
@@ -218,6 +221,46 @@ def test_a_beam_that_stays_on_is_seen(live: Live, tmp_path: Path) -> None:
     ended = live("--standoff", 600, rig=rig)
     assert ended.code == 7
     assert "A beam may be on" in ended.err
+
+
+def test_one_beam_that_stays_on_is_seen_among_the_others(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    """L1 shorts when it is first lit; the difference of every pair shows L2, L3 and L4 only."""
+    lit, shorted = Controller.lit, list[bool]()
+
+    def lit_with_a_short(self: Controller) -> tuple[str, ...]:
+        if "L1" in lit(self):
+            shorted.append(True)
+        return tuple(sorted({*lit(self), *(["L1"] if shorted else [])}))
+
+    monkeypatch.setattr(Controller, "lit", lit_with_a_short)
+    ended = live("--readings", 2, "--standoff", 600)
+    assert (ended.code, ended.out) == (7, [])
+    assert "reading 0: the frame with all lasers off shows a spot" in ended.err
+
+
+@pytest.mark.parametrize("lamp_from", [1, 2])
+def test_a_lamp_is_known_if_it_burned_before_the_first_pair(
+    live: Live, monkeypatch: pytest.MonkeyPatch, lamp_from: int
+) -> None:
+    rows, columns = np.mgrid[0:480, 0:640]
+    (u, v), *_ = Ranger(load_calibration(live.calibration)).sensor.spot_px("L1", np.array([600.0]))
+    glow = 120.0 * np.exp(-((columns - u) ** 2 + (rows - v) ** 2) / (2 * 1.5**2))
+    really_grab = EmulatedCamera.grab
+
+    def with_a_lamp(camera: EmulatedCamera) -> Frame:
+        frame = really_grab(camera)
+        return replace(frame, image=np.clip(frame.image + glow, 0, 255).astype(np.uint8))
+
+    from_the(lamp_from, with_a_lamp, monkeypatch)
+    ended = live("--readings", 1)
+    if lamp_from == 1:
+        assert ended.code == 0
+        (line,) = ended.out
+        assert "no_points" in line
+        assert "burned before any laser was fired" in line
+        assert "warning: a light at" in ended.err
+    else:
+        assert (ended.code, ended.out) == (7, [])
 
 
 @pytest.mark.parametrize(
