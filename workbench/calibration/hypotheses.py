@@ -44,6 +44,8 @@ SPOT_COST = 2 * 2 * log(500 / 0.05)
 MINIMA = 4
 STEPS = 5
 SCAN_MM = np.geomspace(20.0, 50_000.0, 120)
+SPARSE = 6
+"""Of the scan, where a board's corners tell the distance: no other standoff lies as near to fitting them."""
 MOST_REJECTED = 0.1
 """Of all spots: more than that are no outliers."""
 FEWEST_SPOTS = 6
@@ -181,21 +183,29 @@ def _from_priors(problem: Problem, used: BoolArray) -> Refit:
 
 
 def _standoffs(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
-    """Each placement's standoff free; the rest must be better off without the placement by what it takes."""
+    """Placements' standoffs free, the most strained first, until one explains everything.
+
+    The rest must be better off without the placement by what a free standoff takes.
+    """
     cost = STANDOFF_COST + 2 * log(len(fit.cells.placements))
     boards = {view.placement.key for view in fit.boards}
-    for index, info in enumerate(fit.cells.placements):
+    strain = [_strain(fit, state, index) for index in range(len(fit.cells.placements))]
+    for index in np.argsort(strain)[::-1].tolist():
+        on_board = fit.cells.placements[index].key in boards
         rows = rows_at(state.problem, index) & state.used
         others = state.used & ~rows
-        on_board = info.key in boards
         if not rows.any() or not others.any():
             continue
         # The noise of a board's corners would pass for a gain: there, what the standoff costs is the measure.
-        if on_board and _strain(fit, state, index) < cost + DECISIVE:
+        if on_board and strain[index] < cost + DECISIVE:
             continue
         left = _from_priors(state.problem, others)
         if on_board or state.cost - left.cost > cost + DECISIVE:
-            yield _scored("standoff", (index,), state, _freed(fit, state, left, rows, index), cost)
+            at_mm = _where_it_stood(fit, left, rows, index, SCAN_MM[::SPARSE] if on_board else SCAN_MM)
+            found = _scored("standoff", (index,), state, _freed(fit, state, left, index, at_mm), cost)
+            yield found
+            if found.significant and not is_improbable(found.state):
+                return
 
 
 def _strain(fit: Fit, state: Refit, index: int) -> float:
@@ -205,9 +215,8 @@ def _strain(fit: Fit, state: Refit, index: int) -> float:
     return float(state.y[error] ** 2 / told) if told > UNTOLD else 0.0
 
 
-def _freed(fit: Fit, state: Refit, left: Refit, rows: BoolArray, index: int) -> Refit:
+def _freed(fit: Fit, state: Refit, left: Refit, index: int, at_mm: float) -> Refit:
     """The state with the placement where its spots say that it stood."""
-    at_mm = _where_it_stood(fit, left, rows, index)
     problem = _problem_at(left.problem, index, at_mm)
     found = refit(problem, state.used, left.y)
     # Once more with the sensor that all of them make: a standoff with no error of its own costs nothing.
@@ -215,12 +224,12 @@ def _freed(fit: Fit, state: Refit, left: Refit, rows: BoolArray, index: int) -> 
     return refit(_problem_at(problem, index, at_mm + float(error)), state.used, found.y)
 
 
-def _where_it_stood(fit: Fit, left: Refit, rows: BoolArray, index: int) -> float:
-    """The standoff that the rest finds likeliest for the spots of a placement."""
-    scanned = np.nan_to_num([_surprise(_stands(left, index, mm), rows) for mm in SCAN_MM], nan=np.inf)
+def _where_it_stood(fit: Fit, left: Refit, rows: BoolArray, index: int, scan_mm: FloatArray) -> float:
+    """The standoff that the rest finds likeliest for what was seen of a placement."""
+    scanned = np.nan_to_num([_surprise(_stands(left, index, mm), rows) for mm in scan_mm], nan=np.inf)
     low = [n for n in range(1, len(scanned) - 1) if scanned[n] <= min(scanned[n - 1], scanned[n + 1])]
     lowest = sorted(low, key=lambda n: float(scanned[n]))[:MINIMA]
-    starts = [fit.cells.placements[index].standoff_mm, *SCAN_MM[lowest].tolist()]
+    starts = [fit.cells.placements[index].standoff_mm, *scan_mm[lowest].tolist()]
     refined = [_nearby(left, rows, index, start) for start in starts]
     return min(
         refined, key=lambda mm: float(np.nan_to_num(_surprise(_stands(left, index, mm), rows), nan=np.inf))
