@@ -167,6 +167,25 @@ def test_the_closest_is_at_the_near_end_of_an_incline(ranger: Ranger) -> None:
     assert line.shape.angle_rad == pytest.approx(-np.arctan(40 / 120), abs=0.01)
 
 
+@pytest.mark.parametrize("angle_deg", [-60.0, 0.0, 60.0])
+def test_the_mean_of_one_line_is_known_as_well_as_the_line(ranger: Ranger, angle_deg: float) -> None:
+    """Pointing and baselines put the spots elsewhere along an incline, which moves its closest range."""
+    at = zip(IDS, (-60.0, -30.0, 30.0, 60.0), strict=True)
+    incline = {i: 600.0 + np.tan(np.radians(angle_deg)) * x for i, x in at}
+    reading = ranger.read_known("s", 4, IDS, positions(ranger, incline), np.full((4, 2), 0.03))
+    assert reading.lines[0].shape.kind == ("incline" if angle_deg else "flat")
+    assert reading.mean_mm == reading.closest_mm
+    assert reading.mean_sigma_mm == pytest.approx(reading.sigma_mm, rel=1e-4)
+
+
+def test_the_mean_of_a_cylinder_s_line_is_known_as_well_as_the_line(ranger: Ranger) -> None:
+    at = zip(IDS, (-60.0, -30.0, 30.0, 60.0), strict=True)
+    tube = {i: 300.0 - np.sqrt(75.0**2 - (x - 4.0) ** 2) for i, x in at}
+    reading = ranger.read_known("s", 4, IDS, positions(ranger, tube), np.full((4, 2), 0.03))
+    assert reading.lines[0].shape.kind == "cylinder"
+    assert reading.mean_sigma_mm == pytest.approx(reading.sigma_mm, rel=1e-4)
+
+
 @pytest.mark.parametrize("count", [0, 1, 3, 5])
 def test_not_as_many_spots_as_lasers(coplanar: Ranger, count: int) -> None:
     ranger = coplanar

@@ -31,6 +31,8 @@ class CylinderFit:
     """(3, 3) of the three."""
     by_range: FloatArray
     """(3, n) their derivatives by the ranges that were fitted."""
+    by_place: FloatArray
+    """(3, n) and by the places: a place that errs by dx is a range that errs by -slope dx."""
     chi2: float
     freedom: int
 
@@ -46,7 +48,8 @@ class CylinderFit:
         ahead = math.sqrt(max(self.radius_mm**2 - aside**2, (GRAZING * self.radius_mm) ** 2))
         gradient = np.array([-aside / ahead, 1.0, -self.radius_mm / ahead])
         sigma = math.sqrt(gradient @ self.covariance @ gradient)
-        return Closest(self.axis_range_mm - ahead, sigma, x, gradient @ self.by_range)
+        by_range, by_place = gradient @ self.by_range, gradient @ self.by_place
+        return Closest(self.axis_range_mm - ahead, sigma, x, by_range, by_place)
 
 
 def fit_cylinder(points: Points) -> CylinderFit | None:
@@ -64,7 +67,9 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
     (x, z, radius), covariance, by_range, chi2 = found
     if not math.isfinite(chi2):
         return None
-    fit = CylinderFit(float(x), float(z), float(radius), covariance, by_range, chi2, len(points) - 3)
+    by_place = by_range * ((points.x_mm - x) / (points.range_mm - z))
+    freedom = len(points) - 3
+    fit = CylinderFit(float(x), float(z), float(radius), covariance, by_range, by_place, chi2, freedom)
     return fit if 0 < fit.radius_sigma_mm < MOST_RELATIVE_SIGMA * radius else None
 
 

@@ -28,6 +28,10 @@ class Line:
     shape: Shape
     indices: tuple[int, ...]
     """Which of the reading's ranges are its own."""
+    closest_by_parameter: FloatArray
+    """(P,) derivatives of the closest range by the calibration's parameters, through ranges and places."""
+    closest_spot_sd_mm: FloatArray
+    """(n,) 1 sigma of the closest range by each spot's own noise."""
 
 
 def line_of(sensor: Sensor, axis: Axis, ids: Sequence[str], ranges: Ranges, indices: Sequence[int]) -> Line:
@@ -56,23 +60,27 @@ def line_of(sensor: Sensor, axis: Axis, ids: Sequence[str], ranges: Ranges, indi
         by_parameter @ c @ by_parameter.T + np.diag(tangent**2 * spot),
         own.by_parameter @ c @ by_parameter.T + np.diag(tangent * spot),
     )
-    return Line(axis, fit_shape(points, sensor.front_mm(axis)), tuple(indices))
+    shape = fit_shape(points, sensor.front_mm(axis))
+    by_parameter = shape.closest_by_range @ own.by_parameter + shape.closest_by_place @ by_parameter
+    spot_sd = (shape.closest_by_range + shape.closest_by_place * tangent) * own.spot_sd_mm
+    return Line(axis, shape, tuple(indices), by_parameter, spot_sd)
 
 
 def mean_of_lines(
-    lines: Sequence[Line], ranges: Ranges, weights: Weights, size_px: tuple[int, int]
+    lines: Sequence[Line], covariance: FloatArray, weights: Weights, size_px: tuple[int, int]
 ) -> tuple[float, float]:
     """Mean of the lines' closest ranges and its 1 sigma, mm.
 
     `information` weights by 1 / sigma^2, `pixels` by the pixels along each line, as the thesis does. What the
-    calibration has wrong is common to the lines and stays in sigma.
+    calibration has wrong is common to the lines and stays in sigma; `covariance` (P, P) is that of its
+    parameters.
     """
     by_information = [1.0 / line.shape.closest_sigma_mm**2 for line in lines]
     by_pixels = [float(size_px[0] if line.axis == "u" else size_px[1]) for line in lines]
     weight = np.array(by_information if weights == "information" else by_pixels)
     weight /= weight.sum()
-    by_range = np.zeros(len(ranges.range_mm))
-    for share, line in zip(weight, lines, strict=True):
-        by_range[list(line.indices)] += share * line.shape.closest_by_range
+    by_parameter = weight @ np.array([line.closest_by_parameter for line in lines])
+    by_spot = [share * line.closest_spot_sd_mm for share, line in zip(weight, lines, strict=True)]
+    variance = by_parameter @ covariance @ by_parameter + sum(float(sd @ sd) for sd in by_spot)
     mean = float(weight @ [line.shape.closest_mm for line in lines])
-    return mean, float(np.sqrt(by_range @ ranges.covariance_mm2 @ by_range))
+    return mean, float(np.sqrt(variance))

@@ -66,6 +66,8 @@ class Closest(NamedTuple):
     x_mm: float
     by_range: FloatArray
     """(n,) its derivatives by the ranges that were fitted."""
+    by_place: FloatArray
+    """(n,) and by their places along the front."""
 
 
 def interval_mm(range_mm: float, sigma_mm: float, offset_mm: float = 0.0) -> tuple[float, float]:

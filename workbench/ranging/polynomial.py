@@ -25,6 +25,8 @@ class PolynomialFit:
     """(degree + 1, degree + 1) of them."""
     by_range: FloatArray
     """(degree + 1, n) their derivatives by the ranges that were fitted."""
+    by_place: FloatArray
+    """(degree + 1, n) and by the places: a place that errs by dx is a range that errs by -slope dx."""
     scale_mm: float
     chi2: float
     freedom: int
@@ -48,7 +50,8 @@ class PolynomialFit:
         ranges = powers @ self.coefficients
         at = int(ranges.argmin())
         sigma = math.sqrt(powers[at] @ self.covariance @ powers[at])
-        return Closest(float(ranges[at]), sigma, float(places[at]), powers[at] @ self.by_range)
+        by = powers[at]
+        return Closest(float(ranges[at]), sigma, float(places[at]), by @ self.by_range, by @ self.by_place)
 
     def _turns(self, front_mm: tuple[float, float]) -> list[float]:
         """Places inside the front where the slope is 0."""
@@ -77,7 +80,8 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
     coefficients, covariance, by_range, chi2 = fitted
     if not math.isfinite(chi2):
         return None
-    return PolynomialFit(coefficients, covariance, by_range, scale, chi2, len(points) - degree - 1)
+    by_place = -by_range * (slopes @ coefficients)
+    return PolynomialFit(coefficients, covariance, by_range, by_place, scale, chi2, len(points) - degree - 1)
 
 
 def _powers(t: FloatArray, degree: int) -> FloatArray:

@@ -215,7 +215,7 @@ class Ranger:
             nearest.closest_mm,
             nearest.closest_sigma_mm,
             nearest.closest_interval_mm,
-            *mean_of_lines(lines, ranges, self.weights, self.size_px),
+            *mean_of_lines(lines, self.sensor.covariance, self.weights, self.size_px),
             lasers,
             lines,
             *flat_range(ranges),

@@ -48,6 +48,8 @@ class Shape:
     """Where on the front."""
     closest_by_range: FloatArray
     """(n,) derivatives of `closest_mm` by the ranges."""
+    closest_by_place: FloatArray
+    """(n,) and by the places of the spots along the front."""
     degree: int | None = None
     """Of the polynomial; 0 for a flat, 1 for an incline."""
     coefficients: tuple[float, ...] = ()
@@ -142,6 +144,7 @@ def _unknown(points: Points, tried: tuple[Tried, ...]) -> Shape:
         math.sqrt(points.covariance_mm2[nearest, nearest]),
         float(points.x_mm[nearest]),
         np.eye(len(points))[nearest],
+        np.zeros(len(points)),
     )
     return replace(_shape("unknown", closest, points), tried=tried)
 
@@ -154,4 +157,5 @@ def _shape(kind: Kind, closest: Closest, points: Points) -> Shape:
         closest_interval_mm=interval_mm(closest.range_mm, closest.sigma_mm, points.offset_mm),
         closest_x_mm=closest.x_mm,
         closest_by_range=closest.by_range,
+        closest_by_place=closest.by_place,
     )
