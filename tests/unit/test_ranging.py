@@ -353,6 +353,23 @@ def test_alternative_capture_fires_each_laser_alone(coplanar: Ranger) -> None:
     assert reading.flat_mm == pytest.approx(700.0)
 
 
+@pytest.mark.parametrize(("alone", "words"), [(0, "no spots"), (2, "2 spots")])
+def test_alternative_capture_that_tells_nothing_says_what_was_seen(
+    coplanar: Ranger, alone: int, words: str
+) -> None:
+    astray = Spot(300.0, 60.0, 0.03, 0.03, 1e4, 1.5, 150.0)
+
+    def shoot(ids: tuple[str, ...]) -> Finding:
+        if len(ids) > 1:
+            return Finding((*spots(coplanar, dict.fromkeys(ids[:2], 700.0)), astray))
+        return Finding(tuple(spot for r in (700.0, 900.0)[:alone] for spot in spots(coplanar, {ids[0]: r})))
+
+    reading = acquire(coplanar, "s", shoot)
+    assert (reading.status, reading.closest_mm) == ("not_enough_points", None)
+    assert "1 of 3 spots on no laser's line: other light" in reading.notes
+    assert reading.notes[-4:] == tuple(f"{i}: fired alone, {words} on its line" for i in IDS)
+
+
 def captures(tmp_path: Path, *rows: str) -> Path:
     path = tmp_path / "c.csv"
     path.write_text("\n".join(["laser_id,standoff_mm,repeat,u_px,v_px,scene", *rows]) + "\n")

@@ -7,6 +7,7 @@ frame, all off, frame, subtract, spots.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
 from typing import Final
 
@@ -65,6 +66,7 @@ class _Control:
         self._ranger, self._scene, self._shoot = ranger, scene, shoot
         self._known: list[tuple[str, Spot]] = []
         self._untold: tuple[str, ...] = ()
+        self._notes: list[str] = []
         self.reading: Reading | None = None
 
     def run(self, state: State) -> Seen:
@@ -75,6 +77,7 @@ class _Control:
         spots = self._shoot(self._ranger.sensor.ids).spots
         dealt = self._ranger.deal(spots)
         self._known, self._untold = self._of(spots, dealt), dealt.untold
+        self._notes = list(dealt.notes)
         self.reading = self._ranger.read_dealt(self._scene, spots, dealt)
         if not spots:
             return Seen.NOTHING
@@ -82,12 +85,17 @@ class _Control:
 
     def _alternative(self) -> Seen:
         for laser_id in self._untold:
-            spot = self._ranger.alone(laser_id, self._shoot((laser_id,)).spots)
-            if spot is not None:
-                self._known.append((laser_id, spot))
+            spots = self._ranger.alone(laser_id, self._shoot((laser_id,)).spots)
+            if len(spots) == 1:
+                self._known.append((laser_id, spots[0]))
+            else:
+                self._notes.append(f"{laser_id}: fired alone, {len(spots) or 'no'} spots on its line")
         position, sd = spot_arrays([spot for _, spot in self._known])
         ids = [laser_id for laser_id, _ in self._known]
-        self.reading = self._ranger.read_known(self._scene, len(self._ranger.sensor.ids), ids, position, sd)
+        fired = len(self._ranger.sensor.ids)
+        reading = self._ranger.read_known(self._scene, fired, ids, position, sd, self._notes)
+        # The normal capture showed spots, or this one would not have been asked for.
+        self.reading = replace(reading, status="not_enough_points") if not reading.lasers else reading
         return Seen.TOLD if ids else Seen.NOTHING
 
     def _of(self, spots: tuple[Spot, ...], dealt: Dealt) -> list[tuple[str, Spot]]:

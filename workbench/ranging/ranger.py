@@ -118,7 +118,13 @@ class Ranger:
         return {axis: lasers for axis in axes if len(lasers := self.sensor.lasers_on(axis))}
 
     def read_known(
-        self, scene: str, fired: int, laser_ids: Sequence[str], position_px: FloatArray, sd_px: FloatArray
+        self,
+        scene: str,
+        fired: int,
+        laser_ids: Sequence[str],
+        position_px: FloatArray,
+        sd_px: FloatArray,
+        notes: Sequence[str] = (),
     ) -> Reading:
         """Range spots whose lasers are known, because each was fired alone.
 
@@ -128,9 +134,10 @@ class Ranger:
             laser_ids: n lasers.
             position_px: (n, 2), NaN where a coordinate was not measured.
             sd_px: (n, 2) 1 sigma, NaN where not known.
+            notes: what is to be said of the captures.
         """
         ranges = self.sensor.ranges(laser_ids, position_px, sd_px)
-        return self._answer(scene, fired, laser_ids, position_px, ranges)
+        return self._answer(scene, fired, laser_ids, position_px, ranges, notes)
 
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
         """Range the spots of a frame in which every laser is lit.
@@ -166,12 +173,12 @@ class Ranger:
         notes = self._what_is_left(pairs, len(spots), tuple(axis for axis in self._axes if axis not in told))
         return Dealt(lasers, dealt, pairs.chosen(lasers, dealt), tuple(untold), notes)
 
-    def alone(self, laser_id: str, spots: Sequence[Spot]) -> Spot | None:
-        """The spot of a laser that was fired alone: the only one on its line; None if there is not one."""
+    def alone(self, laser_id: str, spots: Sequence[Spot]) -> list[Spot]:
+        """The spots on the line of a laser that was fired alone; its own is known if there is one only."""
         position, sd = spot_arrays(spots)
         ranges = self.sensor.ranges([laser_id] * len(spots), position, sd)
         on_line = np.flatnonzero((ranges.misfit_sd < MOST_MISFIT_SD) & (ranges.range_mm > 0))
-        return spots[int(on_line[0])] if len(on_line) == 1 else None
+        return [spots[n] for n in on_line.tolist()]
 
     def _what_is_left(self, pairs: Pairs, spots: int, untold: tuple[Axis, ...]) -> tuple[str, ...]:
         astray = int((pairs.misfit_sd >= MOST_MISFIT_SD).all(axis=0).sum())
