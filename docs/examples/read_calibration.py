@@ -2,7 +2,8 @@
 
     python docs/examples/read_calibration.py calibration.yaml spots.csv
 
-reads lines of `laser_id,u_px,v_px,u_sd_px,v_sd_px` and prints the range and its 1 sigma of each, in mm.
+reads a CSV file whose first line is `laser_id,u_px,v_px,u_sd_px,v_sd_px`, and prints the range of each spot
+and its 1 sigma, in mm.
 """
 
 import csv
@@ -91,4 +92,6 @@ def main(calibration, spots):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit(f"usage: {sys.argv[0]} calibration.yaml spots.csv")
     main(*sys.argv[1:])

@@ -201,6 +201,17 @@ class TestBadInput:
         outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
         refused(outcome, 2, f"{captures}: row 4, column standoff_mm: expected a number, got 4oo")
 
+    @pytest.mark.parametrize("which", [0, 1])
+    def test_an_output_that_is_an_input(self, workbench: Run, tmp_path: Path, which: int) -> None:
+        made_from = [tmp_path / "captures.csv", tmp_path / "rig.yaml"]
+        made_from[0].write_bytes(WEBCAM.read_bytes())
+        made_from[1].write_bytes(WEBCAM_RIG.read_bytes())
+        before = made_from[which].read_bytes()
+        outcome = workbench("fit", made_from[0], "--rig", made_from[1], "-o", made_from[which])
+        assert outcome.code == 2
+        assert "expected another file than the calibration is made from" in outcome.err.replace("\n", " ")
+        assert made_from[which].read_bytes() == before
+
     def test_an_output_folder_that_is_not_there(self, workbench: Run, tmp_path: Path) -> None:
         outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "no/c.yaml")
         refused(outcome, 2, "cannot be written")

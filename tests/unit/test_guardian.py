@@ -56,8 +56,13 @@ class AtWork:
         hurry(self.process.pid, before=1)  # not before the guardian and the instruments: it computes
         os.close(theirs)
         assert self.process.stdout is not None
-        self.guardian = int(self.process.stdout.readline())
-        controller.wait_for(LIT)
+        try:
+            self.guardian = int(self.process.stdout.readline())
+            controller.wait_for(LIT)
+        except BaseException:
+            self.process.kill()
+            self.process.wait(20)
+            raise
 
     def off_after(self, end: Callable[[AtWork], object]) -> float:
         """Milliseconds from `end` to the pins all low."""

@@ -29,7 +29,8 @@ from workbench.model.rig import Rig, load_rig
 from workbench.report.tables import derived_table, left_out_table, parameter_table, rejected_lines, term_table
 from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.files import check_output
-from workbench.session.manifest import load_session_rig, workbench_version
+from workbench.session.journal import JOURNAL
+from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,7 @@ def fit_captures(request: Request, as_json: bool) -> None:
         LimitFailedError: the calibration is refused; nothing is written.
     """
     check_output(request.output)
+    _check_distinct(request)
     rig = hold(_rig(request), request.fixed)
     captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
     content = read_captures_file(captures)
@@ -78,6 +80,19 @@ def fit_captures(request: Request, as_json: bool) -> None:
     write_calibration(request.output, calibration)
     kept = "" if request.accept is None or assessment.verdict == "accepted" else f", kept: {request.accept}"
     Console(stderr=True).print(f"{request.output} written{kept}", highlight=False, soft_wrap=True)
+
+
+def _check_distinct(request: Request) -> None:
+    """What a calibration comes from is not written over."""
+    made_from = [request.source] if request.rig is None else [request.source, request.rig]
+    if request.source.is_dir():
+        made_from += [request.source / name for name in (CALIBRATION_TABLE, MANIFEST, JOURNAL)]
+    for path in made_from:
+        if request.output.resolve() == path.resolve():
+            raise BadInputError(
+                f"--output {request.output}: expected another file than the calibration is made from;"
+                " name a new one"
+            )
 
 
 def _rig(request: Request) -> Rig:

@@ -12,8 +12,8 @@ import serial
 
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 
-REPLY_S = 0.5
-"""A controller answers within milliseconds; after this it is not going to."""
+REPLY_S = 1.0
+"""A controller answers within milliseconds, a busy computer passes it on within this."""
 LONGEST_REPLY = 200
 LOOK_S = 0.02
 """Between two looks at whether `alarm` wants the lasers off, while a reply is waited for."""

@@ -16,7 +16,7 @@ from workbench.model import errors
 from workbench.model.errors import LaserOffNotConfirmedError, WorkbenchError
 
 ANSWER_S = 10.0
-"""Longer than the guardian takes for anything: twice two requests of half a second, and a busy computer."""
+"""Longer than the guardian takes for anything: twice two requests of a second, and a busy computer."""
 
 
 class Guarded:
