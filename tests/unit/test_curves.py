@@ -63,3 +63,18 @@ def test_a_model_that_is_no_polynomial_is_refused(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(curves, "TERMS", 6)
     with pytest.raises(ValueError, match="no polynomial of degree 5"):
         SpotCurves(LENSES["barrel"], RAYS)
+
+
+def test_no_depth_where_the_lens_model_folds_over() -> None:
+    """r (1 - 0.45 r^2) grows up to r = 0.861, where it is 0.574: no depth puts a spot farther out."""
+    lens = np.array([530.0, 320.0, 240.0, -0.45, 0.0, 0.0, 0.0, 0.0])
+    fold = np.sqrt(1.0 / (3 * 0.45))
+    seen_at = np.array([0.3, 0.6, 0.9]) * fold
+    reach = 530.0 * np.array(
+        [*(seen_at * (1 - 0.45 * seen_at**2)), *(fold * 2 / 3 * np.array([1.02, 1.1, 1.4]))]
+    )
+    position = np.stack((320.0 - reach, np.full(6, 240.0)), axis=1)
+    ray = np.array([[-60.0, 0.0, 0.0, 0.0]])
+    found = SpotCurves(lens, ray).invert(np.zeros(6, np.intp), position, np.full((6, 2), 20.0))
+    np.testing.assert_allclose(found.inverse_depth_per_mm[:3], seen_at / 60.0, rtol=1e-9)
+    assert np.isnan(found.inverse_depth_per_mm[3:]).all()

@@ -12,6 +12,7 @@ from tests.unit.rigs import World, prior, thesis_rig
 from tests.unit.test_calibration_file import PROVENANCE
 from workbench.calibration.export import calibrate
 from workbench.calibration.fit import fit
+from workbench.calibration.sensor import Sensor
 from workbench.model.acceptance import Acceptance
 from workbench.model.captures import load_captures
 from workbench.model.errors import BadInputError
@@ -20,6 +21,7 @@ from workbench.ranging.assignment import assign, pair_up
 from workbench.ranging.bands import band
 from workbench.ranging.captures import read_captures, scenes
 from workbench.ranging.lines import Axis
+from workbench.ranging.objections import objections
 from workbench.ranging.ranger import Ranger
 from workbench.spots import Finding, Scanline, Spot
 
@@ -255,6 +257,16 @@ def test_a_spot_that_cannot_be_the_laser_s_has_no_range(
     assert (reading.status, reading.closest_mm, reading.lasers) == ("no_points", None, ())
     assert reading.notes[0].startswith("L1: ")
     assert why in reading.notes[0]
+
+
+def test_a_spot_where_the_lens_model_folds_over_has_no_range(ranger: Ranger) -> None:
+    folding = Sensor(ranger.calibration, {"k1": -0.45, "k2": 0.0, "k3": 0.0})
+    (far,) = folding.spot_px("L4", np.array([np.inf]))
+    beyond = np.array([[20.0, far[1]]])
+    ranges = folding.ranges(["L1"], beyond, np.full((1, 2), 0.05))
+    (why,) = objections(beyond, ranges, ranger.size_px)
+    assert why is not None
+    assert "folds over" in why
 
 
 def test_a_spot_all_but_at_infinity_has_no_range(ranger: Ranger) -> None:

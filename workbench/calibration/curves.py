@@ -39,7 +39,8 @@ class Inverted(NamedTuple):
     """n spots brought back to their rays; see `workbench.optics.triangulate.DepthEstimate`."""
 
     inverse_depth_per_mm: FloatArray
-    """(n,) not positive where the spot lies at or beyond the image of the laser's point at infinity."""
+    """(n,) not positive where the spot lies at or beyond the image of the laser's point at infinity; not a
+    number where no depth before the lens model folds over puts the laser's spot there."""
     across_sd: FloatArray
     """(n,) distance from the laser's line, signed, in standard deviations of the spot."""
     z_sd_of_spot_mm: FloatArray
@@ -90,7 +91,8 @@ class SpotCurves:
                 break
         # The residual across the line no longer changes; the rest is evaluated once, at the end.
         by = _at(self._derivatives[laser], t).reshape(len(t), 2, PARAMETERS) * inverse_sd[:, :, None]
-        w = t * unit
+        found = (np.abs(step) <= CONVERGED) & (_dot(curve[:, 1, :2], seen[:, 2:]) > 0)  # still outwards
+        w = np.where(found, t * unit, np.nan)
         root = np.sqrt(information)
         dz_dt = unit / w**2
         along = slope * (dz_dt / information)[:, None]

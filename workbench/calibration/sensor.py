@@ -148,10 +148,10 @@ class Sensor:
         measured = np.isfinite(position_px)
         own_sd = np.where(np.isfinite(sd_px), sd_px, noise.spot_sd_px)
         inverse_sd = measured / np.hypot(own_sd, noise.speckle_sd_px)
-        with np.errstate(divide="ignore", invalid="ignore"):  # a spot at infinity, or not measured at all
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # at infinity, or nowhere
             found = self._curves.invert(laser, np.where(measured, position_px, 0.0), inverse_sd)
             w = found.inverse_depth_per_mm
-            range_mm = np.where(w > 0, 1.0 / w, np.inf) - self.offset_mm
+            range_mm = np.where(w <= 0, np.inf, 1.0 / w) - self.offset_mm
         gradient = self._by_parameter(laser, found.dz)
         gradient[:, self._columns["offset_mm"]] = -1.0
         covariance = gradient @ self.covariance @ gradient.T

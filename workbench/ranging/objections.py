@@ -42,6 +42,8 @@ def _objection(
     seen = np.isfinite(position)
     if not (seen.any() and ((position > -0.5) & (position < size - 0.5))[seen].all()):
         return "its spot lies outside the picture"
+    if np.isnan(range_mm):
+        return "its spot lies where the lens model folds over: at no range would it be seen there"
     if not misfit_sd < MOST_MISFIT_SD:
         return (
             f"its spot lies {misfit_sd:.0f} sd off the laser's line: another light, or the sensor has moved"
