@@ -417,6 +417,23 @@ def test_all_lasers_lit_are_a_scene_by_row(tmp_path: Path) -> None:
     }
 
 
+def test_no_row_is_lost_where_lasers_lit_together_and_alone_share_a_scene(tmp_path: Path) -> None:
+    path = tmp_path / "c.csv"
+    rows = ["all,,0,a.png,s", "L1,,0,b.png,s", "all,,1,c.png,s (row 5)", "all,,2,d.png,s", "L2,,0,e.png,s"]
+    rows += ["L3,,0,f.png,t", "all,,0,g.png,t", "L4,,0,h.png,t", "all,,0,i.png,s (row 5)"]
+    path.write_text("\n".join(["laser_id,standoff_mm,repeat,on,scene", *rows]) + "\n")
+    grouped = scenes(load_captures(path))
+    assert {name: [row.row for row in rows] for name, rows in grouped.items()} == {
+        "s": [2],
+        "s (fired alone)": [3, 6],
+        "s (row 5)": [4],
+        "s (row 5) (row 5)": [5],
+        "t": [7, 9],
+        "t (row 8)": [8],
+        "s (row 5) (row 10)": [10],
+    }
+
+
 def test_a_laser_that_the_calibration_does_not_have(ranger: Ranger, tmp_path: Path) -> None:
     path = captures(tmp_path, "L9,,0,1,2,s")
     with pytest.raises(BadInputError, match="row 2, column laser_id: expected all or one of"):

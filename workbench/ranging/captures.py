@@ -29,8 +29,12 @@ def scenes(rows: Sequence[CaptureRow]) -> dict[str, list[CaptureRow]]:
         name = row.scene or f"row {row.row}"
         if not row.scene and name in named:
             name = f"{name} without a scene"
-        if row.laser_id == ALL_LASERS and name in grouped:
-            name = f"{name} (row {row.row})"
+        if row.laser_id == ALL_LASERS:
+            while name in grouped:
+                name = f"{name} (row {row.row})"
+        else:
+            while name in grouped and grouped[name][0].laser_id == ALL_LASERS:
+                name = f"{name} (fired alone)"
         grouped.setdefault(name, []).append(row)
     return grouped
 
