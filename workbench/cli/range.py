@@ -12,9 +12,11 @@ from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.captures import load_captures
 from workbench.model.errors import BadInputError
 from workbench.ranging.captures import read_captures
+from workbench.ranging.live import check_same_sensor
 from workbench.ranging.ranger import Ranger
 from workbench.report.tables import reading_table
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE
+from workbench.session.manifest import MANIFEST, load_session_rig
 
 
 def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
@@ -24,6 +26,8 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
         BadInputError: a file is wrong.
     """
     ranger = Ranger(usable(calibration))
+    if (captures / MANIFEST).is_file():
+        check_same_sensor(load_session_rig(captures), ranger.calibration)
     readings = []
     for reading in read_captures(ranger, load_captures(_table(captures))):
         readings.append(reading)

@@ -19,6 +19,7 @@ from tests.bench.sensors import calibration_of
 from workbench import emulator
 from workbench.calibration.export import write_calibration
 from workbench.cli.main import main
+from workbench.cli.range import range_captures
 from workbench.cli.stopping import SIGNALS
 from workbench.devices.protocols import Frame
 from workbench.devices.watched import PATIENCE_S, WatchedCamera
@@ -26,9 +27,10 @@ from workbench.emulator.bench import EmulatedBench
 from workbench.emulator.camera import EmulatedCamera
 from workbench.emulator.controller import Controller
 from workbench.model.calibration import load_calibration
-from workbench.model.errors import RigNotReadyError
+from workbench.model.errors import BadInputError, RigNotReadyError
 from workbench.model.rig import Rig, load_rig
 from workbench.ranging.ranger import Ranger
+from workbench.session.manifest import create_session
 
 ROOT = Path(__file__).parents[3]
 RIG = ROOT / "rigs/thesis-emulated.yaml"
@@ -283,6 +285,20 @@ def test_the_calibration_of_another_sensor(
     assert (ended.code, ended.out) == (2, [])
     assert words in ended.err
     assert live.controllers == []
+
+
+@pytest.mark.parametrize(("serial", "refused"), [("emulated-1", False), ("emulated-9", True)])
+def test_a_session_of_another_sensor(calibration: Path, tmp_path: Path, serial: str, refused: bool) -> None:
+    rig_file, folder = tmp_path / "rig.yaml", tmp_path / "session"
+    rig_file.write_text(RIG.read_text().replace("serial: emulated-1", f"serial: {serial}"))
+    stated = {"operator": "", "created": "2026-01-01T00:00:00Z", "command": "test"}
+    create_session(folder, load_rig(rig_file), rig_file, [], **stated)
+    (folder / "captures.csv").write_text("laser_id,standoff_mm,repeat,u_px,v_px\nL1,,0,250,240\n")
+    if refused:
+        with pytest.raises(BadInputError, match="its serial is emulated-9"):
+            range_captures(folder, calibration, as_json=False)
+    else:
+        range_captures(folder, calibration, as_json=False)
 
 
 def test_usage(live: Live, tmp_path: Path) -> None:
