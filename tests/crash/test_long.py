@@ -9,7 +9,7 @@ import pytest
 from tests.crash.long import compare
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [2])
 def test_a_session_with_random_faults_loses_nothing(tmp_path: Path, seed: int) -> None:
-    told = compare(200, tmp_path, seed, mean_records=80)
+    told = compare(100, tmp_path, seed, mean_records=150)
     assert any("kill" in line or "stop" in line or "disk full" in line for line in told), told

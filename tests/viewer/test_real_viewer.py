@@ -23,6 +23,7 @@ VIEWS_OF_TAB = {
         "Residual v against standoff [mm], bars 1 sigma",
         "Verdict",
         "Checks",
+        "Parameters",
     },
     "Trial": {
         "Error of every reading against true range [mm], bars stated 1 sigma",

@@ -21,6 +21,7 @@ from workbench.procedure.operator import Scripted
 from workbench.procedure.outline import Forecast, learn_pace, outline
 from workbench.procedure.resume import plan_of, resume
 from workbench.procedure.run import Caller, Plan, run
+from workbench.report.thesis_figures import FigureWriter
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
 
@@ -77,7 +78,8 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
         person = whoever_is_there(answers.no_input, console, lambda: asked.reason, terminal.quiet)
         operator = person if answers.file is None else Scripted.load(answers.file, person)
-        consumers = (Guarded(terminal, "the progress", console), beside)
+        figures = Guarded(FigureWriter(session_dir), "drawing figures", console)
+        consumers = (Guarded(terminal, "the progress", console), figures, beside)
         try:
             yield Screen(consumers, lambda: asked.reason, operator)
         except (RigNotReadyError, StoppedError, AnswerNeededError):
