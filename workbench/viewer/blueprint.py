@@ -52,11 +52,9 @@ def _fit() -> rrb.Container:
     )
     words = rrb.Vertical(
         rrb.TextDocumentView(origin=at.FIT_SUMMARY, name="Verdict"),
-        rrb.Tabs(
-            rrb.TextDocumentView(origin=at.FIT_CHECKS, name="Checks"),
-            rrb.TextDocumentView(origin=at.FIT_TABLE, name="Parameters"),
-        ),
-        row_shares=[1, 2],
+        rrb.TextDocumentView(origin=at.FIT_CHECKS, name="Checks"),
+        rrb.TextDocumentView(origin=at.FIT_TABLE, name="Parameters"),
+        row_shares=[2, 3, 3],
     )
     return rrb.Horizontal(charts, words, column_shares=[3, 2], name="Fit")
 
