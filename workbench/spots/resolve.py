@@ -147,10 +147,13 @@ def _as_traces(scene: Scene, joint: Joint, row0: int, col0: int) -> list[Trace]:
     return traces
 
 
-def fitted_together(scene: Scene, group: list[Trace]) -> list[Trace]:
-    """A cluster fitted jointly, the strongest first; members that the data do not ask for are dropped."""
+def fitted_together(scene: Scene, group: list[Trace]) -> list[list[Trace]]:
+    """A cluster fitted jointly, the strongest first; members that the data do not ask for are dropped.
+
+    A clear spot that the fit lost although no light of the others comes there is a group of its own again.
+    """
     if len(group) == 1:
-        return group
+        return [group]
     points = np.array([t.params[U:LN_SU] for t in group])
     win, row0, col0 = _window(scene, points, max(t.reach_px for t in group))
     starts = np.array([t.params[:SHEAR] for t in group]) - (0, 0, col0, row0, 0, 0)
@@ -162,8 +165,17 @@ def fitted_together(scene: Scene, group: list[Trace]) -> list[Trace]:
         if _is_better(fit_joint(win, best.params, noise, more.weight), more, win):
             best, chosen = more, more.params
     if len(best.params) == 1:
-        return group[:1]
-    return _as_traces(scene, fit_joint(win, best.params, best.noise), row0, col0)
+        together = group[:1]
+    else:
+        together = _as_traces(scene, fit_joint(win, best.params, best.noise), row0, col0)
+    return [together, *([t] for t in group if _stands_alone(t, together))]
+
+
+def _stands_alone(trace: Trace, others: list[Trace]) -> bool:
+    """Whether a clear spot lies where no light of the others comes."""
+    return trace.clarity >= CLEAR_SD and all(
+        _apart_px(trace, o) > _TAIL_WIDTHS * (trace.reach_px + o.reach_px) for o in others
+    )
 
 
 def grown(scene: Scene, group: list[Trace]) -> list[Trace]:

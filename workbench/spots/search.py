@@ -61,7 +61,7 @@ class Search:
                 break
         if not traces or (len(traces) == self._expected and are_apart(traces)):
             return traces
-        groups = [fitted_together(scenes[0], group) for group in clusters(traces)]
+        groups = [g for cluster in clusters(traces) for g in fitted_together(scenes[0], cluster)]
         if self._expected is None or sum(map(len, groups)) < self._expected:
             groups = [split(scenes[0], g[0]) if len(g) == 1 else g for g in groups]
             groups = [grown(scenes[0], group) for group in groups]
