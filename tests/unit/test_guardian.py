@@ -146,7 +146,7 @@ def test_what_a_terminal_sends_does_not_end_the_guardian(controller: Running) ->
         time.sleep(0.2)
         assert controller.lines() == LIT
         assert os.getsid(at_work.guardian) == at_work.guardian  # a session of its own
-        assert at_work.off_after(lambda it: it.process.kill()) <= HANG_MS
+        assert at_work.off_after(lambda it: it.process.kill()) <= END_MS
     finally:
         at_work.clear()
 
