@@ -34,6 +34,8 @@ class Joint:
     """(k, 3): of flux, u, v."""
     chi2: float
     """Sum of squared residuals over the variance of the fit that the evidence is asked of."""
+    signal: Floats
+    """(pixels,) expected value above the background, DN."""
     residual: Floats
     """(pixels,), DN."""
     weight: Floats
@@ -77,7 +79,7 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
         signal.reshape(one), residual.reshape(one), used.reshape(one), leverage.reshape(one), noise
     )
     measured = Noise(noise.floor_dn2, slope)
-    return Joint(params, sd, float(used @ residual**2), residual, used, measured, converged)
+    return Joint(params, sd, float(used @ residual**2), signal, residual, used, measured, converged)
 
 
 def _with_second_order(sd_px: Floats, width_px: Floats) -> Floats:

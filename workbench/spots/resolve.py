@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations, product, starmap
 
@@ -36,6 +35,7 @@ CLEAR_SD = 7.0
 _RIVAL_WIDTHS = 2.0
 _MAX_HALF_PX = 30
 _MAX_HIDDEN = 4
+_TURNS = 2
 
 
 def _apart_px(one: Trace, other: Trace) -> float:
@@ -111,7 +111,10 @@ def _noise(scene: Scene, group: list[Trace]) -> Noise:
 
 
 def _is_better(one: Joint, two: Joint, win: Windows) -> bool:
-    """Whether the data ask for the last spot of `two`; `one` was fitted with the weights of `two`."""
+    """Whether the data ask for the spot that `two` has and `one` has not.
+
+    `one` was fitted with the weights of `two`.
+    """
     flux = two.params[:, FLUX]
     reach = float(np.exp(two.params[0, LN_SU:SHEAR].max()))
     points = two.params[:, U:LN_SU]
@@ -147,35 +150,52 @@ def _as_traces(scene: Scene, joint: Joint, row0: int, col0: int) -> list[Trace]:
     return traces
 
 
-def fitted_together(scene: Scene, group: list[Trace]) -> list[list[Trace]]:
+def fitted_together(scene: Scene, group: list[Trace], wants_more: bool) -> list[Trace]:
     """A cluster fitted jointly, the strongest first; members that the data do not ask for are dropped.
 
-    A clear spot that the fit lost although no light of the others comes there is a group of its own again.
+    Where more spots are wanted, longish members are tried as two.
     """
     if len(group) == 1:
-        return [group]
+        return group
     points = np.array([t.params[U:LN_SU] for t in group])
     win, row0, col0 = _window(scene, points, max(t.reach_px for t in group))
-    starts = np.array([t.params[:SHEAR] for t in group]) - (0, 0, col0, row0, 0, 0)
+    start = np.array([t.params[:SHEAR] for t in group]) - (0, 0, col0, row0, 0, 0)
     noise = _noise(scene, group)
-    best, chosen = fit_joint(win, starts[:1], noise), starts[:1]
-    for start in starts[1:]:
-        tried = np.vstack([chosen, start])
-        more = _fit_twice(win, tried, noise)
-        if _is_better(fit_joint(win, best.params, noise, more.weight), more, win):
-            best, chosen = more, more.params
-    if len(best.params) == 1:
-        together = group[:1]
-    else:
-        together = _as_traces(scene, fit_joint(win, best.params, best.noise), row0, col0)
-    return [together, *([t] for t in group if _stands_alone(t, together))]
+    halved = _halved(start) if wants_more else start
+    if len(halved) > len(start):
+        best, _ = _needed(win, halved, noise)
+        if best is not None and len(best.params) > len(start):
+            return _as_traces(scene, best, row0, col0)
+    best, kept = _needed(win, start, noise)
+    return [group[i] for i in kept] if best is None else _as_traces(scene, best, row0, col0)
 
 
-def _stands_alone(trace: Trace, others: list[Trace]) -> bool:
-    """Whether a clear spot lies where no light of the others comes."""
-    return trace.clarity >= CLEAR_SD and all(
-        _apart_px(trace, o) > _TAIL_WIDTHS * (trace.reach_px + o.reach_px) for o in others
-    )
+def _needed(win: Windows, start: Floats, noise: Noise) -> tuple[Joint | None, list[int]]:
+    """The fit of those of the spots that the data ask for, and their indices; no fit where one is left.
+
+    All at first, then without the least certain one: to a model that lacks a spot its light is noise, and in
+    that noise the others are lost, too.
+    """
+    kept = list(range(len(start)))
+    while len(kept) > 1:
+        full = _settled(win, start[kept], noise)
+        flux, sd = full.params[:, FLUX], full.sd[:, 0]
+        weakest = int(np.divide(flux, sd, out=np.zeros_like(flux), where=sd > 0).argmin())
+        fewer = np.delete(full.params, weakest, axis=0)
+        if _is_better(fit_joint(win, fewer, noise, full.weight), full, win):
+            return full, kept
+        del kept[weakest]
+    return None, kept
+
+
+def _halved(start: Floats) -> Floats:
+    """First guesses in which longish spots are two."""
+    narrowest = start[:, LN_SU:].min()
+    long = start[:, LN_SU:].max(axis=1) > narrowest + np.log(_LONGISH)
+    pairs = [halves(np.append(params, 0.0)) for params in start[long]]
+    halved: Floats = np.vstack([start[~long], *pairs])
+    halved[:, LN_SU:] = narrowest
+    return halved
 
 
 def grown(scene: Scene, group: list[Trace]) -> list[Trace]:
@@ -187,34 +207,27 @@ def grown(scene: Scene, group: list[Trace]) -> list[Trace]:
     allowed = _allowed(scene, win, row0, col0)
     best = fit_joint(win, start, noise)
     while len(best.params) < len(group) + _MAX_HIDDEN:
-        better = next(
-            (m for p in _proposals(best, start, win, allowed) if (m := _asked_for(best, p, noise, win))), None
-        )
-        if better is None:
+        hidden = hidden_spot(best, win, allowed)
+        if hidden is None:
             break
-        best = better
+        more = _settled(win, np.vstack([best.params, hidden]), noise)
+        if not _is_better(fit_joint(win, best.params, noise, more.weight), more, win):
+            break
+        best = more
     return group if len(best.params) == len(group) else _as_traces(scene, best, row0, col0)
 
 
-def _fit_twice(win: Windows, start: Floats, noise: Noise) -> Joint:
-    """Fit with the noise that a first fit of the same model measures: that of a poorer model is too high."""
-    first = fit_joint(win, start, noise)
-    return fit_joint(win, first.params, first.noise)
-
-
-def _proposals(best: Joint, start: Floats, win: Windows, allowed: Bools) -> Iterator[Floats]:
-    """First guesses with more spots: the longish ones as two, or one where the residuals rise."""
-    if len(best.params) == len(start):
-        narrowest = start[:, LN_SU:].min()
-        long = np.flatnonzero(start[:, LN_SU:].max(axis=1) > narrowest + np.log(_LONGISH))
-        for chosen in ([*long], *([i] for i in long)) if long.size else ():
-            pairs = [halves(np.append(start[i], 0.0)) for i in chosen]
-            proposal = np.vstack([np.delete(best.params, chosen, axis=0), *pairs])
-            proposal[:, LN_SU:] = narrowest
-            yield proposal
-    hidden = hidden_spot(best, win, allowed)
-    if hidden is not None:
-        yield np.vstack([best.params, hidden])
+def _settled(win: Windows, start: Floats, noise: Noise) -> Joint:
+    """Fit with the noise that the model itself measures, without pixels that no spot explains."""
+    for _ in range(_TURNS):
+        joint = fit_joint(win, start, noise)
+        signal, residual, weight = (
+            part.reshape(1, *win.shape) for part in (joint.signal, joint.residual, joint.weight)
+        )
+        largest = np.array([[(weight * residual**2).max()]])
+        usable, _ = without_outliers(win.usable, signal, residual, weight, largest)
+        win, start, noise = win._replace(usable=usable), joint.params, joint.noise
+    return fit_joint(win, start, noise)
 
 
 def _allowed(scene: Scene, win: Windows, row0: int, col0: int) -> Bools:
@@ -229,15 +242,15 @@ def _allowed(scene: Scene, win: Windows, row0: int, col0: int) -> Bools:
     return allowed
 
 
-def _asked_for(best: Joint, proposal: Floats, noise: Noise, win: Windows) -> Joint | None:
-    """The fit from `proposal` if it explains the data far better than `best`."""
-    more = _fit_twice(win, proposal, noise)
-    return more if _is_better(fit_joint(win, best.params, noise, more.weight), more, win) else None
+def split(scene: Scene, trace: Trace, others: list[Trace]) -> list[Trace]:
+    """A spot as two if it is elongated and two explain it far better; flagged merged if only the former.
 
-
-def split(scene: Scene, trace: Trace) -> list[Trace]:
-    """A spot as two if it is elongated and two explain it far better; flagged merged if only the former."""
+    Spots whose light mixes with that of others are left to the fit of all of them together.
+    """
+    if any(_apart_px(trace, o) < _TAIL_WIDTHS * (trace.reach_px + o.reach_px) for o in others):
+        return [trace]
     win, row0, col0 = _window(scene, trace.params[None, U:LN_SU], 1.3 * trace.reach_px)
+    win = win._replace(usable=win.usable & ~_light_of(others, win.shape, row0, col0))
     start = np.zeros((1, 7))
     start[0, : trace.params.size] = trace.params - (0, 0, col0, row0, 0, 0, 0)[: trace.params.size]
     noise = _noise(scene, [trace])
@@ -249,8 +262,17 @@ def split(scene: Scene, trace: Trace) -> list[Trace]:
     short, long = principal_axes(whole.params[0])[0]
     if not whole.converged[0] or long < _ELONGATED * short:
         return [trace]
-    two = _fit_twice(win, halves(whole.params[0]), noise)
+    two = _settled(win, halves(whole.params[0]), noise)
     one = float(two.weight @ whole.residual.ravel() ** 2)
     if not _is_better(replace(two, chi2=one), two, win):
         return [trace]
     return _as_traces(scene, two, row0, col0)
+
+
+def _light_of(traces: list[Trace], shape: tuple[int, int], row0: int, col0: int) -> Bools:
+    """(height, width) where light of the spots comes."""
+    light = np.zeros(shape, bool)
+    rows, cols = np.mgrid[row0 : row0 + shape[0], col0 : col0 + shape[1]]
+    for t in traces:
+        light |= np.hypot(cols - t.spot.u_px, rows - t.spot.v_px) < _TAIL_WIDTHS * t.reach_px
+    return light

@@ -61,11 +61,17 @@ class Search:
                 break
         if not traces or (len(traces) == self._expected and are_apart(traces)):
             return traces
-        groups = [g for cluster in clusters(traces) for g in fitted_together(scenes[0], cluster)]
-        if self._expected is None or sum(map(len, groups)) < self._expected:
-            groups = [split(scenes[0], g[0]) if len(g) == 1 else g for g in groups]
-            groups = [grown(scenes[0], group) for group in groups]
-        return self._as_many_as_lasers([trace for group in groups for trace in group], scenes)
+        more = self._wants_more(traces)
+        if more:
+            traces = [s for t in traces for s in split(scenes[0], t, [o for o in traces if o is not t])]
+        groups = [fitted_together(scenes[0], group, more) for group in clusters(traces)]
+        traces = [trace for group in groups for trace in group]
+        if self._wants_more(traces):
+            traces = [trace for group in groups for trace in grown(scenes[0], group)]
+        return self._as_many_as_lasers(traces, scenes)
+
+    def _wants_more(self, traces: list[Trace]) -> bool:
+        return self._expected is None or len(traces) < self._expected
 
     def _is_complete(self, traces: list[Trace]) -> bool:
         """Whether every laser has a spot that is no spike of noise."""

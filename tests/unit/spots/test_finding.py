@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.unit.spots.draw import Drawn, Sensor, draw
+from tests.unit.spots.draw import Drawn, Sensor, draw, profile
 from workbench.model.errors import BadInputError
 from workbench.spots import Failure, Scanline, SpotFinder, explain, find_spots
 from workbench.spots.thesis import thesis_centres
@@ -79,6 +79,30 @@ def test_overlapping_spots_are_separated(apart: float) -> None:
     for spot, t in zip(finding.spots, true, strict=True):
         assert spot.u_px == pytest.approx(t.u, abs=5 * spot.u_sd_px)
     assert (Failure.MERGED in finding.failures) == (apart < 4 * 1.3)
+
+
+CROWDS = {
+    "three side by side": [(13.8, 20.0), (13.9, 24.1), (8.8, 22.7), (21.3, 23.7)],
+    "a merged pair and two more": [(13.8, 16.7), (14.4, 24.5), (24.6, 22.9), (27.6, 22.2)],
+    "two merged pairs": [(13.4, 20.6), (16.7, 20.6), (23.3, 20.6), (26.6, 20.6)],
+}
+"""Places of four lasers' spots on a target far away, u and v."""
+SPECKLE = 0.2
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("crowd", CROWDS)
+def test_a_crowd_of_spots_is_told_apart(crowd: str, seed: int) -> None:
+    """In speckle, whose noise hides the neighbours of a spot from a model that lacks them."""
+    places, random = sorted(CROWDS[crowd]), rng(seed)
+    light = np.sum([profile((40, 40), Drawn(u, v, 5000.0, 0.75, 0.75)) for u, v in places], axis=0)
+    grains = random.gamma(SPECKLE**-2, SPECKLE**2, light.shape)
+    frame = Sensor(10.0, 6.0, 8).expose(20.0 + light * grains, random)
+    spots = find_spots(frame, expected=4).spots
+    assert len(spots) == 4
+    for spot, (u, v) in zip(spots, places, strict=True):
+        assert spot.u_px == pytest.approx(u, abs=5 * spot.u_sd_px)
+        assert spot.v_px == pytest.approx(v, abs=5 * spot.v_sd_px)
 
 
 def test_an_ellipse_is_not_split() -> None:
