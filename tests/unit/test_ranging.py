@@ -283,6 +283,16 @@ def test_a_range_beyond_the_calibrated_ones_is_marked(ranger: Ranger) -> None:
     assert ranger.read_lit("s", spots(ranger, dict.fromkeys(IDS, 4400.0))).notes == ()
 
 
+@pytest.mark.parametrize(("range_mm", "end_mm"), [(7000.0, 4500.0), (110.0, 125.0)])
+def test_how_far_a_spot_lies_outside_the_calibrated_field_is_told(
+    ranger: Ranger, range_mm: float, end_mm: float
+) -> None:
+    reading = ranger.read_lit("s", spots(ranger, {"L2": range_mm, "L3": range_mm}))
+    for laser_id, note in zip(("L2", "L3"), reading.notes, strict=True):
+        seen, end = ranger.sensor.spot_px(laser_id, np.array([range_mm, end_mm]))
+        assert note.endswith(f", its spot {np.hypot(*(seen - end)):.1f} px outside the calibrated field")
+
+
 def test_repeats_average_as_the_fit_averages_them(ranger: Ranger, tmp_path: Path) -> None:
     (spot,) = ranger.sensor.spot_px("L1", np.array([800.0])).tolist()
     one = captures(tmp_path, f"L1,,0,{spot[0]},{spot[1]},s")
@@ -339,6 +349,44 @@ def test_spots_that_are_told_apart_ask_for_no_more(ranger: Ranger) -> None:
     assert fired == [IDS]
     assert reading.status == "not_enough_points"
     assert [laser.laser_id for laser in reading.lasers] == ["L1", "L3", "L4"]
+
+
+def test_a_spot_that_may_be_two_is_not_ranged_and_both_lasers_fire_alone(ranger: Ranger) -> None:
+    """Far away the pointing of two beams puts their spots on one another: their sum is neither's."""
+    crossing = moved_onto(ranger, "L1", "L2", 3000.0)
+    fired: list[tuple[str, ...]] = []
+
+    def shoot(ids: tuple[str, ...]) -> Finding:
+        fired.append(ids)
+        seen = [i for i in ids if len(ids) == 1 or i != "L1"]
+        return Finding(tuple(spots(crossing, dict.fromkeys(seen, 3000.0))))
+
+    reading = acquire(crossing, "s", shoot)
+    assert fired == [IDS, ("L1",), ("L2",)]
+    assert reading.status == "done"
+    assert [laser.range_mm for laser in reading.lasers] == pytest.approx([3000.0] * 4)
+    lit = crossing.read_lit("s", spots(crossing, dict.fromkeys(("L2", "L3", "L4"), 3000.0)))
+    assert [laser.laser_id for laser in lit.lasers] == ["L3", "L4"]
+    assert any(note.startswith("L1: its spot may be one with that at u = ") for note in lit.notes)
+
+
+def moved_onto(ranger: Ranger, laser_id: str, other: str, range_mm: float) -> Ranger:
+    """The sensor with one beam turned so that its spot lies on another's at a range, but for a pixel."""
+    there, here = positions(ranger, {other: range_mm, laser_id: range_mm})
+    values = ranger.calibration.geometry()
+    turned = {
+        f"{laser_id}.tx": values[f"{laser_id}.tx"] + (there[0] + 1.0 - here[0]) / values["f_px"],
+        f"{laser_id}.ty": values[f"{laser_id}.ty"] + (there[1] - here[1]) / values["f_px"],
+    }
+    parameters = ranger.calibration.laser_ranger.parameters
+    moved = tuple(turned.get(n, v) for n, v in zip(parameters.names, parameters.values, strict=True))
+    part = ranger.calibration.laser_ranger
+    parameters = parameters.model_copy(update={"values": moved})
+    return Ranger(
+        ranger.calibration.model_copy(
+            update={"laser_ranger": part.model_copy(update={"parameters": parameters})}
+        )
+    )
 
 
 def test_every_state_leads_to_an_answer() -> None:

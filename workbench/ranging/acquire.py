@@ -46,10 +46,10 @@ NEXT: Final = {
 
 
 def acquire(ranger: Ranger, scene: str, shoot: Shoot) -> Reading:
-    """One reading: normal capture, and alternative capture of the lines whose spots cannot be told apart.
+    """One reading: normal capture, and alternative capture of the lasers whose spots cannot be told apart.
 
     A line that is told stands whatever becomes of the other one. Spots that are missing are not asked for
-    again where the others are told.
+    again where the others are told, unless they may hide in one of these.
     """
     control = _Control(ranger, scene, shoot)
     state = State.NORMAL

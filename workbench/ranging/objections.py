@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,6 @@ from workbench.calibration.sensor import Ranges
 from workbench.model.calibration import Validity
 from workbench.model.event import LaserRange
 from workbench.ranging.assignment import MOST_MISFIT_SD
-from workbench.spots import Scanline
 
 FloatArray = NDArray[np.float64]
 MOST_RELATIVE_SIGMA = 0.5
@@ -58,9 +56,15 @@ def _objection(
 
 
 def outside_validity(
-    lasers: Sequence[LaserRange], validity: Validity, lines: Mapping[str, Scanline]
+    lasers: Sequence[LaserRange], validity: Validity, calibrated_px: Mapping[str, FloatArray]
 ) -> list[str]:
-    """A remark for each range that the calibration was not measured at, and how far off the spot lies."""
+    """A remark for each range that the calibration was not measured at, and how far off the spot lies.
+
+    Args:
+        lasers: ranges.
+        validity: nearest and farthest standoff of the calibration.
+        calibrated_px: (2, 2) for each laser: u, v of its spot at these.
+    """
     nearest, farthest = validity.standoff_mm
     remarks = []
     for laser in lasers:
@@ -68,19 +72,18 @@ def outside_validity(
             continue
         calibrated = f"{nearest:g} to {farthest:g}"
         remark = f"{laser.laser_id}: {laser.range_mm:.0f} mm lies outside the calibrated {calibrated} mm"
-        beyond = _beyond_field_px(laser, lines[laser.laser_id])
+        beyond = _beyond_px(laser, *calibrated_px[laser.laser_id])
         remarks.append(
             remark
             if beyond < LEAST_BEYOND_PX
-            else f"{remark}, its spot {beyond:.0f} px outside the calibrated field"
+            else f"{remark}, its spot {beyond:.1f} px outside the calibrated field"
         )
     return remarks
 
 
-def _beyond_field_px(laser: LaserRange, field: Scanline) -> float:
+def _beyond_px(laser: LaserRange, near: FloatArray, far: FloatArray) -> float:
     """How far a spot lies outside the part of its line where the calibration saw it (0: inside)."""
-    length = hypot(field.du, field.dv)
-    du = 0.0 if laser.u_px is None else (laser.u_px - field.u0_px) * field.du
-    dv = 0.0 if laser.v_px is None else (laser.v_px - field.v0_px) * field.dv
-    along = (du + dv) / length
-    return max(along - length, -along, 0.0)
+    along, length = near - far, float(np.hypot(*(near - far)))
+    seen = np.array([far[n] if p is None else p for n, p in enumerate((laser.u_px, laser.v_px))])
+    place = float((seen - far) @ along) / length
+    return max(place - length, -place, 0.0)

@@ -25,6 +25,8 @@ BoolArray = NDArray[np.bool_]
 Ints = NDArray[np.intp]
 NOTHING_SEEN = "no spot was seen"
 Status = Literal["done", "not_enough_points", "no_points"]
+MERGING_WIDTHS = 4.0
+"""Spots nearer than this to each other may be found as one."""
 SCANLINE_HALF_WIDTH_PX = 8.0
 """A beam of 1.5 mm at the sensor's front spreads over some 8 px on either side of its line."""
 
@@ -112,6 +114,12 @@ class Ranger:
         return dict(zip(self.sensor.ids, self.scanlines, strict=True))
 
     @cached_property
+    def _calibrated_px(self) -> dict[str, FloatArray]:
+        """(2, 2) u, v of each laser's spot at the nearest and the farthest standoff of the calibration."""
+        ends = np.array(self.calibration.laser_ranger.validity.standoff_mm)
+        return {i: self.sensor.spot_px(i, ends) for i in self.sensor.ids}
+
+    @cached_property
     def _axes(self) -> dict[Axis, Ints]:
         """The lasers of each line that there is."""
         axes: tuple[Axis, ...] = ("u", "v")
@@ -160,7 +168,8 @@ class Ranger:
     def deal(self, spots: Sequence[Spot]) -> Dealt:
         """Deal the spots of a frame in which every laser is lit to the lasers, each line apart.
 
-        A spot that two lines claim leaves both untold.
+        A spot that two lines claim leaves both untold. A laser without a spot whose spot would lie where
+        another is leaves both of these untold: what is seen there may be the sum of the two.
         """
         pairs = pair_up(self.sensor, *spot_arrays(spots))
         found = {axis: assign(pairs, lasers) for axis, lasers in self._axes.items()}
@@ -169,9 +178,36 @@ class Ranger:
         told = {axis: f for axis, f in found.items() if f is not None and twice.isdisjoint(f[1].tolist())}
         lasers = np.concatenate([np.empty(0, np.intp), *(f[0] for f in told.values())])
         dealt = np.concatenate([np.empty(0, np.intp), *(f[1] for f in told.values())])
-        untold = [self.sensor.ids[i] for axis, all_ in self._axes.items() if axis not in told for i in all_]
+        hidden = [pair for axis in told for pair in self._hidden(spots, pairs, *told[axis], self._axes[axis])]
+        clear = ~np.isin(dealt, [spot for _, spot in hidden])
+        untold = {int(i) for axis, all_ in self._axes.items() if axis not in told for i in all_}
+        untold |= {laser for laser, _ in hidden} | set(lasers[~clear].tolist())
         notes = self._what_is_left(pairs, len(spots), tuple(axis for axis in self._axes if axis not in told))
-        return Dealt(lasers, dealt, pairs.chosen(lasers, dealt), tuple(untold), notes)
+        notes += tuple(
+            f"{self.sensor.ids[laser]}: its spot may be one with that at u = {spots[spot].u_px:.0f},"
+            f" v = {spots[spot].v_px:.0f} px: fire each laser alone"
+            for laser, spot in hidden
+        )
+        ids = tuple(i for n, i in enumerate(self.sensor.ids) if n in untold)
+        lasers, dealt = lasers[clear], dealt[clear]
+        return Dealt(lasers, dealt, pairs.chosen(lasers, dealt), ids, notes)
+
+    def _hidden(
+        self, spots: Sequence[Spot], pairs: Pairs, told: Ints, dealt: Ints, lasers: Ints
+    ) -> list[tuple[int, int]]:
+        """Lasers of a line without a spot, each with a spot that its own would lie on at a depth told."""
+        if len(told) in (0, len(lasers)):
+            return []
+        depth_mm = pairs.chosen(told, dealt).range_mm
+        depth_mm = depth_mm[np.isfinite(depth_mm)]
+        place, _ = spot_arrays(spots)
+        near_px = MERGING_WIDTHS * np.array([spot.width_px for spot in spots])
+        hidden = []
+        for laser in np.setdiff1d(lasers, told).tolist():
+            expected = self.sensor.spot_px(self.sensor.ids[laser], depth_mm)
+            apart_px = np.hypot(*(expected[:, None] - place).T).min(axis=1, initial=np.inf)
+            hidden += [(laser, int(n)) for n in np.flatnonzero(apart_px < near_px)]
+        return hidden
 
     def alone(self, laser_id: str, spots: Sequence[Spot]) -> list[Spot]:
         """The spots on the line of a laser that was fired alone; its own is known if there is one only."""
@@ -215,7 +251,7 @@ class Ranger:
         status: Status = "done" if len(lasers) == fired else "not_enough_points"
         lines = self._lines(ids, ranges)
         nearest = min((line.shape for line in lines), key=lambda shape: shape.closest_mm)
-        said += outside_validity(lasers, self.calibration.laser_ranger.validity, self._fields)
+        said += outside_validity(lasers, self.calibration.laser_ranger.validity, self._calibrated_px)
         return Reading(
             scene,
             status,
