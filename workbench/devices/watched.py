@@ -53,6 +53,8 @@ class WatchedCamera:
             self._ask(self.camera.close)
 
     def _ask(self, call: Callable[[], T]) -> T:
+        if self._gone:  # its late answer would be taken for that to this call
+            raise RigNotReadyError("camera: it stopped delivering before; end this run, check its cable")
         self._asked.put(call)
         try:
             answer = self._answers.get(timeout=self._patience_s)

@@ -130,21 +130,37 @@ def _row(simulated: SceneSimulated, claim: Claim) -> ClaimRow:
         stated=claim.stated,
         **reached,
         reproduced=_reproduced(claim, reached["thesis"]),
-        better=_better(claim, farthest, reached["ours"], reached["thesis"]),
+        better=_better(claim, farthest, reached["ours"], reached["thesis"])
+        and _untold(simulated, claim, simulated.ours) <= _untold(simulated, claim, simulated.thesis),
     )
 
 
 def _reached(simulated: SceneSimulated, claim: Claim, chain: ChainReadings) -> float | None:
-    nearest, farthest = claim.set_mm or simulated.scene.set_mm
-    set_mm = np.array(simulated.set_mm)
-    inside = np.flatnonzero((set_mm >= nearest * (1 - 1e-9)) & (set_mm <= farthest * (1 + 1e-9))).tolist()
+    inside = _inside(simulated, claim)
     if claim.quantity == "shape":
         return _farthest_right(simulated, chain, inside)
     if claim.quantity == "readings":
         return float(sum(chain.closest_mm[i] is not None for i in inside))
-    error = _range_error if claim.quantity == "range" else _angle_error
-    told = [e for i in inside if (e := error(simulated, chain, i)) is not None]
+    told = [e for i in inside if (e := _error(simulated, claim, chain, i)) is not None]
     return max(told, default=None)
+
+
+def _inside(simulated: SceneSimulated, claim: Claim) -> list[int]:
+    """Which of the distances a claim is about."""
+    nearest, farthest = claim.set_mm or simulated.scene.set_mm
+    set_mm = np.array(simulated.set_mm)
+    inside = np.flatnonzero((set_mm >= nearest * (1 - 1e-9)) & (set_mm <= farthest * (1 + 1e-9)))
+    return [int(i) for i in inside]
+
+
+def _error(simulated: SceneSimulated, claim: Claim, chain: ChainReadings, i: int) -> float | None:
+    error = _angle_error if claim.quantity == "angle" else _range_error
+    return error(simulated, chain, i)
+
+
+def _untold(simulated: SceneSimulated, claim: Claim, chain: ChainReadings) -> int:
+    """Readings that a largest error leaves out, for they tell no range, or no angle."""
+    return sum(_error(simulated, claim, chain, i) is None for i in _inside(simulated, claim))
 
 
 def _range_error(simulated: SceneSimulated, chain: ChainReadings, i: int) -> float | None:
