@@ -50,21 +50,26 @@ def _step(by: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @compiled
 def polynomial(
-    powers: FloatArray,
-    slopes: FloatArray,
+    x_mm: FloatArray,
+    degree: int,
+    scale_mm: float,
     range_mm: FloatArray,
     offset_mm: float,
     ranges: FloatArray,
     places: FloatArray,
     cross: FloatArray,
     steps: int,
-) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Fit range = powers @ coefficients, whose slope is slopes @ coefficients; see `fit_polynomial`.
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
+    """Fit range = sum of coefficients[k] (x / scale)^k; see `fit_polynomial`.
 
     Returns:
-        coefficients (p,), covariance (p, p), derivatives by the ranges (p, n), chi2 (not a number where the
-        polynomial passes behind the pinhole at a point).
+        coefficients (p,), covariance (p, p), derivatives by the ranges (p, n) and by the places (p, n), chi2
+        (not a number where the polynomial passes behind the pinhole at a point).
     """
+    powers, slopes = np.ones((len(x_mm), degree + 1)), np.zeros((len(x_mm), degree + 1))
+    for k in range(1, degree + 1):
+        powers[:, k] = powers[:, k - 1] * (x_mm / scale_mm)
+        slopes[:, k] = powers[:, k - 1] * (k / scale_mm)
     measured = 1.0 / (range_mm + offset_mm)
     by_range = measured * measured
     _, gain = _step(powers, _inverse(ranges))
@@ -81,7 +86,8 @@ def polynomial(
     depth = powers @ coefficients + offset_mm
     residual = 1.0 / depth - measured
     chi2 = float(np.sum(residual * (weight @ residual))) if depth.min() > 0.0 else math.nan
-    return coefficients, covariance, gain * by_range, chi2
+    by_coefficient = gain * by_range
+    return coefficients, covariance, by_coefficient, -by_coefficient * (slopes @ coefficients), chi2
 
 
 @compiled

@@ -27,11 +27,14 @@ def objections(position_px: FloatArray, ranges: Ranges, size_px: tuple[int, int]
         ranges: what the sensor makes of them.
         size_px: (width, height) of the picture.
     """
-    rows = zip(position_px, ranges.range_mm, ranges.sigma_mm, ranges.misfit_sd, strict=True)
-    return [
-        _objection(position, float(r), float(s), float(m), np.array(size_px, float))
-        for position, r, s, m in rows
-    ]
+    why: list[str | None] = [None] * len(position_px)
+    bound = MOST_RELATIVE_SIGMA * ranges.range_mm
+    good = (ranges.misfit_sd < MOST_MISFIT_SD) & (ranges.sigma_mm < bound) & np.isfinite(ranges.range_mm)
+    good &= ((position_px > -0.5) & (position_px < np.array(size_px) - 0.5)).all(axis=1)
+    for n in np.flatnonzero(~good).tolist():
+        one = (ranges.range_mm[n], ranges.sigma_mm[n], ranges.misfit_sd[n])
+        why[n] = _objection(position_px[n], *map(float, one), np.array(size_px, float))
+    return why
 
 
 def _objection(

@@ -73,14 +73,17 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
     from workbench.ranging.kernels import polynomial  # loads the compiler, which only a fit needs
 
     scale = float(np.abs(points.x_mm).max()) or 1.0
-    powers = _powers(points.x_mm / scale, degree)
-    slopes = np.zeros_like(powers)
-    slopes[:, 1:] = powers[:, :-1] * (np.arange(1, degree + 1) / scale)
-    fitted = polynomial(powers, slopes, points.range_mm, points.offset_mm, *points.covariances(), STEPS)
-    coefficients, covariance, by_range, chi2 = fitted
+    coefficients, covariance, by_range, by_place, chi2 = polynomial(
+        points.x_mm,
+        degree,
+        scale,
+        points.range_mm,
+        points.offset_mm,
+        *points.covariances(),
+        STEPS,
+    )
     if not math.isfinite(chi2):
         return None
-    by_place = -by_range * (slopes @ coefficients)
     return PolynomialFit(coefficients, covariance, by_range, by_place, scale, chi2, len(points) - degree - 1)
 
 
