@@ -140,9 +140,18 @@ def test_a_number_that_says_two_things(path: Path) -> None:
     assert "f_px is 600.0" in edited(path, change)
 
 
+def test_a_covariance_with_a_negative_variance(path: Path) -> None:
+    def change(data: dict[str, Any]) -> None:
+        data["laser_ranger"]["parameters"]["covariance"]["data"][0] = -1.5e-12
+
+    assert "no negative variance, got -1.5e-12" in edited(path, change)
+
+
 def test_a_covariance_that_is_none(path: Path) -> None:
     def change(data: dict[str, Any]) -> None:
-        data["laser_ranger"]["parameters"]["covariance"]["data"][0] = -1.0
+        matrix = data["laser_ranger"]["parameters"]["covariance"]
+        cells, n = matrix["data"], matrix["cols"]
+        cells[1] = cells[n] = 1.1 * (cells[0] * cells[n + 1]) ** 0.5  # more than fully correlated
 
     assert "no negative eigenvalue" in edited(path, change)
 

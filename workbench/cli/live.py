@@ -80,7 +80,4 @@ def _read_all(
 
 
 def _show(reading: Reading, as_json: bool) -> None:
-    try:
-        print(json.dumps(plain(reading)) if as_json else reading_line(reading), flush=True)
-    except BrokenPipeError:
-        raise StoppedError("nobody reads the readings any more") from None
+    print(json.dumps(plain(reading)) if as_json else reading_line(reading), flush=True)

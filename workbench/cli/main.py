@@ -13,7 +13,7 @@ import typer
 
 from workbench.cli.leaving import leave
 from workbench.cli.stopping import stop_at_once
-from workbench.model.errors import WorkbenchError
+from workbench.model.errors import StoppedError, WorkbenchError
 
 # Our matrices are small: threads of the linear algebra wait for each other longer than they work.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -268,6 +268,8 @@ def main() -> None:
     try:
         app()
     except SystemExit as ended:
+        if isinstance(ended.__context__, BrokenPipeError):  # as with `| head`; typer has made a 1 of it
+            leave(StoppedError.exit_code)
         leave(ended.code if isinstance(ended.code, int) else int(ended.code is not None))
     except WorkbenchError as error:
         _say(f"error: {error}")

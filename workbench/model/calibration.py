@@ -249,7 +249,9 @@ def load_calibration(path: Path) -> Calibration:
 def _check_covariance(covariance: NDArray[np.float64]) -> None:
     if not np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0):
         raise ValueError("covariance: expected a symmetric matrix")
-    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    if (np.diag(covariance) < 0).any():
+        raise ValueError(f"covariance: expected no negative variance, got {np.diag(covariance).min():g}")
+    scale = np.sqrt(np.diag(covariance))
     safe = np.where(scale > 0, scale, 1.0)
     smallest = float(np.linalg.eigvalsh(covariance / np.outer(safe, safe))[0])
     # Rounding leaves a singular direction at +- some 1e-15 of the largest; anything below is a wrong matrix.

@@ -94,5 +94,6 @@ def _position(ranger: Ranger, row: CaptureRow) -> tuple[float, float, float, flo
     if row.on is None:
         return row.u_px, row.v_px, row.u_sd_px, row.v_sd_px
     index = ranger.sensor.ids.index(row.laser_id)
-    spots = find_row_spots(row, ranger.size_px, ranger.scanlines[index : index + 1], 1).spots
+    found = find_row_spots(row, ranger.size_px, ranger.scanlines[index : index + 1], 1).spots
+    spots = ranger.alone(row.laser_id, found)
     return (spots[0].u_px, spots[0].v_px, spots[0].u_sd_px, spots[0].v_sd_px) if len(spots) == 1 else None

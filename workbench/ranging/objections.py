@@ -32,8 +32,8 @@ def objections(position_px: FloatArray, ranges: Ranges, size_px: tuple[int, int]
     good = (ranges.misfit_sd < MOST_MISFIT_SD) & (ranges.sigma_mm < bound) & np.isfinite(ranges.range_mm)
     good &= ((position_px > -0.5) & (position_px < np.array(size_px) - 0.5)).all(axis=1)
     for n in np.flatnonzero(~good).tolist():
-        one = (ranges.range_mm[n], ranges.sigma_mm[n], ranges.misfit_sd[n])
-        why[n] = _objection(position_px[n], *map(float, one), np.array(size_px, float))
+        range_mm, sigma_mm, misfit_sd = ranges.range_mm[n], ranges.sigma_mm[n], ranges.misfit_sd[n]
+        why[n] = _objection(position_px[n], range_mm, sigma_mm, misfit_sd, np.array(size_px, float))
     return why
 
 

@@ -131,7 +131,7 @@ def _row(simulated: SceneSimulated, claim: Claim) -> ClaimRow:
         **reached,
         reproduced=_reproduced(claim, reached["thesis"]),
         better=_better(claim, farthest, reached["ours"], reached["thesis"])
-        and _untold(simulated, claim, simulated.ours) <= _untold(simulated, claim, simulated.thesis),
+        and not _tells_less(simulated, claim, simulated.ours, simulated.thesis),
     )
 
 
@@ -158,8 +158,15 @@ def _error(simulated: SceneSimulated, claim: Claim, chain: ChainReadings, i: int
     return error(simulated, chain, i)
 
 
+def _tells_less(simulated: SceneSimulated, claim: Claim, one: ChainReadings, other: ChainReadings) -> bool:
+    """Whether a largest error of `one` is that of fewer readings."""
+    if claim.quantity not in ("range", "angle"):
+        return False
+    return _untold(simulated, claim, one) > _untold(simulated, claim, other)
+
+
 def _untold(simulated: SceneSimulated, claim: Claim, chain: ChainReadings) -> int:
-    """Readings that a largest error leaves out, for they tell no range, or no angle."""
+    """How many readings tell no range, or no angle."""
     return sum(_error(simulated, claim, chain, i) is None for i in _inside(simulated, claim))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -123,4 +124,18 @@ def test_a_covariance_that_is_not_positive(refused: Refused, calibration: Path, 
     wrong = tmp_path / "wrong.yaml"
     wrong.write_text(f"{head}covariance:{tail.replace(variance, f'-{variance}', 1)}")
     said = refused(table(tmp_path, "all,,0,on.png,"), wrong)
-    assert "covariance: expected no negative eigenvalue" in said
+    assert "covariance: expected no negative variance, got -" in said
+
+
+def test_nobody_reads_the_answer(calibration: Path, tmp_path: Path) -> None:
+    """As with `| head`: it ends, without a word and with the code for what was stopped."""
+    frame(tmp_path / "on.png")
+    captures = table(tmp_path, "all,,0,on.png,")
+    script = Path(sys.executable).with_name("workbench")
+    command: list[str | Path] = [script, "range", captures, "--calibration", calibration, "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
+        assert child.stdout is not None
+        assert child.stderr is not None
+        child.stdout.close()
+        said = child.stderr.read()
+    assert (child.returncode, said) == (5, b"")
