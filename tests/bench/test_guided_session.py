@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.crash.short import CALLER, RESUMER, go_on, results, story, write_files
-from workbench.devices.protocols import Operator
+from workbench.devices.protocols import Operator, StreamingCamera
 from workbench.devices.registry import open_bench
 from workbench.model import event as ev
 from workbench.model.errors import (
@@ -227,10 +227,11 @@ def test_latency_is_counted_whatever_the_driver_believes(tmp_path: Path, latency
     with open_bench(rig, tmp_path / "s") as bench:
         bench.target.place(Placement(key="k", standoff_mm=500.0))
         bench.mark("k")
-        assert count_latency(bench.lasers, bench.camera, rig, 10) == latency  # type: ignore[arg-type]
+        assert isinstance(bench.camera, StreamingCamera)
+        assert count_latency(bench.lasers, bench.camera, rig, 10) == latency
         if latency > 1:
             with pytest.raises(RigNotReadyError, match="at most 1 frames"):
-                count_latency(bench.lasers, bench.camera, rig, 1)  # type: ignore[arg-type]
+                count_latency(bench.lasers, bench.camera, rig, 1)
 
 
 @pytest.mark.parametrize(

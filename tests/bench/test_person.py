@@ -64,7 +64,6 @@ class Terminal:
     def type(self, line: str) -> None:
         """Answer a prompt, once it is there."""
         self.wait_for("> ")
-        time.sleep(0.3)  # a hand is slower than the flush of what was typed ahead
         os.write(self.master, line.encode() + b"\n")
 
     def end(self) -> int:
@@ -155,7 +154,6 @@ def test_control_c_at_a_prompt_pauses(terminal: Terminal, tmp_path: Path) -> Non
 
 def test_the_end_of_input_is_no_answer(terminal: Terminal) -> None:
     terminal.wait_for("> ")
-    time.sleep(0.3)
     os.write(terminal.master, b"\x04")
     assert terminal.end() == 6
     assert "prompt p.1" in terminal.text

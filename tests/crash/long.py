@@ -23,6 +23,7 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
@@ -152,8 +153,7 @@ def run_to_the_end(plan: Plan, session: Path, weather: Weather, *consumers: ev.C
             raise StoppedError("the journal cannot be written: no space left on device") from error
         return whole(journal, event)
 
-    Journal.append = append  # type: ignore[method-assign, assignment]
-    try:
+    with patch.object(Journal, "append", append):
         weather.next_fault()
         while True:
             try:
@@ -167,8 +167,6 @@ def run_to_the_end(plan: Plan, session: Path, weather: Weather, *consumers: ev.C
                 weather.next_fault()
             else:
                 return
-    finally:
-        Journal.append = whole  # type: ignore[method-assign]
 
 
 def lost_shots(session: Path, shots: int) -> int:

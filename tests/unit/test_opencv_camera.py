@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import cast
 
 import cv2
 import numpy as np
@@ -206,7 +207,7 @@ class Device:
 def test_settings_are_made_and_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cv2, "VideoCapture", Device)
     camera = camera_of("/dev/video0", exposure=16, gain=3, pixel_format="GREY", buffer_frames=1)
-    made = camera._capture.settings  # type: ignore[attr-defined]
+    made = cast(Device, camera._capture).settings
     assert made == {
         cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*"GREY"),
         cv2.CAP_PROP_FRAME_WIDTH: WIDTH,

@@ -87,12 +87,12 @@ def test_what_is_said_to_be_off_is_off(seed: int) -> None:
     assert outcomes["LaserOffNotConfirmedError"]
 
 
-def test_the_faults_are_all_met() -> None:
+def test_the_faults_are_all_met(monkeypatch: pytest.MonkeyPatch) -> None:
     """The suite before is only as good as what it injects."""
     happened: Counter[str] = Counter()
     for seed in range(4):
         line = BadLine(np.random.default_rng(seed), spoils=True)
-        line._spoilt = lambda fault, reply: reply  # type: ignore[method-assign]
+        monkeypatch.setattr(line, "_spoilt", lambda fault, reply: reply)
         for _ in range(200):
             line.receive(b"STATE? 1\n")
         happened += line.happened
