@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -51,6 +52,22 @@ def a_capture(folder: Path, key: str, standoff_mm: float = 500.0) -> ev.CaptureT
             sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
             time_ns=1_790_000_000_000_000_000,
         ),
+    )
+
+
+def a_reading(
+    standoff_mm: float, status: Literal["not_enough_points", "no_points"], *lasers: ev.LaserRange
+) -> ev.ReadingTaken:
+    """Without a range."""
+    return ev.ReadingTaken(
+        trial="t",
+        scene="s",
+        standoff_mm=standoff_mm,
+        reading=1,
+        status=status,
+        range_mm=None,
+        sigma_mm=None,
+        lasers=lasers,
     )
 
 
@@ -102,16 +119,7 @@ def test_reading_names_the_spots_of_its_picture(tmp_path: Path) -> None:
     spots = ev.SpotsFound(key="a", spots=(a_spot(None, 100.0), a_spot(None, 300.0)))
     unseen = ev.LaserRange(laser_id="L3", range_mm=499.0, sigma_mm=1.0, u_px=None, v_px=None)
     seen = unseen.model_copy(update={"laser_id": "L2", "u_px": 300.0, "v_px": 240.0})
-    reading = ev.ReadingTaken(
-        trial="t",
-        scene="s",
-        standoff_mm=500.0,
-        reading=1,
-        status="not_enough_points",
-        range_mm=None,
-        sigma_mm=None,
-        lasers=(unseen, seen),
-    )
+    reading = a_reading(500.0, "not_enough_points", unseen, seen)
     contents = record(tmp_path, [STARTED, a_capture(tmp_path, "a"), spots, reading])
     labels = contents.values("/bench/camera/spots", "Points2D:labels", "time")
     assert [label for _, label in labels] == [["? (clipped)", "? (clipped)"], ["? (clipped)", "L2 (clipped)"]]
@@ -152,16 +160,7 @@ def test_refused_fit_of_one_axis_and_readings_without_range(tmp_path: Path) -> N
     refused = whole.model_copy(
         update={"verdict": "refused", "reasons": ("rms too large",), "warnings": (), "residuals": residuals}
     )
-    reading = ev.ReadingTaken(
-        trial="t",
-        scene="far",
-        standoff_mm=4500.0,
-        reading=1,
-        status="no_points",
-        range_mm=None,
-        sigma_mm=None,
-        lasers=(),
-    )
+    reading = a_reading(4500.0, "no_points")
     finished = ev.SessionFinished(exit_code=3, message="refused")
     row = ev.TrialRow(standoff_mm=4500.0, readings=0, missing=1, reference_sd_mm=2.0)
     table = ev.TrialFinished(trial="t", rows=(row,))

@@ -10,6 +10,7 @@ import pytest
 
 from tests.unit.board.world import CORNER_SD_PX, BoardWorld
 from tests.unit.rigs import World, prior, thesis_rig
+from tests.unit.test_calibration_file import PROVENANCE
 from workbench.calibration.assess import determined_by
 from workbench.calibration.boards import BoardView, on_boards
 from workbench.calibration.export import calibrate, render
@@ -18,7 +19,7 @@ from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.significance import fit_chosen
 from workbench.calibration.validation import leave_each_out
 from workbench.model.acceptance import Acceptance
-from workbench.model.calibration import Provenance, load_calibration
+from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Prior, Rig
 
@@ -58,7 +59,7 @@ def test_the_board_gives_the_focal_length_where_the_flat_does_not(seed: int) -> 
     assert sd < 0.001 / 3 * truth["f_px"]
     assert share > 0.999
     assert by == "data"
-    directions = calibrate(result, Acceptance(), SOMEWHERE)[1].directions
+    directions = calibrate(result, Acceptance(), PROVENANCE)[1].directions
     assert not any("f_px" in one.words for one in directions)
 
     flat = fit(rig, World(rig, seed).sightings())
@@ -140,7 +141,7 @@ def test_an_unsquare_board_upside_down() -> None:
 
 def test_what_the_yaml_says_of_it(tmp_path: Path) -> None:
     result, _ = joint(board_rig(), 8)
-    calibration, assessment = calibrate(result, Acceptance(), SOMEWHERE)
+    calibration, assessment = calibrate(result, Acceptance(), PROVENANCE)
     assert assessment.verdict == "accepted"
     path = tmp_path / "calibration.yaml"
     path.write_text(render(calibration))
@@ -185,18 +186,6 @@ def test_a_mirrored_picture_fits_no_pose() -> None:
     mirrored = replace(corners, position_px=position_px)
     with pytest.raises(BadInputError, match="mirrored"):
         fit(rig, sightings, (), [replace(views[1], corners=mirrored)])
-
-
-SOMEWHERE = Provenance(
-    session="",
-    captures_sha256="",
-    rig="thesis",
-    serial="1",
-    command="",
-    version="",
-    operator="",
-    created="",
-)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
