@@ -7,24 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 from numpy.typing import NDArray
 
 from workbench.calibration.faults import Fault, find_faults
 from workbench.calibration.fit import Fit
 from workbench.calibration.observability import NullDirection, direction_lines
 from workbench.calibration.parameters import LENS, RAY, REFERENCE
-from workbench.calibration.programs import kept
 from workbench.calibration.residuals import ResidualTest, explain, residual_tests
 from workbench.calibration.residuals import alarms as residual_alarms
 from workbench.calibration.validation import LeftOut, alarms, leave_each_out
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import DeterminedBy
-from workbench.optics.lens import Lens
-from workbench.optics.rays import Ray, spot_at_inverse_depth
 
 CONTRADICTION_SD = 5.0
 """By chance one parameter in 2 million lies so far from its prior."""
@@ -139,36 +133,26 @@ def _beyond(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> list[
 
 def _derive_one(fit: Fit, index: int) -> Derived:
     laser = fit.rig.lasers[index]
-    lens = slice(0, len(LENS))
     start = len(LENS) + len(REFERENCE) + len(RAY) * index
-    ray = slice(start, start + len(RAY))
+    origin = slice(start, start + 2)
 
-    baseline = float(np.hypot(*fit.values[ray][:2]))
+    baseline = float(np.hypot(*fit.values[origin]))
     product = np.zeros(len(fit.values))
     product[0] = baseline
-    product[ray.start : ray.start + 2] = fit.values[0] * fit.values[ray][:2] / baseline
+    product[origin] = fit.values[0] * fit.values[origin] / baseline
 
-    spot, by_lens, by_ray = map(np.asarray, _infinity(fit.values[lens], fit.values[ray]))
+    this, infinity = np.array([index]), np.zeros(1)
     axis = "uv".index(laser.axis)
+    own = [*range(len(LENS)), *range(start, start + len(RAY))]
     vanishing = np.zeros(len(fit.values))
-    vanishing[lens], vanishing[ray] = by_lens[axis], by_ray[axis]
+    vanishing[own] = fit.curves.gradients(this, infinity)[0, axis, : len(own)]
     return Derived(
         laser_id=laser.id,
         f_b_px_mm=float(fit.values[0]) * baseline,
         f_b_sd=_sd(fit, product),
-        infinity_px=float(spot[axis]),
+        infinity_px=float(fit.curves.spots(this, infinity)[0, axis]),
         infinity_sd=_sd(fit, vanishing),
     )
-
-
-@kept()
-def _infinity(lens: Array, ray: Array) -> tuple[Array, Array, Array]:
-    """(2,) where the spot of a target at infinity lies; (2, 8) and (2, 4) derivatives by lens and ray."""
-
-    def spot(lens: Array, ray: Array) -> Array:
-        return jnp.stack(spot_at_inverse_depth(Lens(*lens), Ray(*ray), 0.0))
-
-    return spot(lens, ray), *jax.jacfwd(spot, argnums=(0, 1))(lens, ray)
 
 
 def _sd(fit: Fit, gradient: NDArray[np.float64]) -> float:

@@ -71,6 +71,18 @@ class SpotCurves:
         self._place_and_slope = np.concatenate((place, slope), axis=2)
         self._derivatives = self._table[:, :, 2:]
 
+    def spots(self, laser: Ints, inverse_depth_per_mm: FloatArray) -> FloatArray:
+        """(n, 2) pixels where points of the lasers `laser` (n,) at inverse depths (n,) appear."""
+        return _at(self._table[laser, :, :2], inverse_depth_per_mm / self._unit[laser])
+
+    def gradients(self, laser: Ints, inverse_depth_per_mm: FloatArray) -> FloatArray:
+        """(n, 2, 13) derivatives of `spots` by the lens's eight parameters, the ray's four, inverse depth."""
+        unit = self._unit[laser]
+        t = inverse_depth_per_mm / unit
+        own = _at(self._derivatives[laser], t).reshape(len(laser), 2, PARAMETERS)
+        slope = _at(self._place_and_slope[laser], t)[:, 2:] / unit[:, None]
+        return np.concatenate((own, slope[:, :, None]), axis=2)
+
     def invert(self, laser: Ints, position_px: FloatArray, inverse_sd: FloatArray) -> Inverted:
         """Maximum-likelihood inverse depths of n spots, by Gauss-Newton from infinity.
 

@@ -15,8 +15,6 @@ from workbench.calibration.fit import Fit
 from workbench.calibration.hypotheses import Hypothesis, explain_misfit
 from workbench.calibration.moved import Movement, find_movements
 from workbench.calibration.observations import Sighting, positions, stated_sd
-from workbench.calibration.parameters import LENS, RAY, REFERENCE
-from workbench.calibration.sensor import spots
 from workbench.calibration.validation import LeftOut
 
 FaultName = Literal[
@@ -228,7 +226,6 @@ def _reach(fit: Fit, laser: int) -> float | None:
     if len(np.unique(standoff)) < 2:
         return None
     near = mine[np.argmin(standoff)]
-    start = len(LENS) + len(REFERENCE) + len(RAY) * laser
-    infinity = spots(fit.values[: len(LENS)], fit.values[start : start + len(RAY)], np.zeros(1))
-    away = cells.position_px[near, axis] - fit.residual_px[near, axis] - np.asarray(infinity)[0, axis]
+    infinity = fit.curves.spots(np.array([laser]), np.zeros(1))[0, axis]
+    away = cells.position_px[near, axis] - fit.residual_px[near, axis] - infinity
     return float(abs(away) / (camera.width_px, camera.height_px)[axis])

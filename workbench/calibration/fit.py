@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import radians, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.calibration.boards import BoardView, PoseGuess, guess_pose, with_placements
+from workbench.calibration.curves import SpotCurves
 from workbench.calibration.missing import name_out_of_frame
 from workbench.calibration.observations import Cells, PlacementInfo, Rejected, Sighting, group, positions
 from workbench.calibration.parameters import (
+    LENS,
     POSE,
     PRINT,
+    RAY,
+    REFERENCE,
     Parameter,
     ParameterTable,
     board_parameters,
@@ -72,6 +77,14 @@ class Fit:
     def sd(self) -> FloatArray:
         """(P,) posterior standard deviations."""
         return np.sqrt(np.diag(self.covariance))
+
+    @cached_property
+    def curves(self) -> SpotCurves:
+        """Where the lasers' spots lie, by the fitted lens and rays."""
+        sensor = self.values[self.sensor]
+        start = len(LENS) + len(REFERENCE)
+        rays = sensor[start : start + len(RAY) * len(self.rig.lasers)]
+        return SpotCurves(sensor[: len(LENS)], rays.reshape(-1, len(RAY)))
 
     @property
     def corner_rms_px(self) -> float:

@@ -41,6 +41,8 @@ STANDOFF_COST = 2 * log(5000 / 0.5)
 """Some metres in which a mistyped standoff may lie, over the half millimetre to which spots fix it."""
 SPOT_COST = 2 * 2 * log(500 / 0.05)
 """The picture in which a wrong spot may lie, over its deviation, for u and v."""
+CLEARLY_LESS = 0.5
+"""Of what it takes: where first order says so of a fit that is not improbable, no refit is made."""
 MINIMA = 4
 STEPS = 5
 SCAN_MM = np.geomspace(20.0, 50_000.0, 120)
@@ -190,6 +192,7 @@ def _standoffs(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
     cost = STANDOFF_COST + 2 * log(len(fit.cells.placements))
     boards = {view.placement.key for view in fit.boards}
     strain = [_strain(fit, state, index) for index in range(len(fit.cells.placements))]
+    sound = not is_improbable(state)
     for index in np.argsort(strain)[::-1].tolist():
         on_board = fit.cells.placements[index].key in boards
         rows = rows_at(state.problem, index) & state.used
@@ -198,6 +201,8 @@ def _standoffs(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
             continue
         # The noise of a board's corners would pass for a gain: there, what the standoff costs is the measure.
         if on_board and strain[index] < cost + DECISIVE:
+            continue
+        if sound and not on_board and _gain_without(state, rows) < CLEARLY_LESS * (cost + DECISIVE):
             continue
         left = _from_priors(state.problem, others)
         if on_board or state.cost - left.cost > cost + DECISIVE:
@@ -213,6 +218,13 @@ def _strain(fit: Fit, state: Refit, index: int) -> float:
     error = _error_index(fit, index)
     told = 1.0 - state.covariance[error, error]
     return float(state.y[error] ** 2 / told) if told > UNTOLD else 0.0
+
+
+def _gain_without(state: Refit, rows: BoolArray) -> float:
+    """By how much the cost falls without some rows, to first order."""
+    own = state.jacobian[rows]
+    free = np.eye(len(own)) - own @ state.covariance @ own.T
+    return float(state.residual[rows] @ np.linalg.solve(free, state.residual[rows]))
 
 
 def _freed(fit: Fit, state: Refit, left: Refit, index: int, at_mm: float) -> Refit:

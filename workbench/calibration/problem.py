@@ -88,7 +88,7 @@ class Problem:
 
         u and v of one position after the other, spots first; 0 where not measured.
         """
-        residual, jacobian = _linearise(jnp.asarray(y), self.data, self.layout)
+        residual, jacobian = _linearise(y, self.data, self.layout)
         return np.asarray(residual) / scale, np.asarray(jacobian) / scale
 
     def solve(self, scale: float) -> Solution:

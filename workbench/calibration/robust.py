@@ -6,32 +6,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from workbench.calibration.boards import BoardView
 from workbench.calibration.fit import Fit, fit
 from workbench.calibration.hypotheses import explain_misfit
 from workbench.calibration.moved import find_movements
-from workbench.calibration.observations import Rejected, Sighting
-from workbench.model.rig import Rig
+from workbench.calibration.observations import Rejected
 
 
-def fit_without_outliers(
-    rig: Rig,
-    sightings: Sequence[Sighting],
-    rejected: Sequence[Rejected] = (),
-    boards: Sequence[BoardView] = (),
-) -> Fit:
-    """As `fit`, without the spots that lie apart from where all the others put them.
+def without_outliers(found: Fit, rejected: Sequence[Rejected]) -> Fit:
+    """The fit, repeated without the spots that lie apart from where all the others put them if there are any.
 
     A spot is the mean of its repeats: they share what is wrong with it. It is rejected where its distance is
     what one sound fit in 1000 shows in any of its spots, and where no other account (lasers exchanged, a
     standoff mistyped, a target that moved) explains it better; its captures are
     listed with the fit's own rejections.
 
+    Args:
+        found: a fit of everything.
+        rejected: what was already rejected before that fit.
+
     Raises:
-        BadInputError: as `fit`.
         LimitFailedError: as `fit`.
     """
-    found = fit(rig, sightings, rejected, boards)
     outliers = [h.subject[0] for h in explain_misfit(found) if h.kind == "spot"]
     suspects = sorted({int(found.cells.placement[cell]) for cell in outliers})
     moved = [movement.placement for movement in find_movements(found, suspects)]
@@ -43,9 +38,10 @@ def fit_without_outliers(
     if not outliers:
         return found
     apart = {s.source: _reason(found, cell) for cell in outliers for s in found.cells.members[cell]}
+    sightings = found.cells.captures
     strays = [Rejected(s.source, apart[s.source], stray=s) for s in sightings if s.source in apart]
     kept = [s for s in sightings if s.source not in apart]
-    return fit(rig, kept, [*rejected, *strays], boards)
+    return fit(found.rig, kept, [*rejected, *strays], found.boards)
 
 
 def _is_most(found: Fit, placement: int, outliers: Sequence[int]) -> bool:

@@ -7,18 +7,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 from numpy.typing import NDArray
 
 from workbench.calibration.curves import SpotCurves
 from workbench.calibration.parameters import LENS, RAY
-from workbench.calibration.programs import kept
 from workbench.model.calibration import Calibration
 from workbench.optics.lens import Lens, radial_slope
-from workbench.optics.rays import Ray, spot_at_inverse_depth
 
 FloatArray = NDArray[np.float64]
 
@@ -116,19 +111,15 @@ class Sensor:
 
     def spot_px(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
         """(n, 2) where the laser's spot appears at ranges (n,); infinity allowed."""
-        inverse_depth = 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
-        return np.asarray(spots(self._lens, self._rays[self.ids.index(laser_id)], inverse_depth))
+        return self._curves.spots(*self._points(laser_id, range_mm))
 
     def spot_gradient(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
         """(n, 2, P) derivatives of `spot_px` by the calibration's parameters, in the order of its names."""
-        ray = self._rays[self.ids.index(laser_id)]
-        by_lens, by_ray, by_offset = spot_gradients(
-            self._lens, ray, self.offset_mm, np.asarray(range_mm, float)
-        )
-        gradient = np.zeros((len(range_mm), 2, len(self._columns)))
-        gradient[:, :, [self._columns[name] for name in LENS]] = by_lens
-        gradient[:, :, [self._columns[f"{laser_id}.{name}"] for name in RAY]] = by_ray
-        gradient[:, :, self._columns["offset_mm"]] = by_offset
+        laser, w = self._points(laser_id, range_mm)
+        by = self._curves.gradients(laser, w)
+        gradient = np.zeros((len(w), 2, len(self._columns)))
+        gradient[:, :, self._own_columns[self.ids.index(laser_id)]] = by[:, :, :-1]
+        gradient[:, :, self._columns["offset_mm"]] = -by[:, :, -1] * w[:, None] ** 2
         return gradient
 
     def ranges(self, laser_ids: Sequence[str], position_px: FloatArray, sd_px: FloatArray) -> Ranges:
@@ -195,41 +186,20 @@ class Sensor:
     def in_frame(self, laser_id: str, range_mm: FloatArray) -> NDArray[np.bool_]:
         """(n,) whether the laser's spot lies in the image, where the lens model does not fold over."""
         u, v = self.spot_px(laser_id, range_mm).T
-        w = 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
-        unfolded = np.asarray(_slopes(self._lens, self._rays[self.ids.index(laser_id)], w)) > 0
+        laser, w = self._points(laser_id, range_mm)
+        x, y, tx, ty = self._rays[laser].T
+        unfolded = radial_slope(Lens(*self._lens), tx + x * w, ty + y * w) > 0
         width, height = self.calibration.image_width, self.calibration.image_height
         inside = (u > -0.5) & (u < width - 0.5) & (v > -0.5) & (v < height - 0.5) & unfolded
         return np.asarray(inside, bool)
+
+    def _points(self, laser_id: str, range_mm: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+        """Index of the laser, n times, and the inverse depths of ranges (n,)."""
+        index = np.full(len(range_mm), self.ids.index(laser_id), np.intp)
+        return index, 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
 
     def _by_parameter(self, laser: NDArray[np.intp], own: FloatArray) -> FloatArray:
         """(n, P) from (n, 12) derivatives by lens and own ray; those by other lasers' rays are 0."""
         gradient = np.zeros((len(laser), len(self._columns)))
         gradient[np.arange(len(laser))[:, None], self._own_columns[laser]] = own
         return gradient
-
-
-@kept()
-def _slopes(lens: Array, ray: Array, inverse_depth: Array) -> Array:
-    """(n,) radial slope of the lens where the ray's points at these inverse depths appear."""
-    x, y, tx, ty = ray
-    return radial_slope(Lens(*lens), tx + x * inverse_depth, ty + y * inverse_depth)
-
-
-@kept()
-def spots(lens: Array, ray: Array, inverse_depth: Array) -> Array:
-    """(n, 2) pixels where the points of a ray (4,) at inverse depths (n,), 1/mm, appear."""
-    return jnp.stack(spot_at_inverse_depth(Lens(*lens), Ray(*ray), inverse_depth), axis=1)
-
-
-@kept()
-def spot_gradients(lens: Array, ray: Array, offset_mm: Array, range_mm: Array) -> tuple[Array, ...]:
-    """Derivatives of `spots` at ranges (n,) by lens (n, 2, 8), ray (n, 2, 4) and offset (n, 2).
-
-    The last is the derivative by the range as well: only their sum counts.
-    """
-
-    def at_ranges(lens: Array, ray: Array, offset_mm: Array) -> Array:
-        return jnp.asarray(spots(lens, ray, 1.0 / (range_mm + offset_mm)))
-
-    derivatives: tuple[Array, ...] = jax.jacfwd(at_ranges, argnums=(0, 1, 2))(lens, ray, offset_mm)
-    return derivatives

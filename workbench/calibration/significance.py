@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from workbench.calibration.boards import BoardView
-from workbench.calibration.expected import Expectation
 from workbench.calibration.fit import Fit, fit, table_of
 from workbench.calibration.observations import Rejected, Sighting
-from workbench.calibration.parameters import LENS, sensor_parameters
+from workbench.calibration.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.problem import Problem
-from workbench.calibration.robust import fit_without_outliers
+from workbench.calibration.robust import without_outliers
 from workbench.calibration.term import Term
 from workbench.model.calibration import TermVerdict
 from workbench.model.errors import BadInputError
@@ -85,14 +84,18 @@ def fit_chosen(
         LimitFailedError: as `fit`.
     """
     # Asked before anything is rejected: the spots that the model lacks a term for look like wrong ones.
-    missing = _called_for(fit(rig, sightings, rejected, boards))
-    sound = fit_without_outliers(_freed(rig, [t.name for t in missing]), sightings, rejected, boards)
+    whole = fit(rig, sightings, rejected, boards)
+    missing = _called_for(whole)
+    if missing:
+        whole = fit(_freed(rig, [t.name for t in missing]), sightings, rejected, boards)
+    sound = without_outliers(whole, rejected)
 
     def refit(model: Rig) -> Fit:
         return fit(model, sound.used, sound.rejected, boards)
 
     fitted = refit(rig) if missing else sound
-    missing = _called_for(fitted)
+    if fitted is not whole:
+        missing = _called_for(fitted)
     _check_names(fitted, keep)
     terms: list[Term] = []
     idle: list[str] = []
@@ -228,14 +231,22 @@ def _range_gradients(fitted: Fit) -> tuple[FloatArray, FloatArray]:
     grid = np.geomspace(min(standoffs), max(standoffs), GRID)
     noise = fitted.rig.noise
     spot_px = float(np.hypot(noise.spot_sd_px, noise.speckle_sd_px)) * fitted.noise_scale
-    sensor = slice(0, len(sensor_parameters(fitted.rig)))  # a board's print scale moves no range
-    rows, own_sd = Expectation(fitted.rig, fitted.values[None, sensor]).range_rows(grid, spot_px)
-    seen = np.isfinite(own_sd)
-    by_prior_sd = rows[seen]
-    sd = fitted.table.prior_sd[sensor]
-    gradient = np.zeros((len(by_prior_sd), len(fitted.values)))
-    gradient[:, sensor] = np.divide(by_prior_sd, sd, out=np.zeros_like(by_prior_sd), where=sd > 0)
-    return gradient, own_sd[seen]
+    laser = np.repeat(np.arange(len(fitted.rig.lasers)), GRID)
+    range_mm = np.tile(grid, len(fitted.rig.lasers))
+    offset = len(LENS) + REFERENCE.index("offset_mm")
+    w = 1.0 / (range_mm + fitted.values[offset])
+    spots = fitted.curves.spots(laser, w)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of spots that no picture shows
+        found = fitted.curves.invert(laser, spots, np.full(spots.shape, 1.0 / spot_px))
+    gradient = np.zeros((len(laser), len(fitted.values)))
+    lens = np.tile(np.arange(len(LENS)), (len(laser), 1))
+    ray = len(RAY) * laser[:, None] + np.arange(len(RAY))
+    own = np.concatenate((lens, len(LENS) + len(REFERENCE) + ray), axis=1)
+    gradient[np.arange(len(laser))[:, None], own] = found.dz
+    gradient[:, offset] = -1.0
+    size = np.array([fitted.rig.camera.width_px, fitted.rig.camera.height_px])
+    seen = ((spots > -0.5) & (spots < size - 0.5)).all(axis=1) & np.isfinite(found.z_sd_of_spot_mm)
+    return gradient[seen] / range_mm[seen, None], found.z_sd_of_spot_mm[seen] / range_mm[seen]
 
 
 def _called_for(fitted: Fit) -> list[Term]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
+from numpy.typing import NDArray
+
+Numbers = TypeVar("Numbers", Array, NDArray[np.float64])
 
 
 class Lens(NamedTuple):
@@ -43,7 +47,8 @@ def project(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
     return jnp.asarray(lens.cx_px) + f_px * x_distorted, jnp.asarray(lens.cy_px) + f_px * y_distorted
 
 
-def radial_slope(lens: Lens, x: ArrayLike, y: ArrayLike) -> Array:
+def radial_slope(lens: Lens, x: Numbers, y: Numbers) -> Numbers:
     """d(distorted radius) / d(radius) at (x, y): where it is not positive the lens model folds over."""
-    r2 = jnp.asarray(x) ** 2 + jnp.asarray(y) ** 2
-    return 1.0 + r2 * (3.0 * lens.k1 + r2 * (5.0 * lens.k2 + r2 * 7.0 * lens.k3))
+    r2 = x * x + y * y
+    slope: Numbers = 1.0 + r2 * (3.0 * lens.k1 + r2 * (5.0 * lens.k2 + r2 * 7.0 * lens.k3))  # type: ignore[assignment]
+    return slope
