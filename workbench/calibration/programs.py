@@ -37,11 +37,11 @@ def kept(static: int = 0) -> Callable[[Program[T]], Program[T]]:
     The function takes its arguments by position, and returns an array or a tuple of arrays.
 
     Args:
-        static: how many of the last arguments are no arrays but choose the program, by their `repr`.
+        static: how many of the last arguments are no arrays but choose the program, by their `repr`; they can be hashed.
     """
 
     def decorate(function: Program[T]) -> Program[T]:
-        programs: dict[str, Program[T]] = {}
+        programs: dict[Any, Program[T]] = {}
 
         @wraps(function)
         def call(*args: Any) -> T:
@@ -50,16 +50,17 @@ def kept(static: int = 0) -> Callable[[Program[T]], Program[T]]:
             if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):  # part of a larger program
                 return function(*args)
             leaves = [leaf if isinstance(leaf, jax.Array) else np.asarray(leaf) for leaf in leaves]
-            shapes = [(leaf.shape, str(leaf.dtype)) for leaf in leaves]
-            name = f"{function.__module__}.{function.__qualname__}"
-            key = repr((name, statics, str(tree), shapes))
-            if key not in programs:
+            shapes = tuple((leaf.shape, leaf.dtype) for leaf in leaves)
+            program = programs.get((tree, statics, shapes))
+            if program is None:
 
                 def flat(*leaves: jax.Array) -> T:
                     return function(*jax.tree.unflatten(tree, leaves), *statics)
 
-                programs[key] = jax.jit(_lowered(flat, leaves, key).call)
-            return programs[key](*leaves)
+                name = f"{function.__module__}.{function.__qualname__}"
+                program = jax.jit(_lowered(flat, leaves, repr((name, statics, str(tree), shapes))).call)
+                programs[tree, statics, shapes] = program
+            return program(*leaves)
 
         return call
 

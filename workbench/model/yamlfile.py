@@ -15,7 +15,8 @@ from workbench.model.errors import BadInputError
 class FileModel(BaseModel):
     """Base of everything read from a file: unknown keys are mistakes, values do not change after reading."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    # Built at first use: a command uses few of all the models that it imports.
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 Model = TypeVar("Model", bound=BaseModel)
