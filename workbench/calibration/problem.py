@@ -96,7 +96,7 @@ class Problem:
         inverse_sd = np.asarray(self.data.inverse_sd)
         data = self.data._replace(inverse_sd=inverse_sd / scale)
         y, converged = _solve(data, self.layout)
-        residual, jacobian = (np.asarray(part) for part in _linearise(y, data, self.layout))
+        residual, jacobian = (np.asarray(part) for part in _linearise(np.asarray(y), data, self.layout))
         information = jacobian.T @ jacobian
         covariance = np.linalg.inv(information + np.eye(len(information)))
         freedom = int((inverse_sd > 0).sum()) - float(np.trace(information @ covariance))

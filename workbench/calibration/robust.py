@@ -6,10 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from workbench.calibration.boards import BoardView
 from workbench.calibration.fit import Fit, fit
 from workbench.calibration.hypotheses import explain_misfit
 from workbench.calibration.moved import find_movements
-from workbench.calibration.observations import Rejected
+from workbench.calibration.observations import Rejected, Sighting
+from workbench.model.rig import Rig
+
+
+def fit_without_outliers(
+    rig: Rig,
+    sightings: Sequence[Sighting],
+    rejected: Sequence[Rejected] = (),
+    boards: Sequence[BoardView] = (),
+) -> Fit:
+    """As `fit`, and then `without_outliers`."""
+    return without_outliers(fit(rig, sightings, rejected, boards), rejected)
 
 
 def without_outliers(found: Fit, rejected: Sequence[Rejected]) -> Fit:

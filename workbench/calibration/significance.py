@@ -24,7 +24,7 @@ from workbench.calibration.fit import Fit, fit, table_of
 from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.problem import Problem
-from workbench.calibration.robust import without_outliers
+from workbench.calibration.robust import fit_without_outliers, without_outliers
 from workbench.calibration.term import Term
 from workbench.model.calibration import TermVerdict
 from workbench.model.errors import BadInputError
@@ -86,9 +86,12 @@ def fit_chosen(
     # Asked before anything is rejected: the spots that the model lacks a term for look like wrong ones.
     whole = fit(rig, sightings, rejected, boards)
     missing = _called_for(whole)
-    if missing:
-        whole = fit(_freed(rig, [t.name for t in missing]), sightings, rejected, boards)
-    sound = without_outliers(whole, rejected)
+    freed = _freed(rig, [t.name for t in missing])
+    sound = (
+        fit_without_outliers(freed, sightings, rejected, boards)
+        if missing
+        else without_outliers(whole, rejected)
+    )
 
     def refit(model: Rig) -> Fit:
         return fit(model, sound.used, sound.rejected, boards)
