@@ -107,10 +107,10 @@ def test_fit_prints_one_object_and_writes_the_calibration(workbench: Run, tmp_pa
     assert set(derived) == {"laser", "f_b_px_mm", "f_b_sd", "infinity_px", "infinity_sd"}
     assert derived["laser"] == "1"
     assert (result["observations"], result["rejected"], result["verdict"]) == (9, [], "accepted")
-    assert "the data cannot tell f_px from the baseline" in " ".join(result["warnings"])
+    assert "(f_px) and the baseline cannot be known apart" in " ".join(result["warnings"])
     assert list(result["null_directions"][0]["change"]) == ["f_px", "1.y_mm"]
     assert "largest residual is -1.35 px in v of laser 1 at 300 mm" in " ".join(result["warnings"])
-    assert "the data cannot tell f_px from the baseline" in " ".join(outcome.err.split())
+    assert "(f_px) and the baseline cannot be known apart" in " ".join(outcome.err.split())
     assert load_calibration(output).laser_ranger.provenance.command.startswith("workbench fit")
 
 
@@ -131,6 +131,7 @@ def test_a_fit_that_fails_a_limit_is_said_and_not_written(workbench: Run, tmp_pa
     output.write_text("as it was\n")
     outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", output, "--json")
     refused(outcome, 3, "seen at 2 standoffs, expected at least 3", "is not written")
+    assert outcome.err.splitlines()[-1].startswith("do: ")  # what is seen last
     assert json.loads(outcome.out)["verdict"] == "refused"
     assert output.read_text() == "as it was\n"
 
@@ -323,7 +324,7 @@ class TestDesign:
         assert {r["laser_id"] for r in result["ranges"]} == {"L1", "L2", "L3", "L4"}
         assert result["worst_relative_sd"] > result["worst_relative_sd_of_calibration"] > 0
         assert any("f_px" in d["change"] for d in result["directions"])
-        assert "cannot tell f_px from all baselines" in " ".join(outcome.err.split())
+        assert "(f_px) and all baselines cannot be known apart" in " ".join(outcome.err.split())
         assert max(len(line) for line in outcome.err.splitlines()) <= 80
 
     def test_without_standoffs_some_are_proposed(self, workbench: Run) -> None:

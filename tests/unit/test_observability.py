@@ -90,18 +90,21 @@ def test_ranges_are_hurt_where_a_direction_moves_them(fitted: Fit) -> None:
     for name in ("f_px", "cx_px", "cy_px"):
         assert not found[name].hurts_ranges
         assert found[name].relative_range_change < 1e-4
-        assert "ranges are not hurt" in found[name].line
+        assert "Ranges do not suffer" in found[name].line
     # A ruler that is wrong by 0.05 % makes every range wrong by 0.05 %.
     assert found["ruler_scale"].relative_range_change == pytest.approx(0.0005, rel=0.02)
+    assert "Ranges suffer, by up to 0.05 %. Do: check the ruler" in found["ruler_scale"].line
 
 
 def test_words_and_remedies(fitted: Fit) -> None:
     found = by_first(directions_of(fitted))
-    assert found["f_px"].words.startswith("the data cannot tell f_px from all baselines: +0.2")
+    assert found["f_px"].words.startswith(
+        "the focal length (f_px) and all baselines cannot be known apart: changed together by +0.2"
+    )
     assert "measure a baseline" in found["f_px"].remedy
     assert "workbench target" in found["f_px"].remedy
-    assert "cx_px from the pointing along u of all lasers" in found["cx_px"].words
-    assert "cy_px from the pointing along v of all lasers" in found["cy_px"].words
+    assert "(cx_px) and the pointing along u of all lasers cannot be known apart" in found["cx_px"].words
+    assert "(cy_px) and the pointing along v of all lasers cannot be known apart" in found["cy_px"].words
     assert found["ruler_scale"].remedy == "check the ruler against a better one"
 
 
@@ -116,7 +119,7 @@ def test_a_baseline_known_exactly_resolves_f() -> None:
 def test_lasers_that_are_each_open_by_themselves_are_one_line() -> None:
     rig = pinhole()
     found = directions_of(fit(rig, World(rig, 1).sightings((2000.0, 2500.0, 3000.0))))
-    (one,) = [d for d in found if d.words.startswith("the data cannot tell the baseline from")]
+    (one,) = [d for d in found if d.words.startswith("the baseline and the")]
     assert one.lasers == ("L1", "L2", "L3", "L4")
     assert "each by itself" in one.words
     assert one.remedy == "place the target at standoffs farther apart"
@@ -144,7 +147,7 @@ def test_what_no_spot_shows_stands_alone() -> None:
     )
     found = by_first(directions_of(fit(rig, World(rig, 1).sightings((1000.0, 2000.0, 4000.0)))))
     assert found["k3"].change.keys() == {"k3"}
-    assert "the data do not show k3" in found["k3"].words
+    assert "the lens term k3 cannot be known" in found["k3"].words
     assert not any("k3" in line for line in direction_lines(tuple(found.values())))
 
 

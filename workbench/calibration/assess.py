@@ -91,16 +91,17 @@ def judge(
     """
     reasons = _too_few_standoffs(fit, limits)
     if not fit.converged:
-        reasons.append("the solver did not converge; check the standoffs and the laser ids")
+        reasons.append("the solver did not converge. Do: check the standoffs and the laser ids")
     left_out = leave_each_out(fit)
     faults = find_faults(fit, left_out)
     tests = residual_tests(fit)
     named = [fault.message for fault in faults if fault.refuses]
-    warnings = [*(fault.message for fault in faults if not fault.refuses), *_warnings(fit)]
+    warnings = [fault.message for fault in faults if not fault.refuses]
     # What has a name needs no list of its consequences.
     if named:
         reasons = [*named, *reasons]
     else:
+        warnings = [*direction_lines(directions), *warnings, *_warnings(fit)]
         reasons += [
             *_contradictions(fit),
             *map(_alarm, alarms(left_out)),
@@ -110,7 +111,7 @@ def judge(
     return Assessment(
         verdict="refused" if reasons else "accepted",
         reasons=tuple(reasons),
-        warnings=(*direction_lines(directions), *warnings),
+        warnings=tuple(warnings),
         left_out=left_out,
         faults=faults,
         residual_tests=tests,
@@ -122,11 +123,15 @@ def _beyond(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> list[
     """The limits' own figures that are not met."""
     reasons = []
     if not fit.rms_px <= limits.max_rms_px:
-        reasons.append(f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px")
+        reasons.append(
+            f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px. Do: look at what"
+            f" lies farthest off ({_largest_residual(fit)}), and capture it again"
+        )
     if not max_relative_range_sd <= limits.max_relative_range_sd:
         reasons.append(
             f"standard deviation of a range up to {100 * max_relative_range_sd:.2g} % of it,"
-            f" expected at most {100 * limits.max_relative_range_sd:g} %"
+            f" expected at most {100 * limits.max_relative_range_sd:g} %. Do: add standoffs (workbench design"
+            " proposes them) or repeats"
         )
     return reasons
 
@@ -165,7 +170,8 @@ def _too_few_standoffs(fit: Fit, limits: Acceptance) -> list[str]:
     for s in fit.used:
         seen[s.laser_id].add(s.standoff_mm)
     return [
-        f"laser {i} was seen at {len(seen[i])} standoffs, expected at least {limits.min_standoffs}"
+        f"laser {i} was seen at {len(seen[i])} standoffs, expected at least {limits.min_standoffs}."
+        " Do: capture it at more of them"
         for i in fit.rig.laser_ids
         if len(seen[i]) < limits.min_standoffs and (seen[i] or i in captured)  # never lit: a fault by name
     ]
@@ -175,7 +181,7 @@ def _contradictions(fit: Fit) -> list[str]:
     """Priors that the data contradict: a rig file that is wrong, or a standoff that was mistyped."""
     return [
         f"the data pull {p.name} {abs(pull):.1f} sd away from what the rig file says ({p.prior.value:g} +-"
-        f" {p.prior.sd:g} {p.unit}), to {value:.5g}; check it, and the standoffs"
+        f" {p.prior.sd:g} {p.unit}), to {value:.5g}. Do: check it, and the standoffs"
         for p, pull, value in zip(fit.table.parameters, fit.prior_pull, fit.values, strict=True)
         if abs(pull) > CONTRADICTION_SD
     ]
@@ -187,8 +193,8 @@ def _alarm(one: LeftOut) -> str:
     else:
         off = f"lie apart from its prediction (chi2 {one.chi2:.0f} for {one.coordinates} coordinates)"
     return (
-        f"the captures at {one.standoff_mm:g} mm contradict the others: to the fit without them they {off};"
-        f" check that standoff and its captures, or leave it out (--without-standoff {one.standoff_mm:g})"
+        f"the captures at {one.standoff_mm:g} mm contradict the others: to the fit without them they {off}."
+        f" Do: check that standoff and its captures, or leave it out (--without-standoff {one.standoff_mm:g})"
     )
 
 
@@ -205,7 +211,7 @@ def _warnings(fit: Fit) -> list[str]:
     prior = [p.name for p, by in sensor if by == "prior" and p.kind == "sensor"]
     warnings: list[str] = []
     if prior:
-        warnings.append(f"not determined by the data, the rig file's value stands: {', '.join(prior)}")
+        warnings.append(f"these captures say nothing of it, the rig file's value stands: {', '.join(prior)}")
     warnings += [
         f"the data call for {term.name} (p {term.p_value:.1g}), which the rig file holds constant:"
         " give it an sd there"

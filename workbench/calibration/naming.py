@@ -29,6 +29,14 @@ REMEDIES = {
     BASELINE: "measure a baseline more closely",
     **dict.fromkeys(LENS, "use the printed board (workbench target)"),
 }
+SHARED = {
+    "f_px": "the focal length",
+    **dict.fromkeys(("cx_px", "cy_px"), "the image centre"),
+    "offset_mm": "the reference plane's offset",
+    "ruler_scale": "the ruler's scale",
+    **dict.fromkeys(PRINT, "the board's scale"),
+}
+"""What all lasers share, in words; the other terms are the lens's."""
 LENGTHS = ("ruler_scale", *PRINT)
 """Where one of these is among what trades, nothing but a better ruler tells them apart."""
 APART = "place the target at standoffs farther apart"
@@ -114,12 +122,12 @@ def describe(rig: Rig, groups: Sequence[Group], each: Sequence[str] = ()) -> str
         groups: what trades.
         each: lasers of each of which this holds by itself.
     """
-    first, *others = (_phrase(rig, group, bool(each)) for group in groups)
+    names = [_phrase(rig, group, bool(each)) for group in groups]
     of = f" of {', '.join(each)}{', each by itself' if len(each) > 1 else ''}" if each else ""
-    if not others:
-        return f"the data do not show {first}{of}: {groups[0].size} moves no spot by more than its noise"
-    sizes = " with ".join(group.size for group in groups)
-    return f"the data cannot tell {first} from {' and '.join(others)}{of}: {sizes} show in no spot"
+    sizes = _listed([group.size for group in groups])
+    if len(names) == 1:
+        return f"{names[0]}{of} cannot be known: changed by {sizes}, it moves no spot by more than its noise"
+    return f"{_listed(names)}{of} cannot be known apart: changed together by {sizes}, they move no spot"
 
 
 def remedy(groups: Sequence[Group], each: Sequence[str] = ()) -> str:
@@ -157,9 +165,14 @@ def _shown(kind: str, value: float, change: float) -> tuple[float, str]:
     return change, next((unit for unit in ("px", "mm") if kind.endswith(unit)), "")
 
 
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
 def _phrase(rig: Rig, group: Group, each: bool) -> str:
     if not group.lasers:
-        return group.kind
+        words = SHARED.get(group.kind)
+        return f"{words} ({group.kind})" if words else f"the lens term {group.kind}"
     if each or len(rig.lasers) == 1:
         return f"the {group.kind}"
     if len(group.lasers) < len(rig.lasers):

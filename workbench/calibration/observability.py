@@ -47,8 +47,10 @@ class NullDirection:
     @property
     def line(self) -> str:
         """For people."""
-        hurt = f"move by up to {100 * self.relative_range_change:.2g} %"
-        return f"{self.words}; ranges {hurt if self.hurts_ranges else 'are not hurt'}. To tell: {self.remedy}"
+        if self.hurts_ranges:
+            size = f"{100 * self.relative_range_change:.2g} %"
+            return f"{self.words}. Ranges suffer, by up to {size}. Do: {self.remedy}"
+        return f"{self.words}. Ranges do not suffer. Only to know each by itself: {self.remedy}"
 
 
 class Ranges(NamedTuple):
@@ -116,7 +118,7 @@ def direction_lines(directions: Sequence[NullDirection]) -> list[str]:
     """For people, the few combinations that matter most; what stands alone is seen in the table."""
     lines = [d.line for d in directions if len(d.change) > 1]
     left = len(lines) - SHOWN
-    return lines if left <= 0 else [*lines[:SHOWN], f"{left} more such combinations of parameters are open"]
+    return lines if left <= 0 else [*lines[:SHOWN], f"{left} more such combinations cannot be known apart"]
 
 
 def _posterior(

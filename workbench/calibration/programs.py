@@ -37,7 +37,7 @@ def kept(static: int = 0) -> Callable[[Program[T]], Program[T]]:
     The function takes its arguments by position, and returns an array or a tuple of arrays.
 
     Args:
-        static: how many of the last arguments are no arrays but choose the program: hashable, told apart by `repr`.
+        static: how many of the last arguments are no arrays but choose the program (hashable, with a `repr`).
     """
 
     def decorate(function: Program[T]) -> Program[T]:

@@ -7,6 +7,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from rich.console import Console
@@ -31,6 +32,8 @@ from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.files import check_output
 from workbench.session.journal import JOURNAL
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
+
+MOST_REASONS = 3
 
 
 @dataclass(frozen=True)
@@ -72,10 +75,7 @@ def fit_captures(request: Request, as_json: bool) -> None:
     _print_tables(fitted, assessment)
     if assessment.verdict == "refused":
         if request.accept is None:
-            raise LimitFailedError(
-                f"the calibration is refused and {request.output} is not written: "
-                + "; ".join(assessment.reasons)
-            )
+            raise LimitFailedError(_refusal(request.output, assessment.reasons))
         calibration = kept_because(calibration, request.accept)
     write_calibration(request.output, calibration)
     kept = "" if request.accept is None or assessment.verdict == "accepted" else f", kept: {request.accept}"
@@ -153,6 +153,29 @@ def _as_json(fitted: Fit, assessment: Assessment) -> dict[str, Any]:
         "residual_tests": [asdict(test) for test in assessment.residual_tests],
         "terms": [asdict(term) for term in fitted.terms],
     }
+
+
+def _refusal(output: Path, reasons: Sequence[str]) -> str:
+    """What is wrong and what to do, in lines for a terminal: the last thing that is seen."""
+    lines = [f"the calibration is refused and {output} is not written"]
+    for reason in reasons[:MOST_REASONS]:
+        wrong, _, remedy = reason.partition(". Do: ")
+        lines += _wrapped("wrong", wrong) + (_wrapped("do", remedy) if remedy else [])
+    if (left := len(reasons) - MOST_REASONS) > 0:
+        lines.append(f"and {left} more, which may follow from these; --json tells all")
+    return "\n".join(lines)
+
+
+def _wrapped(label: str, text: str) -> list[str]:
+    first = f"{label + ':':<7}"
+    return wrap(
+        text,
+        width=80,
+        initial_indent=first,
+        subsequent_indent=" " * len(first),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _print_tables(fitted: Fit, assessment: Assessment) -> None:

@@ -10,7 +10,7 @@ from jax import Array
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-Numbers = TypeVar("Numbers", Array, NDArray[np.float64])
+Numbers = TypeVar("Numbers", float, Array, NDArray[np.float64])
 
 
 class Lens(NamedTuple):
