@@ -8,27 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from workbench.spots.shapes import profile, sheared_rows, upright_rows
+from workbench.spots.shapes import sheared_rows, upright_rows
 from workbench.spots.types import Floats
 
 BACKGROUND, FLUX, U, V, LN_SU, LN_SV, SHEAR = range(7)
 """Order of a spot's parameters: DN per pixel, DN, pixels, pixels, ln(pixels) twice, pixels per pixel."""
-
-
-def axis_profiles(centre_px: float, ln_sd: float, n: int) -> Floats:
-    """Share of a unit Gaussian that falls into each of `n` pixels in a row, and its derivatives.
-
-    Args:
-        centre_px: Centre; pixels are at 0 .. n - 1.
-        ln_sd: Logarithm of the standard deviation in pixels.
-        n: Number of pixels.
-
-    Returns:
-        (3, n): the share, its derivative by the centre, its derivative by the logarithm of the width.
-    """
-    profiles = np.empty((4, n))
-    profile(centre_px, ln_sd, profiles)
-    return profiles[:3]
 
 
 def derivatives(params: Floats, shape: tuple[int, int]) -> Floats:

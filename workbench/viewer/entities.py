@@ -65,7 +65,6 @@ _PALETTE: tuple[Rgb, ...] = (
 GREY: Rgb = (150, 150, 150)
 WHITE: Rgb = (235, 235, 235)
 RED: Rgb = (255, 70, 70)
-GREEN: Rgb = (90, 200, 110)
 
 
 def laser_colors(laser_ids: Sequence[str]) -> dict[str, Rgb]:
