@@ -243,7 +243,7 @@ def _allowed(scene: Scene, win: Windows, row0: int, col0: int) -> Bools:
 
 
 def split(scene: Scene, trace: Trace, others: list[Trace]) -> list[Trace]:
-    """A spot as two if it is elongated and two explain it far better; flagged merged if only the former.
+    """A spot as two if it is elongated and two explain it far better.
 
     Spots whose light mixes with that of others are left to the fit of all of them together.
     """
