@@ -10,7 +10,7 @@ import pytest
 from workbench.calibration import curves
 from workbench.calibration.curves import SpotCurves
 from workbench.optics.lens import Lens
-from workbench.optics.rays import Ray
+from workbench.optics.rays import Ray, spot_at_inverse_depth
 from workbench.optics.triangulate import DepthEstimate, Sighted, estimate_depth
 
 LENSES = {
@@ -50,6 +50,22 @@ def test_against_the_model(name: str, depth_mm: float) -> None:
     ):
         theirs = np.concatenate((lens_part, ray_part), axis=1)
         np.testing.assert_allclose(ours, theirs, rtol=1e-7, atol=1e-9 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_spots_and_their_derivatives_are_those_of_the_model(name: str) -> None:
+    def spot(lens: jax.Array, ray: jax.Array, w: jax.Array) -> jax.Array:
+        return jnp.stack(spot_at_inverse_depth(Lens(*lens), Ray(*ray), w))
+
+    lens, laser = LENSES[name], np.array([0, 1, 2, 0, 2])
+    w = np.array([0.0, 1 / 100.0, 1 / 400.0, 1 / 30_000.0, -1 / 500.0])  # infinity, near, far, behind
+    of_all = jax.vmap(spot, in_axes=(None, 0, 0))(jnp.asarray(lens), jnp.asarray(RAYS[laser]), jnp.asarray(w))
+    derivatives = [jax.jacfwd(spot, (0, 1, 2))(lens, RAYS[n], at) for n, at in zip(laser, w, strict=True)]
+    expected = np.array([np.concatenate((a, b, c[:, None]), axis=1) for a, b, c in derivatives])
+    found = SpotCurves(lens, RAYS)
+    np.testing.assert_allclose(found.spots(laser, w), of_all, rtol=1e-10)
+    scale = np.abs(expected).max(axis=(0, 1))
+    np.testing.assert_allclose(found.gradients(laser, w) / scale, expected / scale, rtol=1e-8, atol=1e-9)
 
 
 def test_no_spots() -> None:
