@@ -52,7 +52,7 @@ def streams() -> Iterator[Callable[..., Stream]]:
         stream.close()
 
 
-def camera_of(source: str, **settings: float | str) -> OpenCvCamera:
+def camera_of(source: str, **settings: float | str | tuple[float, float]) -> OpenCvCamera:
     return OpenCvCamera(CameraDevice.model_validate({"source": source, **settings}), FORMAT)
 
 
@@ -238,3 +238,43 @@ def test_room_light_has_an_exposure_of_its_own(monkeypatch: pytest.MonkeyPatch) 
 def test_an_ambient_exposure_needs_one_to_go_back_to() -> None:
     with pytest.raises(ValidationError, match="needs an exposure to go back to"):
         CameraDevice(source="0", ambient_exposure=5.0)
+
+
+def test_an_exposure_is_set_as_near_as_the_camera_can(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cv2, "VideoCapture", Device)
+    camera = camera_of("/dev/video0", exposure=16, exposure_limits=(8, 240), ambient_exposure=160)
+    assert camera.exposure_limits == (8, 240)
+    assert camera.set_exposure(70.0) == 72
+    assert level(camera.grab().image) == 72
+    assert level(camera.grab_ambient().image) == 160
+    assert level(camera.grab().image) == 72, "not what it began with"
+    with pytest.raises(RigNotReadyError, match=r"exposure: asked for 3, the camera says 0.*limits"):
+        camera.set_exposure(3.0)
+    camera.close()
+
+
+def test_without_limits_the_exposure_is_fixed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cv2, "VideoCapture", Device)
+    camera = camera_of("/dev/video0", exposure=16)
+    assert camera.exposure_limits is None
+    camera.close()
+
+
+@pytest.mark.parametrize(("exposure", "limits"), [(None, (1, 9)), (10, (1, 9)), (5, (9, 1)), (5, (5, 5))])
+def test_limits_that_make_no_sense(exposure: float | None, limits: tuple[float, float]) -> None:
+    with pytest.raises(ValidationError, match="exposure_limits: expected"):
+        CameraDevice(source="0", exposure=exposure, exposure_limits=limits)
+
+
+def test_a_camera_that_ends_while_its_exposure_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Unplugged(Device):
+        def read(self) -> tuple[bool, Picture]:
+            if self.settings[cv2.CAP_PROP_EXPOSURE] != 16:
+                return False, flat(0)
+            return super().read()
+
+    monkeypatch.setattr(cv2, "VideoCapture", Unplugged)
+    camera = camera_of("/dev/video0", exposure=16, exposure_limits=(8, 240))
+    with pytest.raises(RigNotReadyError, match="expected a frame, got the end of the stream"):
+        camera.set_exposure(64.0)
+    camera.close()

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from workbench.model.errors import BadInputError
 from workbench.procedure.check import check_file
+from workbench.procedure.exposure import MOST_TRIALS
 from workbench.procedure.latency import LEASE_S
 from workbench.procedure.outline import Pace, PlannedStep, learn_pace, outline
 from workbench.procedure.run import Plan
@@ -51,6 +52,10 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
         f"{total} shots, {emission(total, pace)}; {duration(sum(map(pace.seconds, steps)))} in all",
         highlight=False,
     )
+    if total:
+        console.print(
+            f"Where the camera's exposure is set, each placing takes up to {MOST_TRIALS} trial shots more."
+        )
     console.print(_told_by(pace, plan.rig.rig), highlight=False)
 
 

@@ -72,8 +72,11 @@ class Terminal:
                 self._print(f"{e.index}. {e.title}", indent=2)
                 if e.shots:
                     self._task = self._progress.add_task("     capturing", total=e.shots)
-            case ev.TargetPlaced():
+            case ev.TargetPlaced(placement=placed):
+                self._placed = f"{placed.standoff_mm:g} mm"
                 self._spots.clear()
+            case ev.ExposureSet() as e:
+                self._print(f"{self._placed}: {e.text}", style="" if e.verdict == "good" else "yellow")
             case ev.CaptureTaken() as e:
                 self._captures[e.key] = e
                 if self._task is not None and _counts(e):
@@ -127,7 +130,7 @@ class Terminal:
             seen = _live(quality_of(self._spots[capture.laser_id])) if capture.laser_id != "all" else ""
             self._progress.update(self._task, description=f"     {name} {seen}")
 
-    _placement = ""
+    _placement = _placed = ""
 
     def _end_step(self, outcome: str) -> None:
         if self._task is not None:

@@ -24,12 +24,14 @@ BACKLOG = 32
 """Frames kept for whoever reads them one by one."""
 MANUAL_EXPOSURE = 1.0
 """Of V4L2's `exposure_auto`."""
+COARSEST_STEP = 2.0
+"""Factor between an exposure that was asked for and the nearest that the camera has."""
 SAME = 0.005
 """Relative difference below which a setting was taken as asked."""
 
 
 class OpenCvCamera:
-    """See `protocols.StreamingCamera`.
+    """See `protocols.StreamingCamera` and `protocols.ExposableCamera`.
 
     A thread of its own takes the frames as they come, so that none is older than it need be; from a file it
     takes one when the one before has been read.
@@ -51,7 +53,10 @@ class OpenCvCamera:
         self.discard_frames = device.latency_frames
         self._device, self._format, self._beat = device, camera, beat
         self._is_file = Path(device.source).is_file()
-        self._exposure = device.exposure
+        self.exposure_limits, self.exposure_unit = device.exposure_limits, ""
+        self._exposure = self._for_spots = device.exposure
+        self._wish: float | None = None
+        """An exposure to take as near as the camera can."""
         self._frames: deque[Frame] = deque(maxlen=BACKLOG)
         self._changed = threading.Condition()
         self._ended: str | None = None
@@ -88,8 +93,29 @@ class OpenCvCamera:
             self.read()  # the frame under way when the setting is made
             return self.grab()
         finally:
-            self._exposure = self._device.exposure
+            self._exposure = self._for_spots
             self.read()
+
+    def set_exposure(self, exposure: float) -> float:
+        """Expose so, as near as the camera can; returns the exposure that it says it has.
+
+        Raises:
+            RigNotReadyError: it is another, or the camera does not answer.
+        """
+        with self._changed:
+            self._wish = exposure
+            self._changed.wait_for(lambda: self._wish is None or self._ended is not None, SILENT_S)
+            if self._ended is not None or self._wish is not None:
+                raise RigNotReadyError(self._ended or self._silent(f"nothing for {SILENT_S:g} s"))
+            came = self._for_spots
+            self._frames.clear()
+        if came is None or not exposure / COARSEST_STEP <= came <= exposure * COARSEST_STEP:
+            raise RigNotReadyError(
+                f"camera {self._device.source}: exposure: asked for {exposure:g}, the camera says {came};"
+                " put limits into the rig file that it can keep, or leave exposure_limits out"
+            )
+        self.read()  # the frame under way when the setting is made
+        return came
 
     def read(self) -> Frame:
         """The next frame of the stream, with the wall clock when it arrived.
@@ -125,6 +151,8 @@ class OpenCvCamera:
         made = self._exposure
         while not self._closing:
             try:
+                if self._wish is not None:
+                    made = self._grant(self._wish)
                 if self._exposure != made:
                     made = self._exposure
                     _set(self._capture, self._device.source, cv2.CAP_PROP_EXPOSURE, "exposure", made)
@@ -141,6 +169,15 @@ class OpenCvCamera:
                 self._changed.notify_all()
                 if self._is_file:
                     self._changed.wait_for(lambda: not self._frames or self._closing)
+
+    def _grant(self, wish: float) -> float:
+        self._capture.set(cv2.CAP_PROP_EXPOSURE, wish)
+        came = self._capture.get(cv2.CAP_PROP_EXPOSURE)
+        with self._changed:
+            self._exposure = self._for_spots = came
+            self._wish = None
+            self._changed.notify_all()
+        return came
 
     def _end(self, why: str) -> None:
         with self._changed:

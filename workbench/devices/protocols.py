@@ -61,6 +61,23 @@ class StreamingCamera(Camera, Protocol):
         """
 
 
+@runtime_checkable
+class ExposableCamera(Camera, Protocol):
+    """A camera whose exposure can be set; its numbers are linear in it until they are clipped."""
+
+    exposure_limits: tuple[float, float] | None
+    """Shortest and longest that may be set; None where the rig file fixes the exposure."""
+    exposure_unit: str
+    """Empty for a driver's own."""
+
+    def set_exposure(self, exposure: float) -> float:
+        """Expose so from the next `grab` on; returns the exposure as the camera took it.
+
+        Raises:
+            RigNotReadyError: the camera does not take it.
+        """
+
+
 class LaserBank(Protocol):
     """The lasers. There is one way to switch one on, and it ends by itself."""
 

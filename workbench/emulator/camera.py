@@ -32,11 +32,15 @@ class Exposure:
     gain: float
 
 
+MICRO = 1e-6
+
+
 class EmulatedCamera:
     """Camera of the virtual bench.
 
     `exposure_s` (None: metered at every placement) and `gain` may be set at any time and hold from the next
-    frame on. `discard_frames` is what the driver believes the latency to be: `grab` throws that many away.
+    frame on; `set_exposure` sets it in microseconds, unless the rig file fixes it. `discard_frames` is what
+    the driver believes the latency to be: `grab` throws that many away.
     """
 
     def __init__(
@@ -44,6 +48,9 @@ class EmulatedCamera:
     ) -> None:
         self._spec, self._scene, self._sensor, self._lasers = spec, scene, sensor, lasers
         self.exposure_s = spec.camera.exposure_s
+        self.exposure_unit = "us"
+        limits = (spec.camera.shortest_exposure_s / MICRO, spec.camera.longest_exposure_s / MICRO)
+        self.exposure_limits = None if self.exposure_s is not None else limits
         self.gain = spec.camera.gain
         self.discard_frames = spec.camera.latency_frames
         self._key, self._number = "", 0
@@ -81,6 +88,11 @@ class EmulatedCamera:
         if self._last is None or chance[1] >= self._spec.camera.repeated:
             self._last = self._develop(exposure)
         return self._last
+
+    def set_exposure(self, exposure: float) -> float:
+        """See `protocols.ExposableCamera`; microseconds."""
+        self.exposure_s = exposure * MICRO
+        return exposure
 
     def meter(self) -> float:
         """Exposure (s) that puts the brightest spot of the present placement at `metered_peak`, gain as set.

@@ -16,7 +16,7 @@ BOARD = "board"
 REQUIRED = ("laser_id", "standoff_mm", "repeat")
 IMAGES = ("on", "off")
 POSITION = ("u_px", "v_px")
-OPTIONAL = ("scene", "standoff_sd_mm", "u_sd_px", "v_sd_px", "tilt_deg")
+OPTIONAL = ("scene", "standoff_sd_mm", "u_sd_px", "v_sd_px", "tilt_deg", "exposure")
 LARGEST = 1e6
 """Of any millimetres or pixels: a kilometre, and beyond every camera."""
 NEAREST_MM = 1e-3
@@ -44,6 +44,8 @@ class CaptureRow:
     u_sd_px: float
     v_sd_px: float
     tilt_deg: float
+    exposure: float = nan
+    """In the camera's own unit; tells how a frame came about, nothing is computed from it."""
 
 
 def load_captures(path: Path) -> tuple[CaptureRow, ...]:
@@ -141,6 +143,7 @@ class _Parser:
             u_sd_px=self._number_in("u_sd_px", at_least=SMALLEST_SD_PX),
             v_sd_px=self._number_in("v_sd_px", at_least=SMALLEST_SD_PX),
             tilt_deg=self._number_in("tilt_deg", above=-90.0, below=90.0),
+            exposure=self._number_in("exposure", above=0.0),
         )
 
     def _image(self, column: str) -> Path | None:

@@ -107,6 +107,33 @@ class SessionResumed(FileModel):
     accepted_because: str | None = None
 
 
+class ExposureSet(FileModel):
+    """The camera's exposure for what is captured at a placement, found by trial pairs with all lasers lit."""
+
+    kind: Literal["exposure_set"] = "exposure_set"
+    key: str
+    """The placement's."""
+    exposure: float
+    unit: str
+    """Empty for the camera driver's own."""
+    peak: float
+    """Brightest pixel of that trial as a share of full scale; 1 is clipped."""
+    verdict: Literal["good", "dim", "clipped"]
+    """Dim and clipped spots are so because the camera's limits do not let it be otherwise."""
+    trials: int
+
+    @property
+    def text(self) -> str:
+        """One line for people."""
+        spelt = f"exposure {self.exposure:g} {self.unit}".rstrip()
+        share = f"brightest spot at {100 * self.peak:.0f} % of full scale"
+        remarks = {
+            "clipped": "; take a darker target or a filter",
+            "dim": "; does every spot lie on the target?",
+        }
+        return f"{spelt}, {share}{remarks.get(self.verdict, '')}"
+
+
 class FrameRef(FileModel):
     """A stored frame."""
 
@@ -134,6 +161,8 @@ class CaptureTaken(FileModel):
     repeat: int
     on: FrameRef
     off: FrameRef | None = None
+    exposure: float | None = None
+    """In the unit of the placement's `ExposureSet`; None where it was not set."""
     lit_s: float | None = None
     """How long a laser was lit for it, switching included; None for a frame in room light."""
 
@@ -371,6 +400,7 @@ Event = Annotated[
     | StepStarted
     | StepFinished
     | TargetPlaced
+    | ExposureSet
     | Answered
     | PlacementFinished
     | SetAside

@@ -134,6 +134,9 @@ class CameraDevice(FileModel):
     pixel_format: Annotated[str, Field(pattern=r"^[ -~]{4}$")] | None = None
     """Four letters, as YUYV or GREY."""
     exposure: float | None = None
+    exposure_limits: tuple[PositiveFloat, PositiveFloat] | None = None
+    """Shortest and longest to choose from at each placement, beginning with `exposure`; without them that
+    one is kept."""
     ambient_exposure: float | None = None
     """For frames of room light alone, as of the printed board; without it they are exposed as all others."""
     gain: float | None = None
@@ -145,6 +148,17 @@ class CameraDevice(FileModel):
     def _has_an_exposure_to_go_back_to(self) -> CameraDevice:
         if self.ambient_exposure is not None and self.exposure is None:
             raise ValueError("ambient_exposure needs an exposure to go back to")
+        return self
+
+    @model_validator(mode="after")
+    def _begins_within_its_limits(self) -> CameraDevice:
+        if self.exposure_limits is not None:
+            shortest, longest = self.exposure_limits
+            if self.exposure is None or not shortest <= self.exposure <= longest or shortest == longest:
+                raise ValueError(
+                    "exposure_limits: expected [shortest, longest], with an exposure to begin with between"
+                    f" them, got {list(self.exposure_limits)} and {self.exposure}"
+                )
         return self
 
 

@@ -21,6 +21,7 @@ from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, Rig
 from workbench.model.prompt import Answer, Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
+from workbench.procedure.exposure import restore_exposure, set_exposure
 from workbench.procedure.latency import LEASE_S, count_latency
 from workbench.procedure.prompts import placement_prompt, safety_prompt
 from workbench.procedure.recorder import SAFETY, Recorder
@@ -80,6 +81,8 @@ class Context:
     """The exported one: what a trial ranges with."""
     _served: Group | None = None
     """What is on disk already of the present placement."""
+    _exposure: float | None = None
+    """Of the present placement, where the camera's is set."""
     _dark: Image | None = None
     """The last frame at the present placement with all lasers off."""
     _safe: bool = False
@@ -159,6 +162,7 @@ class Context:
         """Do the work at a placement, again where it asks for that."""
         while True:
             try:
+                self._set_exposure(placed.key)
                 return work(placed)
             except RetakeError as again:
                 self._set_aside(placed.key, from_n, str(again))
@@ -168,6 +172,22 @@ class Context:
             except _LeftOutError as left_out:
                 self._set_aside(placed.key, from_n, left_out.answer.reason or "")
                 raise
+
+    def _set_exposure(self, key: str) -> None:
+        """Set it by trial shots; of what is on disk already it is known.
+
+        Raises:
+            StoppedError: a stop was asked for.
+            LaserOffNotConfirmedError: a beam stays on.
+            RigNotReadyError: a device does not answer.
+        """
+        if self._served is None:
+            found = set_exposure(self.bench, self.rig, key, self._begin)
+        elif (found := self._served.exposure) is not None:
+            restore_exposure(self.bench, found)
+        self._exposure = None if found is None else found.exposure
+        if found is not None:
+            self.emit(found)
 
     def _tell_skipped(self, asked: Placement, answer: Answer) -> None:
         self.emit(ev.Answered(key=asked.key, question=f"{asked.standoff_mm:g} mm", answer=answer))
@@ -325,6 +345,7 @@ class Context:
             repeat=repeat,
             on=frames.save(key, "on", on.image, on.time_ns),
             off=frames.save(key, "off", off.image, off.time_ns),
+            exposure=self._exposure,
             lit_s=lit_s,
         )
         return on.image, off.image, taken

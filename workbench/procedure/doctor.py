@@ -15,6 +15,7 @@ from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, 
 from workbench.model.prompt import Prompt
 from workbench.model.rig import LaserSpec, Rig
 from workbench.model.target import Placement
+from workbench.procedure.exposure import set_exposure
 from workbench.procedure.latency import LEASE_S, count_latency
 from workbench.procedure.prompts import placement_prompt, safety_prompt
 from workbench.spots import Failure, find_spots
@@ -60,6 +61,7 @@ def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[Finding]:
         if answer.action != "done":
             raise StoppedError(f"aborted by the operator at {prompt.key}: {answer.reason}")
     bench.target.place(_placement())
+    yield from _exposure(rig, bench)
     for laser in rig.lasers:
         yield _tried(f"laser {laser.id}", partial(_laser, rig, bench, laser))
     yield _tried("latency", partial(_latency, rig, bench))
@@ -100,6 +102,17 @@ def _camera(rig: Rig, bench: Bench) -> str:
             f"every pixel is {image.max()}: is the cap on, or does the driver deliver nothing?"
         )
     return f"{expected[1]} x {expected[0]}, {image.dtype.itemsize * 8} bits, median {np.median(image):.0f}"
+
+
+def _exposure(rig: Rig, bench: Bench) -> Iterator[Finding]:
+    """Set as for captures, where it can be set."""
+    try:
+        found = set_exposure(bench, rig, "doctor", bench.mark)
+    except RigNotReadyError as error:
+        yield Finding("exposure", False, str(error))
+        return
+    if found is not None:
+        yield Finding("exposure", found.verdict == "good", found.text)
 
 
 def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:

@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 from collections.abc import Iterable
+from itertools import compress
 from pathlib import Path
 
 from workbench.model.event import CaptureTaken
@@ -13,8 +14,9 @@ from workbench.session.files import write_record
 
 CALIBRATION_TABLE = "captures.csv"
 TRIAL_TABLE = "trial-captures.csv"
-COLUMNS = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene", "standoff_sd_mm")
-"""The last one only where a capture states it."""
+COLUMNS = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene", "standoff_sd_mm", "exposure")
+OPTIONAL = 2
+"""So many of the last, only where a capture states them."""
 
 
 def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
@@ -24,11 +26,10 @@ def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
     that placing's error.
     """
     rows = [_row(capture) for capture in captures]
-    columns = COLUMNS if any(row[-1] for row in rows) else COLUMNS[:-1]
+    stated = [n < len(COLUMNS) - OPTIONAL or any(row[n] for row in rows) for n in range(len(COLUMNS))]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(row[: len(columns)] for row in rows)
+    writer.writerows(compress(row, stated) for row in (COLUMNS, *rows))
     content = stream.getvalue().encode()
     write_record(path, content)
     return hashlib.sha256(content).hexdigest()
@@ -43,4 +44,5 @@ def _row(capture: CaptureTaken) -> tuple[str, ...]:
         "" if capture.off is None else capture.off.path,
         capture.scene or capture.placement_key,
         "" if capture.standoff_sd_mm is None else repr(capture.standoff_sd_mm),
+        "" if capture.exposure is None else repr(capture.exposure),
     )

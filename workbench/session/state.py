@@ -29,6 +29,7 @@ class Group:
     """Everything captured at one placement."""
 
     placed: ev.TargetPlaced
+    exposure: ev.ExposureSet | None = None
     captures: dict[str, ev.CaptureTaken] = field(default_factory=dict)
     """By key."""
     whole: bool = False
@@ -44,6 +45,8 @@ def groups(records: Iterable[ev.Record]) -> dict[str, Group]:
         match event:
             case ev.TargetPlaced(placement=placement):
                 found[placement.key] = Group(event)
+            case ev.ExposureSet() if event.key in found:
+                found[event.key].exposure = event
             case ev.CaptureTaken() if event.placement_key in found:
                 found[event.placement_key].captures[event.key] = event
             case ev.PlacementFinished() if event.key in found:

@@ -206,6 +206,10 @@ class _OpenRecording:
         steps.say(self.stream, f"Camera latency: {event.frames} frames")
 
     @_log.register
+    def _(self, event: ev.ExposureSet, moment: Moment) -> None:
+        steps.say(self.stream, event.text, steps.INFO if event.verdict == "good" else steps.WARN)
+
+    @_log.register
     def _(self, event: ev.StandoffAdvised, moment: Moment) -> None:
         steps.say(self.stream, f"After {event.placements} placements, {event.text}")
 
