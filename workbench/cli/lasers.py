@@ -40,6 +40,7 @@ def lasers_state(rig_path: Path) -> str:
         state = lasers.state()
     finally:
         lasers.close()
-    interlock = "closed" if state.interlock_closed else "open: nothing can be lit"
+    told = {True: "closed", False: "open: nothing can be lit", None: "not told by this driver"}
+    interlock = told[state.interlock_closed]
     lit = ", ".join(state.lit) or "none (opening the port puts all off)"
     return f"controller: {lasers.identity}\ninterlock:  {interlock}\nlit:        {lit}"

@@ -14,6 +14,7 @@ import time
 
 from workbench.model import errors
 from workbench.model.errors import LaserOffNotConfirmedError, WorkbenchError
+from workbench.model.rig import LaserDriver
 
 ANSWER_S = 10.0
 """Longer than the guardian takes for anything: twice two requests of a second, and a busy computer."""
@@ -22,7 +23,7 @@ ANSWER_S = 10.0
 class Guarded:
     """A guardian process, see `guardian.py`. It holds the port until this is closed, or its process ends."""
 
-    def __init__(self, port: str, baud: int, boot_s: float, hang_s: float) -> None:
+    def __init__(self, driver: LaserDriver, port: str, baud: int, boot_s: float, hang_s: float) -> None:
         """Start it, and wait until every laser is off.
 
         Raises:
@@ -33,7 +34,7 @@ class Guarded:
         self._answers, answers = os.pipe()
         signals, self._signals = os.pipe()
         os.set_blocking(self._signals, False)
-        call = [port, str(baud), str(boot_s), str(hang_s), str(signals)]
+        call = [driver, port, str(baud), str(boot_s), str(hang_s), str(signals)]
         # -P: what lies in the current folder is not imported. A session of its own: no terminal reaches it.
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-P", "-m", "workbench.devices.guardian", *call],
@@ -107,7 +108,7 @@ class Guarded:
             if not came:
                 raise LaserOffNotConfirmedError(
                     f"the guardian of the laser controller {'does not answer' if not ready else 'is gone'};"
-                    " a lease still running ends by itself, but nobody verified it: treat the beams as on,"
+                    " a controller's lease ends by itself, but nobody verified it: treat the beams as on,"
                     " then run `workbench lasers off`"
                 )
             self._heard += came

@@ -13,7 +13,8 @@ signals that the workbench got, one byte each, written by its C-level signal han
 
 It puts everything off when the workbench ends in whatever way, when it is told to end (SIGTERM, SIGHUP), and
 when no beat came for `hang_s` while something was lit. The last it leaves to nobody's clock but the
-controller's: that is never given a lease longer than `hang_s`, and each beat renews it.
+controller's: that is never given a lease longer than `hang_s`, and each beat renews it. A digital output
+board has no lease: there it is the guardian's clock.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from workbench.devices.controller_line import ControllerLine
+from workbench.devices.digital_output import DigitalOutputLine
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError, WorkbenchError
 
 LOOK_S = 0.02
@@ -39,6 +41,7 @@ TRY_ALONE_S = 1.0
 """How long it goes on trying to put off when there is nobody left to tell: twice the longest lease."""
 RENEW = 5
 """A lease is renewed when a fifth of it has gone."""
+Line = ControllerLine | DigitalOutputLine
 AT_ONCE = {int(signal.SIGTERM), int(signal.SIGHUP)}
 
 
@@ -95,7 +98,7 @@ class Lease:
 class Guardian:
     """Serves one workbench on one controller."""
 
-    def __init__(self, workbench: Workbench, line: ControllerLine, hang_s: float) -> None:
+    def __init__(self, workbench: Workbench, line: Line, hang_s: float) -> None:
         self._workbench, self._line, self._hang_s = workbench, line, hang_s
         self._lease: Lease | None = None
         self._failure: WorkbenchError | None = None
@@ -222,8 +225,8 @@ def answer(number: int, act: Callable[[], object]) -> int:
     return code
 
 
-def main(port: str, baud: int, boot_s: float, hang_s: float, signals: int) -> int:
-    """Hold the port until the workbench is gone."""
+def main(driver: str, port: str, baud: int, boot_s: float, hang_s: float, signals: int) -> int:
+    """Hold the port, or the lines of a board, until the workbench is gone."""
     # What a terminal, or a system that goes down, sends to everybody. The workbench's end is what counts.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
         signal.signal(number, signal.SIG_IGN)
@@ -231,10 +234,11 @@ def main(port: str, baud: int, boot_s: float, hang_s: float, signals: int) -> in
     with suppress(AttributeError, OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
     workbench = Workbench(sys.stdin.fileno(), signals)
-    opened: list[ControllerLine] = []
+    opened: list[Line] = []
 
     def connect() -> str:
-        opened.append(ControllerLine(port, baud, workbench.alarm))
+        on_board = driver == "nidaqmx"
+        opened.append(DigitalOutputLine(port) if on_board else ControllerLine(port, baud, workbench.alarm))
         identity = opened[0].identify(boot_s)
         opened[0].all_off()
         return identity
@@ -243,5 +247,5 @@ def main(port: str, baud: int, boot_s: float, hang_s: float, signals: int) -> in
 
 
 if __name__ == "__main__":
-    _, port, baud, boot_s, hang_s, signals = sys.argv
-    sys.exit(main(port, int(baud), float(boot_s), float(hang_s), int(signals)))
+    _, driver, port, baud, boot_s, hang_s, signals = sys.argv
+    sys.exit(main(driver, port, int(baud), float(boot_s), float(hang_s), int(signals)))

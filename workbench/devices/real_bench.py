@@ -1,4 +1,4 @@
-"""The driver `opencv+serial`: a camera that OpenCV opens, lasers on a serial line, a target put by hand."""
+"""The driver `opencv+serial`: a camera that OpenCV opens, lasers on a controller, a target put by hand."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def open_lasers(rig: Rig) -> SerialLaserBank:
         RigNotReadyError, LaserOffNotConfirmedError: see `SerialLaserBank`.
     """
     device = devices_of(rig).lasers
-    return SerialLaserBank(device.port, rig.laser_ids, device.baud)
+    return SerialLaserBank(device.port, rig.laser_ids, device.baud, driver=device.driver)
 
 
 def open_bench(rig: Rig, session_dir: Path) -> Bench:

@@ -1,6 +1,7 @@
 """Lasers behind a serial line: the driver of any controller that speaks docs/laser-controller.md.
 
-It never touches the port. A guardian process does, and puts the lasers off when this one no longer can.
+Or, with the driver `nidaqmx`, on a digital output board. It never touches port or board. A guardian process
+does, and puts the lasers off when this one no longer can.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import cast
 
 from workbench.devices.guarded import Guarded
 from workbench.model.errors import BadInputError
+from workbench.model.rig import LaserDriver
 
 HANG_S = 0.5
 """After this time without a beat whatever is lit goes off."""
@@ -24,14 +26,21 @@ class LaserState:
     """What the controller tells of its outputs and its interlock."""
 
     lit: tuple[str, ...]
-    interlock_closed: bool
+    interlock_closed: bool | None
+    """None where the driver knows nothing of one."""
 
 
 class SerialLaserBank:
     """The lasers `ids`, in the order of the controller's lines 1, 2, ...; see `protocols.LaserBank`."""
 
     def __init__(
-        self, port: str, ids: Sequence[str], baud: int = 115_200, boot_s: float = 3.0, hang_s: float = HANG_S
+        self,
+        port: str,
+        ids: Sequence[str],
+        baud: int = 115_200,
+        boot_s: float = 3.0,
+        hang_s: float = HANG_S,
+        driver: LaserDriver = "serial",
     ) -> None:
         """Open the port and put every laser off.
 
@@ -42,7 +51,7 @@ class SerialLaserBank:
             LaserOffNotConfirmedError: the controller answers, but not that all are off.
         """
         self.ids = tuple(ids)
-        self._guardian = Guarded(port, baud, boot_s, hang_s)
+        self._guardian = Guarded(driver, port, baud, boot_s, hang_s)
         self.identity = self._guardian.identity
         self._lit = False
 
@@ -82,7 +91,7 @@ class SerialLaserBank:
         Raises:
             RigNotReadyError: the controller does not answer.
         """
-        mask, interlock_closed = cast("tuple[int, bool]", self._guardian.ask("STATE"))
+        mask, interlock_closed = cast("tuple[int, bool | None]", self._guardian.ask("STATE"))
         lit = tuple(name for bit, name in enumerate(self.ids) if mask >> bit & 1)
         return LaserState(lit, interlock_closed)
 

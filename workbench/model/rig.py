@@ -162,10 +162,16 @@ class CameraDevice(FileModel):
         return self
 
 
+LaserDriver = Literal["serial", "nidaqmx"]
+
+
 class LaserDevice(FileModel):
     """How the laser controller is reached."""
 
+    driver: LaserDriver = "serial"
+    """`nidaqmx`: no controller but a digital output board, a line for each laser."""
     port: str
+    """Of the controller; or the board's lines, as `Dev1/port0/line0:3`."""
     baud: Annotated[int, Field(gt=0)] = 115_200
 
 

@@ -38,7 +38,7 @@ class Finding:
 
 class _Interlocked(Protocol):
     @property
-    def interlock_closed(self) -> bool: ...
+    def interlock_closed(self) -> bool | None: ...
 
 
 @runtime_checkable
@@ -82,9 +82,9 @@ def _identity(bench: Bench) -> str:
 
 
 def _interlock(bench: Bench) -> Finding:
-    if not isinstance(bench.lasers, _TellsState):
+    closed = bench.lasers.state().interlock_closed if isinstance(bench.lasers, _TellsState) else None
+    if closed is None:
         return Finding("interlock", True, "not told by this driver; an open one refuses the lasers below")
-    closed = bench.lasers.state().interlock_closed
     return Finding("interlock", closed, "closed" if closed else "open: close the door or the key switch")
 
 

@@ -1,0 +1,196 @@
+"""Lasers on a digital output board: NI's package is faked at its boundary, the guardian is the real one."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.unit.fake_board import changes, write_package
+from workbench.devices.real_bench import open_lasers
+from workbench.devices.serial_lasers import LaserState, SerialLaserBank
+from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
+from workbench.model.rig import CameraDevice, DeviceSpec, LaserDevice, load_rig
+
+ROOT = Path(__file__).parents[2]
+LINES = "Dev1/port0/line0:3"
+IDS = ("L1", "L2", "L3", "L4")
+LIGHT_AND_WAIT = f"""
+import time
+from workbench.devices.serial_lasers import SerialLaserBank
+bank = SerialLaserBank({LINES!r}, {IDS!r}, driver="nidaqmx")
+with bank.lit(["L2"], for_s=30):
+    print("lit", flush=True)
+    while True:
+        time.sleep(0.05)
+        {{beat}}
+"""
+
+
+@pytest.fixture
+def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    write_package(tmp_path / "lib")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path / "lib"), str(ROOT)]))
+    monkeypatch.setenv("FAKE_BOARD_LOG", str(tmp_path / "lines.log"))
+    return tmp_path / "lines.log"
+
+
+def fail(log: Path, how: str) -> None:
+    Path(f"{log}.fault").write_text(how)
+
+
+def bank(lines: str = LINES) -> SerialLaserBank:
+    return SerialLaserBank(lines, IDS, driver="nidaqmx")
+
+
+def masks(log: Path) -> list[int]:
+    return [mask for _, mask in changes(log)]
+
+
+def test_lines_follow_the_lasers_and_end_low(log: Path) -> None:
+    lasers = bank()
+    assert lasers.identity == "PCI-6503 Dev1, 4 lines"
+    assert set(masks(log)) == {0}, "whatever was left high is put low before anything else"
+    with lasers.lit(["L1", "L4"], for_s=2.0):
+        assert masks(log)[-1] == 0b1001
+        assert lasers.state() == LaserState(("L1", "L4"), None)
+    assert masks(log)[-1] == 0
+    lasers.close()
+
+
+def test_a_board_of_one_line(log: Path) -> None:
+    lasers = SerialLaserBank("Dev1/port0/line2", ("L1",), driver="nidaqmx")
+    with lasers.lit(["L1"], for_s=2.0):
+        assert masks(log)[-1] == 1
+    assert lasers.state() == LaserState((), None)
+    lasers.close()
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
+def test_off_when_the_workbench_ends(log: Path, how: signal.Signals) -> None:
+    with lit_elsewhere("bank.beat()") as process:
+        began = time.monotonic_ns()
+        process.send_signal(how)
+        process.wait(10)
+        assert 0 < wait_for_dark(log) - began < 1e9
+
+
+def test_off_when_the_workbench_hangs(log: Path) -> None:
+    with lit_elsewhere("pass") as process:
+        began = time.monotonic_ns()
+        assert 0 < wait_for_dark(log) - began < 2e9, "no beat: half a second, and a busy computer's delay"
+        process.kill()
+
+
+def lit_elsewhere(beat: str) -> subprocess.Popen[str]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", LIGHT_AND_WAIT.replace("{beat}", beat)], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "lit\n"
+    return process
+
+
+def wait_for_dark(log: Path) -> int:
+    deadline = time.monotonic() + 10
+    while masks(log)[-1] != 0:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    lit = [n for n, mask in enumerate(masks(log)) if mask]
+    return changes(log)[lit[-1] + 1][0]
+
+
+def test_lines_that_stay_high_are_never_taken_for_off(log: Path) -> None:
+    lasers = bank()
+    told = r"read back as 100 .*treat the beams as on"
+    with pytest.raises(LaserOffNotConfirmedError, match=told), lasers.lit(["L3"], for_s=2.0):
+        fail(log, "stuck")
+    fail(log, "")
+    lasers.close()
+
+
+def test_a_board_unplugged_while_lit(log: Path) -> None:
+    lasers = bank()
+    with (
+        pytest.raises(LaserOffNotConfirmedError, match="Device is not available"),
+        lasers.lit(["L1"], for_s=2.0),
+    ):
+        fail(log, "unplugged")
+    fail(log, "")
+    lasers.close()
+    assert masks(log)[-1] == 0
+
+
+@pytest.mark.parametrize(
+    ("lines", "how", "told"),
+    [
+        ("Dev9/port0", "", "Physical channel specified does not exist.*named right"),
+        (LINES, "no driver", "Could not find an installation of NI-DAQmx.*check that NI-DAQmx is installed"),
+    ],
+)
+def test_a_board_that_is_not_there(log: Path, lines: str, how: str, told: str) -> None:
+    fail(log, how)
+    with pytest.raises(RigNotReadyError, match=told):
+        bank(lines)
+
+
+def test_fewer_lines_than_lasers(log: Path) -> None:
+    lasers = bank("Dev1/port0/line0:1")
+    with (
+        pytest.raises(RigNotReadyError, match="a line for laser 4, the board has 2"),
+        lasers.lit(["L4"], 2.0),
+    ):
+        pass
+    assert set(masks(log)) == {0}
+    lasers.close()
+
+
+@pytest.mark.skipif(importlib.util.find_spec("nidaqmx") is not None, reason="the package is installed")
+def test_without_the_package(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    text = (
+        (ROOT / "rigs/thesis-emulated.yaml").read_text().replace("driver: emulated", "driver: opencv+serial")
+    )
+    devices = f"devices:\n  camera: {{source: 0}}\n  lasers: {{driver: nidaqmx, port: '{LINES}'}}\n"
+    path.write_text(text + devices)
+    with pytest.raises(RigNotReadyError, match=r"expected the package nidaqmx.*pip install"):
+        open_lasers(load_rig(path))
+    script = Path(sys.executable).with_name("workbench")
+    done = subprocess.run([script, "doctor", path], capture_output=True, text=True, check=False)
+    assert done.returncode == 4
+    assert "pip install" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_what_is_called_is_in_the_real_package() -> None:
+    """Where it is installed; without NI's driver, that is told."""
+    package = pytest.importorskip("nidaqmx")
+    errors = importlib.import_module("nidaqmx.errors")
+    constants = importlib.import_module("nidaqmx.constants")
+    assert "auto_start" in inspect.signature(package.Task.write).parameters
+    assert callable(package.Task.read)
+    for name in ("number_of_channels", "devices", "do_channels"):
+        assert isinstance(inspect.getattr_static(package.Task, name), property)
+    collections = importlib.import_module("nidaqmx.task.collections")
+    assert "line_grouping" in inspect.signature(collections.DOChannelCollection.add_do_chan).parameters
+    assert constants.LineGrouping.CHAN_PER_LINE
+    assert issubclass(errors.DaqNotFoundError, errors.Error)
+    assert issubclass(errors.DaqError, errors.Error)
+    assert package.errors is errors
+
+
+def test_the_rig_file_takes_it() -> None:
+    spec = DeviceSpec(
+        camera=CameraDevice(source="0"),
+        lasers=LaserDevice.model_validate({"driver": "nidaqmx", "port": LINES}),
+    )
+    assert spec.lasers.driver == "nidaqmx"
+    assert LaserDevice(port="/dev/ttyACM0").driver == "serial"

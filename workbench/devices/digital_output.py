@@ -1,0 +1,118 @@
+"""Lasers on the lines of a digital output board, by NI-DAQmx. Only the guardian holds one.
+
+The board has no lease of its own: what was written stays until something else is written. The guardian, which
+holds nothing longer than its lease, is all that puts the lasers off (docs/laser-controller.md).
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
+
+PACKAGE = "nidaqmx"
+
+
+class DigitalOutputLine:
+    """Has the methods of `ControllerLine`; laser 1 is the first line."""
+
+    def __init__(self, lines: str) -> None:
+        """Reserve the board's lines, as `Dev1/port0/line0:3`, and put them low.
+
+        Raises:
+            RigNotReadyError: the package or its driver is missing, or there are no such lines.
+        """
+        self._lines = lines
+        try:
+            package = importlib.import_module(PACKAGE)
+            constants = importlib.import_module(f"{PACKAGE}.constants")
+        except ImportError as error:
+            raise RigNotReadyError(
+                f"lasers at {lines}: expected the package {PACKAGE}, got: {error};"
+                f" install it with `pip install 'laser-range-workbench[{PACKAGE}]'`, and NI's driver with it"
+            ) from None
+        self._failures = package.errors.Error
+        try:
+            self._task: Any = package.Task()
+            self._task.do_channels.add_do_chan(lines, line_grouping=constants.LineGrouping.CHAN_PER_LINE)
+            self._count = int(self._task.number_of_channels)
+            self._write(0)
+        except self._failures as error:
+            raise self._error("reserve the lines", error) from None
+
+    def identify(self, boot_s: float) -> str:
+        """Which board; it needs no time to start.
+
+        Raises:
+            RigNotReadyError: it does not answer.
+        """
+        try:
+            boards = [f"{device.product_type} {device.name}" for device in self._task.devices]
+        except self._failures as error:
+            raise self._error("tell its name", error) from None
+        return f"{', '.join(boards)}, {self._count} lines"
+
+    def light(self, mask: int, lease_ms: int) -> None:
+        """The lasers of `mask` on and the others off, until they are put off: the lease is the guardian's.
+
+        Raises:
+            RigNotReadyError: there is no such line, or the board does not take it.
+        """
+        if mask >> self._count:
+            raise RigNotReadyError(
+                f"lasers at {self._lines}: expected a line for laser {mask.bit_length()}, the board has"
+                f" {self._count} there; name as many lines as the rig has lasers"
+            )
+        try:
+            self._write(mask)
+        except self._failures as error:
+            raise self._error("set the lines", error) from None
+
+    def all_off(self) -> None:
+        """Put every line low and read them back; tried twice.
+
+        Raises:
+            LaserOffNotConfirmedError: they do not read low.
+        """
+        came = ""
+        for _ in range(2):
+            try:
+                self._write(0)
+                mask = self._read()
+            except self._failures as error:
+                came = str(error)
+            else:
+                if mask == 0:
+                    return
+                came = f"lines read back as {mask:b} (binary)"
+        raise LaserOffNotConfirmedError(
+            f"the lasers at {self._lines} may be on: {came}; treat the beams as on, cut the lasers' supply"
+        )
+
+    def state(self) -> tuple[int, bool | None]:
+        """Mask of the lines that are high; of an interlock the board knows nothing.
+
+        Raises:
+            RigNotReadyError: it does not answer.
+        """
+        try:
+            return self._read(), None
+        except self._failures as error:
+            raise self._error("read the lines", error) from None
+
+    def _write(self, mask: int) -> None:
+        levels = [bool(mask >> line & 1) for line in range(self._count)]
+        # One line takes one level, several take a list.
+        self._task.write(levels if self._count > 1 else levels[0], auto_start=True)
+
+    def _read(self) -> int:
+        came = self._task.read()
+        levels = came if isinstance(came, list) else [came]
+        return sum(1 << line for line, high in enumerate(levels) if high)
+
+    def _error(self, what: str, error: Exception) -> RigNotReadyError:
+        return RigNotReadyError(
+            f"lasers at {self._lines}: expected the board to {what}, got: {error};"
+            " check that NI-DAQmx is installed, the board is plugged in, and its lines are named right"
+        )
