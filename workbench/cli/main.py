@@ -13,7 +13,7 @@ import typer
 
 from workbench.cli.leaving import leave
 from workbench.cli.stopping import stop_at_once
-from workbench.model.errors import StoppedError, WorkbenchError
+from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
 
 # Our matrices are small: threads of the linear algebra wait for each other longer than they work.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -275,7 +275,8 @@ def main() -> None:
             leave(StoppedError.exit_code)
         leave(ended.code if isinstance(ended.code, int) else int(ended.code is not None))
     except WorkbenchError as error:
-        _say(f"error: {error}")
+        unsafe = isinstance(error, LaserOffNotConfirmedError)
+        _say(f"error: {error}", red=unsafe)
         leave(error.exit_code)
     except Exception:
         traceback.print_exc()
@@ -283,6 +284,6 @@ def main() -> None:
         leave(INTERNAL_ERROR)
 
 
-def _say(message: str) -> None:
+def _say(message: str, red: bool = False) -> None:
     with suppress(OSError):  # a terminal that was closed
-        typer.echo(message, err=True)
+        typer.secho(message, err=True, fg="red" if red else None, bold=red)

@@ -16,7 +16,12 @@ from workbench.cli.stopping import StopAfterShot
 from workbench.cli.terminal import Guarded, Terminal
 from workbench.devices.protocols import Operator
 from workbench.model import event as ev
-from workbench.model.errors import AnswerNeededError, RigNotReadyError, StoppedError
+from workbench.model.errors import (
+    AnswerNeededError,
+    LaserOffNotConfirmedError,
+    RigNotReadyError,
+    StoppedError,
+)
 from workbench.procedure.operator import Scripted
 from workbench.procedure.outline import Forecast, learn_pace, outline
 from workbench.procedure.resume import plan_of, resume
@@ -82,7 +87,7 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
         consumers = (Guarded(terminal, "the progress", console), figures, beside)
         try:
             yield Screen(consumers, lambda: asked.reason, operator)
-        except (RigNotReadyError, StoppedError, AnswerNeededError):
+        except (RigNotReadyError, StoppedError, AnswerNeededError, LaserOffNotConfirmedError):
             if (session_dir / MANIFEST).exists():
                 with suppress(OSError):  # a terminal that was closed
                     console.print(f"go on:   workbench resume {session_dir}", highlight=False, soft_wrap=True)
