@@ -199,7 +199,7 @@ HEAD = "format: 1\nprocedure: p\ntitle: P\nsteps:\n"
     [
         (
             "  - step: capture_grid\n    standoffs_mm: [5]\n    repeats: 0\n",
-            ":7: steps[0].capture_grid.repeats",
+            ":7: steps[0].repeats: expected at least 1, got 0",
         ),
         ("  - step: dance\n", ":5: steps[0]"),
         (

@@ -47,10 +47,10 @@ def test_a_rig_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
-        ("sd: 25.0", "sd: -1", 6, ["camera.f_px.sd", "greater than or equal to 0", "got -1"]),
-        ("sd: 25.0", "sd: wide", 6, ["camera.f_px.sd", "valid number", "got 'wide'"]),
-        ("  height_px: 480\n", "  height_px: 480\n  hue: 1\n", 6, ["camera.hue", "not permitted"]),
-        ("  width_px: 640\n", "", 3, ["camera.width_px", "required"]),
+        ("sd: 25.0", "sd: -1", 6, ["camera.f_px.sd", "expected at least 0", "got -1"]),
+        ("sd: 25.0", "sd: wide", 6, ["camera.f_px.sd", "expected a number", "got 'wide'"]),
+        ("  height_px: 480\n", "  height_px: 480\n  hue: 1\n", 6, ["camera.hue", "no such key"]),
+        ("  width_px: 640\n", "", 3, ["camera.width_px", "is missing"]),
         ("axis: u", "axis: x", 11, ["lasers[0].axis", "'u' or 'v'", "got 'x'"]),
         ("x_mm: {value: 30.0", "x_mm: {value: 0.0", 10, ["lasers[0]", "needs a baseline"]),
         ("format: 1", "format: 2", 1, ["format", "got 2"]),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
 
 from workbench.devices.protocols import Bench
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
+from workbench.model.yamlfile import FileModel
 
 GROUP = "workbench.benches"
 
@@ -23,6 +26,17 @@ def open_bench(rig: Rig, session_dir: Path) -> Bench:
     """
     bench: Bench = entry_points(group=GROUP)[check_driver(rig)].load()(rig, session_dir)
     return bench
+
+
+def blocks_of(rig: Rig) -> Mapping[str, type[FileModel]]:
+    """Blocks of the rig file that its driver alone reads: `BLOCKS` of its module, where it has that.
+
+    Raises:
+        BadInputError: see `check_driver`.
+    """
+    module = import_module(entry_points(group=GROUP)[check_driver(rig)].module)
+    blocks: Mapping[str, type[FileModel]] = getattr(module, "BLOCKS", {})
+    return blocks
 
 
 def check_driver(rig: Rig) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
 from workbench.model.errors import BadInputError
+from workbench.model.problems import problems
 from workbench.model.rig import NonNegativeFloat, PositiveFloat, Rig
 from workbench.model.yamlfile import FileModel
 
@@ -174,6 +175,14 @@ class EmulatorSpec(FileModel):
     answers: bool = True
     """Whether the bench answers the procedures' questions; without it a person can practise on it."""
 
+    @field_validator("truth")
+    @classmethod
+    def _is_of_the_rigs_lasers(cls, truth: TruthSpec, info: ValidationInfo) -> TruthSpec:
+        known = info.context.laser_ids if isinstance(info.context, Rig) else truth.lasers
+        if unknown := [name for name in truth.lasers if name not in known]:
+            raise ValueError(f"lasers.{unknown[0]}: expected a laser of the rig ({', '.join(known)})")
+        return truth
+
 
 def emulator_spec(rig: Rig) -> EmulatorSpec:
     """Validate the rig's `emulator:` block.
@@ -183,19 +192,8 @@ def emulator_spec(rig: Rig) -> EmulatorSpec:
     """
     block: dict[str, Any] = {} if rig.emulator is None else rig.emulator
     try:
-        spec = EmulatorSpec.model_validate(block)
+        return EmulatorSpec.model_validate(block, context=rig)
     except ValidationError as error:
-        raise BadInputError("\n".join(_describe(rig, dict(p)) for p in error.errors())) from None
-    for name in spec.truth.lasers:
-        if name not in rig.laser_ids:
-            known = ", ".join(rig.laser_ids)
-            raise BadInputError(
-                f"rig {rig.rig}: emulator.truth.lasers.{name}: expected a laser of the rig ({known})"
-            )
-    return spec
-
-
-def _describe(rig: Rig, problem: dict[str, Any]) -> str:
-    key = ".".join(["emulator", *(str(part) for part in problem["loc"])])
-    came = "" if problem["type"] in {"missing", "extra_forbidden"} else f", got {problem['input']!r}"
-    return f"rig {rig.rig}: {key}: {problem['msg'][:1].lower()}{problem['msg'][1:]}{came}"
+        found = problems(block, error.errors())
+        lines = [f"rig {rig.rig}: emulator.{one.key}: {one.text}" for one in found]
+        raise BadInputError("\n".join(lines)) from None

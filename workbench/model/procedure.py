@@ -308,6 +308,7 @@ Step = Annotated[
 class Procedure(FileModel):
     """A procedure file, format 1."""
 
+    told_by = "procedure"
     format: Literal[1]
     procedure: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
     title: str

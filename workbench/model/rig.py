@@ -192,6 +192,8 @@ LaserClass = Annotated[
 class Rig(FileModel):
     """A rig file, format 1."""
 
+    told_by = "rig"
+
     format: Literal[1]
     rig: str
     serial: Name = "unknown"

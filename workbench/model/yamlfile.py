@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from workbench.model.errors import BadInputError
+from workbench.model.problems import Location, Problem, problems
+
+KINDS = {"procedure": "a procedure", "rig": "a rig", "laser_ranger": "a calibration"}
+"""The keys that tell what a file is."""
 
 
 class FileModel(BaseModel):
     """Base of everything read from a file: unknown keys are mistakes, values do not change after reading."""
+
+    told_by: ClassVar[str | None] = None
+    """The key of a whole file's kind."""
 
     # Built at first use: a command uses few of all the models that it imports.
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
@@ -40,11 +47,29 @@ def load_yaml(path: Path) -> Any:
 def parse_yaml_model(text: str, path: Path, model: type[Model]) -> Model:
     """Validate YAML `text`, which comes from `path`, as `model`; the errors of `load_yaml_model`."""
     data = parse_yaml(text, path)
+    _check_kind(path, data, model)
+    return validate(path, data, (), model)
+
+
+def validate(path: Path, data: Any, part: Location, model: type[Model], context: object = None) -> Model:
+    """Validate a part of `data`, which comes from `path`, as `model`; the errors of `load_yaml_model`.
+
+    Args:
+        path: for the message.
+        data: the whole document.
+        part: keys that lead to the part; one that is not there is empty.
+        model: what the part is to be.
+        context: handed to the model's validators.
+    """
+    node = data
+    for key in part:
+        node = node.get(key) or {}
     try:
-        return model.model_validate(data)
+        return model.model_validate(node, context=context)
     except ValidationError as error:
-        problems = [_describe(path, data, dict(problem)) for problem in error.errors()]
-        raise BadInputError("\n".join(problems)) from None
+        found = [Problem((*part, *one.location), one.text) for one in problems(node, error.errors())]
+        lines = [f"{path}:{line_of(data, one.location)}: {one.key}: {one.text}" for one in found]
+        raise BadInputError("\n".join(lines)) from None
 
 
 def parse_yaml(text: str, path: Path) -> Any:
@@ -68,6 +93,20 @@ def parse_yaml(text: str, path: Path) -> Any:
     return data
 
 
+def kind_of(data: Any) -> str:
+    """What a document is, for people."""
+    if not isinstance(data, dict):
+        return "no mapping of keys to values"
+    return next((name for key, name in KINDS.items() if key in data), "a mapping of other keys")
+
+
+def _check_kind(path: Path, data: Any, model: type[BaseModel]) -> None:
+    """A file of another kind is one mistake, not as many as it has keys."""
+    key = getattr(model, "told_by", None)
+    if key is not None and not (isinstance(data, dict) and key in data):
+        raise BadInputError(f"{path}:1: expected {KINDS[key]}, with the key {key}; this is {kind_of(data)}")
+
+
 def _read(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
@@ -77,16 +116,7 @@ def _read(path: Path) -> str:
         raise BadInputError(f"{path}: expected a readable UTF-8 YAML file: {error}") from None
 
 
-def _describe(path: Path, data: Any, problem: dict[str, Any]) -> str:
-    """One line for one pydantic problem."""
-    location = tuple(problem["loc"])
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
-    message = problem["msg"][:1].lower() + problem["msg"][1:]
-    came = "" if problem["type"] in {"missing", "extra_forbidden"} else f", got {_short(problem['input'])}"
-    return f"{path}:{line_of(data, location)}: {key or 'document'}: {message}{came}"
-
-
-def line_of(data: Any, location: tuple[int | str, ...]) -> int:
+def line_of(data: Any, location: Location) -> int:
     """Line (from 1) of the deepest part of `location` that stands in the file."""
     line = 1
     node = data
@@ -97,8 +127,3 @@ def line_of(data: Any, location: tuple[int | str, ...]) -> int:
         line = position.data[part][0] + 1
         node = node[part]
     return line
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."

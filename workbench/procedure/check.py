@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from workbench.devices.registry import check_driver
+from workbench.devices.registry import blocks_of, check_driver
 from workbench.model.errors import BadInputError
 from workbench.model.procedure import Procedure, load_procedure
 from workbench.model.rig import load_rig
-from workbench.model.yamlfile import line_of, load_yaml
+from workbench.model.yamlfile import kind_of, line_of, load_yaml, validate
 
 
 def check_file(path: Path) -> list[str]:
@@ -20,7 +20,9 @@ def check_file(path: Path) -> list[str]:
     data = load_yaml(path)
     kinds = [kind for kind in ("procedure", "rig") if isinstance(data, dict) and kind in data]
     if len(kinds) != 1:
-        raise BadInputError(f"{path}:1: expected a procedure or a rig: a mapping with one key of these names")
+        raise BadInputError(
+            f"{path}:1: expected a procedure or a rig, with one key of these names; this is {kind_of(data)}"
+        )
     return _check_procedure(path) if kinds == ["procedure"] else _check_rig(path)
 
 
@@ -52,4 +54,6 @@ def _check_rig(path: Path) -> list[str]:
         check_driver(rig)
     except BadInputError as error:
         raise BadInputError(f"{path}:{line_of(load_yaml(path), ('driver',))}: {error}") from None
+    for block, model in blocks_of(rig).items():
+        validate(path, load_yaml(path), (block,), model, context=rig)
     return []

@@ -117,10 +117,10 @@ def test_a_torn_line_is_dropped(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("block", "says"),
     [
-        (None, "emulator.seed: field required"),
-        ({"seed": 1, "beam": {"power_mw": -1}}, r"emulator.beam.power_mw: .*greater than 0, got -1"),
-        ({"seed": 1, "lense": {}}, "emulator.lense: extra"),
-        ({"seed": 1, "truth": {"lasers": {"L9": {}}}}, r"emulator.truth.lasers.L9: expected .*L1"),
+        (None, "emulator.seed: is missing"),
+        ({"seed": 1, "beam": {"power_mw": -1}}, r"emulator.beam.power_mw: expected more than 0.*, got -1"),
+        ({"seed": 1, "lense": {}}, "emulator.lense: no such key"),
+        ({"seed": 1, "truth": {"lasers": {"L9": {}}}}, r"emulator.truth: lasers.L9: expected .*L1"),
     ],
 )
 def test_mistakes_are_named(tmp_path: Path, block: Any, says: str) -> None:
