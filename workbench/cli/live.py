@@ -55,11 +55,16 @@ def range_live(request: LiveRequest, as_json: bool) -> None:
         tempfile.TemporaryDirectory(prefix="workbench-range-") as folder,
         watched(open_bench(rig, Path(folder) / "live")) as bench,
     ):
-        _read_all(bench, Ranger(calibration), request, as_json, stopping)
+        _read_all(bench, Ranger(calibration), request, as_json, stopping, rig.driver == "emulated")
 
 
 def _read_all(
-    bench: Bench, ranger: Ranger, request: LiveRequest, as_json: bool, stopping: StopAfterShot
+    bench: Bench,
+    ranger: Ranger,
+    request: LiveRequest,
+    as_json: bool,
+    stopping: StopAfterShot,
+    virtual: bool,
 ) -> None:
     live = LiveRanger(ranger, bench)
     live.warm_up()
@@ -72,11 +77,20 @@ def _read_all(
         for number in count() if request.readings is None else range(request.readings):
             if stopping.reason is not None:
                 raise StoppedError(stopping.reason)
-            _show(live.read(f"{number}"), as_json)
+            reading = live.read(f"{number}")
+            _show(reading, as_json)
+            if number == 0 and reading.status == "no_points":
+                Console(stderr=True).print(f"hint: {_why_nothing(request, virtual)}", highlight=False)
     finally:
         if request.stats:
             words = latency_words(live.latencies_s, time.monotonic() - began)
             Console(stderr=True).print(words, highlight=False)
+
+
+def _why_nothing(request: LiveRequest, virtual: bool) -> str:
+    if virtual and request.standoff_mm is None:
+        return "the virtual bench is empty; --standoff MM has a target placed there"
+    return "no spot was seen: do the beams end on a target, within range, and is the exposure long enough?"
 
 
 def _show(reading: Reading, as_json: bool) -> None:

@@ -7,7 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
+from rich.padding import Padding
+from rich.text import Text
 
 from workbench.model.errors import BadInputError
 from workbench.session.manifest import MANIFEST
@@ -31,7 +32,7 @@ def list_sessions(sessions: Path, as_json: bool) -> None:
     if not found:
         console.print(f"no sessions in {sessions}")
         return
-    console.print(_table(found[-SHOWN:]))
+    _show(found[-SHOWN:], console)
     if len(found) > SHOWN:
         console.print(f"and {len(found) - SHOWN} older ones")
     if unfinished := [each for each in found if each.unfinished]:
@@ -55,12 +56,11 @@ def find_session(name: Path | None, sessions: Path) -> Path:
     return unfinished[-1].session_dir
 
 
-def _table(found: list[Standing]) -> Table:
-    table = Table(title="Sessions", title_justify="left")
-    table.add_column("session", overflow="fold")
-    table.add_column("state")
-    table.add_column("captures", justify="right")
-    table.add_column("how it ended", overflow="fold")
+def _show(found: list[Standing], console: Console) -> None:
+    """A line each; how it ended stands below, where it did not end well: there it has room."""
+    widths = [max(len(each.session_dir.name) for each in found), max(len(each.state) for each in found)]
     for each in found:
-        table.add_row(each.session_dir.name, each.state, str(each.captures), each.why)
-    return table
+        name, state = each.session_dir.name.ljust(widths[0]), each.state.ljust(widths[1])
+        console.print(f"{name}  {state}  {each.captures:6} captures", highlight=False, soft_wrap=True)
+        if each.state != "finished":
+            console.print(Padding(Text(each.why), (0, 0, 0, 4)))

@@ -127,19 +127,25 @@ def rejected_lines(rejected: Iterable[Rejected | RejectedRecord]) -> list[str]:
     return [f"{_and_more(names)}: {reason}" for reason, names in sources.items()]
 
 
+LONGEST_SCENE = 30
+"""Characters of a scene's name in one line."""
+
+
 def reading_table(readings: Iterable[Reading]) -> Table:
-    """The ranger's readings, a line a scene."""
+    """The ranger's readings, a line a scene; names are what is looked up, so they are broken last."""
+    told = list(readings)
     table = Table(title="Ranges (mm, 1 sigma)", title_justify="left")
-    table.add_column("scene", overflow="fold")
-    table.add_column("status")
-    table.add_column("closest", justify="right")
+    longest = max((len(r.scene) for r in told), default=0)
+    table.add_column("scene", overflow="fold", no_wrap=longest <= LONGEST_SCENE)
+    table.add_column("closest", justify="right", no_wrap=True)
     table.add_column("shape")
     table.add_column("lasers", no_wrap=True)
-    for r in readings:
+    for r in told:
         closest = "-" if r.closest_mm is None or r.sigma_mm is None else _with_sd(r.closest_mm, r.sigma_mm)
-        shapes = "\n".join(shape_words(line.shape) for line in r.lines)
+        shapes = [shape_words(line.shape) for line in r.lines]
+        status = [] if r.status == "done" else [r.status.replace("_", " ")]
         lasers = "\n".join(f"{laser.laser_id} {laser.range_mm:.1f}" for laser in r.lasers)
-        table.add_row(r.scene, r.status, closest, shapes, lasers)
+        table.add_row(r.scene, closest, "\n".join(status or shapes), lasers)
     return table
 
 
