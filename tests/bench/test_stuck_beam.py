@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.crash.short import begin, write_files
+from tests.crash.short import PROCEDURE, begin, write_files
 from workbench.emulator.controller import Controller
 from workbench.model.errors import LaserOffNotConfirmedError
 from workbench.model.event import CaptureTaken, PlacementFinished
@@ -14,13 +14,13 @@ from workbench.session.journal import read_journal
 
 
 def test_a_group_ends_with_a_look_for_beams(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """L1 is well while it is captured, and shorts when L4 is lit: L4's pairs do not show it, in both."""
+    """L1 is well while captured, and shorts when L4 is lit alone: L4's pairs show it in both frames."""
     lit = Controller.lit
     shorted = False
 
     def lit_with_a_short(self: Controller) -> tuple[str, ...]:
         nonlocal shorted
-        shorted = shorted or "L4" in lit(self)
+        shorted = shorted or lit(self) == ("L4",)
         return tuple(sorted({*lit(self), *(["L1"] if shorted else [])}))
 
     monkeypatch.setattr(Controller, "lit", lit_with_a_short)
@@ -30,3 +30,13 @@ def test_a_group_ends_with_a_look_for_beams(tmp_path: Path, monkeypatch: pytest.
     events = [record.event for record in read_journal(tmp_path / "session")]
     assert [e.laser_id for e in events if isinstance(e, CaptureTaken)] == ["L1", "L4"]
     assert not any(isinstance(e, PlacementFinished) for e in events)
+
+
+@pytest.mark.parametrize("standoff_mm", [125, 300, 1500])
+def test_beams_that_burn_from_the_first_shot_on(tmp_path: Path, standoff_mm: float) -> None:
+    """Lit and dark frames are alike: no exposure is bright enough, and a long one must not hide them."""
+    write_files(tmp_path, PROCEDURE.replace("[300, 600, 1500]", f"[{standoff_mm}]"))
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(rig.read_text() + "  controller: {fault: hides_stuck_beam}\n")
+    with pytest.raises(LaserOffNotConfirmedError, match="shows a spot"):
+        begin(tmp_path, tmp_path / "session")

@@ -12,8 +12,9 @@ from workbench.model.procedure import GridLimits
 from workbench.model.prompt import Prompt
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
-from workbench.procedure.context import Context, RetakeError
+from workbench.procedure.context import Context
 from workbench.procedure.quality import quality_of
+from workbench.procedure.visiting import RetakeError, settle
 
 RETRIES = 2
 """`on_fail: retry` captures a placement again so often before it stops."""
@@ -47,7 +48,7 @@ def check_captures(
                 retries[placement.key] += 1
                 raise RetakeError(failed)
             if limit.on_fail == "ask":
-                context.settle(_about_captures(f"{of}/{name}", failed), failed)
+                settle(context, _about_captures(f"{of}/{name}", failed), failed)
             else:
                 raise LimitFailedError(failed)
 

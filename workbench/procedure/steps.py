@@ -33,6 +33,7 @@ from workbench.model.simulation import SimulationFinished
 from workbench.model.target import BoardTarget, Placement
 from workbench.procedure.context import Context
 from workbench.procedure.limits import check_captures, check_fit
+from workbench.procedure.visiting import visit
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE, write_capture_table
@@ -97,7 +98,7 @@ def _(step: pr.AskStep, context: Context, name: str) -> str:
 
 @run_step.register
 def _(step: pr.PlaceTargetStep, context: Context, name: str) -> str:
-    placed = context.visit([_placement(name, step.standoff_mm)], lambda placement: placement)
+    placed = visit(context, [_placement(name, step.standoff_mm)], lambda placement: placement)
     return f"at {placed[0].standoff_mm:g} mm" if placed else "left out"
 
 
@@ -145,7 +146,7 @@ def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
         _advise(context)
         return pairs
 
-    return f"{sum(context.visit(placements, work))} pairs"
+    return f"{sum(visit(context, placements, work))} pairs"
 
 
 @run_step.register
@@ -170,7 +171,7 @@ def _(step: pr.CaptureBoardStep, context: Context, name: str) -> str:
         context.boards[placement.key] = see_board(frames, context.rig.board, told)
         _capture_lasers(context, placement, step.repeats)
 
-    context.visit(placements, work)
+    visit(context, placements, work)
     mine = [seen for key, seen in context.boards.items() if key.startswith(f"{name}/")]
     corners = sum(len(seen.corners.ids) for seen in mine if isinstance(seen, BoardView))
     missed = [seen.reason for seen in mine if isinstance(seen, Rejected)]
@@ -243,7 +244,7 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
             )
         return accuracy_row(placement.standoff_mm, readings, context.rig.bench)
 
-    rows = context.visit([_placement(name, standoff_mm) for standoff_mm in step.standoffs_mm], work)
+    rows = visit(context, [_placement(name, standoff_mm) for standoff_mm in step.standoffs_mm], work)
     trial = [c for c in context.captures if c.purpose == "trial"]
     write_capture_table(context.session_dir / TRIAL_TABLE, trial)
     table = f"{name}.csv"
