@@ -1,7 +1,8 @@
 """What happens in a session, one typed record each: the journal's lines and the viewer's only input.
 
 A consumer is anything callable with a `Record`. Records name frames by their path in the session folder, so
-that every view (the recording, a table, a report) can be made again from the folder alone.
+that every view (the recording, a table, a report) can be made again from the folder alone. What a fit and a
+trial tell is in modules of their own, and reached by this one.
 """
 
 from __future__ import annotations
@@ -11,11 +12,22 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from workbench.model.calibration import TermSummary
+from workbench.model.fit_event import FaultRecord as FaultRecord
+from workbench.model.fit_event import FitFinished as FitFinished
+from workbench.model.fit_event import LaserErrorRecord as LaserErrorRecord
+from workbench.model.fit_event import LeftOutRecord as LeftOutRecord
+from workbench.model.fit_event import ParameterRecord as ParameterRecord
+from workbench.model.fit_event import RejectedRecord as RejectedRecord
+from workbench.model.fit_event import ResidualRecord as ResidualRecord
+from workbench.model.fit_event import ResidualTestRecord as ResidualTestRecord
 from workbench.model.limit import Verdict
 from workbench.model.prompt import Answer, By
 from workbench.model.simulation import SceneSimulated, SimulationFinished
 from workbench.model.target import Placement
+from workbench.model.trial_event import LaserRange as LaserRange
+from workbench.model.trial_event import ReadingTaken as ReadingTaken
+from workbench.model.trial_event import TrialFinished as TrialFinished
+from workbench.model.trial_event import TrialRow as TrialRow
 from workbench.model.yamlfile import FileModel
 
 
@@ -213,73 +225,6 @@ class LatencyMeasured(FileModel):
     frames: int
 
 
-class ParameterRecord(FileModel):
-    """One fitted parameter; standard deviations are 1 sigma."""
-
-    name: str
-    unit: str
-    value: float
-    sd: float
-    prior_value: float
-    prior_sd: float
-    data_share: float
-    determined_by: Literal["data", "joint", "prior"]
-
-
-class ResidualRecord(FileModel):
-    """Measured minus predicted position of one laser at one placement, mean of its repeats."""
-
-    laser_id: str
-    standoff_mm: float
-    u_px: float | None
-    v_px: float | None
-    u_sd_px: float | None
-    v_sd_px: float | None
-
-
-class RejectedRecord(FileModel):
-    """A capture or row that a fit left out."""
-
-    source: str
-    """`row 3` of a captures file, or the path of a frame."""
-    reason: str
-
-
-class LaserErrorRecord(FileModel):
-    """Range by one laser's spot at a placement left out - its standoff; 1 sigma as promised."""
-
-    laser_id: str
-    error_mm: float
-    sd_mm: float
-
-
-class LeftOutRecord(FileModel):
-    """What the fit without one placement says of it; 1 sigma as promised."""
-
-    placement: str
-    standoff_mm: float
-    error_mm: float
-    """Range by all its spots - standoff."""
-    sd_mm: float
-    lasers: tuple[LaserErrorRecord, ...]
-    alarm: bool
-    """Farther off than promised; one sound fit in 1000 has any."""
-
-
-class FaultRecord(FileModel):
-    """Something wrong with a fit's data, by name; docs/validation.md lists the names."""
-
-    name: str
-    message: str
-
-
-class ResidualTestRecord(FileModel):
-    """A test of a fit's residuals, and the chance of a value as far out if nothing is wrong."""
-
-    name: str
-    p: float
-
-
 class StandoffAdvised(FileModel):
     """How good ranges are by the captures so far, and where the target would help most next.
 
@@ -306,84 +251,12 @@ class StandoffAdvised(FileModel):
         )
 
 
-class FitFinished(FileModel):
-    """A calibration has been fitted, accepted or not."""
-
-    kind: Literal["fit_finished"] = "fit_finished"
-    parameters: tuple[ParameterRecord, ...]
-    residuals: tuple[ResidualRecord, ...]
-    rms_px: float
-    observations: int
-    rejected: tuple[RejectedRecord, ...]
-    verdict: Literal["accepted", "refused"]
-    reasons: tuple[str, ...]
-    warnings: tuple[str, ...]
-    terms: tuple[TermSummary, ...] = ()
-    left_out: tuple[LeftOutRecord, ...] = ()
-    """Cross-validation, a placement each."""
-    faults: tuple[FaultRecord, ...] = ()
-    residual_tests: tuple[ResidualTestRecord, ...] = ()
-
-
 class CalibrationExported(FileModel):
     """The calibration YAML is on disk."""
 
     kind: Literal["calibration_exported"] = "calibration_exported"
     path: str
     sha256: str
-
-
-class LaserRange(FileModel):
-    """Range of one laser's spot, from the reference plane; 1 sigma."""
-
-    laser_id: str
-    range_mm: float
-    sigma_mm: float
-    u_px: float | None
-    v_px: float | None
-    low_mm: float | None = None
-    high_mm: float | None = None
-    """The 95 % interval, longer beyond the range than before it; no upper end where it reaches infinity."""
-
-
-class ReadingTaken(FileModel):
-    """One reading of a trial."""
-
-    kind: Literal["reading_taken"] = "reading_taken"
-    trial: str
-    scene: str
-    standoff_mm: float
-    reading: int
-    status: Literal["done", "not_enough_points", "no_points"]
-    range_mm: float | None
-    sigma_mm: float | None
-    lasers: tuple[LaserRange, ...]
-
-
-class TrialRow(FileModel):
-    """Statistics of one standoff of an accuracy trial; errors are measured - true, in mm, 1 sigma."""
-
-    standoff_mm: float
-    readings: int
-    """With a range; the numbers below are of these, and None where there are too few of them."""
-    missing: int = 0
-    """Readings without a range."""
-    mean_error_mm: float | None = None
-    max_error_mm: float | None = None
-    min_error_mm: float | None = None
-    sd_mm: float | None = None
-    range_sd_mm: float | None = None
-    """Stated standard deviation of one reading: calibration and spots."""
-    reference_sd_mm: float
-    """Standard deviation of the true range itself: the placement's, by the ruler."""
-
-
-class TrialFinished(FileModel):
-    """A trial's table."""
-
-    kind: Literal["trial_finished"] = "trial_finished"
-    trial: str
-    rows: tuple[TrialRow, ...]
 
 
 class SessionFinished(FileModel):
