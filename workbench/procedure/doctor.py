@@ -112,7 +112,7 @@ def _exposure(rig: Rig, bench: Bench) -> Iterator[Finding]:
         yield Finding("exposure", False, str(error))
         return
     if found is not None:
-        yield Finding("exposure", found.verdict == "good", found.text)
+        yield Finding("exposure", found.verdict == "good", found.text.removeprefix("exposure "))
 
 
 def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:
