@@ -271,6 +271,27 @@ def change(old: str, new: str) -> Callable[[Path], None]:
     return edit
 
 
+def test_a_stop_while_it_goes_over_what_is_there_takes_nothing_away(tmp_path: Path) -> None:
+    """Answers given before are not asked for again, and the journal does not grow by what it has already."""
+    steps = GRID + "  - {step: ask, text: Which card?, choices: [white, grey]}\n" + GRID
+    said = Says(("p.2", Answer(value="grey")), ("p.3/600mm", Answer(action="abort", reason="lunch")))
+    with pytest.raises(StoppedError, match="lunch"):
+        session(tmp_path, steps, said)
+    stopped = tmp_path / "s"
+    before = effective(read_journal(stopped))
+    for _ in range(2):
+        with pytest.raises(StoppedError, match="at once"):
+            resume(stopped, (), RESUMER, lambda: "at once", Says())
+    counted = [record.n for record in effective(read_journal(stopped))]
+    assert [record.n for record in before if not isinstance(record.event, ev.SessionFinished)] == [
+        n for n in counted if n <= before[-1].n
+    ]
+    later = Says()
+    resume(stopped, (), RESUMER, lambda: None, later)
+    assert [prompt.key for prompt in later.asked] == ["safety", "p.3/600mm", "p.3/1500mm"]
+    assert standing(stopped).state == "finished"
+
+
 def test_a_comment_is_no_change(tmp_path: Path) -> None:
     stopped = stopped_session(tmp_path)
     change("serial: emulated-1", "serial: emulated-1  # by the window")(tmp_path / "rig.yaml")

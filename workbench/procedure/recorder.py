@@ -60,6 +60,9 @@ class Recorder:
                 f"session {event.session}: expected the rig and the procedures that it began with,"
                 f" {self._kept[0].event}, got {event}; run these anew"
             )
+        if self._kept and isinstance(event, ev.SessionFinished) and event.exit_code != 0:
+            # It ended again before anything was new: what was there already still counts, all of it.
+            self._from_n = self._kept[-1].n + 1
         self._kept.clear()
         if self._resumed is not None:
             resumed = self._resumed.model_copy(update={"from_n": self._from_n})
