@@ -9,7 +9,7 @@ from workbench.calibration.fit import Fit
 from workbench.calibration.significance import without_idle
 from workbench.calibration.validation import alarms
 from workbench.model.calibration import TermSummary
-from workbench.model.event import (
+from workbench.model.fit_event import (
     FaultRecord,
     FitFinished,
     LaserErrorRecord,

@@ -30,7 +30,6 @@ from workbench.model.rig import Rig, load_rig
 from workbench.report.tables import derived_table, left_out_table, parameter_table, rejected_lines, term_table
 from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.files import check_output
-from workbench.session.journal import JOURNAL
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
 
 MOST_REASONS = 3
@@ -86,6 +85,8 @@ def _check_distinct(request: Request) -> None:
     """What a calibration comes from is not written over."""
     made_from = [request.source] if request.rig is None else [request.source, request.rig]
     if request.source.is_dir():
+        from workbench.session.journal import JOURNAL  # with all events, which no captures file needs
+
         made_from += [request.source / name for name in (CALIBRATION_TABLE, MANIFEST, JOURNAL)]
     for path in made_from:
         if request.output.resolve() == path.resolve():

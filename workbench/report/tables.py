@@ -10,13 +10,13 @@ from rich import box
 from rich.table import Table
 
 from workbench.model.calibration import TERM_VERDICTS, TermSummary
-from workbench.model.event import LeftOutRecord, ParameterRecord, RejectedRecord, TrialRow
-from workbench.model.simulation import ClaimRow
 
-if TYPE_CHECKING:  # the ranger finds spots in images, a table of a fit does without
+if TYPE_CHECKING:  # a table of one of them is made without the rest
     from workbench.calibration.assess import Derived
     from workbench.calibration.compare import Difference
     from workbench.calibration.observations import Rejected
+    from workbench.model.event import LeftOutRecord, ParameterRecord, RejectedRecord, TrialRow
+    from workbench.model.simulation import ClaimRow
     from workbench.ranging.ranger import Reading
     from workbench.ranging.shape import Shape
 

@@ -8,9 +8,12 @@ import io
 from collections.abc import Iterable
 from itertools import compress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from workbench.model.event import CaptureTaken
 from workbench.session.files import write_record
+
+if TYPE_CHECKING:  # a fit of a captures file needs a name from here and no events
+    from workbench.model.event import CaptureTaken
 
 CALIBRATION_TABLE = "captures.csv"
 TRIAL_TABLE = "trial-captures.csv"
