@@ -79,6 +79,14 @@ def test_a_flat_before_both_lines(both: Setup) -> None:
     assert reading.mean_sigma_mm <= min(s.closest_sigma_mm for s in shapes(reading).values())
 
 
+@pytest.mark.parametrize("standoff_mm", [1500.0, 2500.0, 3500.0])
+def test_far_away_where_the_spots_of_both_lines_crowd(both: Setup, standoff_mm: float) -> None:
+    reading = both.read(FlatTarget(), standoff_mm)
+    assert reading.status == "done"
+    for laser in reading.lasers:
+        assert abs(laser.range_mm - standoff_mm) < 5 * laser.sigma_mm
+
+
 @pytest.mark.parametrize("angle", [-30.0, 30.0])
 def test_each_line_sees_its_own_incline(both: Setup, angle: float) -> None:
     turned, tipped = (

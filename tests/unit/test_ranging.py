@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from workbench.ranging.captures import read_captures, scenes
 from workbench.ranging.lines import Axis
 from workbench.ranging.objections import objections
 from workbench.ranging.ranger import Ranger
-from workbench.spots import Finding, Scanline, Spot
+from workbench.spots import Failure, Finding, Scanline, Spot
 
 IDS = ("L1", "L2", "L3", "L4")
 
@@ -292,6 +293,32 @@ def test_how_far_a_spot_lies_outside_the_calibrated_field_is_told(
     for laser_id, note in zip(lit, reading.notes, strict=True):
         seen, end = ranger.sensor.spot_px(laser_id, np.array([range_mm, end_mm]))
         assert note.endswith(f", its spot {np.hypot(*(seen - end)):.1f} px outside the calibrated field")
+
+
+def test_a_calibration_of_one_standoff_tells_how_far_its_spot_is(ranger: Ranger) -> None:
+    part = ranger.calibration.laser_ranger
+    one = part.validity.model_copy(update={"standoff_mm": (500.0, 500.0)})
+    only = ranger.calibration.model_copy(update={"laser_ranger": part.model_copy(update={"validity": one})})
+    reading = Ranger(only).read_lit("s", spots(ranger, dict.fromkeys(IDS, 800.0)))
+    seen, there = ranger.sensor.spot_px("L1", np.array([800.0, 500.0]))
+    assert f"its spot {np.hypot(*(seen - there)):.1f} px outside" in reading.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("flag", "words"),
+    [
+        (Failure.SATURATED, "is saturated: its range is known less well"),
+        (Failure.MERGED, "runs into another: both ranges err together"),
+        (Failure.AT_EDGE, "is cut by the edge of the picture"),
+    ],
+)
+def test_what_a_range_suffers_from_is_told(ranger: Ranger, flag: Failure, words: str) -> None:
+    def shoot(ids: tuple[str, ...]) -> Finding:
+        found = spots(ranger, dict.fromkeys(ids, 700.0))
+        return Finding((replace(found[0], flags=frozenset({flag})), *found[1:]))
+
+    reading = acquire(ranger, "s", shoot)
+    assert (reading.status, reading.notes) == ("done", (f"L1: its spot {words}",))
 
 
 def test_repeats_average_as_the_fit_averages_them(ranger: Ranger, tmp_path: Path) -> None:

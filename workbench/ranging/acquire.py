@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from workbench.ranging.ranger import Dealt, Ranger, Reading, spot_arrays
+from workbench.ranging.records import flag_notes
 from workbench.spots import Finding, Spot
 
 Shoot = Callable[[tuple[str, ...]], Finding]
@@ -90,8 +91,9 @@ class _Control:
                 self._known.append((laser_id, spots[0]))
             else:
                 self._notes.append(f"{laser_id}: fired alone, {len(spots) or 'no'} spots on its line")
-        position, sd = spot_arrays([spot for _, spot in self._known])
-        ids = [laser_id for laser_id, _ in self._known]
+        ids, spots = [laser_id for laser_id, _ in self._known], [spot for _, spot in self._known]
+        position, sd = spot_arrays(spots)
+        self._notes += flag_notes(ids, spots)
         fired = len(self._ranger.sensor.ids)
         reading = self._ranger.read_known(self._scene, fired, ids, position, sd, self._notes)
         # The normal capture showed spots, or this one would not have been asked for.

@@ -134,7 +134,7 @@ class LiveRanger:
             )
         if ids not in self._finders:
             lines = self.ranger.searched(ids)
-            self._finders[ids] = SpotFinder((height, width), lines, expected=len(ids))
+            self._finders[ids] = SpotFinder((height, width), lines, expected=len(ids), reasons=False)
         return self._finders[ids].find(on, off)
 
 

@@ -88,5 +88,7 @@ def _beyond_px(laser: LaserRange, near: FloatArray, far: FloatArray) -> float:
     """How far a spot lies outside the part of its line where the calibration saw it (0: inside)."""
     along, length = near - far, float(np.hypot(*(near - far)))
     seen = np.array([far[n] if p is None else p for n, p in enumerate((laser.u_px, laser.v_px))])
+    if length == 0:
+        return float(np.hypot(*(seen - far)))
     place = float((seen - far) @ along) / length
     return max(place - length, -place, 0.0)

@@ -17,7 +17,7 @@ from workbench.ranging.assignment import MOST_MISFIT_SD, Pairs, assign, pair_up
 from workbench.ranging.bands import band
 from workbench.ranging.lines import NAMES, Axis, Line, Weights, line_of, mean_of_lines
 from workbench.ranging.objections import objections, outside_validity
-from workbench.ranging.records import flat_range, laser_ranges
+from workbench.ranging.records import flag_notes, flat_range, laser_ranges
 from workbench.spots import Scanline, Spot
 
 FloatArray = NDArray[np.float64]
@@ -159,8 +159,10 @@ class Ranger:
         if not spots:
             return Reading(scene, "no_points", notes=(NOTHING_SEEN,))
         ids = [self.sensor.ids[i] for i in dealt.lasers]
-        position, _ = spot_arrays([spots[i] for i in dealt.spots.tolist()])
-        reading = self._answer(scene, len(self.sensor.ids), ids, position, dealt.ranges, dealt.notes)
+        mine = [spots[i] for i in dealt.spots.tolist()]
+        position, _ = spot_arrays(mine)
+        notes = (*dealt.notes, *flag_notes(ids, mine))
+        reading = self._answer(scene, len(self.sensor.ids), ids, position, dealt.ranges, notes)
         if dealt.untold and reading.status == "no_points":
             return Reading(scene, "not_enough_points", notes=reading.notes)
         return reading

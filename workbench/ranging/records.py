@@ -11,8 +11,26 @@ from numpy.typing import NDArray
 from workbench.calibration.sensor import Ranges
 from workbench.model.event import LaserRange
 from workbench.ranging.points import interval_mm
+from workbench.spots import Failure, Spot
 
 FloatArray = NDArray[np.float64]
+FLAGGED = {
+    Failure.SATURATED: "is saturated: its range is known less well",
+    Failure.MERGED: "runs into another: both ranges err together",
+    Failure.AT_EDGE: "is cut by the edge of the picture",
+}
+"""What of a spot's flags a range suffers from."""
+
+
+def flag_notes(laser_ids: Sequence[str], spots: Sequence[Spot]) -> list[str]:
+    """A note for each flag of n spots, by their lasers."""
+    return [
+        f"{laser_id}: its spot {words}"
+        for laser_id, spot in zip(laser_ids, spots, strict=True)
+        if spot.flags
+        for flag, words in FLAGGED.items()
+        if flag in spot.flags
+    ]
 
 
 def laser_ranges(

@@ -18,9 +18,10 @@ class SpotFinder:
     Args:
         shape: Height and width of the frames.
         scanlines: Where spots may lie; none means anywhere. Only their bands are read.
-        expected: Number of lasers lit. Fewer spots start a search for the reason.
+        expected: Number of lasers lit.
         saturation_dn: Value of a clipped pixel; None means the full scale of the depth (255; for uint16 the
             10, 12 or 14 bit full scale if the brightest pixel has exactly that value, else 65535).
+        reasons: Whether fewer spots than expected start a search for the reason, over the whole frame.
 
     Raises:
         BadInputError: a scanline without direction or width.
@@ -33,6 +34,7 @@ class SpotFinder:
         *,
         expected: int | None = None,
         saturation_dn: int | None = None,
+        reasons: bool = True,
     ) -> None:
         from workbench.spots.search import (
             Search,
@@ -42,7 +44,7 @@ class SpotFinder:
             check_line(line)
         self._shape = shape
         self._saturation_dn = saturation_dn
-        self._search = Search(shape, tuple(scanlines), expected)
+        self._search = Search(shape, tuple(scanlines), expected, reasons)
 
     def find(self, on: Image, off: Image | None = None) -> Finding:
         """Spots of one capture.

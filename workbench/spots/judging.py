@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.spots.compiled import compiled
 from workbench.spots.cutting import half_for
+from workbench.spots.noise import ROUNDING_DN2
 from workbench.spots.scoring import JUDGED, score
 from workbench.spots.types import Bools, Floats
 
@@ -62,18 +63,22 @@ def without_outliers(
 
 
 @compiled
-def _raise_floor(floor: Floats, judged: Floats) -> bool:
-    """Raise the floor (n,) of windows whose rim is noisier than predicted; whether any is.
+def _follow_rim(floor: Floats, judged: Floats) -> bool:
+    """Take the floor (n,) of windows from their rim where it is not as noisy as predicted; whether any is.
 
-    Clutter and bright surroundings do that. The threshold is 5 sd of the estimate from those of
-    the rim's pixels that are used, so that an even scene keeps the strip's floor, which is known better.
+    Clutter and bright surroundings make it noisier, a dark patch of a bright scene quieter. The threshold is
+    5 sd of the estimate from those of the rim's pixels that are used, so that an even scene keeps the strip's
+    floor, which is known better.
     """
-    raised = False
+    changed = False
     for i in range(len(floor)):
-        if judged[i, 1] > 1.0 + _RIM_SD * math.sqrt(2.0 / max(judged[i, 8], 1.0)):
-            floor[i] *= judged[i, 1]
-            raised = True
-    return raised
+        n = max(judged[i, 8], 1.0)
+        # The mean of n squares is far from Gaussian below 1: its cube root is not (Wilson and Hilferty).
+        least = max(1.0 - 2.0 / (9.0 * n) - _RIM_SD * math.sqrt(2.0 / (9.0 * n)), 0.0) ** 3
+        if judged[i, 1] > 1.0 + _RIM_SD * math.sqrt(2.0 / n) or 0.0 < judged[i, 1] < least:
+            floor[i] = max(floor[i] * judged[i, 1], ROUNDING_DN2)
+            changed = True
+    return changed
 
 
 @compiled
@@ -188,7 +193,7 @@ def fit_group(
         if turn == 0:
             usable, asked = without_outliers(usable, signal, residual, weight, judged)
         elif turn == 1:
-            asked = _raise_floor(floor, judged)
+            asked = _follow_rim(floor, judged)
     for i in range(n):
         k = group[i]
         start[k] = params[i] + origin[i, :6]

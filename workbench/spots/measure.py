@@ -43,6 +43,8 @@ class Trace(NamedTuple):
     """The larger of both widths."""
     clarity: float
     """Flux over its standard deviation."""
+    scene: Scene
+    """The strip that it was found in."""
 
 
 def spot_flags(scene: Scene, params: Floats) -> list[frozenset[Failure]]:
@@ -104,5 +106,6 @@ def _traces(scene: Scene, found: Floats) -> list[Trace]:
         _, flux, u, v, ln_su, ln_sv, _, u_sd, v_sd, flux_sd, peak, slope, is_spot, _ = row
         if is_spot:
             spot = Spot(u, v, u_sd, v_sd, flux, math.exp(0.5 * (ln_su + ln_sv)), peak, its_flags)
-            traces.append(Trace(spot, params[:U_SD], slope, math.exp(max(ln_su, ln_sv)), flux / flux_sd))
+            reach = math.exp(max(ln_su, ln_sv))
+            traces.append(Trace(spot, params[:U_SD], slope, reach, flux / flux_sd, scene))
     return traces

@@ -104,9 +104,17 @@ def _quantiles(sample: Floats32, shares: tuple[float, float, float]) -> tuple[fl
 
 
 @compiled
+def _stride(width: int, wanted: int) -> int:
+    """The smallest from `wanted` on that has no divisor in common with the width: it visits every column."""
+    while math.gcd(width, wanted) > 1:
+        wanted += 1
+    return wanted
+
+
+@compiled
 def level_of(values: Floats32, samples: int, clip_sd: float, least_variance: float) -> tuple[float, float]:
     """Robust mean and variance: see `noise.level_and_variance`."""
-    sample = values.ravel()[:: max(1, values.size // samples)].copy()
+    sample = values.ravel()[:: _stride(values.shape[1], max(1, values.size // samples))].copy()
     low, middle, high = _quantiles(sample, (0.1587, 0.5, 0.8413))
     # Half the distance between the quantiles of +-1 sd; the lower half alone when spots fill the upper one.
     reach = clip_sd * max(min(middle - low, 0.5 * (high - low)), 0.5)

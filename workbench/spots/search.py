@@ -6,19 +6,11 @@ from typing import Final
 
 import numpy as np
 
+from workbench.spots.crowd import fitted_together, grown, split
 from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
 from workbench.spots.measure import Trace, measure
 from workbench.spots.pair import Pair, Scene, look
-from workbench.spots.resolve import (
-    CLEAR_SD,
-    are_apart,
-    clearest,
-    clusters,
-    fitted_together,
-    grown,
-    split,
-    without_duplicates,
-)
+from workbench.spots.resolve import CLEAR_SD, are_apart, clearest, clusters, without_duplicates
 from workbench.spots.strip import Strip, is_on, strip_of
 from workbench.spots.types import NO_FLAGS, Failure, Finding, Image, Scanline, Spot
 
@@ -32,8 +24,11 @@ _CLEAR_PEAK_SD: Final = 5.0
 class Search:
     """A search of frames of one size; see `SpotFinder` for the arguments."""
 
-    def __init__(self, shape: tuple[int, int], scanlines: tuple[Scanline, ...], expected: int | None) -> None:
+    def __init__(
+        self, shape: tuple[int, int], scanlines: tuple[Scanline, ...], expected: int | None, reasons: bool
+    ) -> None:
         self._lines = scanlines
+        self._wants_reasons = reasons
         self._expected = expected
         self._everywhere = Strip(slice(0, shape[0]), slice(0, shape[1]), None)
         strips = tuple(strip_of(line, shape) for line in scanlines) or (self._everywhere,)
@@ -63,11 +58,12 @@ class Search:
             return traces
         more = self._wants_more(traces)
         if more:
-            traces = [s for t in traces for s in split(scenes[0], t, [o for o in traces if o is not t])]
-        groups = [fitted_together(scenes[0], group, more) for group in clusters(traces)]
-        traces = [trace for group in groups for trace in group]
+            traces = [s for t in traces for s in split(scenes, t, _without(traces, [t]))]
+        groups = [fitted_together(scenes, g, _without(traces, g), more) for g in clusters(traces)]
+        traces = without_duplicates([trace for group in groups for trace in group])
         if self._wants_more(traces):
-            traces = [trace for group in groups for trace in grown(scenes[0], group)]
+            found = [t for g in clusters(traces) for t in grown(scenes, g, _without(traces, g))]
+            traces = without_duplicates(found)
         return self._as_many_as_lasers(traces, scenes)
 
     def _wants_more(self, traces: list[Trace]) -> bool:
@@ -100,7 +96,7 @@ class Search:
             failures.append(Failure.OFF_SCANLINE)
         if not spots or (self._expected is not None and len(spots) < self._expected):
             failures.append(Failure.TOO_FEW if spots else Failure.NO_SPOT)
-            failures += self._reasons(pair, scenes, spots)
+            failures += self._reasons(pair, scenes, spots) if self._wants_reasons else []
         if self._expected is not None and len(spots) > self._expected:
             failures.append(Failure.TOO_MANY)
         if flags := NO_FLAGS.union(*(s.flags for s in spots)):
@@ -127,6 +123,12 @@ class Search:
             if any(not self._on_a_line(t.spot) for t in elsewhere):
                 reasons.append(Failure.OFF_SCANLINE)
         return reasons
+
+
+def _without(traces: list[Trace], group: list[Trace]) -> list[Trace]:
+    """The traces that are not in a group."""
+    mine = {id(t) for t in group}
+    return [t for t in traces if id(t) not in mine]
 
 
 def _new_ones(peaks: Peaks, traces: list[Trace]) -> Peaks:

@@ -64,8 +64,7 @@ class Chain:
     def _finders(self) -> dict[tuple[str, ...], SpotFinder]:
         size = self.ranger.size_px[::-1]
         sets = [self.line.ids, *((i,) for i in self.line.ids)]
-        lines = dict(zip(self.line.ids, self.ranger.scanlines, strict=True))
-        return {ids: SpotFinder(size, [lines[i] for i in ids], expected=len(ids)) for ids in sets}
+        return {ids: SpotFinder(size, self.ranger.searched(ids), expected=len(ids)) for ids in sets}
 
 
 def _outcome(reading: Reading) -> Outcome:

@@ -105,6 +105,70 @@ def test_a_crowd_of_spots_is_told_apart(crowd: str, seed: int) -> None:
         assert spot.v_px == pytest.approx(v, abs=5 * spot.v_sd_px)
 
 
+APART = {
+    "two pairs, one above the other": [(36.0, 25.0), (43.0, 25.0), (36.0, 34.0), (43.0, 34.0)],
+    "three in a row and one below": [(30.0, 25.0), (37.0, 25.0), (44.0, 25.0), (37.0, 35.0)],
+    "two on a diagonal": [(40.0, 30.0), (45.0, 35.0)],
+    "a long chain": [(10.0 + 10.0 * n, 30.0) for n in range(8)],
+}
+"""Clear spots whose windows overlap and whose light does not mix."""
+
+
+@pytest.mark.parametrize("expected", [True, False])
+@pytest.mark.parametrize("places", APART.values(), ids=APART)
+def test_spots_in_each_other_s_windows_are_each_found_once(
+    places: list[tuple[float, float]], expected: bool
+) -> None:
+    for seed in range(5):
+        random = rng(seed)
+        moved = sorted((u + random.uniform(-0.4, 0.4), v + random.uniform(-0.4, 0.4)) for u, v in places)
+        true = [Drawn(u, v, 2e4, 0.9, 0.9) for u, v in moved]
+        on, off = draw(true, random, (60, 90)), draw([], random, (60, 90))
+        spots = find_spots(on, off, expected=len(true) if expected else None, saturation_dn=4095).spots
+        assert len(spots) == len(true)
+        for spot, t in zip(spots, true, strict=True):
+            assert spot.u_px == pytest.approx(t.u, abs=5 * spot.u_sd_px)
+            assert spot.v_px == pytest.approx(t.v, abs=5 * spot.v_sd_px)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.05])
+def test_a_clear_spot_on_dark_paper_is_not_dropped_for_its_neighbours(share: float) -> None:
+    true = [Drawn(30.2 + 6.5 * n, 30.1, (1.0, share, 1.0, 1.0)[n] * 5e4, 0.85, 0.85) for n in range(4)]
+    for seed in range(5):
+        random = rng(seed)
+        on, off = draw(true, random), draw([], random)
+        spots = find_spots(on, off, scanlines=ROW, expected=4, saturation_dn=4095).spots
+        assert [round(s.u_px) for s in spots] == [30, 37, 43, 50]
+
+
+def test_neighbours_on_the_second_of_two_scanlines_are_both_found() -> None:
+    true = [Drawn(20, 30), Drawn(30, 12), Drawn(30.2, 19), Drawn(45, 30)]
+    lines = [Scanline(0, 30, 1, 0, 2), Scanline(30, 0, 0, 1, 2)]
+    for order in (lines, lines[::-1]):
+        spots = find_spots(draw(true, rng(), (60, 60)), scanlines=order, expected=4).spots
+        assert sorted((round(s.u_px), round(s.v_px)) for s in spots) == [
+            (20, 30),
+            (30, 12),
+            (30, 19),
+            (45, 30),
+        ]
+
+
+def test_bars_of_light_do_not_pass_for_the_noise_of_the_frame() -> None:
+    """Bright bars in the columns that a sample of every 256th pixel would come from."""
+    scene = np.full((480, 640), 20.0)
+    for column in range(0, 640, 128):
+        scene[:, max(column - 2, 0) : column + 3] = 3000.0
+    random = rng(3)
+    true = Drawn(190.3, 240.2, 1.2e3, 1.5, 1.5)
+    on, off = (
+        draw([true], random, ambient=scene, shape=(480, 640)),
+        draw([], random, (480, 640), ambient=scene),
+    )
+    (spot,) = find_spots(on, off, expected=1, saturation_dn=4095).spots
+    assert spot.u_px == pytest.approx(true.u, abs=5 * spot.u_sd_px)
+
+
 def test_an_ellipse_is_not_split() -> None:
     frame = draw([Drawn(50, 30, 4e4, 2.6, 1.3)], rng(4), ambient=5.0)
     assert len(find_spots(frame, scanlines=ROW).spots) == 1

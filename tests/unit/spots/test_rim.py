@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
+from tests.unit.spots.draw import Drawn, draw
+from workbench.spots import find_spots
 from workbench.spots.fit import Windows, fit_spots
-from workbench.spots.judging import _raise_floor
+from workbench.spots.judging import _follow_rim
 from workbench.spots.noise import Noise
 
 HALF, WINDOWS = 5, 400
@@ -40,11 +43,37 @@ def test_the_noise_at_the_rim_does_not_depend_on_how_much_of_it_is_used(used: st
 def test_a_rim_of_fewer_pixels_must_be_noisier_to_count(count: int, reads: float, raised: bool) -> None:
     judged, floor = np.zeros((1, 9)), np.ones(1)
     judged[0, 1], judged[0, 8] = reads, count
-    assert _raise_floor(floor, judged) == raised
+    assert _follow_rim(floor, judged) == raised
     assert floor[0] == (reads if raised else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("count", "reads", "lowered"), [(40, 0.26, False), (40, 0.22, True), (20, 0.12, False)]
+)
+def test_a_rim_must_be_much_quieter_to_count(count: int, reads: float, lowered: bool) -> None:
+    """As rare as 5 sd of a Gaussian on one side: 2.9e-7."""
+    judged, floor = np.zeros((1, 9)), np.ones(1)
+    judged[0, 1], judged[0, 8] = reads, count
+    assert _follow_rim(floor, judged) == lowered
+    assert floor[0] == (reads if lowered else 1.0)
+    assert (chi2(count).cdf(reads * count) < 2.9e-7) == lowered
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_in_a_dark_patch_of_a_bright_scene_the_deviation_is_that_of_the_patch(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene = np.full((60, 120), 1000.0)
+    scene[15:45, 40:80] = 60.0
+    z = []
+    for _ in range(150):
+        true = Drawn(60 + rng.uniform(-0.5, 0.5), 30 + rng.uniform(-0.5, 0.5), 3e3, 1.5, 1.5)
+        on, off = draw([true], rng, ambient=scene), draw([], rng, ambient=scene)
+        (spot,) = find_spots(on, off, expected=1, saturation_dn=4095).spots
+        z += [(spot.u_px - true.u) / spot.u_sd_px, (spot.v_px - true.v) / spot.v_sd_px]
+    assert 0.88 < np.std(z) < 1.12  # 300 values: 3 sd of their standard deviation are 0.12
 
 
 def test_a_rim_that_no_pixel_tells_of_leaves_the_floor_alone() -> None:
     floor = np.ones(1)
-    assert not _raise_floor(floor, np.zeros((1, 9)))
+    assert not _follow_rim(floor, np.zeros((1, 9)))
     assert floor[0] == 1.0
