@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ from workbench.viewer.recording import rebuild
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = Path(sys.executable).with_name("workbench")
-POINTS = 40
+POINTS = 100
+"""Of each scene in the procedure."""
 OUTER_LOST = "flat-outer-lost"
 
 
@@ -65,13 +67,24 @@ class Simulation:
 @pytest.fixture(scope="module")
 def simulation(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
     folder = tmp_path_factory.mktemp("simulation")
-    text = (ROOT / "procedures/thesis-simulation.yaml").read_text()
-    assert "\n    points: 100\n" in text
-    procedure = folder / "procedure.yaml"
-    procedure.write_text(text.replace("\n    points: 100\n", f"\n    points: {POINTS}\n"))
-    terminal = run(procedure, ROOT / "rigs/thesis-simulated.yaml", folder / "sessions")
+    procedure, rig = ROOT / "procedures/thesis-simulation.yaml", ROOT / "rigs/thesis-simulated.yaml"
+    terminal = run(procedure, rig, folder / "sessions")
     (session,) = [p for p in (folder / "sessions").iterdir() if p.is_dir()]
     return Simulation(session, terminal)
+
+
+def test_the_table_in_the_documentation_is_what_comes_out(simulation: Simulation) -> None:
+    """To the digits that the last bits of another processor may move."""
+    text = (ROOT / "docs/thesis-simulation.md").read_text()
+    lines = [line for line in text.splitlines() if re.match(r"\| [a-z0-9-]+ \| \w+ \d", line)]
+    table = [line.strip("| ").split(" | ") for line in lines]
+    assert len(table) == len(simulation.rows)
+    for (scene, what, *shown), (_, row) in zip(table, simulation.rows.iterrows(), strict=True):
+        assert (scene, what) == (row.scene, f"{row.quantity} {row.nearest_mm:.0f}-{row.farthest_mm:.0f}")
+        for cell, value in zip(shown[1:], (row.thesis, row.ours, row.noisy), strict=True):
+            told = float(cell.rstrip("*").removesuffix(" %"))
+            found = 100 * value if "%" in cell else value
+            assert told == pytest.approx(found, abs=0.02, rel=0.02)
 
 
 @pytest.mark.parametrize(
