@@ -20,6 +20,8 @@ class Sensor:
     def __init__(self, path):
         document = yaml.safe_load(Path(path).read_text())
         own = document["laser_ranger"]
+        if own["fit"]["verdict"] == "refused":
+            raise SystemExit(f"{path}: this calibration was refused: {own['fit'].get('reasons')}")
         k = document["camera_matrix"]["data"]
         self.lens = np.array([k[0], k[2], k[5], *document["distortion_coefficients"]["data"]])
         self.rays = {

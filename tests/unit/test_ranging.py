@@ -290,7 +290,9 @@ def test_how_far_a_spot_lies_outside_the_calibrated_field_is_told(
 ) -> None:
     lit = ("L2", "L3") if range_mm < end_mm else IDS  # the outer spots leave the picture
     reading = ranger.read_lit("s", spots(ranger, dict.fromkeys(lit, range_mm)))
-    for laser_id, note in zip(lit, reading.notes, strict=True):
+    outside = [note for note in reading.notes if "calibrated field" in note]
+    assert len(reading.notes) - len(outside) == len(IDS) - len(lit)
+    for laser_id, note in zip(lit, outside, strict=True):
         seen, end = ranger.sensor.spot_px(laser_id, np.array([range_mm, end_mm]))
         assert note.endswith(f", its spot {np.hypot(*(seen - end)):.1f} px outside the calibrated field")
 
@@ -377,6 +379,7 @@ def test_spots_that_are_told_apart_ask_for_no_more(ranger: Ranger) -> None:
     assert fired == [IDS]
     assert reading.status == "not_enough_points"
     assert [laser.laser_id for laser in reading.lasers] == ["L1", "L3", "L4"]
+    assert reading.notes == ("L2: no spot was seen",)
 
 
 def test_a_spot_that_may_be_two_is_not_ranged_and_both_lasers_fire_alone(ranger: Ranger) -> None:

@@ -94,4 +94,5 @@ def _why_nothing(request: LiveRequest, virtual: bool) -> str:
 
 
 def _show(reading: Reading, as_json: bool) -> None:
-    print(json.dumps(plain(reading)) if as_json else reading_line(reading), flush=True)
+    notes = "".join(f"\n   {note}" for note in reading.notes if reading.lasers)  # else the line has them
+    print(json.dumps(plain(reading)) if as_json else reading_line(reading) + notes, flush=True)

@@ -95,7 +95,8 @@ class _Control:
         position, sd = spot_arrays(spots)
         self._notes += flag_notes(ids, spots)
         fired = len(self._ranger.sensor.ids)
-        reading = self._ranger.read_known(self._scene, fired, ids, position, sd, self._notes)
+        unseen = [i for i in self._ranger.sensor.ids if i not in ids and i not in self._untold]
+        reading = self._ranger.read_known(self._scene, fired, ids, position, sd, self._notes, unseen)
         # The normal capture showed spots, or this one would not have been asked for.
         self.reading = replace(reading, status="not_enough_points") if not reading.lasers else reading
         return Seen.TOLD if ids else Seen.NOTHING

@@ -133,6 +133,7 @@ class Ranger:
         position_px: FloatArray,
         sd_px: FloatArray,
         notes: Sequence[str] = (),
+        unseen: Sequence[str] = (),
     ) -> Reading:
         """Range spots whose lasers are known, because each was fired alone.
 
@@ -143,9 +144,10 @@ class Ranger:
             position_px: (n, 2), NaN where a coordinate was not measured.
             sd_px: (n, 2) 1 sigma, NaN where not known.
             notes: what is to be said of the captures.
+            unseen: lasers that were fired and made no spot.
         """
         ranges = self.sensor.ranges(laser_ids, position_px, sd_px)
-        return self._answer(scene, fired, laser_ids, position_px, ranges, notes)
+        return self._answer(scene, fired, laser_ids, position_px, ranges, notes, unseen)
 
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
         """Range the spots of a frame in which every laser is lit.
@@ -162,7 +164,8 @@ class Ranger:
         mine = [spots[i] for i in dealt.spots.tolist()]
         position, _ = spot_arrays(mine)
         notes = (*dealt.notes, *flag_notes(ids, mine))
-        reading = self._answer(scene, len(self.sensor.ids), ids, position, dealt.ranges, notes)
+        unseen = [i for i in self.sensor.ids if i not in ids and i not in dealt.untold]
+        reading = self._answer(scene, len(self.sensor.ids), ids, position, dealt.ranges, notes, unseen)
         if dealt.untold and reading.status == "no_points":
             return Reading(scene, "not_enough_points", notes=reading.notes)
         return reading
@@ -236,7 +239,8 @@ class Ranger:
         laser_ids: Sequence[str],
         position_px: FloatArray,
         ranges: Ranges,
-        notes: Sequence[str] = (),
+        notes: Sequence[str],
+        unseen: Sequence[str],
     ) -> Reading:
         against = objections(position_px, ranges, self.size_px)
         said = [
@@ -251,8 +255,10 @@ class Ranger:
         ranges = ranges.only(np.array(good))
         lasers = laser_ranges(ids, position, ranges, self.sensor.offset_mm)
         status: Status = "done" if len(lasers) == fired else "not_enough_points"
+        flat_mm, flat_sigma_mm = flat_range(ranges)
         lines = self._lines(ids, ranges)
         nearest = min((line.shape for line in lines), key=lambda shape: shape.closest_mm)
+        said += [self._why_unseen(i, flat_mm) for i in unseen]
         said += outside_validity(lasers, self.calibration.laser_ranger.validity, self._calibrated_px)
         return Reading(
             scene,
@@ -263,9 +269,15 @@ class Ranger:
             *mean_of_lines(lines, self.sensor.covariance, self.weights, self.size_px),
             lasers,
             lines,
-            *flat_range(ranges),
+            flat_mm,
+            flat_sigma_mm,
             tuple(said),
         )
+
+    def _why_unseen(self, laser_id: str, range_mm: float) -> str:
+        if self.sensor.in_frame(laser_id, np.array([range_mm]))[0]:
+            return f"{laser_id}: no spot was seen"
+        return f"{laser_id}: at {range_mm:.0f} mm its spot lies outside the picture"
 
     def _lines(self, ids: Sequence[str], ranges: Ranges) -> tuple[Line, ...]:
         lines = []
