@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from tests.viewer.session import (
 )
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
-from workbench.viewer.recording import RecordingConsumer, rebuild
+from workbench.viewer.recording import RecordingConsumer, _OpenRecording, rebuild
 
 CAPTURES = len(LASERS) * len(STANDOFFS) * REPEATS + len(TRIAL_STANDOFFS) * READINGS
 
@@ -196,3 +197,9 @@ def test_first_record_must_name_the_session(recorded: Recorded, tmp_path: Path) 
         pytest.raises(ValueError, match="expected session_started"),
     ):
         consumer(recorded.records[1])
+
+
+def test_every_event_has_its_way_of_being_logged() -> None:
+    """One without would end the recording of a session, in which it is the first."""
+    union, _ = get_args(ev.Event)
+    assert set(get_args(union)) <= set(_OpenRecording.__dict__["_log"].dispatcher.registry)

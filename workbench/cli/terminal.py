@@ -116,10 +116,10 @@ class Terminal:
                 pass
 
     def how_far(self) -> str:
-        """`Step 7 of 48, about 11 min left`."""
+        """`Step 7 of 48, ~11 min left`."""
         left_s = self._forecast.seconds_left
         left = f"{left_s:.0f} s" if left_s < 90 else f"{left_s / 60:.0f} min"
-        return f"Step {self._forecast.done} of {self._forecast.total}, about {left} left"
+        return f"Step {self._forecast.done} of {self._forecast.total}, ~{left} left"
 
     def _show_capture(self, capture: ev.CaptureTaken, found: ev.SpotsFound) -> None:
         """The live line: this laser here, over its repeats so far."""
