@@ -39,6 +39,8 @@ from workbench.session.state import effective
 LASERS = 2
 STANDOFFS = 50
 FAULTS = ("kill", "stop", "disk full")
+AMID_OLD = 0.25
+"""Chance that a fault may come while a resumed session goes over what is there already."""
 REDO = 0.1
 """Chance that the operator has the placement before captured again."""
 
@@ -95,7 +97,11 @@ class Usage:
 
 @dataclass
 class Weather:
-    """Random faults, one at a time, each after a random number of records; none without `rng`."""
+    """Random faults, one at a time, each after a random number of records; none without `rng`.
+
+    As a rule only what is new counts: a resumed session goes over thousands of records before that, and with
+    a fault in each 1500 of those it would never come to its end. Now and then they count too.
+    """
 
     rng: np.random.Generator | None = None
     mean_records: int = 0
@@ -103,6 +109,9 @@ class Weather:
     seen: Counter[str] = field(default_factory=Counter)
     left: int = 0
     fault: str = ""
+    newest: int = -1
+    """Number of the last record that was new."""
+    counts_all: bool = False
 
     def next_fault(self) -> None:
         """Draw the next, if there is to be one."""
@@ -110,9 +119,13 @@ class Weather:
             return
         self.fault = str(self.rng.choice(FAULTS))
         self.left = int(self.rng.geometric(1 / self.mean_records))
+        self.counts_all = bool(self.rng.random() < AMID_OLD)
 
     def consumer(self, record: ev.Record) -> None:
         """Count down; a kill comes right after a record."""
+        if record.n <= self.newest and not self.counts_all:
+            return
+        self.newest = max(self.newest, record.n)
         self.left -= 1
         if self.left == 0 and self.fault == "kill":
             self.seen["kill"] += 1
