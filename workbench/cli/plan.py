@@ -53,8 +53,11 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
         highlight=False,
     )
     if total:
+        trials = MOST_TRIALS * sum(step.placements for step in steps if step.shots)
         console.print(
-            f"Where the camera's exposure is set, each placing takes up to {MOST_TRIALS} trial shots more."
+            f"Where the camera's exposure is set, each placing takes up to {MOST_TRIALS} trial shots more, of"
+            f" all lasers at once: at most {trials} shots, {emission(trials, pace)}.",
+            highlight=False,
         )
     console.print(_told_by(pace, plan.rig.rig), highlight=False)
 
