@@ -167,7 +167,7 @@ def test_a_matrix_with_a_number_missing(path: Path) -> None:
     def change(data: dict[str, Any]) -> None:
         data["camera_matrix"]["data"].pop()
 
-    assert "camera_matrix: value error, expected 3 x 3 numbers, got 8" in edited(path, change)
+    assert "camera_matrix: expected 3 x 3 numbers, got 8" in edited(path, change)
 
 
 def test_lists_of_different_lengths(path: Path) -> None:
