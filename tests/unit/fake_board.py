@@ -1,7 +1,7 @@
 """Stands for NI's package `nidaqmx`, at its boundary: a board whose lines are a log file.
 
 Only what the guardian calls is there, refused where the real one refuses it. What the board does wrong is the
-word in the file `<log>.fault`: `unplugged` or `stuck`.
+word in the file `<log>.fault`: `unplugged`, `broken pipe` (an error not of the package), `stuck`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,13 @@ LOG = Path(os.environ["FAKE_BOARD_LOG"])
 def fault():
     file = Path(f"{LOG}.fault")
     return file.read_text() if file.exists() else ""
+
+
+def fail_if_gone():
+    if fault() == "unplugged":
+        raise errors.DaqError("Device is not available for this operation.")
+    if fault() == "broken pipe":
+        raise OSError("the driver's service has ended")
 
 
 class Channels:
@@ -45,8 +52,7 @@ class Task:
         self.devices = [SimpleNamespace(product_type="PCI-6503", name="Dev1")]
 
     def write(self, data, auto_start=False, timeout=10.0):
-        if fault() == "unplugged":
-            raise errors.DaqError("Device is not available for this operation.")
+        fail_if_gone()
         levels = data if isinstance(data, list) else [data]
         assert isinstance(data, list) == (self.number_of_channels > 1)
         assert auto_start and all(type(level) is bool for level in levels), levels
@@ -59,8 +65,7 @@ class Task:
         return 1
 
     def read(self):
-        if fault() == "unplugged":
-            raise errors.DaqError("Device is not available for this operation.")
+        fail_if_gone()
         return list(self.levels) if self.number_of_channels > 1 else self.levels[0]
 """,
     "errors.py": """

@@ -90,6 +90,30 @@ def test_off_when_the_workbench_hangs(log: Path) -> None:
         process.kill()
 
 
+@pytest.mark.parametrize("how", ["unplugged", "broken pipe"])
+def test_an_off_that_failed_is_tried_again(log: Path, how: str) -> None:
+    """The workbench hangs: nobody but the guardian would put the lasers off once the board is back."""
+    with lit_elsewhere("pass") as process:
+        fail(log, how)
+        time.sleep(1.0)  # the guardian's lease of half a second is over
+        assert masks(log)[-1] != 0
+        fail(log, "")
+        wait_for_dark(log)
+        process.kill()
+
+
+@pytest.mark.parametrize("how", ["unplugged", "broken pipe"])
+def test_an_off_that_failed_is_tried_again_when_nobody_is_left(log: Path, how: str) -> None:
+    with lit_elsewhere("bank.beat()") as process:
+        fail(log, how)
+        process.kill()
+        process.wait(10)
+        time.sleep(2.0)  # longer than a controller with leases of its own is tried
+        assert masks(log)[-1] != 0
+        fail(log, "")
+        wait_for_dark(log)
+
+
 def lit_elsewhere(beat: str) -> subprocess.Popen[str]:
     process = subprocess.Popen(
         [sys.executable, "-c", LIGHT_AND_WAIT.replace("{beat}", beat)], stdout=subprocess.PIPE, text=True

@@ -24,6 +24,9 @@ LINE_FAILURES = (serial.SerialException, OSError, termios.error)
 class ControllerLine:
     """Requests and replies."""
 
+    has_leases = True
+    """The controller puts off by itself what is not renewed."""
+
     def __init__(self, port: str, baud: int, alarm: Callable[[], bool]) -> None:
         """Open the port, exclusively.
 

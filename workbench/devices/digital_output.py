@@ -1,7 +1,8 @@
 """Lasers on the lines of a digital output board, by NI-DAQmx. Only the guardian holds one.
 
 The board has no lease of its own: what was written stays until something else is written. The guardian, which
-holds nothing longer than its lease, is all that puts the lasers off (docs/laser-controller.md).
+holds nothing longer than its lease, is all that puts the lasers off (docs/laser-controller.md). So whatever
+goes wrong in the driver is an answer to it, and never its end.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ PACKAGE = "nidaqmx"
 
 class DigitalOutputLine:
     """Has the methods of `ControllerLine`; laser 1 is the first line."""
+
+    has_leases = False
 
     def __init__(self, lines: str) -> None:
         """Reserve the board's lines, as `Dev1/port0/line0:3`, and put them low.
@@ -32,13 +35,12 @@ class DigitalOutputLine:
                 f"lasers at {lines}: expected the package {PACKAGE}, got: {error};"
                 f" install it with `pip install 'laser-range-workbench[{PACKAGE}]'`, and NI's driver with it"
             ) from None
-        self._failures = package.errors.Error
         try:
             self._task: Any = package.Task()
             self._task.do_channels.add_do_chan(lines, line_grouping=constants.LineGrouping.CHAN_PER_LINE)
             self._count = int(self._task.number_of_channels)
             self._write(0)
-        except self._failures as error:
+        except Exception as error:
             raise self._error("reserve the lines", error) from None
 
     def identify(self, boot_s: float) -> str:
@@ -49,7 +51,7 @@ class DigitalOutputLine:
         """
         try:
             boards = [f"{device.product_type} {device.name}" for device in self._task.devices]
-        except self._failures as error:
+        except Exception as error:
             raise self._error("tell its name", error) from None
         return f"{', '.join(boards)}, {self._count} lines"
 
@@ -66,7 +68,7 @@ class DigitalOutputLine:
             )
         try:
             self._write(mask)
-        except self._failures as error:
+        except Exception as error:
             raise self._error("set the lines", error) from None
 
     def all_off(self) -> None:
@@ -80,7 +82,7 @@ class DigitalOutputLine:
             try:
                 self._write(0)
                 mask = self._read()
-            except self._failures as error:
+            except Exception as error:
                 came = str(error)
             else:
                 if mask == 0:
@@ -98,7 +100,7 @@ class DigitalOutputLine:
         """
         try:
             return self._read(), None
-        except self._failures as error:
+        except Exception as error:
             raise self._error("read the lines", error) from None
 
     def _write(self, mask: int) -> None:

@@ -39,6 +39,8 @@ LOOK_S = 0.02
 child holds open does not."""
 TRY_ALONE_S = 1.0
 """How long it goes on trying to put off when there is nobody left to tell: twice the longest lease."""
+TRY_BOARD_S = 60.0
+"""The same where the hardware has no lease that would end it."""
 RENEW = 5
 """A lease is renewed when a fifth of it has gone."""
 Line = ControllerLine | DigitalOutputLine
@@ -103,9 +105,18 @@ class Guardian:
         self._lease: Lease | None = None
         self._failure: WorkbenchError | None = None
         """Why lasers went off that the workbench takes for lit."""
+        self._may_be_on = False
+        """Whether an off was not confirmed; tried again and again where no lease of the hardware ends it."""
 
     def serve(self) -> int:
-        """Serve until the workbench is gone; returns the exit code."""
+        """Serve until the workbench is gone; returns the exit code. Whatever ends it, off comes first."""
+        try:
+            self._serve()
+        finally:
+            code = self._leave()
+        return code
+
+    def _serve(self) -> None:
         while not self._workbench.gone:
             command = self._workbench.command(self._wait_s())
             if self._workbench.gone:
@@ -116,12 +127,13 @@ class Guardian:
                 self._obey(command)
             elif self._lease is not None and time.monotonic() >= self._lease.held_until:
                 self._end_of_lease(self._lease)
-        return self._leave()
+            elif self._lease is None and self._may_be_on:
+                self._put_off(self._failure)
 
     def _wait_s(self) -> float | None:
         """Until something has to be looked at; None: nothing is lit."""
         if self._lease is None:
-            return None
+            return LOOK_S if self._may_be_on else None
         return min(LOOK_S, max(0.0, self._lease.held_until - time.monotonic()))
 
     def _obey(self, command: str) -> None:
@@ -181,24 +193,28 @@ class Guardian:
     def _put_off(self, why: WorkbenchError | None) -> None:
         self._failure = why
         try:
-            self._lease = None
-            self._line.all_off()
+            self._all_off()
         except LaserOffNotConfirmedError as error:
             self._failure = error
 
     def _off(self) -> None:
-        self._lease = None
         failure, self._failure = self._failure, None
-        self._line.all_off()
+        self._all_off()
         if failure is not None:
             raise failure
+
+    def _all_off(self) -> None:
+        self._lease = None
+        self._may_be_on = not self._line.has_leases
+        self._line.all_off()
+        self._may_be_on = False
 
     def _stopped(self) -> StoppedError:
         return StoppedError(f"stopped by {self._workbench.told_to_end}; the lasers were put off at once")
 
     def _leave(self) -> int:
         """Off, and tried again for a while: there is nobody left who would."""
-        deadline = time.monotonic() + TRY_ALONE_S
+        deadline = time.monotonic() + (TRY_ALONE_S if self._line.has_leases else TRY_BOARD_S)
         while True:
             try:
                 self._line.all_off()

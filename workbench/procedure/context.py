@@ -58,9 +58,6 @@ class Context:
     """And what it says of each placement when it has not seen it."""
     calibration: Calibration | None = None
     """The exported one: what a trial ranges with."""
-    _safe: bool = False
-    """Whether somebody has confirmed that the beams may be switched on."""
-
     shooting: Shooting = field(init=False)
 
     def __post_init__(self) -> None:
@@ -84,11 +81,11 @@ class Context:
 
     def confirm_safety(self) -> None:
         """Before the first emission: eyewear and beam path, whoever resumes a session asks again."""
-        if not self._safe:
+        if not self.shooting.may_fire:
             prompt = safety_prompt(self.rig)
             answer = self.ask_now(prompt)
             self.emit(ev.Answered(key=SAFETY, question=prompt.do, answer=answer))
-            self._safe = True
+            self.shooting.may_fire = True
 
     def capture(
         self,

@@ -31,6 +31,8 @@ class Shooting:
     bench: Bench
     served: Group | None = None
     """What is on disk already of the present placement."""
+    may_fire: bool = False
+    """Whether somebody has confirmed that the beams may be switched on."""
     _exposure: float | None = None
     """Of the present placement, where the camera's is set."""
     _dark: Image | None = None
@@ -51,6 +53,7 @@ class Shooting:
             RigNotReadyError: a device does not answer.
         """
         if self.served is None:
+            self._refuse_unsafe()
             found = set_exposure(self.bench, self.rig, key, begin)
         elif (found := self.served.exposure) is not None:
             restore_exposure(self.bench, found)
@@ -100,6 +103,7 @@ class Shooting:
     def _shoot(
         self, key: str, laser_ids: Sequence[str], placement: Placement, repeat: int, scene: str | None
     ) -> tuple[Image, Image, ev.CaptureTaken]:
+        self._refuse_unsafe()
         began = time.monotonic()
         with self.bench.lasers.lit(laser_ids, for_s=LEASE_S):
             on = self.bench.camera.grab()
@@ -121,6 +125,10 @@ class Shooting:
             lit_s=lit_s,
         )
         return on.image, off.image, taken
+
+    def _refuse_unsafe(self) -> None:
+        if not self.may_fire:
+            raise RuntimeError("a laser was to be lit before anybody confirmed eyewear and beam path")
 
     def _expose(self, key: str, placement: Placement, repeat: int) -> tuple[Image, ev.CaptureTaken]:
         frame = self.bench.camera.grab_ambient()

@@ -19,6 +19,10 @@ class RetakeError(Exception):
     """What was captured at the present placement is to be captured again; says why."""
 
 
+class _ServedAgainError(Exception):
+    """What a resumed session had on disk of the present placement is to be captured again."""
+
+
 class _LeftOutError(Exception):
     """The present placement is to be left out."""
 
@@ -65,6 +69,9 @@ def visit(context: Context, placements: Sequence[Placement], work: Callable[[Pla
         began[asked.key] = record.n
         try:
             results[asked.key] = _work(context, work, placed, record.n, answer)
+        except _ServedAgainError:  # the target is not known to stand there, nor the beams to be free
+            del began[asked.key]
+            index -= 1
         except _LeftOutError as left_out:
             del began[asked.key]
             _tell_skipped(context, asked, left_out.answer)
@@ -85,7 +92,8 @@ def _work(
             return work(placed)
         except RetakeError as again:
             _set_aside(context, placed.key, from_n, str(again))
-            context.shooting.served = None
+            if context.shooting.served is not None:
+                raise _ServedAgainError from again
             FrameStore(context.session_dir).set_aside(placed.key)
             from_n = context.emit(ev.TargetPlaced(placement=placed, by=answer.by)).n
         except _LeftOutError as left_out:
