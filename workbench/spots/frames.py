@@ -19,6 +19,8 @@ def check_frame(frame: object, name: str) -> Image:
     Raises:
         BadInputError: it is not; says what was expected, what came and what to do.
     """
+    if isinstance(frame, np.ndarray) and frame.ndim == 2 and frame.dtype in _DTYPES and frame.size:
+        return cast(Image, frame)
     expected = f"frame '{name}': expected a grey image (rows x columns, uint8 or uint16)"
     if not isinstance(frame, np.ndarray):
         raise BadInputError(f"{expected}, got {type(frame).__name__}; read the image with cv2.imread first")
@@ -27,9 +29,7 @@ def check_frame(frame: object, name: str) -> Image:
         raise BadInputError(f"{expected}, got an array of shape {frame.shape}; {remedy}")
     if frame.dtype not in _DTYPES:
         raise BadInputError(f"{expected}, got dtype {frame.dtype}; store the camera's raw numbers unscaled")
-    if frame.size == 0:
-        raise BadInputError(f"{expected}, got no pixel (shape {frame.shape}); check the file or the crop")
-    return cast(Image, frame)
+    raise BadInputError(f"{expected}, got no pixel (shape {frame.shape}); check the file or the crop")
 
 
 def check_pair(on: object, off: object | None) -> tuple[Image, Image | None]:

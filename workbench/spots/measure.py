@@ -69,9 +69,9 @@ def measure(scene: Scene, peaks: Peaks) -> list[Trace]:
     for turn in range(_MAX_CUTS):
         # Small windows first: a spot that outgrows its window is fitted again with those of its new size.
         for half in HALVES_PX:
-            group = [k for k, own in enumerate(halves) if own == half]
-            if not group:
+            if half not in halves:
                 continue
+            group = [k for k, own in enumerate(halves) if own == half]
             numbers = np.array(group)
             if turn > 0 or half > _SMALLEST or len(group) < n:
                 win = scene.pair.cut(rows, cols, numbers, half)
