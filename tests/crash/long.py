@@ -45,6 +45,12 @@ REDO = 0.1
 """Chance that the operator has the placement before captured again."""
 
 
+TORN = b'{"n":'
+"""What is left of a line that was being written."""
+MOST_SLOW = 20
+"""Times that a busy machine may miss a deadline of the rig's before that is a fault of the software."""
+
+
 class KilledError(BaseException):
     """Stands for SIGKILL in this one process: nothing that the workbench does catches it and goes on."""
 
@@ -112,6 +118,8 @@ class Weather:
     newest: int = -1
     """Number of the last record that was new."""
     counts_all: bool = False
+    dead: bool = False
+    """Whether the process that stands for the workbench has been killed: it writes no more."""
 
     def next_fault(self) -> None:
         """Draw the next, if there is to be one."""
@@ -129,6 +137,7 @@ class Weather:
         self.left -= 1
         if self.left == 0 and self.fault == "kill":
             self.seen["kill"] += 1
+            self.dead = True
             raise KilledError
 
     def stopping(self) -> str | None:
@@ -158,10 +167,13 @@ def run_to_the_end(plan: Plan, session: Path, weather: Weather, *consumers: ev.C
     whole = Journal.append
 
     def append(journal: Journal, event: ev.Event) -> ev.Record:
+        if weather.dead:  # what the end of a session writes is not written by a killed one
+            os.write(journal._file, TORN)
+            raise KilledError
         try:
             weather.check_disk()
         except OSError as error:
-            os.write(journal._file, b'{"n":')  # what fitted
+            os.write(journal._file, TORN)  # what fitted
             journal._cut_back()
             raise StoppedError("the journal cannot be written: no space left on device") from error
         return whole(journal, event)
@@ -176,7 +188,10 @@ def run_to_the_end(plan: Plan, session: Path, weather: Weather, *consumers: ev.C
                     run(plan, session, [weather.consumer, *consumers], CALLER, weather.stopping, weather)
             except RigNotReadyError:
                 weather.seen["slow machine"] += 1  # nobody has drawn this one
+                if weather.seen["slow machine"] > MOST_SLOW:
+                    raise
             except (KilledError, StoppedError):
+                weather.dead = False
                 weather.next_fault()
             else:
                 return
@@ -204,7 +219,7 @@ def compare(shots: int, folder: Path, seed: int = 1, mean_records: int = 1500) -
     """Run both sessions; returns lines that tell how it went.
 
     Raises:
-        AssertionError: a shot is lost, the results differ, or memory or handles leak.
+        AssertionError: a shot is lost, the results differ, or handles leak; what memory grows by is told.
     """
     plan = write_coarse_files(folder, shots)
     usage, began = Usage(), time.monotonic()

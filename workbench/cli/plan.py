@@ -52,8 +52,7 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
         f"{total} shots, {emission(total, pace)}; {duration(sum(map(pace.seconds, steps)))} in all",
         highlight=False,
     )
-    if total:
-        trials = MOST_TRIALS * sum(step.placements for step in steps if step.shots)
+    if trials := MOST_TRIALS * sum(step.placements for step in steps):
         console.print(
             f"Where the camera's exposure is set, each placing takes up to {MOST_TRIALS} trial shots more, of"
             f" all lasers at once: at most {trials} shots, {emission(trials, pace)}.",
