@@ -324,6 +324,17 @@ def test_a_change_is_refused_unless_it_is_accepted(
     assert (tmp_path / file).read_text() not in _texts(stopped / "session-1.yaml")
 
 
+def test_what_a_resumed_session_captures_again_is_asked_for_first(tmp_path: Path) -> None:
+    """Nobody knows where the target stands by now, nor who stands in the beams."""
+    stopped = stopped_session(tmp_path)
+    tighter = "repeats: 2\n    limits:\n      snr: {in: [1.0e9, null], on_fail: retry}"
+    change("repeats: 2", tighter)(tmp_path / "p.yaml")
+    operator = Says()
+    with pytest.raises(LimitFailedError, match=r"p.1/300mm/L1: snr"):
+        resume(stopped, (), RESUMER, lambda: None, operator, "brighter spots are asked for")
+    assert [prompt.key for prompt in operator.asked] == ["safety", "p.1/300mm"]
+
+
 def _texts(manifest: Path) -> list[str]:
     import yaml
 
