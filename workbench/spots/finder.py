@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from workbench.model.errors import BadInputError
 from workbench.spots.frames import check_pair, default_saturation_dn
 from workbench.spots.strip import check_line
@@ -77,7 +75,7 @@ def find_spots(
         BadInputError: a frame is no grey uint8 or uint16 image, or the two differ in size or depth; a
             scanline without direction or width.
     """
-    shape = np.shape(on)
+    shape: tuple[int, ...] = getattr(on, "shape", ())  # `find` says what is wrong with it
     finder = SpotFinder(
         (shape[0], shape[1]) if len(shape) == 2 else (1, 1),
         scanlines,

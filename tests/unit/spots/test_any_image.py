@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -83,3 +85,9 @@ def test_what_is_no_grey_image_is_refused_by_name(shape: list[int], dtype: str) 
     else:
         with pytest.raises(BadInputError, match="expected a grey image"):
             find_spots(frame)
+
+
+@pytest.mark.parametrize("frame", [[[1], [1, 2]], None, "on.png"])
+def test_what_is_no_array_is_refused_by_name(frame: Any) -> None:
+    with pytest.raises(BadInputError, match="expected a grey image"):
+        find_spots(frame)
