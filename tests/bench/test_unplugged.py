@@ -20,6 +20,7 @@ from tests.bench.test_person import AT_TERMINAL, SCRIPT, Terminal
 from tests.crash.short import CALLER, RESUMER
 from tests.firmware.parts import Running, build, hurried
 from tests.unit.mjpeg import Picture, Stream
+from tests.unit.test_check import PROCEDURE
 from tests.unit.test_real_bench import Scene, write_rig
 from workbench.model import event as ev
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, WorkbenchError
@@ -28,15 +29,6 @@ from workbench.procedure.run import Plan, run
 from workbench.session.journal import read_journal
 from workbench.session.state import effective, groups, standing
 
-PROCEDURE = """\
-format: 1
-procedure: p
-title: P
-steps:
-  - step: capture_grid
-    standoffs_mm: [300, 600]
-    repeats: 2
-"""
 SHOTS = 8
 
 

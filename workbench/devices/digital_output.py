@@ -8,6 +8,8 @@ goes wrong in the driver is an answer to it, and never its end.
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
@@ -35,13 +37,11 @@ class DigitalOutputLine:
                 f"lasers at {lines}: expected the package {PACKAGE}, got: {error};"
                 f" install it with `pip install 'laser-range-workbench[{PACKAGE}]'`, and NI's driver with it"
             ) from None
-        try:
+        with self._asked("reserve the lines"):
             self._task: Any = package.Task()
             self._task.do_channels.add_do_chan(lines, line_grouping=constants.LineGrouping.CHAN_PER_LINE)
             self._count = int(self._task.number_of_channels)
             self._write(0)
-        except Exception as error:
-            raise self._error("reserve the lines", error) from None
 
     def identify(self, boot_s: float) -> str:
         """Which board; it needs no time to start.
@@ -49,10 +49,8 @@ class DigitalOutputLine:
         Raises:
             RigNotReadyError: it does not answer.
         """
-        try:
+        with self._asked("tell its name"):
             boards = [f"{device.product_type} {device.name}" for device in self._task.devices]
-        except Exception as error:
-            raise self._error("tell its name", error) from None
         return f"{', '.join(boards)}, {self._count} lines"
 
     def light(self, mask: int, lease_ms: int) -> None:
@@ -66,10 +64,8 @@ class DigitalOutputLine:
                 f"lasers at {self._lines}: expected a line for laser {mask.bit_length()}, the board has"
                 f" {self._count} there; name as many lines as the rig has lasers"
             )
-        try:
+        with self._asked("set the lines"):
             self._write(mask)
-        except Exception as error:
-            raise self._error("set the lines", error) from None
 
     def all_off(self) -> None:
         """Put every line low and read them back; tried twice.
@@ -98,10 +94,8 @@ class DigitalOutputLine:
         Raises:
             RigNotReadyError: it does not answer.
         """
-        try:
+        with self._asked("read the lines"):
             return self._read(), None
-        except Exception as error:
-            raise self._error("read the lines", error) from None
 
     def _write(self, mask: int) -> None:
         levels = [bool(mask >> line & 1) for line in range(self._count)]
@@ -113,8 +107,13 @@ class DigitalOutputLine:
         levels = came if isinstance(came, list) else [came]
         return sum(1 << line for line, high in enumerate(levels) if high)
 
-    def _error(self, what: str, error: Exception) -> RigNotReadyError:
-        return RigNotReadyError(
-            f"lasers at {self._lines}: expected the board to {what}, got: {error};"
-            " check that NI-DAQmx is installed, the board is plugged in, and its lines are named right"
-        )
+    @contextmanager
+    def _asked(self, what: str) -> Iterator[None]:
+        """Whatever goes wrong while the board is asked to do it is one kind of error."""
+        try:
+            yield
+        except Exception as error:
+            raise RigNotReadyError(
+                f"lasers at {self._lines}: expected the board to {what}, got: {error};"
+                " check that NI-DAQmx is installed, the board is plugged in, and its lines are named right"
+            ) from None

@@ -50,5 +50,6 @@ def project(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
 def radial_slope(lens: Lens, x: Numbers, y: Numbers) -> Numbers:
     """d(distorted radius) / d(radius) at (x, y): where it is not positive the lens model folds over."""
     r2 = x * x + y * y
+    # A lens of numbers may meet arrays: the type checker, which takes one kind at a time, does not see it.
     slope: Numbers = 1.0 + r2 * (3.0 * lens.k1 + r2 * (5.0 * lens.k2 + r2 * 7.0 * lens.k3))  # type: ignore[assignment]
     return slope
