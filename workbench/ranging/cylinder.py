@@ -74,12 +74,19 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
 
 
 def _start(points: Points) -> FloatArray | None:
-    """(3,) axis x, axis range, radius of the circle x^2 + r^2 = 2 a x + 2 b r + c: linear, not the best."""
-    x, r = points.x_mm, points.range_mm
-    middle = float(r.mean())
-    d = r - middle
-    a, b, c = np.linalg.lstsq(np.column_stack((2 * x, 2 * d, np.ones(len(x)))), x**2 + d**2, rcond=None)[0]
-    square = c + a * a + b * b
-    if not (square > 0 and b > 0):
+    """(3,) axis x, axis range, radius of the circle x^2 + r^2 = 2 a x + 2 b r + c: linear, not the best.
+
+    Counted from the middle of the spots, where c is the mean of the left side; None for spots on a line.
+    """
+    middle_x, middle_r = float(points.x_mm.mean()), float(points.range_mm.mean())
+    x, r = points.x_mm - middle_x, points.range_mm - middle_r
+    square = x * x + r * r
+    xx, xr, rr = float(x @ x), float(x @ r), float(r @ r)
+    of_x, of_r = 0.5 * float(x @ square), 0.5 * float(r @ square)
+    determinant = xx * rr - xr * xr
+    if not determinant > 1e-12 * xx * rr:
         return None
-    return np.array([a, b + middle, math.sqrt(square)])
+    a, b = (rr * of_x - xr * of_r) / determinant, (xx * of_r - xr * of_x) / determinant
+    if not b > 0:
+        return None
+    return np.array([a + middle_x, b + middle_r, math.sqrt(float(square.mean()) + a * a + b * b)])

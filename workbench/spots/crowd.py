@@ -11,7 +11,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from workbench.spots.cutting import half_for
+from workbench.spots.cutting import half_for, mark_light, mark_strip
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, U, principal_axes
 from workbench.spots.joint import Joint, evidence, fit_joint, halves, hidden_spot
@@ -34,6 +34,7 @@ _LONGISH = 1.3
 _MAX_HALF_PX = 120
 _MAX_HIDDEN = 4
 _TURNS = 2
+_NO_MASK = np.zeros((0, 0), bool)
 
 
 class Crowd:
@@ -99,24 +100,19 @@ class Crowd:
 
     def _light_of(self, traces: Sequence[Trace], shape: tuple[int, int]) -> Bools:
         """(height, width) where light of these spots comes."""
-        rows = np.arange(self.row0, self.row0 + shape[0])[:, None]
-        cols = np.arange(self.col0, self.col0 + shape[1])
-        light = np.zeros(shape, bool)
-        for t in traces:
-            light |= np.hypot(cols - t.spot.u_px, rows - t.spot.v_px) < TAIL_WIDTHS * t.reach_px
-        return light
+        found = np.zeros(shape, bool)
+        if traces:
+            lights = np.array([(t.spot.u_px, t.spot.v_px, TAIL_WIDTHS * t.reach_px) for t in traces])
+            mark_light(self.row0, self.col0, lights, found)
+        return found
 
     def _in_a_strip(self, scenes: Sequence[Scene], shape: tuple[int, int]) -> Bools:
         """(height, width) where a scanline lets a spot be."""
         found = np.zeros(shape, bool)
         for strip in (scene.strip for scene in scenes):
-            rows = np.arange(self.row0, self.row0 + shape[0]) - strip.rows.start
-            cols = np.arange(self.col0, self.col0 + shape[1]) - strip.cols.start
-            height, width = strip.rows.stop - strip.rows.start, strip.cols.stop - strip.cols.start
-            inside = ((rows >= 0) & (rows < height))[:, None] & ((cols >= 0) & (cols < width))
-            if strip.mask is not None:
-                inside &= strip.mask[np.ix_(rows.clip(0, height - 1), cols.clip(0, width - 1))]
-            found |= inside
+            rows, cols = (strip.rows.start, strip.rows.stop), (strip.cols.start, strip.cols.stop)
+            mask = _NO_MASK if strip.mask is None else strip.mask
+            mark_strip(self.row0, self.col0, rows, cols, mask, found)
         return found
 
 
@@ -215,7 +211,7 @@ def _halved(start: Floats, alone: Bools) -> tuple[Floats, Bools]:
     """First guesses in which longish spots are two, and which of these stand alone."""
     narrowest = start[:, LN_SU:].min()
     long = start[:, LN_SU:].max(axis=1) > narrowest + np.log(_LONGISH)
-    pairs = [halves(np.append(params, 0.0)) for params in start[long]]
+    pairs = [halves(params) for params in start[long]]
     halved = np.vstack([start[~long], *pairs])
     halved[:, LN_SU:] = narrowest
     return halved, np.append(alone[~long], np.zeros(2 * len(pairs), bool))
@@ -248,8 +244,7 @@ def split(scenes: Sequence[Scene], trace: Trace, others: list[Trace]) -> list[Tr
         return [trace]
     crowd = Crowd(scenes, [trace], others, 1.3 * trace.reach_px)
     win = crowd.win
-    start = np.zeros((1, 7))
-    start[0, : trace.params.size] = trace.params
+    start = trace.params[None].copy()
     start[0, U:LN_SU] -= crowd.col0, crowd.row0
     whole = fit_spots(win, start, crowd.noise)
     usable, changed = without_outliers(win.usable, whole.signal, whole.residual, whole.weight, whole.judged)
@@ -260,7 +255,7 @@ def split(scenes: Sequence[Scene], trace: Trace, others: list[Trace]) -> list[Tr
     if not whole.converged[0] or long < _ELONGATED * short:
         return [trace]
     two = _settled(win, halves(whole.params[0]), crowd.noise)
-    one = float(two.weight @ whole.residual.ravel() ** 2)
+    one = float(np.vdot(two.weight, whole.residual[0] ** 2))
     if not _is_better(replace(two, chi2=one), two, win, _Asked([0, 1], _MIN_SHARE)):
         return [trace]
     return crowd.as_traces(two)
@@ -270,9 +265,7 @@ def _settled(win: Windows, start: Floats, noise: Noise) -> Joint:
     """Fit with the noise that the model itself measures, without pixels that no spot explains."""
     for _ in range(_TURNS):
         joint = fit_joint(win, start, noise)
-        signal, residual, weight = (
-            part.reshape(1, *win.shape) for part in (joint.signal, joint.residual, joint.weight)
-        )
+        signal, residual, weight = joint.signal[None], joint.residual[None], joint.weight[None]
         largest = np.array([[(weight * residual**2).max()]])
         usable, _ = without_outliers(win.usable, signal, residual, weight, largest)
         win, start, noise = win._replace(usable=usable), joint.params, joint.noise

@@ -6,12 +6,10 @@ import math
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.spots.compiled import compiled
-from workbench.spots.types import Bools, Floats, Image
+from workbench.spots.types import Bools, Floats, Image, Ints
 
-Ints = NDArray[np.intp]
 _PER_HALF_HEIGHT: Final = 1.0 / (2.0 * math.pi * math.log(2.0))
 _EDGE_WIDTHS: Final = 2.5
 # Half-widths of windows; each holds spots whose width is up to (half - 0.5) / 3: what lies beyond 3 widths
@@ -147,3 +145,32 @@ def halves_for(params: Floats, scale: float, halves: Ints) -> None:
     """Fill (n,) half-widths of windows for spots (n, 6) whose widths are to be multiplied by `scale`."""
     for i in range(len(params)):
         halves[i] = half_for(scale * math.exp(params[i, 4]))
+
+
+@compiled
+def mark_light(row0: int, col0: int, lights: Floats, out: Bools) -> None:
+    """Mark pixels of a window (height, width) that lie within discs (n, 3): u, v and radius in the image.
+
+    `row0` and `col0` are the window's first pixel in the image.
+    """
+    for n in range(len(lights)):
+        u, v, radius = lights[n, 0] - col0, lights[n, 1] - row0, lights[n, 2]
+        for y in range(max(math.floor(v - radius), 0), min(math.ceil(v + radius) + 1, out.shape[0])):
+            for x in range(max(math.floor(u - radius), 0), min(math.ceil(u + radius) + 1, out.shape[1])):
+                if (x - u) ** 2 + (y - v) ** 2 < radius * radius:
+                    out[y, x] = True
+
+
+@compiled
+def mark_strip(
+    row0: int, col0: int, rows: tuple[int, int], cols: tuple[int, int], mask: Bools, out: Bools
+) -> None:
+    """Mark pixels of a window (height, width) that lie in a strip of the image.
+
+    The strip has rows and columns from the first to the one after its last; `mask` says which of its pixels
+    count, all if it is empty.
+    """
+    for y in range(max(rows[0] - row0, 0), min(rows[1] - row0, out.shape[0])):
+        for x in range(max(cols[0] - col0, 0), min(cols[1] - col0, out.shape[1])):
+            if mask.size == 0 or mask[y + row0 - rows[0], x + col0 - cols[0]]:
+                out[y, x] = True

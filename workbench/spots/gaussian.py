@@ -6,6 +6,8 @@ multiplied by the flux, so that nothing degenerates when the flux vanishes. Deri
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from workbench.spots.shapes import sheared_rows, upright_rows
@@ -32,8 +34,12 @@ def derivatives(params: Floats, shape: tuple[int, int]) -> Floats:
 
 
 def principal_axes(params: Floats) -> tuple[Floats, Floats]:
-    """Short and long width in pixels (2,), their directions as columns (2, 2), of one spot (7,)."""
-    su, sv = np.exp(params[LN_SU:SHEAR])
-    mixed = params[SHEAR] * sv**2
-    squares, axes = np.linalg.eigh([[su**2 + params[SHEAR] * mixed, mixed], [mixed, sv**2]])
-    return np.sqrt(np.maximum(squares, 1e-6)), axes
+    """Short and long width in pixels (2,), their directions as columns (2, 2), of one spot (6,) or (7,)."""
+    var_u, var_v = math.exp(2.0 * params[LN_SU]), math.exp(2.0 * params[LN_SV])
+    shear = float(params[SHEAR]) if params.size > SHEAR else 0.0
+    mixed, var_u = shear * var_v, var_u + shear**2 * var_v
+    apart = math.hypot(0.5 * (var_u - var_v), mixed)
+    squares = 0.5 * (var_u + var_v) + np.array([-apart, apart])
+    angle = 0.5 * math.atan2(2.0 * mixed, var_u - var_v)
+    cos, sin = math.cos(angle), math.sin(angle)
+    return np.sqrt(np.maximum(squares, 1e-6)), np.array([[-sin, cos], [cos, sin]])

@@ -8,18 +8,14 @@ import cv2
 import numpy as np
 
 from workbench.spots.fit import Windows
-from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, V, derivatives, principal_axes
+from workbench.spots.gaussian import FLUX, LN_SU, SHEAR, U, V, principal_axes
 from workbench.spots.noise import Noise, photon_transfer_slope
-from workbench.spots.sums import invert
+from workbench.spots.shared_sums import OWN, SHARED
+from workbench.spots.together import score_together
 from workbench.spots.types import Bools, Floats
 
-_MAX_STEPS = 30
 _HIDDEN_SD = 5.0
 _AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
-_MAX_MOVE_PX = 0.7
-_MAX_STRETCH = 0.3
-_LN_WIDTH_RANGE = (float(np.log(0.3)), float(np.log(12.0)))
-_TOLERANCE_SD = 0.1
 # As in `judging`; less, for the widths are known from all spots together (docs/spots.md).
 _SECOND_ORDER = 10.0
 
@@ -35,13 +31,13 @@ class Joint:
     chi2: float
     """Sum of squared residuals over the variance of the fit that the evidence is asked of."""
     signal: Floats
-    """(pixels,) expected value above the background, DN."""
+    """(height, width) expected value above the background, DN."""
     residual: Floats
-    """(pixels,), DN."""
+    """(height, width), DN."""
     weight: Floats
-    """(pixels,)."""
+    """(height, width) inverse variance, 0 where unused."""
     noise: Noise
-    """With the photon-transfer slope that the residuals tell."""
+    """With the photon-transfer slope that the residuals tell, unless the weights were fixed."""
     converged: bool
 
 
@@ -52,34 +48,31 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
         win: The window.
         start: (k, 6) first guesses.
         noise: Of the window.
-        weight: (pixels,) fixed weights; None: those that the model predicts.
+        weight: (height, width) fixed weights; None: those that the model predicts.
     """
-    params = start.copy()
-    converged = False
-    data = win.data.ravel()
-    for _ in range(_MAX_STEPS):
-        rows = derivatives(params, win.shape).reshape(*params.shape, -1)
-        signal = (params[:, FLUX, None] * rows[:, FLUX]).sum(axis=0)
-        used = _weights(win, signal, noise) if weight is None else weight
-        residual = data - params[0, 0] - signal
-        jacobian = _jacobian(params, rows)
-        weighted = jacobian * used
-        cov = np.empty((len(jacobian), len(jacobian)))
-        invert(weighted @ jacobian.T, cov)
-        delta = cov @ (weighted @ residual)
-        converged = bool((np.abs(delta) <= _TOLERANCE_SD * np.sqrt(np.maximum(np.diag(cov), 0.0))).all())
-        params = _moved(params, delta)
-        if converged:
-            break
-    sd = np.sqrt(np.maximum(np.diag(cov)[3:], 0.0)).reshape(-1, 3)
-    sd[:, 1:] = _with_second_order(sd[:, 1:], np.exp(params[:, LN_SU:SHEAR]))
-    leverage = ((cov @ jacobian) * jacobian).sum(axis=0)
-    one = (1, *win.shape)
-    slope = photon_transfer_slope(
-        signal.reshape(one), residual.reshape(one), used.reshape(one), leverage.reshape(one), noise
+    params, m = start.copy(), SHARED + OWN * len(start)
+    cov, used = np.empty((m, m)), np.empty(win.shape) if weight is None else weight
+    signal, residual, leverage = np.empty(win.shape), np.empty(win.shape), np.empty(win.shape)
+    floor, slope = float(noise.floor_dn2[0]), float(noise.slope_dn[0])
+    converged = score_together(
+        win.data[0],
+        win.usable[0],
+        floor,
+        slope,
+        weight is not None,
+        params,
+        cov,
+        signal,
+        residual,
+        used,
+        leverage,
     )
-    measured = Noise(noise.floor_dn2, slope)
-    return Joint(params, sd, float(used @ residual**2), signal, residual, used, measured, converged)
+    sd = np.sqrt(np.maximum(np.diag(cov)[SHARED:], 0.0)).reshape(-1, OWN)
+    sd[:, 1:] = _with_second_order(sd[:, 1:], np.exp(params[:, LN_SU:SHEAR]))
+    if weight is None:
+        measured = photon_transfer_slope(signal[None], residual[None], used[None], leverage[None], noise)
+        noise = Noise(noise.floor_dn2, measured)
+    return Joint(params, sd, float(np.vdot(used, residual**2)), signal, residual, used, noise, converged)
 
 
 def _with_second_order(sd_px: Floats, width_px: Floats) -> Floats:
@@ -92,36 +85,8 @@ def _with_second_order(sd_px: Floats, width_px: Floats) -> Floats:
     return widened
 
 
-def _weights(win: Windows, signal: Floats, noise: Noise) -> Floats:
-    weights: Floats = 1.0 / (noise.floor_dn2 + noise.slope_dn * np.maximum(signal, 0.0))
-    return weights * win.usable.ravel()
-
-
-def _jacobian(params: Floats, rows: Floats) -> Floats:
-    """(3 + 3 k, pixels): by background, both widths, then flux, u and v of each spot."""
-    flux = params[:, FLUX, None]
-    shared = [
-        np.ones(rows.shape[2]),
-        (flux * rows[:, LN_SU]).sum(axis=0),
-        (flux * rows[:, LN_SV]).sum(axis=0),
-    ]
-    own = np.stack([rows[:, FLUX], flux * rows[:, U], flux * rows[:, V]], axis=1)
-    return np.concatenate([np.stack(shared), own.reshape(-1, rows.shape[2])])
-
-
-def _moved(params: Floats, delta: Floats) -> Floats:
-    new = params.copy()
-    new[:, 0] += delta[0]
-    stretched = params[0, LN_SU:SHEAR] + np.clip(delta[1:3], -_MAX_STRETCH, _MAX_STRETCH)
-    new[:, LN_SU:SHEAR] = np.clip(stretched, *_LN_WIDTH_RANGE)
-    own = delta[3:].reshape(-1, 3)
-    new[:, FLUX] = np.maximum(params[:, FLUX] + own[:, 0], 0.1 * np.abs(params[:, FLUX]))
-    new[:, U:LN_SU] += np.clip(own[:, 1:], -_MAX_MOVE_PX, _MAX_MOVE_PX)
-    return new
-
-
 def halves(params: Floats) -> Floats:
-    """(2, 6) first guess for two spots from the sheared fit (7,) of their sum: apart along its long axis."""
+    """(2, 6) first guess for two spots from the fit (6,) or (7,) of their sum: apart along its long axis."""
     widths, axes = principal_axes(params)
     apart = max(np.sqrt(widths[1] ** 2 - widths[0] ** 2), 0.4 * widths[1])
     start = np.stack([params[:SHEAR], params[:SHEAR]])
@@ -144,8 +109,7 @@ def evidence(one: float, two: float, pixels: int, parameters: int) -> float:
 def hidden_spot(joint: Joint, win: Windows, allowed: Bools) -> Floats | None:
     """(6,) first guess of a spot of the same widths that stands out of the residuals; None without one."""
     su, sv = np.exp(joint.params[0, LN_SU:SHEAR])
-    weight = joint.weight.reshape(win.shape)
-    residual = joint.residual.reshape(win.shape)
+    weight, residual = joint.weight, joint.residual
     # A pixel that towers over all its neighbours is hot: it counts no more than the highest of them.
     excess = weight * np.minimum(residual, cv2.dilate(residual, _AROUND))
     matched = cv2.GaussianBlur(excess, (0, 0), sigmaX=su, sigmaY=sv, borderType=cv2.BORDER_CONSTANT)

@@ -6,15 +6,13 @@ import math
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.spots.compiled import compiled
 from workbench.spots.cutting import half_for
 from workbench.spots.noise import ROUNDING_DN2
 from workbench.spots.scoring import JUDGED, score
-from workbench.spots.types import Bools, Floats
+from workbench.spots.types import Bools, Floats, Ints
 
-Ints = NDArray[np.intp]
 # Columns of a table of spots, one row each. The first seven are the parameters as in `gaussian`, in pixels of
 # the image; the next half-width is 0 for a spot whose window fits.
 U_SD, V_SD, FLUX_SD, PEAK, SLOPE, IS_SPOT, NEXT_HALF = range(7, 14)

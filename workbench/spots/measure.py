@@ -6,7 +6,6 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.spots.cutting import HALVES_PX, flag_codes, guess, halves_for
 from workbench.spots.detect import FINE_PX, Peaks
@@ -16,7 +15,6 @@ from workbench.spots.judging import COLUMNS, NEXT_HALF, U_SD, fit_group
 from workbench.spots.pair import Scene
 from workbench.spots.types import NO_FLAGS, Failure, Floats, Spot
 
-Ints = NDArray[np.intp]
 # First guesses of the width scatter upwards; a window too small is cut anew.
 _GUESSED: Final = 0.7
 _SMALLEST: Final = HALVES_PX[0]

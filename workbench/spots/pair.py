@@ -12,10 +12,9 @@ from workbench.spots.cutting import cut
 from workbench.spots.fit import Windows
 from workbench.spots.noise import level_and_variance
 from workbench.spots.strip import Strip
-from workbench.spots.types import Floats, Image
+from workbench.spots.types import Floats, Image, Ints
 
 Floats32 = NDArray[np.float32]
-Ints = NDArray[np.intp]
 # A change of the level below one DN or a quarter of the noise moves no spot: the fit has a background of its
 # own.
 _LEVEL_CHANGE_DN = 1.0

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.spots.compiled import compiled
-from workbench.spots.types import Bools, Floats
+from workbench.spots.types import Bools, Floats, Ints
 
 Floats32 = NDArray[np.float32]
-Ints = NDArray[np.intp]
 _MAX_PEAKS: Final = 64
 # Peaks nearer than this are one unless a valley lies between them, this deep in sd and as a share of the
 # lower.

@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from itertools import combinations, product, starmap
 
-import numpy as np
-
 from workbench.spots.cutting import half_for
-from workbench.spots.gaussian import LN_SU, U
 from workbench.spots.measure import Trace
 
 TAIL_WIDTHS = 2.5
@@ -21,7 +18,7 @@ _RIVAL_WIDTHS = 2.0
 
 def apart_px(one: Trace, other: Trace) -> float:
     """Distance of two spots."""
-    return float(np.hypot(*(one.params[U:LN_SU] - other.params[U:LN_SU])))
+    return math.hypot(one.spot.u_px - other.spot.u_px, one.spot.v_px - other.spot.v_px)
 
 
 def are_apart(traces: list[Trace]) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.intp]
 
 
 class Failure(StrEnum):

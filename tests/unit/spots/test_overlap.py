@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from workbench.spots.fit import Windows
-from workbench.spots.gaussian import FLUX, LN_SU, U, derivatives
-from workbench.spots.joint import _jacobian, fit_joint
+from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, V, derivatives
+from workbench.spots.joint import fit_joint
 from workbench.spots.noise import Noise
+from workbench.spots.shared_sums import add_pairs, leverages, profiles, sums_alone
 from workbench.spots.sums import invert
 
 WIDTH, HALF, APART, TOLD = 2.5, 12, 3.0, 400.0
@@ -25,15 +26,55 @@ def two_spots(rng: np.random.Generator) -> np.ndarray:
     return true
 
 
+def jacobian_of(params: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """(3 + 3 k, pixels): by background, both widths, then flux, u and v of each spot; every pixel."""
+    rows = derivatives(params, shape).reshape(*params.shape, -1)
+    rows[:, U:] *= params[:, FLUX, None, None]
+    own = rows[:, [FLUX, U, V]].reshape(-1, rows.shape[2])
+    return np.concatenate([rows[:1, 0], rows[:, LN_SU:SHEAR].sum(axis=0), own])
+
+
+@pytest.mark.parametrize("k", [1, 2, 4])
+def test_the_sums_of_a_joint_fit_are_those_of_its_derivatives(k: int) -> None:
+    rng, shape = np.random.default_rng(k), (25, 31)
+    params = np.zeros((k, 6))
+    params[:, FLUX] = rng.uniform(100.0, 5000.0, k)
+    # Two that overlap, one that the border of the window cuts, one by itself.
+    params[:, U] = (12.3, 15.1, 30.4, 4.0)[:k]
+    params[:, V] = (11.8, 13.0, 1.2, 24.6)[:k]
+    params[:, LN_SU], params[:, LN_SV] = np.log(1.1), np.log(1.7)
+    weight, residual = rng.uniform(0.0, 1.0, shape), rng.normal(0.0, 3.0, shape)
+    weight[rng.uniform(size=shape) < 0.2] = 0.0
+    dense = jacobian_of(params, shape)
+    m = len(dense)
+    along_u, along_v, box = np.empty((k, 4, shape[1])), np.empty((k, 4, shape[0])), np.empty((k, 4), np.intp)
+    information, gradient, leverage = np.empty((m, m)), np.empty(m), np.empty(shape)
+    profiles(params, along_u, along_v, box)
+    sums_alone(params, along_u, along_v, box, weight, residual, information, gradient)
+    add_pairs(params, along_u, along_v, box, weight, information)
+    expected = (dense * weight.ravel()) @ dense.T
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    np.testing.assert_allclose(information / scale, expected / scale, atol=1e-8)
+    np.testing.assert_allclose(
+        gradient / np.sqrt(np.diag(expected)),
+        dense @ (weight * residual).ravel() / np.sqrt(np.diag(expected)),
+        atol=1e-6,
+    )
+    root = rng.normal(size=(m, 2 * m))
+    cov = root @ root.T / scale
+    leverages(params, along_u, along_v, box, cov, leverage)
+    theirs = ((cov @ dense) * dense).sum(axis=0).reshape(shape)
+    np.testing.assert_allclose(leverage, theirs, rtol=1e-6, atol=1e-6 * theirs.max())
+
+
 def test_the_deviations_of_spots_fitted_together_are_right_to_second_order() -> None:
     rng = np.random.default_rng(1)
     white = Noise(np.ones(1), np.full(1, 1e-9))
     terms = []
     for _ in range(PAIRS):
         true = two_spots(rng)
-        rows = derivatives(true, SHAPE).reshape(2, 6, -1)
-        jacobian = _jacobian(true, rows)
-        signal = (true[:, FLUX, None] * rows[:, FLUX]).sum(axis=0)
+        jacobian = jacobian_of(true, SHAPE)
+        signal = true[:, FLUX] @ jacobian[3::3]
         cov = np.linalg.inv(jacobian @ jacobian.T)
         noise = rng.normal(0.0, 1.0, signal.size)
         first = ((cov @ (jacobian @ noise)) ** 2 / np.diag(cov))[3:].reshape(2, 3)[:, 1:]
