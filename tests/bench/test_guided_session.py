@@ -8,18 +8,20 @@ from pathlib import Path
 import pytest
 
 from tests.crash.short import CALLER, RESUMER, go_on, results, story, write_files
-from workbench.devices.protocols import Operator, StreamingCamera
+from workbench.devices.protocols import Bench, Operator, StreamingCamera
 from workbench.devices.registry import open_bench
+from workbench.emulator.camera import EmulatedCamera
 from workbench.model import event as ev
 from workbench.model.errors import (
     AnswerNeededError,
     BadInputError,
+    LaserOffNotConfirmedError,
     LimitFailedError,
     RigNotReadyError,
     StoppedError,
 )
 from workbench.model.prompt import Answer, Prompt
-from workbench.model.rig import load_rig
+from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
 from workbench.procedure.doctor import examine
 from workbench.procedure.latency import count_latency
@@ -219,6 +221,62 @@ def test_a_procedure_measures_the_latency(tmp_path: Path) -> None:
     assert events(done, ev.LatencyMeasured) == [ev.LatencyMeasured(frames=3)]
 
 
+def too_hopeful(rig: Rig, session_dir: Path) -> Bench:
+    """The rig's bench, whose driver believes in three frames less than there are."""
+    bench = open_bench(rig, session_dir)
+    assert isinstance(bench.camera, StreamingCamera)
+    bench.camera.discard_frames -= 3
+    return bench
+
+
+def test_an_exposure_is_searched_for_on_frames_that_are_not_stale(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the rig file says of the latency: its measurement comes first, and rests on no search."""
+    late = "  camera: {latency_frames: 3}\n"
+    right = session(tmp_path / "right", LATENCY, Says(), late)
+    monkeypatch.setattr("workbench.procedure.run.open_bench", too_hopeful)
+    hopeful = session(tmp_path / "hopeful", LATENCY, Says(), late)
+    assert events(hopeful, ev.LatencyMeasured) == [ev.LatencyMeasured(frames=3)]
+    found = [e for e in events(hopeful, ev.ExposureSet) if isinstance(e, ev.ExposureSet)]
+    assert [e.key for e in found] == ["p.3/300mm", "p.3/600mm", "p.3/1500mm"]
+    assert {e.verdict for e in found} == {"good"}
+    assert found == events(right, ev.ExposureSet)
+    # The test can fail: without the measurement every trial sees the lasers as they were before.
+    with pytest.raises(LaserOffNotConfirmedError, match=r"shows a spot .* measure_latency"):
+        session(tmp_path / "stale", GRID, Says(), late)
+    assert [
+        e.verdict for e in events(tmp_path / "stale/s", ev.ExposureSet) if isinstance(e, ev.ExposureSet)
+    ] == ["dim"]
+
+
+def test_the_doctor_looks_at_the_latency_first(tmp_path: Path) -> None:
+    rig_file, _ = write_files(tmp_path)
+    rig_file.write_text(rig_file.read_text() + "  camera: {latency_frames: 3}\n")
+    rig = load_rig(rig_file)
+    with too_hopeful(rig, tmp_path / "s") as bench:
+        found = {finding.part: finding for finding in examine(rig, bench, Says())}
+    assert [part for part, finding in found.items() if not finding.ok] == ["latency"]
+    assert "3 frames, the driver discards 0" in found["latency"].found
+    assert "measure_latency" in found["latency"].found
+
+
+@pytest.mark.parametrize("exposure_s", [2e-6, 0.033])
+def test_latency_is_counted_whatever_the_exposure_was(tmp_path: Path, exposure_s: float) -> None:
+    """Too dim to be seen at 2.5 m, or the room clipped: others are tried, far apart."""
+    rig_file, _ = write_files(tmp_path)
+    emulator = "  camera: {latency_frames: 3}\n  ambient: {level_e_per_s: 2.0e6}\n"
+    rig_file.write_text(rig_file.read_text() + emulator)
+    rig = load_rig(rig_file)
+    with open_bench(rig, tmp_path / "s") as bench:
+        assert isinstance(bench.camera, EmulatedCamera)
+        bench.camera.exposure_s = exposure_s
+        bench.target.place(Placement(key="k", standoff_mm=2500.0))
+        bench.mark("k")
+        assert count_latency(bench.lasers, bench.camera, rig, 10) == 3
+        assert bench.camera.exposure_s != exposure_s, "it saw nothing at first"
+
+
 @pytest.mark.parametrize("latency", [0, 1, 4])
 def test_latency_is_counted_whatever_the_driver_believes(tmp_path: Path, latency: int) -> None:
     rig_file, _ = write_files(tmp_path)
@@ -252,7 +310,7 @@ def test_the_doctor_finds_what_is_wrong(tmp_path: Path, emulator: str, bad: set[
     assert {finding.part for finding in found if not finding.ok} == bad
     fixed = "exposure_s" in emulator
     exposure = [] if fixed else ["exposure"]
-    parts = ["controller", "interlock", "camera", *exposure, "laser L1", "laser L4", "latency"]
+    parts = ["controller", "interlock", "camera", "latency", *exposure, "laser L1", "laser L4"]
     assert [f.part for f in found] == parts
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import cast
+from typing import ClassVar, cast
 
 import cv2
 import numpy as np
@@ -15,14 +16,18 @@ from pydantic import ValidationError
 
 from tests.unit.mjpeg import Picture, Stream
 from workbench.devices.opencv_camera import OpenCvCamera
-from workbench.devices.protocols import Image, StreamingCamera
+from workbench.devices.protocols import Bench, Frame, Image, StreamingCamera
+from workbench.devices.real_bench import PlacedByHand
 from workbench.model.errors import RigNotReadyError
-from workbench.model.rig import CameraDevice, CameraSpec, exactly
+from workbench.model.rig import CameraDevice, CameraSpec, Rig, exactly
+from workbench.procedure.exposure import set_exposure
 
 WIDTH, HEIGHT = 160, 120
 FORMAT = CameraSpec(
     width_px=WIDTH, height_px=HEIGHT, f_px=exactly(200.0), cx_px=exactly(79.5), cy_px=exactly(59.5)
 )
+LASER = {"id": "L1", "axis": "u", "x_mm": {"value": 60.0, "sd": 0}, "y_mm": {"value": 0.0, "sd": 0}}
+RIG = Rig.model_validate({"format": 1, "rig": "red", "camera": FORMAT, "lasers": [LASER]})
 UNPLUGGED_S = 2.0
 
 
@@ -253,6 +258,101 @@ def test_an_exposure_is_set_as_near_as_the_camera_can(monkeypatch: pytest.Monkey
     camera.close()
 
 
+class Colours(Device):
+    """A red spot on a sensor of colours: each pixel's red is clipped by itself."""
+
+    rate = 0.03
+    """Red's share of full scale, for each unit of exposure."""
+    lit = False
+
+    def read(self) -> tuple[bool, Picture]:
+        time.sleep(0.001)
+        red = min(0.05 + Colours.rate * self.settings[cv2.CAP_PROP_EXPOSURE] * Colours.lit, 1.0)
+        shown = np.full((HEIGHT, WIDTH, 3), 12, np.uint8)
+        shown[59:62, 99:102] = (15, 25, round(255 * red))
+        return True, shown
+
+
+class Lasers:
+    """Shine on it."""
+
+    ids: tuple[str, ...] = ("L1",)
+
+    @contextmanager
+    def lit(self, ids: Sequence[str], for_s: float) -> Iterator[None]:
+        Colours.lit = True
+        yield
+        Colours.lit = False
+
+    def all_off(self) -> None:
+        Colours.lit = False
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("rate", [0.3, 0.01, 0.003])
+def test_a_red_spot_on_a_camera_of_colours_is_not_clipped(
+    monkeypatch: pytest.MonkeyPatch, rate: float
+) -> None:
+    """In the weighted mean of its colours it never gets brighter than 30 %: the search would go to 0.7 s."""
+    monkeypatch.setattr(cv2, "VideoCapture", Colours)
+    monkeypatch.setattr(Colours, "rate", rate)
+    camera = camera_of("/dev/video0", exposure=16, exposure_limits=(8, 7000), latency_frames=1)
+    found = set_exposure(Bench(camera, Lasers(), PlacedByHand()), RIG, "k", lambda key: None)
+    camera.close()
+    assert found is not None
+    assert found.exposure == camera._for_spots
+    red = 0.05 + rate * found.exposure
+    assert found.peak == pytest.approx(min(red, 1.0), abs=0.005)
+    assert found.verdict == ("clipped" if rate == 0.3 else "good"), "steps of 8: two of them clip at 0.3"
+
+
+def test_the_brightest_of_the_colours_is_taken(streams: Callable[..., Stream]) -> None:
+    shown = np.full((HEIGHT, WIDTH, 3), 20, np.uint8)
+    shown[40:80, 60:100] = (0, 0, 255)
+    camera = camera_of(streams(lambda: shown).url)
+    image = camera.grab().image
+    camera.close()
+    assert image.shape == (HEIGHT, WIDTH)
+    assert image[50:70, 70:90].min() > 245, "clipped, and JPEG"
+    assert image[:30].max() < 30
+
+
+def test_an_exposure_that_is_another_the_next_time() -> None:
+    """The last trial was none to keep, and what an earlier one told does not hold for what it has now."""
+
+    class Forgetful:
+        exposure_limits, exposure_unit = (10.0, 1000.0), ""
+        asked: ClassVar[list[float]] = []
+        keeps = True
+
+        def set_exposure(self, exposure: float) -> float:
+            again = exposure in self.asked
+            self.asked.append(exposure)
+            return exposure if self.keeps or not again else 0.9 * exposure
+
+        def grab(self) -> Frame:
+            picture = flat(12)
+            picture[60, 100] = min(12 + int(1.5 * self.asked[-1] * Colours.lit), 255)
+            return Frame(picture, 0)
+
+        grab_ambient = grab
+
+        def close(self) -> None:
+            pass
+
+    camera = Forgetful()
+    bench = Bench(camera, Lasers(), PlacedByHand())
+    found = set_exposure(bench, RIG, "k", lambda key: None)
+    assert found is not None
+    assert camera.asked[-1] in camera.asked[:-1], "half of it confirmed it, then it was set again"
+    camera.asked.clear()
+    camera.keeps = False
+    with pytest.raises(RigNotReadyError, match=r"expected 100 as it was taken in a trial, .* says 90 now"):
+        set_exposure(bench, RIG, "k", lambda key: None)
+
+
 def test_without_limits_the_exposure_is_fixed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cv2, "VideoCapture", Device)
     camera = camera_of("/dev/video0", exposure=16)
@@ -260,7 +360,9 @@ def test_without_limits_the_exposure_is_fixed(monkeypatch: pytest.MonkeyPatch) -
     camera.close()
 
 
-@pytest.mark.parametrize(("exposure", "limits"), [(None, (1, 9)), (10, (1, 9)), (5, (9, 1)), (5, (5, 5))])
+@pytest.mark.parametrize(
+    ("exposure", "limits"), [(None, (1, 9)), (10, (1, 9)), (5, (9, 1)), (5, (5, 5)), (5, (1, 2e7))]
+)
 def test_limits_that_make_no_sense(exposure: float | None, limits: tuple[float, float]) -> None:
     with pytest.raises(ValidationError, match="exposure_limits: expected"):
         CameraDevice(source="0", exposure=exposure, exposure_limits=limits)

@@ -78,6 +78,13 @@ class ExposableCamera(Camera, Protocol):
         """
 
 
+def settable(camera: Camera) -> tuple[ExposableCamera, tuple[float, float]] | None:
+    """The camera and its exposure's limits, where the rig lets it be set."""
+    if not isinstance(camera, ExposableCamera) or camera.exposure_limits is None:
+        return None
+    return camera, camera.exposure_limits
+
+
 class LaserBank(Protocol):
     """The lasers. There is one way to switch one on, and it ends by itself."""
 

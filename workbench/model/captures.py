@@ -16,7 +16,7 @@ BOARD = "board"
 REQUIRED = ("laser_id", "standoff_mm", "repeat")
 IMAGES = ("on", "off")
 POSITION = ("u_px", "v_px")
-OPTIONAL = ("scene", "standoff_sd_mm", "u_sd_px", "v_sd_px", "tilt_deg", "exposure")
+OPTIONAL = ("scene", "standoff_sd_mm", "u_sd_px", "v_sd_px", "tilt_deg", "exposure", "exposure_unit")
 LARGEST = 1e6
 """Of any millimetres or pixels: a kilometre, and beyond every camera."""
 NEAREST_MM = 1e-3
@@ -45,7 +45,9 @@ class CaptureRow:
     v_sd_px: float
     tilt_deg: float
     exposure: float = nan
-    """In the camera's own unit; tells how a frame came about, nothing is computed from it."""
+    """Tells how a frame came about, nothing is computed from it."""
+    exposure_unit: str = ""
+    """Empty for the camera driver's own."""
 
 
 def load_captures(path: Path) -> tuple[CaptureRow, ...]:
@@ -144,6 +146,7 @@ class _Parser:
             v_sd_px=self._number_in("v_sd_px", at_least=SMALLEST_SD_PX),
             tilt_deg=self._number_in("tilt_deg", above=-90.0, below=90.0),
             exposure=self._number_in("exposure", above=0.0),
+            exposure_unit=self._cells.get("exposure_unit", ""),
         )
 
     def _image(self, column: str) -> Path | None:

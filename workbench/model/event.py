@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from workbench.model.exposure import Verdict as BrightnessVerdict
 from workbench.model.fit_event import FaultRecord as FaultRecord
 from workbench.model.fit_event import FitFinished as FitFinished
 from workbench.model.fit_event import LaserErrorRecord as LaserErrorRecord
@@ -129,9 +130,9 @@ class ExposureSet(FileModel):
     unit: str
     """Empty for the camera driver's own."""
     peak: float
-    """Brightest pixel of that trial as a share of full scale; 1 is clipped."""
-    verdict: Literal["good", "dim", "clipped"]
-    """Dim and clipped spots are so because the camera's limits do not let it be otherwise."""
+    """Brightest pixel of that trial as a share of full scale, or of where trials were clipped below it."""
+    verdict: BrightnessVerdict
+    """By `workbench.model.exposure`; not good where the camera's limits or steps give no better."""
     trials: int
 
     @property
@@ -140,8 +141,9 @@ class ExposureSet(FileModel):
         spelt = f"exposure {self.exposure:g} {self.unit}".rstrip()
         share = f"brightest spot at {100 * self.peak:.0f} % of full scale"
         remarks = {
-            "clipped": "; take a darker target or a filter",
-            "dim": "; does every spot lie on the target?",
+            "clipped": ", clipped: take a darker target or a filter",
+            "bright": ", bright: no shorter exposure; a darker target or a filter would help",
+            "dim": ", dim: no longer exposure is good; does every spot lie on the target?",
         }
         return f"{spelt}, {share}{remarks.get(self.verdict, '')}"
 
@@ -174,7 +176,9 @@ class CaptureTaken(FileModel):
     on: FrameRef
     off: FrameRef | None = None
     exposure: float | None = None
-    """In the unit of the placement's `ExposureSet`; None where it was not set."""
+    """None where it was not set."""
+    exposure_unit: str | None = None
+    """None for the camera driver's own."""
     lit_s: float | None = None
     """How long a laser was lit for it, switching included; None for a frame in room light."""
 

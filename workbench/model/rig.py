@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from workbench.model.board import Board
+from workbench.model.exposure import WIDEST
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 PositiveFloat = Annotated[float, Field(gt=0)]
@@ -158,6 +159,11 @@ class CameraDevice(FileModel):
                 raise ValueError(
                     "exposure_limits: expected [shortest, longest], with an exposure to begin with between"
                     f" them, got {list(self.exposure_limits)} and {self.exposure}"
+                )
+            if longest > WIDEST * shortest:
+                raise ValueError(
+                    f"exposure_limits: expected the longest to be at most {WIDEST:g} times the shortest, got"
+                    f" {list(self.exposure_limits)}; no camera's spots differ by more"
                 )
         return self
 

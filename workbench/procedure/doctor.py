@@ -12,6 +12,7 @@ import numpy as np
 from workbench.calibration.sightings import prior_scanline
 from workbench.devices.protocols import Bench, Operator, StreamingCamera
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError
+from workbench.model.exposure import CLIPPED
 from workbench.model.prompt import Prompt
 from workbench.model.rig import LaserSpec, Rig
 from workbench.model.target import Placement
@@ -61,10 +62,11 @@ def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[Finding]:
         if answer.action != "done":
             raise StoppedError(f"aborted by the operator at {prompt.key}: {answer.reason}")
     bench.target.place(_placement())
+    # Before all that is looked at with the lasers lit: those pictures would be stale.
+    yield _tried("latency", partial(_latency, rig, bench))
     yield from _exposure(rig, bench)
     for laser in rig.lasers:
         yield _tried(f"laser {laser.id}", partial(_laser, rig, bench, laser))
-    yield _tried("latency", partial(_latency, rig, bench))
 
 
 def _tried(part: str, check: Callable[[], str]) -> Finding:
@@ -112,7 +114,8 @@ def _exposure(rig: Rig, bench: Bench) -> Iterator[Finding]:
         yield Finding("exposure", False, str(error))
         return
     if found is not None:
-        yield Finding("exposure", found.verdict == "good", found.text.removeprefix("exposure "))
+        well = BRIGHT <= found.peak < CLIPPED
+        yield Finding("exposure", well, found.text.removeprefix("exposure "))
 
 
 def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:
@@ -142,9 +145,10 @@ def _latency(rig: Rig, bench: Bench) -> str:
         return "not told by this driver"
     bench.mark("doctor/latency")
     frames = count_latency(bench.lasers, bench.camera, rig, MOST_FRAMES)
-    if frames > bench.camera.discard_frames:
+    if frames > (believed := bench.camera.discard_frames):
+        bench.camera.discard_frames = frames  # for the checks that follow
         raise RigNotReadyError(
-            f"{frames} frames, the driver discards {bench.camera.discard_frames}: captures would show what"
+            f"{frames} frames, the driver discards {believed}: captures would show what"
             " was before; put a measure_latency step first in the procedure"
         )
     return f"{frames} frames"

@@ -1,32 +1,48 @@
-"""The exposure at which the brightest spot is bright and not clipped, found with a few trial pairs.
+"""The exposure at which the brightest spot is bright and not clipped, found with a few trials.
 
 A pixel's number is its pedestal plus what it is lit with times the exposure, until it is clipped. Scaling
 the exposure by (aim / number) therefore closes in on the aim: the pedestal alone, some hundredths of full
 scale, is scaled wrongly, and the next trial sees how much that was. Of a clipped pixel nothing else is known.
+
+Not every pixel is clipped at full scale: where a camera of colours makes grey by itself, a red spot is
+clipped when it is at 30 % of that. A longer exposure gives no more then; that number is taken for full scale.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-import numpy as np
-
-from workbench.devices.protocols import Bench, ExposableCamera, Image
+from workbench.devices.protocols import Bench, Camera, ExposableCamera, Image, StreamingCamera, settable
+from workbench.model.errors import RigNotReadyError
 from workbench.model.event import ExposureSet
+from workbench.model.exposure import AIM, CLIPPED, GOOD, verdict_of
 from workbench.model.rig import Rig
 from workbench.procedure.latency import LEASE_S
+from workbench.procedure.peak import Peak, look_at_peak, searched_pixels
 
-AIM = 0.65
-"""Of full scale."""
-GOOD = (0.55, 0.7)
-"""A quarter of the range and more is left for what differs from frame to frame."""
-DIM = 0.25
-"""Of full scale; below it a person is told."""
 BOLDEST = 8.0
 """Largest factor from one trial to the next."""
 MOST_TRIALS = 8
 """Four go from the middle of a range of 1 : 10^7 to its ends; as many are left to close in."""
+TELLING = 1.4
+"""Ratio of two exposures from which on their peaks tell whether they grow."""
+LEAST_GROWTH = 0.3
+"""As which power of the exposure a peak grows at least: 1 where it is linear, 0.45 with a gamma of 2.2."""
+GROWTH_SD = 4.0
+SAME = 0.005
+"""Relative difference below which an exposure was taken as in its trial."""
+FLAT = 0.03
+"""How much clipped numbers differ where it is not at full scale: they were averaged, or compressed."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An exposure as the camera took it, and what the lasers lit with it."""
+
+    exposure: float
+    seen: Peak
 
 
 def set_exposure(
@@ -34,12 +50,12 @@ def set_exposure(
 ) -> ExposureSet | None:
     """Set the camera's exposure for all lasers of the rig on the target as it stands.
 
-    They are lit together: no laser by itself is brighter, and one pair of frames tells. The first trial is
+    They are lit together: no laser by itself is brighter, and one trial tells. The first trial is
     always the same, so that what is found at a placement does not depend on where the target was before.
 
     Args:
         bench: its camera and lasers.
-        rig: tells which lasers, and the camera's full scale.
+        rig: tells which lasers, where their spots may lie, and the camera's full scale.
         placement_key: of the placement.
         begin: called with the key of each trial before it.
 
@@ -48,76 +64,87 @@ def set_exposure(
 
     Raises:
         LaserOffNotConfirmedError: a beam stays on.
-        RigNotReadyError: a device does not answer.
+        RigNotReadyError: a device does not answer, or takes another exposure than in its trial.
     """
-    if (settable := _settable(bench)) is None:
+    if (found := settable(bench.camera)) is None:
         return None
-    camera, limits = settable
-    full_scale = 2**rig.camera.bits - 1
+    camera, limits = found
+    searched = searched_pixels(rig)
 
-    def peak_at(exposure: float, trial: int) -> tuple[float, float]:
-        begin(f"{placement_key}/exposure/{trial:02d}")
+    def look(exposure: float, number: int) -> Trial:
+        begin(f"{placement_key}/exposure/{number:02d}")
         taken = camera.set_exposure(exposure)
+        before = camera.grab().image
         with bench.lasers.lit(rig.laser_ids, for_s=LEASE_S):
-            on = camera.grab().image
-        return taken, brightest_lit_dn(on, camera.grab().image) / full_scale
+            on = [camera.grab().image, _next_frame(camera)]
+        off = [before, camera.grab().image]
+        return Trial(taken, look_at_peak(on, off, searched, 2**rig.camera.bits - 1))
 
-    tried = search_exposure(limits, peak_at)
-    exposure, peak = best_of(tried)
-    if exposure != tried[-1][0]:
-        exposure = camera.set_exposure(exposure)
+    tried = search_exposure(limits, look)
+    best = best_of(tried)
+    if best is not tried[-1]:
+        _set_again(camera, best.exposure)
+    peak = share_of(best, tried)
     return ExposureSet(
         key=placement_key,
-        exposure=exposure,
+        exposure=best.exposure,
         unit=camera.exposure_unit,
         peak=peak,
-        verdict="clipped" if peak >= 1 else "dim" if peak < DIM else "good",
+        verdict=verdict_of(peak),
         trials=len(tried),
     )
 
 
-def restore_exposure(bench: Bench, known: ExposureSet) -> None:
-    """Set it as it was found before the session ended early.
+def _next_frame(camera: Camera) -> Image:
+    """After a grab; nothing was switched since then."""
+    return (camera.read() if isinstance(camera, StreamingCamera) else camera.grab()).image
+
+
+def _set_again(camera: ExposableCamera, exposure: float) -> None:
+    """What was found holds for the exposure of its trial, and for no other.
 
     Raises:
-        RigNotReadyError: the camera does not take it.
+        RigNotReadyError: the camera does not take it this time.
     """
-    if (settable := _settable(bench)) is not None:
-        settable[0].set_exposure(known.exposure)
+    came = camera.set_exposure(exposure)
+    if abs(came - exposure) > SAME * exposure:
+        raise RigNotReadyError(
+            f"camera: exposure: expected {exposure:g} as it was taken in a trial, the camera says {came:g}"
+            " now; does another program set it? Leave exposure_limits out if the camera keeps none"
+        )
 
 
-def _settable(bench: Bench) -> tuple[ExposableCamera, tuple[float, float]] | None:
-    camera = bench.camera
-    if not isinstance(camera, ExposableCamera) or camera.exposure_limits is None:
-        return None
-    return camera, camera.exposure_limits
-
-
-def search_exposure(
-    limits: tuple[float, float], peak_at: Callable[[float, int], tuple[float, float]]
-) -> list[tuple[float, float]]:
+def search_exposure(limits: tuple[float, float], look: Callable[[float, int], Trial]) -> list[Trial]:
     """Try exposures until one is good, or the next would be one that was tried.
 
     Args:
         limits: shortest and longest exposure.
-        peak_at: makes the trial of that number at an exposure; returns the exposure as the camera took it,
-            and the brightest pixel as a share of full scale.
+        look: makes the trial of that number at an exposure.
 
     Returns:
-        (exposure as taken, share) of every trial.
+        Every trial.
     """
     asked: list[float] = []
-    tried: list[tuple[float, float]] = []
-    following = _within(limits, math.sqrt(limits[0] * limits[1]))
-    while following not in asked and len(tried) < MOST_TRIALS:
-        asked.append(following)
-        taken, peak = peak_at(following, len(tried))
-        tried.append((taken, peak))
-        if GOOD[0] <= peak <= GOOD[1]:
+    tried: list[Trial] = []
+    following: float | None = math.sqrt(limits[0] * limits[1])
+    while following is not None and len(tried) < MOST_TRIALS:
+        following = _within(limits, following)
+        if following in asked:
             break
-        factor = 1 / BOLDEST if peak >= 1 else AIM / max(peak, AIM / BOLDEST)
-        following = _within(limits, taken * factor)
+        asked.append(following)
+        tried.append(look(following, len(tried)))
+        following = _after(tried)
     return tried
+
+
+def _after(tried: Sequence[Trial]) -> float | None:
+    """The exposure to try next; None: a good one is among them."""
+    best = best_of(tried)
+    if GOOD[0] <= share_of(best, tried) <= GOOD[1]:
+        # Half of it tells whether the number is that of a pixel clipped below full scale.
+        return None if any(_tells(other, best) for other in tried) else best.exposure / 2
+    last, share = tried[-1], share_of(tried[-1], tried)
+    return last.exposure * (1 / BOLDEST if share >= CLIPPED else AIM / max(share, AIM / BOLDEST))
 
 
 def _within(limits: tuple[float, float], exposure: float) -> float:
@@ -125,13 +152,36 @@ def _within(limits: tuple[float, float], exposure: float) -> float:
     return min(max(float(f"{exposure:.3g}"), limits[0]), limits[1])
 
 
-def best_of(tried: list[tuple[float, float]]) -> tuple[float, float]:
+def best_of(tried: Sequence[Trial]) -> Trial:
     """The longest exposure that was not too bright; where all were, the shortest."""
-    sound = [trial for trial in tried if trial[1] <= GOOD[1]]
-    return max(sound) if sound else min(tried)
+    sound = [trial for trial in tried if share_of(trial, tried) <= GOOD[1]]
+    return max(sound, key=_exposure) if sound else min(tried, key=_exposure)
 
 
-def brightest_lit_dn(on: Image, off: Image) -> int:
-    """Number in `on` of the pixel that the lasers light most: a lamp or a hot pixel is in both frames."""
-    lit = on.astype(np.int32) - off
-    return int(on.flat[int(lit.argmax())])
+def share_of(trial: Trial, tried: Sequence[Trial]) -> float:
+    """The brightest pixel as a share of the number at which it is clipped, which all trials tell."""
+    ceiling = _ceiling(tried)
+    share = trial.seen.peak / ceiling
+    return CLIPPED if ceiling < CLIPPED and share >= 1 - FLAT else share
+
+
+def _ceiling(tried: Sequence[Trial]) -> float:
+    """Where peaks do not grow any more; full scale where they do."""
+    flat = any(_tells(a, b) and not _grows(a, b) for a in tried for b in tried)
+    return max(trial.seen.peak for trial in tried) if flat else CLIPPED
+
+
+def _tells(shorter: Trial, longer: Trial) -> bool:
+    """Whether two trials can tell if the peak grows: both see the lasers, at exposures that differ."""
+    return longer.exposure >= TELLING * shorter.exposure and min(shorter.seen.lit, longer.seen.lit) > 0
+
+
+def _grows(shorter: Trial, longer: Trial) -> bool:
+    a, b = shorter.seen, longer.seen
+    growth = (longer.exposure / shorter.exposure) ** LEAST_GROWTH
+    sd = math.hypot(growth * a.noise, b.noise)
+    return b.peak >= CLIPPED or b.lit > growth * a.lit - GROWTH_SD * sd
+
+
+def _exposure(trial: Trial) -> float:
+    return trial.exposure

@@ -2,36 +2,69 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
 from workbench.calibration.sightings import prior_scanline
-from workbench.devices.protocols import LaserBank, StreamingCamera
+from workbench.devices.protocols import Image, LaserBank, StreamingCamera, settable
 from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import Rig
 from workbench.spots import find_spots
 
 LEASE_S = 2.0
 """Longest time that a laser may stay lit for one capture: many frames, and short for an eye."""
+STEP = 16.0
+"""Between two exposures: from too dim to be found to clipped is more than that."""
 
 
 def count_latency(lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_frames: int) -> int:
     """Frames from switching the first laser on to the first frame that shows it.
 
+    Nothing that hangs on the latency is used: it is counted at the exposure that the camera has, and where
+    that shows no spot at others, far apart, if they may be set. Each time more frames pass in the dark than
+    can be late.
+
     Raises:
-        RigNotReadyError: none of `most_frames` frames shows it.
+        RigNotReadyError: none of `most_frames` frames shows it, at no exposure.
     """
     lasers.all_off()
     first = rig.lasers[0]
-    scanlines = [prior_scanline(rig, first)]
     # The first search in a process takes a second: a laser lit meanwhile would be put off as forgotten.
     some = camera.grab().image
-    find_spots(some, some, scanlines=scanlines, expected=1)
-    # Drops what has piled up, then longer than the latency: whatever a laser lit before this call has passed.
-    camera.grab()
-    dark = [camera.read() for _ in range(most_frames + 1)][-1].image
-    with lasers.lit([first.id], for_s=LEASE_S):
-        for frames in range(most_frames + 1):
-            if find_spots(camera.read().image, dark, scanlines=scanlines, expected=1).spots:
-                return frames
+    find_spots(some, some, scanlines=[prior_scanline(rig, first)], expected=1)
+    for _ in _exposures(camera):
+        if (frames := _count(lasers, camera, rig, most_frames)) is not None:
+            return frames
     raise RigNotReadyError(
         f"camera: expected to see laser {first.id} at most {most_frames} frames after it was switched on, saw"
         " no spot; look whether it shines on the target, and into the picture"
     )
+
+
+def _exposures(camera: StreamingCamera) -> Iterator[None]:
+    """Set one after the other: as it is, then from the middle of the limits out to them."""
+    yield
+    if (found := settable(camera)) is None:
+        return
+    exposable, (shortest, longest) = found
+    middle = math.sqrt(shortest * longest)
+    for step in range(math.ceil(math.log(longest / middle, STEP)) + 1):
+        for exposure in {min(middle * STEP**step, longest), max(middle / STEP**step, shortest)}:
+            exposable.set_exposure(exposure)
+            yield
+
+
+def _count(lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_frames: int) -> int | None:
+    first = rig.lasers[0]
+    scanlines = [prior_scanline(rig, first)]
+    # Drops what has piled up, then longer than the latency: whatever a laser lit before this call has passed.
+    camera.grab()
+    # A lamp that flickers is no brighter later than in the brightest of them.
+    dark: Image = np.maximum.reduce([camera.read().image for _ in range(most_frames + 1)])
+    with lasers.lit([first.id], for_s=LEASE_S):
+        for frames in range(most_frames + 1):
+            if find_spots(camera.read().image, dark, scanlines=scanlines, expected=1).spots:
+                return frames
+    return None

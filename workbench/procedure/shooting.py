@@ -15,7 +15,7 @@ from workbench.model.captures import ALL_LASERS, BOARD
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
-from workbench.procedure.exposure import restore_exposure, set_exposure
+from workbench.procedure.exposure import set_exposure
 from workbench.procedure.latency import LEASE_S
 from workbench.session.frames import FrameStore, read_image
 from workbench.session.state import Group
@@ -33,7 +33,7 @@ class Shooting:
     """What is on disk already of the present placement."""
     may_fire: bool = False
     """Whether somebody has confirmed that the beams may be switched on."""
-    _exposure: float | None = None
+    _exposure: ev.ExposureSet | None = None
     """Of the present placement, where the camera's is set."""
     _dark: Image | None = None
     """The last frame at the present placement with all lasers off."""
@@ -55,9 +55,9 @@ class Shooting:
         if self.served is None:
             self._refuse_unsafe()
             found = set_exposure(self.bench, self.rig, key, begin)
-        elif (found := self.served.exposure) is not None:
-            restore_exposure(self.bench, found)
-        self._exposure = None if found is None else found.exposure
+        else:  # nothing is captured there any more: the camera is left as it is
+            found = self.served.exposure
+        self._exposure = found
         return found
 
     def pair(
@@ -121,7 +121,8 @@ class Shooting:
             repeat=repeat,
             on=frames.save(key, "on", on.image, on.time_ns),
             off=frames.save(key, "off", off.image, off.time_ns),
-            exposure=self._exposure,
+            exposure=None if self._exposure is None else self._exposure.exposure,
+            exposure_unit=None if self._exposure is None else self._exposure.unit or None,
             lit_s=lit_s,
         )
         return on.image, off.image, taken
@@ -180,7 +181,8 @@ class Shooting:
                 f"capture {key}: the frame with all lasers off shows a spot at {at}. A beam may be on"
                 " although the controller says that it is off: cut the lasers' supply, keep out of the"
                 " beams, then check the controller. If a lamp or its reflection stands there, cover it"
-                " and start anew"
+                " and start anew; if the camera's latency was never measured, begin with a"
+                " measure_latency step: the frame may be an old one"
             )
 
 

@@ -98,7 +98,8 @@ def _(step: pr.AskStep, context: Context, name: str) -> str:
 
 @run_step.register
 def _(step: pr.PlaceTargetStep, context: Context, name: str) -> str:
-    placed = visit(context, [_placement(name, step.standoff_mm)], lambda placement: placement)
+    # What needs it lit, counting the latency, sees to its own exposure: one set now may rest on old frames.
+    placed = visit(context, [_placement(name, step.standoff_mm)], lambda placement: placement, lights=False)
     return f"at {placed[0].standoff_mm:g} mm" if placed else "left out"
 
 

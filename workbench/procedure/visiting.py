@@ -31,7 +31,9 @@ class _LeftOutError(Exception):
         self.answer = answer
 
 
-def visit(context: Context, placements: Sequence[Placement], work: Callable[[Placement], T]) -> list[T]:
+def visit(
+    context: Context, placements: Sequence[Placement], work: Callable[[Placement], T], *, lights: bool = True
+) -> list[T]:
     """Have the target placed at one placement after the other, and do the `work` at each.
 
     The operator may skip one, or have the one before captured again. What is done at a placement is a
@@ -41,6 +43,7 @@ def visit(context: Context, placements: Sequence[Placement], work: Callable[[Pla
         context: the session.
         placements: where the target is to stand; their keys differ.
         work: gets the placement as measured; takes every capture under its key.
+        lights: whether it captures spots, and so needs the exposure set for them.
 
     Returns:
         What `work` returned, for the placements that were not skipped.
@@ -48,6 +51,7 @@ def visit(context: Context, placements: Sequence[Placement], work: Callable[[Pla
     Raises:
         AnswerNeededError, StoppedError, LaserOffNotConfirmedError: see `Context.ask`.
     """
+    work = _exposed(context, work) if lights else work
     results: dict[str, T] = {}
     began: dict[str, int] = {}
     index = 0
@@ -88,7 +92,6 @@ def _work(
     """Do the work at a placement, again where it asks for that."""
     while True:
         try:
-            _set_exposure(context, placed.key)
             return work(placed)
         except RetakeError as again:
             _set_aside(context, placed.key, from_n, str(again))
@@ -101,9 +104,15 @@ def _work(
             raise
 
 
-def _set_exposure(context: Context, key: str) -> None:
-    if (found := context.shooting.set_exposure(key, context.begin)) is not None:
-        context.emit(found)
+def _exposed(context: Context, work: Callable[[Placement], T]) -> Callable[[Placement], T]:
+    """The work with the camera's exposure set before it."""
+
+    def do(placed: Placement) -> T:
+        if (found := context.shooting.set_exposure(placed.key, context.begin)) is not None:
+            context.emit(found)
+        return work(placed)
+
+    return do
 
 
 def _tell_skipped(context: Context, asked: Placement, answer: Answer) -> None:

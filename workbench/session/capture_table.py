@@ -17,9 +17,9 @@ if TYPE_CHECKING:  # a fit of a captures file needs a name from here and no even
 
 CALIBRATION_TABLE = "captures.csv"
 TRIAL_TABLE = "trial-captures.csv"
-COLUMNS = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene", "standoff_sd_mm", "exposure")
-OPTIONAL = 2
-"""So many of the last, only where a capture states them."""
+NEEDED = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene")
+COLUMNS = (*NEEDED, "standoff_sd_mm", "exposure", "exposure_unit")
+"""Those that are not needed are there only where a capture states them."""
 
 
 def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
@@ -29,7 +29,7 @@ def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
     that placing's error.
     """
     rows = [_row(capture) for capture in captures]
-    stated = [n < len(COLUMNS) - OPTIONAL or any(row[n] for row in rows) for n in range(len(COLUMNS))]
+    stated = [n < len(NEEDED) or any(row[n] for row in rows) for n in range(len(COLUMNS))]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerows(compress(row, stated) for row in (COLUMNS, *rows))
@@ -48,4 +48,5 @@ def _row(capture: CaptureTaken) -> tuple[str, ...]:
         capture.scene or capture.placement_key,
         "" if capture.standoff_sd_mm is None else repr(capture.standoff_sd_mm),
         "" if capture.exposure is None else repr(capture.exposure),
+        capture.exposure_unit or "",
     )
