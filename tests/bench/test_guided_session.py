@@ -173,6 +173,31 @@ def test_retry_captures_again_twice_and_then_stops(tmp_path: Path) -> None:
     assert sorted(p.name for p in (tmp_path / "s/set-aside").iterdir()) == ["1", "2"]
 
 
+def test_a_resumption_grants_no_retries_beyond_the_sessions(tmp_path: Path) -> None:
+    """The first session is stopped after one retry, the second after the other: what is left is one look."""
+    steps = limited("snr", "{in: [1.0e9, null], on_fail: retry}")
+    rig, procedure = write_files(tmp_path, HEAD + steps)
+    rig.write_text(rig.read_text() + "  answers: false\n")
+    stopped = tmp_path / "s"
+
+    def after(retries: int) -> Callable[[], str | None]:
+        def stopping() -> str | None:
+            every = [r.event for r in read_journal(stopped)] if (stopped / "journal.jsonl").exists() else []
+            return "lunch" if sum(isinstance(e, ev.SetAside) for e in every) == retries else None
+
+        return stopping
+
+    with pytest.raises(StoppedError, match="lunch"):
+        run(Plan.load(rig, [procedure]), stopped, (), CALLER, after(1), Says())
+    with pytest.raises(StoppedError, match="lunch"):
+        resume(stopped, (), RESUMER, after(2), Says())
+    for _ in range(2):
+        with pytest.raises(LimitFailedError, match="snr"):
+            resume(stopped, (), RESUMER, lambda: None, Says())
+    told = [r.event for r in read_journal(stopped) if isinstance(r.event, ev.SetAside)]
+    assert [(e.key, e.retry) for e in told] == [("p.1/300mm", True)] * 2
+
+
 def test_ask_lets_the_operator_keep_redo_or_leave_out(tmp_path: Path) -> None:
     operator = Says(
         ("p.1/300mm/L1/snr", Answer(action="redo", reason="wiped the lens")),

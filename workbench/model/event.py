@@ -105,6 +105,8 @@ class SetAside(FileModel):
     """The placement's."""
     from_n: int
     reason: str
+    retry: bool = False
+    """Whether a limit asked for it by itself (`on_fail: retry`): that is done a few times at most."""
 
 
 class SessionResumed(FileModel):

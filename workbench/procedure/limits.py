@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from workbench.model import event as ev
@@ -17,12 +16,10 @@ from workbench.procedure.quality import quality_of
 from workbench.procedure.visiting import RetakeError, settle
 
 RETRIES = 2
-"""`on_fail: retry` captures a placement again so often before it stops."""
+"""`on_fail: retry` captures a placement again so often in a session before it stops."""
 
 
-def check_captures(
-    context: Context, step: str, placement: Placement, limits: GridLimits, retries: Counter[str]
-) -> None:
+def check_captures(context: Context, step: str, placement: Placement, limits: GridLimits) -> None:
     """Hold what each laser gave at a placement against the limits.
 
     Args:
@@ -30,7 +27,6 @@ def check_captures(
         step: name of the step.
         placement: where the captures were taken.
         limits: of the step.
-        retries: counts by placement how often it was captured again for its limits.
 
     Raises:
         RetakeError: the placement is to be captured again.
@@ -44,9 +40,8 @@ def check_captures(
             failed = _check(context, step, of, name, getattr(quality, name), limit)
             if failed is None:
                 continue
-            if limit.on_fail == "retry" and retries[placement.key] < RETRIES:
-                retries[placement.key] += 1
-                raise RetakeError(failed)
+            if limit.on_fail == "retry" and context.recorder.retries(placement.key) < RETRIES:
+                raise RetakeError(failed, by_limit=True)
             if limit.on_fail == "ask":
                 settle(context, _about_captures(f"{of}/{name}", failed), failed)
             else:

@@ -7,8 +7,9 @@ the frames on disk, everything computed from them is computed again.
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Sequence
+from typing import TypeGuard
 
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
@@ -41,6 +42,7 @@ class Recorder:
             e.key: e for e in (record.event for record in self._kept) if isinstance(e, ev.Answered)
         }
 
+        self._retries = Counter(r.event.key for r in before if _is_retry(r.event))
         told = [e for e in (r.event for r in self._kept) if isinstance(e, ev.LatencyMeasured)]
         self.latency = told[-1].frames if told else None
         """As measured before the session ended early."""
@@ -52,6 +54,8 @@ class Recorder:
             StoppedError: the journal cannot be written.
             BadInputError: the session is another one.
         """
+        if _is_retry(event):
+            self._retries[event.key] += 1
         self._show_notes()
         if self._kept and self._kept[0].event == event:
             return self._show(self._kept.popleft())
@@ -74,6 +78,10 @@ class Recorder:
         """What is captured at a placement already, all of it."""
         return self.whole.get(key)
 
+    def retries(self, key: str) -> int:
+        """How often a limit has had a placement captured again in this session, resumptions included."""
+        return self._retries[key]
+
     def answer(self, key: str) -> Answer | None:
         """What was answered before the session ended early."""
         given = self._answers.get(key)
@@ -94,6 +102,10 @@ class Recorder:
         for consumer in self._consumers:
             consumer(record)
         return record
+
+
+def _is_retry(event: ev.Event) -> TypeGuard[ev.SetAside]:
+    return isinstance(event, ev.SetAside) and event.retry
 
 
 def _is_note(event: ev.Event) -> bool:

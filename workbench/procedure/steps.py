@@ -7,7 +7,6 @@ raises where the procedure cannot go on.
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import singledispatch
@@ -139,11 +138,10 @@ def _(step: pr.ValidateStep, context: Context, name: str) -> str:
 @run_step.register
 def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
     placements = [_placement(name, standoff_mm) for standoff_mm in step.standoffs_mm]
-    retries: Counter[str] = Counter()
 
     def work(placement: Placement) -> int:
         pairs = _capture_lasers(context, placement, step.repeats)
-        check_captures(context, name, placement, step.limits, retries)
+        check_captures(context, name, placement, step.limits)
         _advise(context)
         return pairs
 

@@ -18,6 +18,11 @@ T = TypeVar("T")
 class RetakeError(Exception):
     """What was captured at the present placement is to be captured again; says why."""
 
+    def __init__(self, why: str, by_limit: bool = False) -> None:
+        super().__init__(why)
+        self.by_limit = by_limit
+        """Nobody was asked."""
+
 
 class _ServedAgainError(Exception):
     """What a resumed session had on disk of the present placement is to be captured again."""
@@ -94,7 +99,7 @@ def _work(
         try:
             return work(placed)
         except RetakeError as again:
-            _set_aside(context, placed.key, from_n, str(again))
+            _set_aside(context, placed.key, from_n, str(again), again.by_limit)
             if context.shooting.served is not None:
                 raise _ServedAgainError from again
             FrameStore(context.session_dir).set_aside(placed.key)
@@ -139,9 +144,9 @@ def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Recor
     return context.emit(ev.TargetPlaced(placement=placed, by=answer.by)), placed
 
 
-def _set_aside(context: Context, key: str, from_n: int, reason: str) -> None:
+def _set_aside(context: Context, key: str, from_n: int, reason: str, retry: bool = False) -> None:
     """Forget what was captured at a placement; its frames are kept, moved aside when it is repeated."""
-    context.emit(ev.SetAside(key=key, from_n=from_n, reason=reason))
+    context.emit(ev.SetAside(key=key, from_n=from_n, reason=reason, retry=retry))
     context.forget(key)
 
 
