@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
+from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError
 
 PACKAGE = "nidaqmx"
 
@@ -22,10 +22,11 @@ class DigitalOutputLine:
 
     has_leases = False
 
-    def __init__(self, lines: str) -> None:
+    def __init__(self, lines: str, lasers: int) -> None:
         """Reserve the board's lines, as `Dev1/port0/line0:3`, and put them low.
 
         Raises:
+            BadInputError: they are fewer than the rig's lasers.
             RigNotReadyError: the package or its driver is missing, or there are no such lines.
         """
         self._lines = lines
@@ -42,6 +43,11 @@ class DigitalOutputLine:
             self._task.do_channels.add_do_chan(lines, line_grouping=constants.LineGrouping.CHAN_PER_LINE)
             self._count = int(self._task.number_of_channels)
             self._write(0)
+        if self._count < lasers:
+            raise BadInputError(
+                f"lasers at {lines}: expected a line for each of the rig's {lasers} lasers, the board has"
+                f" {self._count} there; name as many lines in the rig file (devices: lasers: port)"
+            )
 
     def identify(self, boot_s: float) -> str:
         """Which board; it needs no time to start.
@@ -57,13 +63,8 @@ class DigitalOutputLine:
         """The lasers of `mask` on and the others off, until they are put off: the lease is the guardian's.
 
         Raises:
-            RigNotReadyError: there is no such line, or the board does not take it.
+            RigNotReadyError: the board does not take it.
         """
-        if mask >> self._count:
-            raise RigNotReadyError(
-                f"lasers at {self._lines}: expected a line for laser {mask.bit_length()}, the board has"
-                f" {self._count} there; name as many lines as the rig has lasers"
-            )
         with self._asked("set the lines"):
             self._write(mask)
 

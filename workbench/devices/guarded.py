@@ -18,15 +18,22 @@ from workbench.model.rig import LaserDriver
 
 ANSWER_S = 10.0
 """Longer than the guardian takes for anything: twice two requests of a second, and a busy computer."""
+LET_GO_S = 3.0
+"""For a guardian to end where an off is not confirmed and somebody has to be told soon."""
+TRY_BOARD_S = 60.0
+"""How long a guardian goes on trying to put off, without its workbench, what no lease would end."""
 
 
 class Guarded:
     """A guardian process, see `guardian.py`. It holds the port until this is closed, or its process ends."""
 
-    def __init__(self, driver: LaserDriver, port: str, baud: int, boot_s: float, hang_s: float) -> None:
+    def __init__(
+        self, driver: LaserDriver, port: str, baud: int, lasers: int, boot_s: float, hang_s: float
+    ) -> None:
         """Start it, and wait until every laser is off.
 
         Raises:
+            BadInputError: a board's port names fewer lines than there are `lasers`.
             RigNotReadyError: no such port, another program holds it, or nobody answers as expected.
             LaserOffNotConfirmedError: the controller answers, but not that all are off.
         """
@@ -34,7 +41,7 @@ class Guarded:
         self._answers, answers = os.pipe()
         signals, self._signals = os.pipe()
         os.set_blocking(self._signals, False)
-        call = [driver, port, str(baud), str(boot_s), str(hang_s), str(signals)]
+        call = [driver, port, str(baud), str(lasers), str(boot_s), str(hang_s), str(signals)]
         # -P: what lies in the current folder is not imported. A session of its own: no terminal reaches it.
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-P", "-m", "workbench.devices.guardian", *call],
@@ -45,6 +52,7 @@ class Guarded:
         )
         for theirs in (commands, answers, signals):
             os.close(theirs)
+        self._has_leases = driver != "nidaqmx"
         self.is_open = True
         self._heard = b""
         self._asked = 0
@@ -78,7 +86,13 @@ class Guarded:
             os.write(self._commands, f"{command}\n".encode())
 
     def close(self) -> None:
-        """Let it go: it puts everything off and ends."""
+        """Let it go: it puts everything off and ends.
+
+        Where no lease of the hardware would end what is lit, one that does not come to its end is left at it.
+
+        Raises:
+            LaserOffNotConfirmedError: it is.
+        """
         if not self.is_open:
             return
         self.is_open = False
@@ -87,8 +101,17 @@ class Guarded:
         for ours in (self._signals, self._commands, self._answers):
             os.close(ours)
         try:
-            self._process.wait(ANSWER_S)
+            self._process.wait(ANSWER_S if self._has_leases else LET_GO_S)
         except subprocess.TimeoutExpired:
+            if not self._has_leases:
+                # Something has to wait for its end.
+                threading.Thread(target=self._process.wait, daemon=True).start()
+                raise LaserOffNotConfirmedError(
+                    "the lasers may be on: the board has not confirmed that they are off; treat the beams"
+                    " as on, cut the lasers' supply. The guardian (process"
+                    f" {self._process.pid}) goes on trying for some {TRY_BOARD_S:g} s, and holds the board as"
+                    " long; then run `workbench lasers off`"
+                ) from None
             self._process.kill()
             self._process.wait()
 

@@ -32,6 +32,7 @@ from dataclasses import dataclass
 
 from workbench.devices.controller_line import ControllerLine
 from workbench.devices.digital_output import DigitalOutputLine
+from workbench.devices.guarded import TRY_BOARD_S
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError, WorkbenchError
 
 LOOK_S = 0.02
@@ -39,8 +40,6 @@ LOOK_S = 0.02
 child holds open does not."""
 TRY_ALONE_S = 1.0
 """How long it goes on trying to put off when there is nobody left to tell: twice the longest lease."""
-TRY_BOARD_S = 60.0
-"""The same where the hardware has no lease that would end it."""
 RENEW = 5
 """A lease is renewed when a fifth of it has gone."""
 Line = ControllerLine | DigitalOutputLine
@@ -113,7 +112,7 @@ class Guardian:
         try:
             self._serve()
         finally:
-            code = self._leave()
+            code = self.leave()
         return code
 
     def _serve(self) -> None:
@@ -212,7 +211,7 @@ class Guardian:
     def _stopped(self) -> StoppedError:
         return StoppedError(f"stopped by {self._workbench.told_to_end}; the lasers were put off at once")
 
-    def _leave(self) -> int:
+    def leave(self) -> int:
         """Off, and tried again for a while: there is nobody left who would."""
         deadline = time.monotonic() + (TRY_ALONE_S if self._line.has_leases else TRY_BOARD_S)
         while True:
@@ -241,7 +240,7 @@ def answer(number: int, act: Callable[[], object]) -> int:
     return code
 
 
-def main(driver: str, port: str, baud: int, boot_s: float, hang_s: float, signals: int) -> int:
+def main(driver: str, port: str, baud: int, lasers: int, boot_s: float, hang_s: float, signals: int) -> int:
     """Hold the port, or the lines of a board, until the workbench is gone."""
     # What a terminal, or a system that goes down, sends to everybody. The workbench's end is what counts.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
@@ -253,15 +252,21 @@ def main(driver: str, port: str, baud: int, boot_s: float, hang_s: float, signal
     opened: list[Line] = []
 
     def connect() -> str:
-        on_board = driver == "nidaqmx"
-        opened.append(DigitalOutputLine(port) if on_board else ControllerLine(port, baud, workbench.alarm))
+        if driver == "nidaqmx":
+            opened.append(DigitalOutputLine(port, lasers))
+        else:
+            opened.append(ControllerLine(port, baud, workbench.alarm))
         identity = opened[0].identify(boot_s)
         opened[0].all_off()
         return identity
 
-    return answer(0, connect) or Guardian(workbench, opened[0], hang_s).serve()
+    code = answer(0, connect)
+    if code not in {0, LaserOffNotConfirmedError.exit_code}:
+        return code
+    guardian = Guardian(workbench, opened[0], hang_s)
+    return guardian.leave() if code else guardian.serve()
 
 
 if __name__ == "__main__":
-    _, driver, port, baud, boot_s, hang_s, signals = sys.argv
-    sys.exit(main(driver, port, int(baud), float(boot_s), float(hang_s), int(signals)))
+    _, driver, port, baud, lasers, boot_s, hang_s, signals = sys.argv
+    sys.exit(main(driver, port, int(baud), int(lasers), float(boot_s), float(hang_s), int(signals)))

@@ -47,11 +47,12 @@ class SerialLaserBank:
         A controller that starts anew when its port is opened (an Arduino does) has `boot_s` to answer.
 
         Raises:
+            BadInputError: a board's port names fewer lines than lasers.
             RigNotReadyError: no such port, another program holds it, or nobody answers as expected.
             LaserOffNotConfirmedError: the controller answers, but not that all are off.
         """
         self.ids = tuple(ids)
-        self._guardian = Guarded(driver, port, baud, boot_s, hang_s)
+        self._guardian = Guarded(driver, port, baud, len(ids), boot_s, hang_s)
         self.identity = self._guardian.identity
         self._lit = False
 
