@@ -18,8 +18,8 @@ SHARED: Final = 3
 """Parameters before those of the single spots: background and both widths."""
 OWN: Final = 3
 """Parameters of each spot: flux, u, v."""
-# Beyond so many widths a spot has a billionth of its light.
-_REACH_WIDTHS: Final = 6.0
+# Beyond so many widths along an axis a spot has a millionth of its light.
+_REACH_WIDTHS: Final = 5.0
 
 
 @compiled

@@ -54,17 +54,15 @@ def test_the_sums_of_a_joint_fit_are_those_of_its_derivatives(k: int) -> None:
     add_pairs(params, along_u, along_v, box, weight, information)
     expected = (dense * weight.ravel()) @ dense.T
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-    np.testing.assert_allclose(information / scale, expected / scale, atol=1e-8)
-    np.testing.assert_allclose(
-        gradient / np.sqrt(np.diag(expected)),
-        dense @ (weight * residual).ravel() / np.sqrt(np.diag(expected)),
-        atol=1e-6,
-    )
+    # Light beyond five widths is left out: a millionth, which a derivative by the width weighs by z^2.
+    np.testing.assert_allclose(information / scale, expected / scale, atol=1e-5)
+    pulled = dense @ (weight * residual).ravel()
+    np.testing.assert_allclose((gradient - pulled) / np.sqrt(np.diag(expected)), 0.0, atol=1e-4)
     root = rng.normal(size=(m, 2 * m))
     cov = root @ root.T / scale
     leverages(params, along_u, along_v, box, cov, leverage)
     theirs = ((cov @ dense) * dense).sum(axis=0).reshape(shape)
-    np.testing.assert_allclose(leverage, theirs, rtol=1e-6, atol=1e-6 * theirs.max())
+    np.testing.assert_allclose(leverage, theirs, atol=1e-5 * theirs.max())
 
 
 def test_the_deviations_of_spots_fitted_together_are_right_to_second_order() -> None:
