@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.proofs import bound, report, simulate, study
+from tests.proofs import bound, report, shapes, simulate, study
 from tests.proofs.ranging import ranges
 from tests.proofs.solve import at_once, one_by_one
 from tests.unit.rigs import STANDOFFS_MM, World, thesis_rig
@@ -87,3 +87,23 @@ def test_one_by_one_is_at_once_where_every_term_stays() -> None:
     free = sd > 0
     np.testing.assert_allclose((single.sensor - many.sensor)[free] / sd[free], 0.0, atol=1e-5)
     np.testing.assert_allclose(single.covariance, many.covariance, atol=1e-6 * many.covariance.max())
+
+
+def test_the_table_of_shapes_in_the_docs_is_what_comes_out() -> None:
+    """Two of its columns; another processor's rounding may tip a reading or two of a thousand."""
+    documented = _cells((ROOT / "docs/ranging.md").read_text().splitlines())
+    computed = _cells(list(shapes.table((600, 2000))))
+    assert computed.keys() == documented.keys() == shapes.ROWS.keys()
+    for name, cells in computed.items():
+        told = [documented[name][shapes.CLOSEST_MM.index(at)] for at in (600, 2000)]
+        np.testing.assert_allclose(told, cells, atol=1.0, err_msg=name)
+
+
+def _cells(lines: list[str]) -> dict[str, list[tuple[float, ...]]]:
+    """The table's rows by name, each cell as its two numbers."""
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    return {
+        row[0]: [tuple(float(part) for part in cell.split("/")) for cell in row[1:]]
+        for row in rows
+        if row[0] in shapes.ROWS and "/" in row[1]
+    }

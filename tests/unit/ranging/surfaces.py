@@ -1,0 +1,59 @@
+"""Surfaces before one line of lasers, and noisy readings of them with an exact calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.ranging.points import Points
+from workbench.ranging.shape import Shape, fit_shape
+
+Floats = NDArray[np.float64]
+Surface = Callable[[Floats], Floats]
+X = np.array([-60.0, -30.0, 30.0, 60.0])
+SD_PX = 0.064  # a spot's 0.05 px and the speckle's 0.04
+F_PX = 533.0
+
+
+def flat(range_mm: float) -> Surface:
+    return lambda x: np.full_like(x, range_mm)
+
+
+def incline(range_mm: float, angle_deg: float) -> Surface:
+    """`range_mm` is the closest, at the left end."""
+    return lambda x: range_mm + np.tan(np.radians(angle_deg)) * (x - X[0])
+
+
+def parabola(range_mm: float) -> Surface:
+    return lambda x: range_mm + 0.02 * x**2
+
+
+def cubic(range_mm: float) -> Surface:
+    return lambda x: range_mm + 0.0003 * (x - X[0]) ** 3
+
+
+def cylinder(range_mm: float, axis_x_mm: float = 0.0, radius_mm: float = 89.0) -> Surface:
+    return lambda x: range_mm + radius_mm - np.sqrt(radius_mm**2 - (x - axis_x_mm) ** 2)
+
+
+def seen(x: Floats, range_mm: Floats, sd_px: float = SD_PX) -> Points:
+    """What spots of this deviation tell: r^2 / (f b) of it in range."""
+    return Points(x, range_mm, np.diag((sd_px * range_mm**2 / (F_PX * np.abs(x))) ** 2))
+
+
+def readings(surface: Surface, n: int, seed: int, x: Floats = X, sd_px: float = SD_PX) -> list[Shape]:
+    """n noisy readings: Gaussian in pixels, that is in the inverse of the range."""
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(0.0, 1.0, (n, len(x))) * sd_px / (F_PX * np.abs(x))
+    return [fit_shape(seen(x, 1.0 / (1.0 / surface(x) + e), sd_px)) for e in noise]
+
+
+def share(shapes: list[Shape], is_so: Callable[[Shape], bool]) -> float:
+    return float(np.mean([is_so(s) for s in shapes]))
+
+
+def holds(shape: Shape, true_mm: float) -> bool:
+    nearest, farthest = shape.closest_interval_mm
+    return nearest <= true_mm <= farthest
