@@ -17,7 +17,7 @@ from tests.unit.test_calibration_file import PROVENANCE
 from workbench.calibration.export import calibrate
 from workbench.calibration.fit import fit
 from workbench.model.acceptance import Acceptance
-from workbench.model.rig import load_rig
+from workbench.model.rig import Rig, load_rig
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
 from workbench.spots import Finding, SpotFinder
@@ -39,8 +39,8 @@ SCENES: dict[str, Scene] = {
 class Bench:
     """A ranger of some lines of lasers, and frames of one scene for it."""
 
-    def __init__(self, axes: str) -> None:
-        rig = load_rig(RIG)
+    def __init__(self, axes: str, rig: Rig | None = None) -> None:
+        rig = rig or load_rig(RIG)
         self.rig = rig.model_copy(update={"lasers": tuple(s for s in rig.lasers if s.axis in axes)})
         self.world = World(self.rig, 3)
         calibration, _ = calibrate(fit(self.rig, self.world.sightings()), Acceptance(), PROVENANCE)
