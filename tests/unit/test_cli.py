@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
+from workbench.cli import leaving
 from workbench.cli.main import main
 from workbench.cli.stopping import SIGNALS
 from workbench.model.calibration import load_calibration
@@ -37,6 +39,9 @@ Run = Callable[..., Outcome]
 @pytest.fixture
 def workbench(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
     before = {number: signal.getsignal(number) for number in SIGNALS}
+
+    monkeypatch.setattr(os, "_exit", sys.exit)  # the tests' own process goes on
+    monkeypatch.setattr(leaving, "all_written", False)
 
     def run(*arguments: object) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["workbench", *map(str, arguments)])
@@ -366,3 +371,14 @@ class TestDesign:
         )
         rig.write_text(text)
         refused(workbench("design", "--rig", rig), 2, "bench.reach_mm", "expected [nearest, farthest] in mm")
+
+
+def test_a_fit_whose_result_nobody_reads_ends_as_stopped(tmp_path: Path) -> None:
+    """The calibration is on disk; what is left of the output finds its pipe closed, or its disk full."""
+    output = tmp_path / "webcam.yaml"
+    script = Path(sys.executable).with_name("workbench")
+    command: list[str | Path] = [script, "fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", output, "--json"]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, output.is_file()) == (5, True), done.stderr
+    assert "Traceback" not in done.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import log
 
 import numpy as np
@@ -214,3 +215,15 @@ def test_no_order_is_left_out_below_one_that_stays() -> None:
 def test_a_term_to_keep_that_is_none_is_named(name: str) -> None:
     with pytest.raises(BadInputError, match=f"--keep {name}: expected a term .* k2, k1, ruler_scale, tilts"):
         chosen(thesis_rig(), World(thesis_rig(), 3), keep=(name,))
+
+
+def test_a_smaller_model_is_fitted_to_the_captures_in_their_order() -> None:
+    """What moved is found by the order of captures, those with a stray spot among them."""
+    rig = thesis_rig()
+    square = rig.model_copy(update={"bench": rig.bench.model_copy(update={"tilt_sd_deg": 0.0})})
+    by_repeat = sorted(World(square, 3).sightings(), key=lambda s: (s.standoff_mm, s.source[::-1]))
+    sightings = [replace(by_repeat[0], u_px=by_repeat[0].u_px + 3.0), *by_repeat[1:]]
+    fitted = fit_chosen(rig, sightings)
+    assert told(fitted)["tilts"].verdict == "absent"
+    assert [r.stray for r in fitted.rejected] == [sightings[0]]
+    assert fitted.cells.captures == tuple(sightings)

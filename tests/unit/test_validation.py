@@ -12,6 +12,7 @@ from tests.unit.rigs import STANDOFFS_MM, World, thesis_rig
 from tests.unit.spoilt import told_as
 from workbench.calibration.assess import judge
 from workbench.calibration.fit import fit
+from workbench.calibration.problem import Problem
 from workbench.calibration.refit import measured, optimum_of, problem_of, refit, rows_of
 from workbench.calibration.sightings import sight_rows
 from workbench.calibration.validation import LeftOut, alarms, leave_each_out
@@ -46,6 +47,24 @@ def test_a_fold_is_the_fit_without_the_placement(standoff_mm: float) -> None:
     assert np.abs(off).max() < 1e-3
     sd = whole.table.prior_sd[sensor] * np.sqrt(np.diag(left.covariance)[sensor])
     np.testing.assert_allclose(sd, without.sd[sensor], rtol=1e-3)
+
+
+def test_what_a_standoff_moves_is_its_difference() -> None:
+    problem, y = (
+        problem_of(fit(RIG, World(RIG, 1).sightings())),
+        optimum_of(fit(RIG, World(RIG, 1).sightings())),
+    )
+    step_mm = 1e-3
+    ahead, behind = (
+        Problem(
+            problem.layout,
+            problem.data._replace(standoff_mm=np.asarray(problem.data.standoff_mm) + sign * step_mm),
+        ).linearise(y, 2.0)[0]
+        for sign in (1, -1)
+    )
+    np.testing.assert_allclose(
+        problem.by_standoff(y, 2.0), (ahead - behind) / (2 * step_mm), rtol=1e-6, atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
 from workbench.calibration.assess import Assessment, determined_by, judge
 from workbench.calibration.fit import Fit
@@ -19,6 +13,7 @@ from workbench.calibration.observations import positions, stated_sd
 from workbench.calibration.records import term_summaries
 from workbench.calibration.sensor import Sensor
 from workbench.calibration.significance import without_idle
+from workbench.calibration.yaml_text import yaml_text
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import (
     Calibration,
@@ -33,9 +28,6 @@ from workbench.model.calibration import (
     Validity,
 )
 from workbench.session.files import write_output
-
-NO_WRAPPING = 10**9
-"""OpenCV reads a list of any length but no string that goes on in the next line."""
 
 
 def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Calibration, Assessment]:
@@ -74,32 +66,8 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
 
 
 def render(calibration: Calibration) -> str:
-    """The YAML text, in the subset that OpenCV, ROS, yaml-cpp and PyYAML read alike."""
-    yaml = YAML()
-    yaml.version = (1, 2)
-    yaml.width = NO_WRAPPING
-    yaml.indent(mapping=2, sequence=4, offset=2)
-    stream = io.StringIO()
-    yaml.dump(_plain(calibration.model_dump()), stream)
-    return stream.getvalue()
-
-
-def _plain(value: Any) -> Any:
-    """Strings quoted (OpenCV refuses a plain one that begins with a digit), lists of words on one line."""
-    if isinstance(value, dict):
-        return CommentedMap({key: _plain(item) for key, item in value.items()})
-    if isinstance(value, tuple | list):
-        items = CommentedSeq([_plain(item) for item in value])
-        if not any(isinstance(item, dict) for item in value) and not _has_sentences(value):
-            items.fa.set_flow_style()
-        return items
-    if isinstance(value, str):
-        return DoubleQuotedScalarString(value)
-    return value
-
-
-def _has_sentences(value: Sequence[Any]) -> bool:
-    return any(isinstance(item, str) and " " in item for item in value)
+    """The YAML text."""
+    return yaml_text(calibration.model_dump())
 
 
 def _calibration(

@@ -129,7 +129,17 @@ def fit(
     """
     _check(rig, sightings)
     cells, strays = group(sightings, rig.laser_ids, rig.noise)
-    cells = with_placements(cells, boards)
+    return fit_cells(rig, with_placements(cells, boards), (*rejected, *strays), boards)
+
+
+def fit_cells(
+    rig: Rig, cells: Cells, rejected: Sequence[Rejected] = (), boards: Sequence[BoardView] = ()
+) -> Fit:
+    """As `fit`, of what is averaged already, with the boards' placements among the cells'.
+
+    Raises:
+        LimitFailedError: the fit does not come to a finite result.
+    """
     table = table_of(rig, cells.placements, boards)
     problem = Problem.of(len(rig.lasers), table, cells, boards, rig.board)
     scale = 1.0
@@ -150,7 +160,7 @@ def fit(
         rig=rig,
         table=table,
         cells=cells,
-        rejected=(*name_out_of_frame(rig, values, rejected), *strays),
+        rejected=name_out_of_frame(rig, values, rejected),
         values=values,
         covariance=solution.covariance * np.outer(table.prior_sd, table.prior_sd),
         prior_pull=np.where(table.prior_sd > 0, solution.y, 0.0),

@@ -133,11 +133,13 @@ def group(
         _check_placement(placements.setdefault(s.placement, PlacementInfo.of(s)), s)
     kept: dict[tuple[str, str], list[Sighting]] = {}
     rejected: list[Rejected] = []
-    usual = usual_scale([_scatter(members, noise) for members in buckets.values()])
-    for key, members in buckets.items():
+    scatter = [_scatter(members, noise) for members in buckets.values()]
+    usual = usual_scale(scatter)
+    for n, (key, members) in enumerate(buckets.items()):
         kept[key], dropped = _without_strays(members, noise, usual)
+        if dropped:
+            scatter[n] = _scatter(kept[key], noise)
         rejected += dropped
-    scatter = [_scatter(members, noise) for members in kept.values()]
     torn = [n for n, one in enumerate(scatter) if is_torn(one, usual)]
     alike = [one for n, one in enumerate(scatter) if n not in torn]
     scale = float(scale_called_for(sum(chi2 for chi2, _ in alike), sum(free for _, free in alike)))

@@ -88,15 +88,19 @@ class Problem:
 
         u and v of one position after the other, spots first; 0 where not measured.
         """
-        residual, jacobian = _linearise(y, self.data, self.layout)
+        residual, jacobian, _ = _linearise(y, self.data, self.layout)
         return np.asarray(residual) / scale, np.asarray(jacobian) / scale
+
+    def by_standoff(self, y: FloatArray, scale: float = 1.0) -> FloatArray:
+        """(2 M,) derivatives of the residuals of `linearise` by the standoff of their own placement, a mm."""
+        return np.asarray(_linearise(y, self.data, self.layout)[2]) / scale
 
     def solve(self, scale: float) -> Solution:
         """Solve with the pixel noise `scale` times what was stated."""
         inverse_sd = np.asarray(self.data.inverse_sd)
         data = self.data._replace(inverse_sd=inverse_sd / scale)
         y, converged = _solve(data, self.layout)
-        residual, jacobian = (np.asarray(part) for part in _linearise(np.asarray(y), data, self.layout))
+        residual, jacobian, _ = (np.asarray(part) for part in _linearise(np.asarray(y), data, self.layout))
         information = jacobian.T @ jacobian
         covariance = np.linalg.inv(information + np.eye(len(information)))
         freedom = int((inverse_sd > 0).sum()) - float(np.trace(information @ covariance))
@@ -142,9 +146,18 @@ def _solve(data: _Data, layout: Layout) -> tuple[Array, Array]:
 
 
 @kept(static=1)
-def _linearise(y: Array, data: _Data, layout: Layout) -> tuple[Array, Array]:
-    """Residuals of the data (2 M,) and their derivatives (2 M, P), both in standard deviations."""
-    return _data_residual(y, data, layout), jax.jacfwd(_data_residual)(y, data, layout)
+def _linearise(y: Array, data: _Data, layout: Layout) -> tuple[Array, Array, Array]:
+    """Residuals of the data (2 M,) in standard deviations, and their derivatives by y and standoff.
+
+    (2 M, P), and (2 M,) a mm: each residual has to do with the standoff of one placement alone.
+    """
+
+    def residual(y: Array, farther_mm: Array) -> Array:
+        standoff_mm = jnp.asarray(data.standoff_mm) + farther_mm
+        return _data_residual(y, data._replace(standoff_mm=standoff_mm), layout)
+
+    here = jnp.zeros(())
+    return residual(y, here), *jax.jacfwd(residual, (0, 1))(y, here)
 
 
 def _data_residual(y: Array, data: _Data, layout: Layout) -> Array:

@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, wraps
-from importlib.metadata import version
+from importlib.metadata import distribution, version
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -93,7 +93,13 @@ def _origin() -> str:
     """What a program depends on beside its function's arguments: our maths, the tracers, the processor."""
     sources = [path for room in (optics, calibration) for path in _sources(room.__path__[0])]
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
-    return repr((digest, [version(name) for name in TRACED_BY], jax.default_backend()))
+    return repr((digest, [_version(name) for name in TRACED_BY], jax.default_backend()))
+
+
+def _version(name: str) -> str:
+    """Of a distribution; `importlib.metadata.version` parses all that is told of it, and takes far longer."""
+    told = distribution(name).read_text("METADATA") or version(name)
+    return next((line for line in told.splitlines() if line.startswith("Version:")), told)
 
 
 def _sources(folder: str) -> list[Path]:

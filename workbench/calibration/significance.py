@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from workbench.calibration.boards import BoardView
-from workbench.calibration.fit import Fit, fit, table_of
+from workbench.calibration.fit import Fit, fit, fit_cells, table_of
 from workbench.calibration.observations import Rejected, Sighting
 from workbench.calibration.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.problem import Problem
@@ -94,7 +94,7 @@ def fit_chosen(
     )
 
     def refit(model: Rig) -> Fit:
-        return fit(model, sound.used, sound.rejected, boards)
+        return fit_cells(model, sound.cells, sound.rejected, boards)
 
     fitted = refit(rig) if missing else sound
     if fitted is not whole:

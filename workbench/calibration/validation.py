@@ -41,8 +41,6 @@ FloatArray = NDArray[np.float64]
 FALSE_ALARM = 1e-3
 """Of one fit whose priors and noise are as stated: the chance that any of its standoffs raises an alarm."""
 FEWEST_PLACEMENTS = 3
-STANDOFF_STEP = 1e-4
-"""Relative change of a standoff by which its effect on the spots is taken."""
 
 
 @dataclass(frozen=True)
@@ -157,14 +155,7 @@ def _without(start: FloatArray, fit: Fit, key: str) -> FloatArray:
 
 def by_standoff(left: Refit) -> FloatArray:
     """(R,) change of the residuals with the standoff of their placement, a mm."""
-    data = left.problem.data
-    standoff = np.asarray(data.standoff_mm, float)
-    step = STANDOFF_STEP * standoff
-    stepped = (data._replace(standoff_mm=standoff + sign * step) for sign in (1.0, -1.0))
-    problems = (Problem(left.problem.layout, numbers) for numbers in stepped)
-    ahead, behind = (problem.linearise(left.y, left.scale)[0] for problem in problems)
-    placement = np.concatenate([data.spots.placement, data.corners.placement]).astype(int)
-    return np.asarray((ahead - behind) / np.repeat(2 * step[placement], 2))
+    return left.problem.by_standoff(left.y, left.scale)
 
 
 def predictive(left: Refit, rows: NDArray[np.bool_]) -> FloatArray:

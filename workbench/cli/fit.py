@@ -69,14 +69,16 @@ def fit_captures(request: Request, as_json: bool) -> None:
     data = _sightings(rig, parse_captures(captures, content), request)
     fitted = fit_chosen(rig, *data, keep=request.kept)
     calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
+    refused = assessment.verdict == "refused" and request.accept is None
+    if assessment.verdict == "refused" and request.accept is not None:
+        calibration = kept_because(calibration, request.accept)
+    if not refused:  # before anything is printed, which may fail: the output's reader may be gone
+        write_calibration(request.output, calibration)
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))
     _print_tables(fitted, assessment)
-    if assessment.verdict == "refused":
-        if request.accept is None:
-            raise LimitFailedError(_refusal(request.output, assessment.reasons))
-        calibration = kept_because(calibration, request.accept)
-    write_calibration(request.output, calibration)
+    if refused:
+        raise LimitFailedError(_refusal(request.output, assessment.reasons))
     kept = "" if request.accept is None or assessment.verdict == "accepted" else f", kept: {request.accept}"
     Console(stderr=True).print(f"{request.output} written{kept}", highlight=False, soft_wrap=True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import traceback
@@ -11,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from workbench.cli import leaving
 from workbench.cli.leaving import leave
 from workbench.cli.stopping import stop_at_once
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
@@ -165,6 +167,7 @@ def fit(
         source, rig, output, accept, tuple(without_standoff or ()), tuple(fix or ()), tuple(keep or ())
     )
     fit_captures(request, json)
+    leaving.all_written = True
 
 
 @app.command()
@@ -265,8 +268,6 @@ def main() -> None:
     """Entry point: every expected failure becomes a message and its exit code."""
     # Before numpy loads: for matrices as small as a fit's a second thread costs more than it gains.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Imports make 10^5 objects that stay; looking for garbage among them is a tenth of a short command.
-    gc.set_threshold(100_000)
     stop_at_once()
     try:
         app()
@@ -278,7 +279,10 @@ def main() -> None:
         unsafe = isinstance(error, LaserOffNotConfirmedError)
         _say(f"error: {error}", red=unsafe)
         leave(error.exit_code)
-    except Exception:
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno == errno.ENOSPC and error.filename is None:
+            _say(f"error: what is printed cannot be written: {error.strerror}")
+            leave(StoppedError.exit_code)
         traceback.print_exc()
         _say("internal error: this is a defect of the workbench, please report it with the lines above")
         leave(INTERNAL_ERROR)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar, cast
 
 import jax.numpy as jnp
 import numpy as np
@@ -26,13 +26,18 @@ class Lens(NamedTuple):
     k3: ArrayLike = 0.0
 
 
+def as_array(x: ArrayLike) -> Array:
+    """JAX's, but for numpy's, which stays: so the same maths is done on complex numbers without a program."""
+    return cast("Array", x) if isinstance(x, np.ndarray) else jnp.asarray(x)
+
+
 def distort(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
     """Distorted normalised coordinates of the undistorted (x, y); shapes broadcast.
 
     Source: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37 (1971), with
     OpenCV's order of coefficients.
     """
-    x, y = jnp.asarray(x), jnp.asarray(y)
+    x, y = as_array(x), as_array(y)
     r2 = x * x + y * y
     radial = 1.0 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3))
     x_distorted = x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x)
@@ -43,8 +48,8 @@ def distort(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
 def project(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
     """Pixel position (u, v) of the undistorted normalised coordinates x = X/Z, y = Y/Z."""
     x_distorted, y_distorted = distort(lens, x, y)
-    f_px = jnp.asarray(lens.f_px)
-    return jnp.asarray(lens.cx_px) + f_px * x_distorted, jnp.asarray(lens.cy_px) + f_px * y_distorted
+    f_px = as_array(lens.f_px)
+    return as_array(lens.cx_px) + f_px * x_distorted, as_array(lens.cy_px) + f_px * y_distorted
 
 
 def radial_slope(lens: Lens, x: Numbers, y: Numbers) -> Numbers:

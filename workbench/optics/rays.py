@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from workbench.optics.lens import Lens, project
+from workbench.optics.lens import Lens, as_array, project
 
 
 class Ray(NamedTuple):
@@ -40,8 +40,8 @@ def spot_at_inverse_depth(lens: Lens, ray: Ray, inverse_depth_per_mm: ArrayLike)
     In inverse depth the undistorted image point moves along a straight line at constant speed, which is why
     the ranger solves for it rather than for z.
     """
-    x = ray.tx + ray.x_mm * jnp.asarray(inverse_depth_per_mm)
-    y = ray.ty + ray.y_mm * jnp.asarray(inverse_depth_per_mm)
+    x = ray.tx + ray.x_mm * as_array(inverse_depth_per_mm)
+    y = ray.ty + ray.y_mm * as_array(inverse_depth_per_mm)
     return project(lens, x, y)
 
 
