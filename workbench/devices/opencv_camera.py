@@ -256,9 +256,17 @@ def _set(capture: cv2.VideoCapture, source: str, number: int, name: str, value: 
 
 
 def _grey(image: np.ndarray[Any, Any]) -> Image:
-    """Of colours the brightest: it is the laser's, and tells when that is clipped.
+    """Of colours their weighted mean, which is linear in the light and sharper than any of them by itself.
 
-    Their weighted mean does not: a red spot clipped long ago is at 30 % of full scale there.
+    Where one of them is clipped it is not linear any more: such a pixel is given as clipped. (The mean of a
+    red spot that was clipped long ago is at 30 % of full scale.)
     """
-    grey: Image = image if image.ndim == 2 else image[:, :, :3].max(axis=2)
+    if image.ndim == 2:
+        return image
+    if image.shape[2] == 1:
+        return image[:, :, 0]
+    grey: Image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=image.dtype)
+    blue, green, red = cv2.split(image)[:3]
+    full_scale = np.iinfo(image.dtype).max
+    grey[np.asarray(cv2.max(cv2.max(blue, green), red)) == full_scale] = full_scale
     return grey
