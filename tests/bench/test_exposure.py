@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
+from tests.bench.sensors import calibration_of
 from tests.crash.short import CALLER, PROCEDURE, go_on, results, story, write_files
+from workbench.cli.live import LiveRequest, _read_all
+from workbench.cli.stopping import StopAfterShot
+from workbench.devices.registry import open_bench
 from workbench.model import event as ev
+from workbench.model.captures import load_captures
 from workbench.model.errors import StoppedError
+from workbench.model.rig import load_rig
 from workbench.procedure.run import Plan, run
+from workbench.ranging.ranger import Ranger
+from workbench.session.capture_table import write_capture_table
 from workbench.session.journal import read_journal
 
 CAPTURES = PROCEDURE[: PROCEDURE.index("  - step: fit")].replace("[300, 600, 1500]", "[130, 600, 2500]")
@@ -65,6 +75,35 @@ def test_a_stop_right_after_it_was_set(tmp_path: Path, stop_after: int) -> None:
     go_on(tmp_path / "cut/s")
     assert story(tmp_path / "cut/s") == story(whole)
     assert results(tmp_path / "cut/s") == results(whole)
+
+
+def test_the_captures_table_tells_exposure_and_unit(tmp_path: Path) -> None:
+    done = session(tmp_path / "a")
+    captures = [r.event for r in read_journal(done) if isinstance(r.event, ev.CaptureTaken)]
+    write_capture_table(tmp_path / "captures.csv", captures)
+    rows = load_captures(tmp_path / "captures.csv")
+    assert [(row.exposure, row.exposure_unit) for row in rows] == [
+        (e.exposure, "us") for e in told(done) for _ in range(2)
+    ]
+
+
+@pytest.mark.parametrize("virtual", [True, False])
+def test_live_ranging_says_that_it_sets_no_exposure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], virtual: bool
+) -> None:
+    """The virtual bench meters by itself; a real camera does not."""
+    rig = load_rig(write_files(tmp_path)[0])
+    request = LiveRequest(tmp_path, tmp_path, readings=0, standoff_mm=500.0, stats=False)
+    with open_bench(rig, tmp_path / "s") as bench:
+        _read_all(
+            bench,
+            Ranger(calibration_of(rig)),
+            request,
+            False,
+            cast(StopAfterShot, SimpleNamespace(reason=None)),
+            virtual,
+        )
+    assert ("exposure stays as the rig file sets it" in " ".join(capsys.readouterr().err.split())) != virtual
 
 
 def test_a_fixed_exposure_is_left_alone(tmp_path: Path) -> None:

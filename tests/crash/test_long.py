@@ -6,10 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.crash.long import compare
+from tests.crash.long import KEPT_B, compare, growth
 
 
 @pytest.mark.parametrize("seed", [2])
 def test_a_session_with_random_faults_loses_nothing(tmp_path: Path, seed: int) -> None:
     told = compare(100, tmp_path, seed, mean_records=150)
     assert any("kill" in line or "stop" in line or "disk full" in line for line in told), told
+
+
+def test_a_shot_leaves_no_more_in_memory_than_the_fit_needs(tmp_path: Path) -> None:
+    left = growth(200, tmp_path)
+    most = sorted(left.items(), key=lambda each: -each[1])[:5]
+    assert 1000 < sum(left.values()) <= KEPT_B, most

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from workbench.model.captures import load_captures
+from workbench.model.captures import CaptureRow, load_captures
 from workbench.model.errors import BadInputError
 
 HEADER = "laser_id,standoff_mm,repeat,u_px,v_px"
 
 
-def load(tmp_path: Path, text: str) -> object:
+def load(tmp_path: Path, text: str) -> tuple[CaptureRow, ...]:
     path = tmp_path / "c.csv"
     path.write_text(text)
     return load_captures(path)
@@ -41,7 +41,9 @@ def test_images_are_relative_to_the_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", ["row 1", "missing: laser_id, standoff_mm, repeat"]),
+        ("", ["the file is empty; expected a header with laser_id, standoff_mm, repeat"]),
+        (HEADER.replace(",", ";") + "\n1;200;0;;42\n", ["separated by commas, got semicolons (;)"]),
+        (HEADER.replace(",", "\t") + "\n", ["separated by commas, got tabs"]),
         ("laser_id,standoff_mm,u_px\n", ["row 1", "missing: repeat"]),
         (f"{HEADER},colour\n", ["row 1", "got colour"]),
         (f"{HEADER},u_px\n", ["row 1", "every column once"]),
@@ -89,3 +91,17 @@ def test_any_bytes_are_read_or_refused_by_name(tmp_path: Path, body: bytes) -> N
     path.write_bytes(HEADER.encode() + b"\n" + body)
     with contextlib.suppress(BadInputError):
         assert load_captures(path)
+
+
+def test_a_session_that_has_no_captures_file_yet(tmp_path: Path) -> None:
+    with pytest.raises(
+        BadInputError, match=r"captures.csv: expected a captures file, there is none; .* resume"
+    ):
+        load_captures(tmp_path / "captures.csv")
+
+
+def test_the_unit_of_an_exposure(tmp_path: Path) -> None:
+    (row,) = load(tmp_path, f"{HEADER},exposure,exposure_unit\n1,200,0,,42,224.0,us\n")
+    assert (row.exposure, row.exposure_unit) == (224.0, "us")
+    (row,) = load(tmp_path, f"{HEADER},exposure\n1,200,0,,42,8\n")
+    assert (row.exposure, row.exposure_unit) == (8.0, "")

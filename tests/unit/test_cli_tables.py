@@ -38,6 +38,23 @@ def test_sessions_are_listed_with_whole_names(
     assert told[-1] == f"go on: workbench resume sessions/{names[1]}"
 
 
+def test_a_session_with_a_name_as_long_as_the_line_has_two(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ["20261122-214141-calibrate-flat", "20261122-214142-" + "calibrate-" * 6 + "x"]
+    found = [Standing(Path("sessions") / name, "finished", ("p",), 440, "done") for name in names]
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(sessions, "standings", lambda folder: found)
+    list_sessions(Path("sessions"), as_json=False)
+    told = capsys.readouterr().err.splitlines()
+    assert max(map(len, told)) <= 80
+    assert [line.split() for line in told] == [
+        [names[0], "finished", "440", "captures"],
+        [names[1]],
+        ["finished", "440", "captures"],
+    ]
+
+
 def reading(scene: str, status: str) -> Reading:
     lasers = [SimpleNamespace(laser_id=f"L{n}", range_mm=1000.0 + n) for n in range(4)]
     shape = SimpleNamespace(kind="incline", angle_rad=-0.0143, angle_sigma_rad=0.0033)

@@ -162,16 +162,56 @@ TOLD = records(
     (62, placed("b")),
     (65, taken("b1", 0.2)),
 )
-STEPS = [PlannedStep("p", 1, "grid", 3, 6), PlannedStep("p", 2, "fit", 0, 0)]
+STEPS = [PlannedStep("p", 1, "grid", 3, 6), PlannedStep("p", 2, "fit", 0, 0, 7.0)]
 
 
-def test_pace_is_the_median_of_what_was_measured() -> None:
+def test_pace_is_what_was_measured() -> None:
+    """Of placings the median, since somebody may go to lunch; of the rest the mean: sums are right."""
     meter = PaceMeter()
     for record in TOLD:
         meter.take(record)
-    pace = meter.pace(Pace(computing_s=7.0))
-    assert (pace.placing_s, pace.shot_s, pace.lit_s) == (30.0, 1.0, 0.2)
-    assert pace.computing_s == 7.0
+    pace = meter.pace(Pace(without_shots_s={"fit": 7.0}))
+    assert pace.placing_s == 30.0
+    assert pace.shot_s == pytest.approx(5 / 3)
+    assert pace.lit_s == pytest.approx(0.2)
+    assert (pace.exposing_s, pace.finishing_s) == (0.0, 0.0), "this camera's exposure is fixed"
+    assert pace.seconds(STEPS[1]) == 7.0
+
+
+def test_a_plan_takes_as_long_as_the_session_that_told_it() -> None:
+    """Nothing that a session does is left out: exposures, advice, each step without shots by itself."""
+    fit = ev.StepStarted(procedure="p", index=2, step="fit", title="fit", shots=0)
+    export = ev.StepStarted(procedure="p", index=3, step="export", title="export", shots=0)
+    exposure = ev.ExposureSet(key="a", exposure=1.0, unit="", peak=0.6, verdict="good", trials=3)
+    told = records(
+        (0, started(1, 4)),
+        (40, placed("a")),
+        (45, exposure),
+        (48, taken("a1", 0.1)),
+        (49, taken("a2", 0.1)),
+        (51, ev.PlacementFinished(key="a")),
+        (91, placed("b")),
+        (94, exposure),
+        (95, taken("b1", 0.1)),
+        (96, taken("b2", 0.1)),
+        (102, ev.PlacementFinished(key="b")),
+        (102, ev.StepFinished(procedure="p", index=1, outcome="")),
+        (102, fit),
+        (132, ev.StepFinished(procedure="p", index=2, outcome="")),
+        (132, export),
+        (133, ev.StepFinished(procedure="p", index=3, outcome="")),
+    )
+    meter = PaceMeter()
+    for record in told:
+        meter.take(record)
+    steps = [
+        PlannedStep("p", 1, "t", 2, 4),
+        PlannedStep("p", 2, "fit", 0, 0),
+        PlannedStep("p", 3, "export", 0, 0),
+    ]
+    pace = meter.pace(Pace())
+    assert sum(map(pace.seconds, steps)) == pytest.approx(133.0)
+    assert pace.seconds(PlannedStep("p", 1, "place", 1, 0)) == 40.0, "somebody has to place it"
 
 
 def test_what_a_stop_tore_apart_tells_no_duration() -> None:
@@ -183,12 +223,12 @@ def test_what_a_stop_tore_apart_tells_no_duration() -> None:
 
 
 def test_the_forecast_counts_placements_and_what_is_left() -> None:
-    forecast = Forecast(STEPS, Pace(computing_s=7.0))
+    forecast = Forecast(STEPS, Pace())
     for record in TOLD:
         forecast.take(record)
     assert (forecast.done, forecast.total) == (2, 4)
     # A placing and three shots of this step, and the fit.
-    assert forecast.seconds_left == pytest.approx(30.0 + 3 * 1.0 + 7.0)
+    assert forecast.seconds_left == pytest.approx(30.0 + 3 * 5 / 3 + 7.0)
 
 
 HEAD = "format: 1\nprocedure: p\ntitle: P\nsteps:\n"

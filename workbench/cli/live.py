@@ -24,6 +24,12 @@ from workbench.ranging.live import LiveRanger, check_same_sensor, latency_words
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.report.tables import reading_line
 
+FIXED_EXPOSURE = (
+    "the camera's exposure stays as the rig file sets it, whatever stands in the beams; a spot that is clipped"
+    " is told with its reading, and `workbench doctor` tells what is right at 500 mm"
+)
+"""Sessions set it at each placement; here nobody says when the target has moved."""
+
 
 @dataclass(frozen=True)
 class LiveRequest:
@@ -68,6 +74,8 @@ def _read_all(
 ) -> None:
     live = LiveRanger(ranger, bench)
     live.warm_up()
+    if not virtual:
+        Console(stderr=True).print(f"note: {FIXED_EXPOSURE}", highlight=False)
     if request.standoff_mm is not None:
         bench.target.place(Placement(key="live", standoff_mm=request.standoff_mm))
     for warning in live.get_ready():

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from workbench.model.errors import BadInputError
 from workbench.procedure.check import check_file
-from workbench.procedure.exposure import MOST_TRIALS
+from workbench.procedure.exposure import LIT_FRAMES, MOST_TRIALS
 from workbench.procedure.latency import LEASE_S
 from workbench.procedure.outline import Pace, PlannedStep, learn_pace, outline
 from workbench.procedure.run import Plan
@@ -54,18 +54,18 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
     )
     if trials := MOST_TRIALS * sum(step.placements for step in steps):
         console.print(
-            f"Where the camera's exposure is set, each placing takes up to {MOST_TRIALS} trial shots more, of"
-            f" all lasers at once: at most {trials} shots, {emission(trials, pace)}.",
+            f"Where the camera's exposure is set, each placing takes up to {MOST_TRIALS} trials more, of"
+            f" all lasers at once: at most {trials}, {emission(trials, pace, LIT_FRAMES)}.",
             highlight=False,
         )
     console.print(_told_by(pace, plan.rig.rig), highlight=False)
 
 
-def emission(shots: int, pace: Pace) -> str:
+def emission(shots: int, pace: Pace, lit_frames: int = 1) -> str:
     """Seconds of emission, as measured before or as the lease bounds them."""
     if pace.lit_s is None:
         return f"at most {shots * LEASE_S:.0f} s of emission (leases of {LEASE_S:g} s)"
-    return f"{shots * pace.lit_s:.1f} s of emission"
+    return f"{lit_frames * shots * pace.lit_s:.1f} s of emission"
 
 
 def duration(seconds: float) -> str:
@@ -94,7 +94,8 @@ def _table(steps: list[PlannedStep], pace: Pace) -> Table:
 def _told_by(pace: Pace, rig: str) -> str:
     if pace.sessions == 0:
         return (
-            f"Times are guesses: {pace.placing_s:g} s a placing, {pace.shot_s:g} s a shot; no session of"
-            f" {rig} has told them yet."
+            f"Times are guesses: {pace.placing_s:g} s a placing, {pace.exposing_s:g} s for its exposure,"
+            f" {pace.shot_s:g} s a shot; no session of {rig} has told them yet."
         )
-    return f"Times are medians over {pace.sessions} sessions of {rig}."
+    sessions = "the last session" if pace.sessions == 1 else f"the last {pace.sessions} sessions"
+    return f"Times as {sessions} of {rig} told them: medians of placings, means of the rest."

@@ -57,10 +57,15 @@ def find_session(name: Path | None, sessions: Path) -> Path:
 
 
 def _show(found: list[Standing], console: Console) -> None:
-    """A line each; how it ended stands below, where it did not end well: there it has room."""
-    widths = [max(len(each.session_dir.name) for each in found), max(len(each.state) for each in found)]
-    for each in found:
-        name, state = each.session_dir.name.ljust(widths[0]), each.state.ljust(widths[1])
-        console.print(f"{name}  {state}  {each.captures:6} captures", highlight=False, soft_wrap=True)
+    """A line each, two where a name is too long; how it ended stands below, where it did not end well."""
+    counted = [
+        f"{each.state:{max(len(e.state) for e in found)}}  {each.captures:6} captures" for each in found
+    ]
+    room = console.width - max(map(len, counted)) - 2
+    names = [each.session_dir.name for each in found]
+    width = max((len(name) for name in names if len(name) <= room), default=0)
+    for each, name, told in zip(found, names, counted, strict=True):
+        line = f"{name:{width}}  {told}" if len(name) <= room else f"{name}\n    {told}"
+        console.print(line, highlight=False, soft_wrap=True)
         if each.state != "finished":
             console.print(Padding(Text(each.why), (0, 0, 0, 4)))

@@ -22,6 +22,8 @@ LARGEST = 1e6
 NEAREST_MM = 1e-3
 SMALLEST_SD_PX = 1e-6
 LONGEST_REPEAT = 9
+SEPARATORS = {";": "semicolons (;)", "\t": "tabs", "|": "bars (|)"}
+"""Of other tables, and what people call them."""
 COLUMNS = (*REQUIRED, *IMAGES, *POSITION, *OPTIONAL)
 
 
@@ -67,6 +69,11 @@ def read_captures_file(path: Path) -> bytes:
     """
     try:
         return path.read_bytes()
+    except FileNotFoundError:
+        raise BadInputError(
+            f"{path}: expected a captures file, there is none; a session has one once it came to its fit:"
+            " `workbench resume` goes on with one that was stopped before"
+        ) from None
     except (OSError, ValueError) as error:
         raise BadInputError(f"{path}: expected a captures file: {error}") from None
 
@@ -99,6 +106,15 @@ def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
 def _check_header(path: Path, names: object) -> None:
     present = list(names) if isinstance(names, list) else []
     where = f"{path}: row 1"
+    if not present:
+        raise BadInputError(
+            f"{path}: the file is empty; expected a header with {', '.join(REQUIRED)} and more"
+        )
+    if len(present) == 1 and (others := [name for mark, name in SEPARATORS.items() if mark in present[0]]):
+        raise BadInputError(
+            f"{where}: expected columns separated by commas, got {others[0]}; save it as CSV with commas, and"
+            " with points in its numbers"
+        )
     if missing := [name for name in REQUIRED if name not in present]:
         needed = ", ".join(REQUIRED)
         raise BadInputError(f"{where}: expected the columns {needed}; missing: {', '.join(missing)}")

@@ -112,6 +112,8 @@ def _read(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise BadInputError(f"{path}: no such file; expected a YAML file") from None
+    except IsADirectoryError:
+        raise BadInputError(f"{path}: expected a YAML file, got a folder; give the files in it") from None
     except (OSError, ValueError) as error:
         raise BadInputError(f"{path}: expected a readable UTF-8 YAML file: {error}") from None
 

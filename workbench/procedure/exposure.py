@@ -26,6 +26,8 @@ BOLDEST = 8.0
 """Largest factor from one trial to the next."""
 MOST_TRIALS = 8
 """Four go from the middle of a range of 1 : 10^7 to its ends; as many are left to close in."""
+LIT_FRAMES = 2
+"""Of a trial."""
 TELLING = 1.4
 """Ratio of two exposures from which on their peaks tell whether they grow."""
 LEAST_GROWTH = 0.3

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import singledispatch
 from pathlib import Path
-from statistics import median
+from statistics import fmean, median
 from typing import Any
 
 from workbench.model import event as ev
@@ -32,28 +32,36 @@ class PlannedStep:
     title: str
     placements: int
     shots: int
+    guess_s: float = 10.0
+    """Where it takes no shots, and no session has told."""
 
 
 @dataclass(frozen=True)
 class Pace:
-    """Medians over the sessions of a rig."""
+    """Over the sessions of a rig: of what a person does the median, of what the computer does the mean."""
 
     placing_s: float = 60.0
     """From the end of one placement to the target's standing at the next."""
+    exposing_s: float = 3.0
+    """Setting the exposure for a placement."""
     shot_s: float = 1.0
     """One capture, with storing it and finding its spots."""
+    finishing_s: float = 1.0
+    """From a placement's last capture to its end: limits, advice."""
     lit_s: float | None = None
     """Emission of one capture."""
-    computing_s: float = 10.0
-    """A step without captures."""
+    without_shots_s: Mapping[str, float] = field(default_factory=dict)
+    """Steps without captures, by their titles."""
     sessions: int = 0
     """That it was learned from; 0: guesses."""
 
     def seconds(self, step: PlannedStep) -> float:
         """How long the step will take."""
-        if step.shots == 0:
-            return self.computing_s
-        return step.placements * self.placing_s + step.shots * self.shot_s
+        if step.shots:
+            each = self.placing_s + self.exposing_s + self.finishing_s
+            return step.placements * each + step.shots * self.shot_s
+        guess_s = step.placements * self.placing_s if step.placements else step.guess_s
+        return self.without_shots_s.get(step.title, guess_s)
 
 
 @singledispatch
@@ -82,10 +90,31 @@ def _(step: pr.PlaceTargetStep) -> int:
     return 1
 
 
+@singledispatch
+def guess_s(step: object) -> float:
+    """How long a step without shots may take where no session has told: computing, as a rule."""
+    return 10.0
+
+
+@guess_s.register
+def _(step: pr.MessageStep) -> float:
+    return 0.0
+
+
+@guess_s.register
+def _(step: pr.ConfirmStep | pr.AskStep) -> float:
+    return 30.0
+
+
+@guess_s.register
+def _(step: pr.WarmUpStep) -> float:
+    return 0.1 * step.frames  # 30 frames a second, two of three too old
+
+
 def outline(procedures: Sequence[Procedure], rig: Rig) -> list[PlannedStep]:
     """Every step of every procedure, in order."""
     return [
-        PlannedStep(procedure.procedure, index, step.title, placements(step), shots(step, rig))
+        PlannedStep(procedure.procedure, index, step.title, placements(step), shots(step, rig), guess_s(step))
         for procedure in procedures
         for index, step in enumerate(procedure.steps, start=1)
     ]
@@ -114,23 +143,38 @@ class PaceMeter:
 
     def __init__(self) -> None:
         self._told: dict[str, list[float]] = defaultdict(list)
+        self._steps: dict[str, list[float]] = defaultdict(list)
+        """Steps without captures, by their titles."""
         self._since: ev.Record | None = None
 
     def pace(self, otherwise: Pace) -> Pace:
-        """Medians so far; what was not measured is as `otherwise`."""
-        told: dict[str, Any] = {name: median(values) for name, values in self._told.items()}
-        return replace(otherwise, **told)
+        """So far; what was not measured is as `otherwise`."""
+        told: dict[str, Any] = {
+            name: median(values) if name == "placing_s" else fmean(values)
+            for name, values in self._told.items()
+        }
+        steps = {title: fmean(values) for title, values in self._steps.items()}
+        # A session that captures without setting an exposure has a camera whose exposure is fixed.
+        told |= {"exposing_s": 0.0} if "shot_s" in told and "exposing_s" not in told else {}
+        return replace(otherwise, **told, without_shots_s={**otherwise.without_shots_s, **steps})
 
     def take(self, record: ev.Record) -> None:
         """Note what a record tells; nothing is told by what a stop tore apart."""
         since = self._since
         match record.event:
-            case ev.StepStarted() | ev.PlacementFinished():
+            case ev.StepStarted():
+                self._since = record
+            case ev.PlacementFinished():
+                if since is not None and isinstance(since.event, ev.CaptureTaken):
+                    self._told["finishing_s"].append(_seconds(since, record))
                 self._since = record
             case ev.SessionResumed() | ev.SetAside():
                 self._since = None
             case ev.TargetPlaced() if since is not None:
                 self._told["placing_s"].append(_seconds(since, record))
+                self._since = record
+            case ev.ExposureSet() if since is not None:
+                self._told["exposing_s"].append(_seconds(since, record))
                 self._since = record
             case ev.CaptureTaken(lit_s=lit_s) if since is not None:
                 self._told["shot_s"].append(_seconds(since, record))
@@ -139,7 +183,7 @@ class PaceMeter:
                     self._told["lit_s"].append(lit_s)
             case ev.StepFinished() if since is not None:
                 if isinstance(since.event, ev.StepStarted):
-                    self._told["computing_s"].append(_seconds(since, record))
+                    self._steps[since.event.title].append(_seconds(since, record))
                 self._since = None
             case _:
                 pass
