@@ -29,9 +29,10 @@ class Sensor:
         step: float = 0.0,
         clips_at: float = 1.0,
         gamma: float = 1.0,
+        jumps_at: float = 1.0,
     ) -> None:
         self.rate, self.pedestal, self.noise_dn, self.step = rate, pedestal, noise_dn, step
-        self.clips_at, self.gamma = clips_at, gamma
+        self.clips_at, self.gamma, self.jumps_at = clips_at, gamma, jumps_at
         self.rng = np.random.default_rng(5)
         self.asked: list[float] = []
 
@@ -43,6 +44,7 @@ class Sensor:
         dn = (
             min(FULL * self.pedestal + lit, self.clips_at * FULL) + self.noise_dn * self.rng.standard_normal()
         )
+        dn = FULL if dn > self.jumps_at * FULL else dn
         peak = float(np.clip(np.rint(dn), 0, FULL)) / FULL
         noise = max(self.noise_dn, 0.5) / FULL
         seen = peak - self.pedestal > 6 * noise
@@ -95,6 +97,17 @@ def test_a_number_that_does_not_grow_is_clipped(decade: float, clips_at: float, 
     unclipped = 0.03 + sensor.rate * best.exposure
     assert 0.4 * clips_at < unclipped < 0.95 * clips_at
     assert share_of(best, tried) == pytest.approx(unclipped / clips_at, abs=0.09)
+
+
+@given(st.floats(-0.7, 4.7), st.sampled_from([0.3, 0.45]))
+def test_grey_that_jumps_where_a_colour_is_clipped(decade: float, jumps_at: float) -> None:
+    """The weighted mean of colours, given as clipped where one is: that colour ends well below it, and bright."""
+    right = 10 ** (1.5 + decade)
+    sensor = Sensor((AIM * jumps_at - 0.03) / right, jumps_at=jumps_at)
+    tried = search_exposure((1.0, 1e7), sensor)
+    best = best_of(tried)
+    assert len(tried) <= MOST_TRIALS
+    assert 0.55 * jumps_at < 0.03 + sensor.rate * best.exposure <= jumps_at
 
 
 @pytest.mark.parametrize("rate", [1e-5, 1e-3, 1e-1])

@@ -25,7 +25,7 @@ from workbench.ranging.ranger import Ranger, Reading
 from workbench.report.tables import reading_line
 
 FIXED_EXPOSURE = (
-    "the camera's exposure stays as the rig file sets it, whatever stands in the beams; a spot that is clipped"
+    "the camera's exposure stays as the rig file sets it, whatever stands in the beams; a clipped spot"
     " is told with its reading, and `workbench doctor` tells what is right at 500 mm"
 )
 """Sessions set it at each placement; here nobody says when the target has moved."""

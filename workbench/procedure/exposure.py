@@ -33,6 +33,10 @@ TELLING = 1.4
 LEAST_GROWTH = 0.3
 """As which power of the exposure a peak grows at least: 1 where it is linear, 0.45 with a gamma of 2.2."""
 GROWTH_SD = 4.0
+SAME_STEP = 1.05
+"""Ratio up to which two exposures are not worth two trials."""
+NEAR = 1.6
+"""Ratio of the shortest exposure that was clipped to the longest that was not, which is near enough."""
 SAME = 0.005
 """Relative difference below which an exposure was taken as in its trial."""
 FLAT = 0.03
@@ -146,7 +150,13 @@ def _after(tried: Sequence[Trial]) -> float | None:
         # Half of it tells whether the number is that of a pixel clipped below full scale.
         return None if any(_tells(other, best) for other in tried) else best.exposure / 2
     last, share = tried[-1], share_of(tried[-1], tried)
-    return last.exposure * (1 / BOLDEST if share >= CLIPPED else AIM / max(share, AIM / BOLDEST))
+    following = last.exposure * (1 / BOLDEST if share >= CLIPPED else AIM / max(share, AIM / BOLDEST))
+    clipped = min((t.exposure for t in tried if share_of(t, tried) >= CLIPPED), default=math.inf)
+    dimmest = best.exposure if share_of(best, tried) < GOOD[0] else 0.0
+    if clipped == math.inf or SAME_STEP * dimmest < following < clipped:
+        return following
+    # It jumps from below the aim to clipped, as grey does where one of its colours is clipped: in between.
+    return math.sqrt(dimmest * clipped) if clipped > NEAR * dimmest else None
 
 
 def _within(limits: tuple[float, float], exposure: float) -> float:
