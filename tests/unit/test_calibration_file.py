@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from workbench.calibration.export import calibrate, render, write_calibration
 from workbench.calibration.fit import Fit, fit
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Calibration, Provenance, load_calibration
-from workbench.model.errors import BadInputError
+from workbench.model.errors import BadInputError, LimitFailedError
 
 PROVENANCE = Provenance(
     session="20261122-120000-calibrate-flat",
@@ -259,3 +260,10 @@ def test_a_link_is_followed_and_a_special_file_is_left_alone(calibration: Calibr
         with pytest.raises(BadInputError, match="expected the name of a file"):
             write_calibration(other, calibration)
     assert pipe.is_fifo()
+
+
+def test_a_fit_that_puts_every_spot_outside_the_picture_is_refused(fitted: Fit) -> None:
+    values = fitted.values.copy()
+    values[1] += 5000.0
+    with pytest.raises(LimitFailedError, match="no spot in the picture"):
+        calibrate(replace(fitted, values=values), Acceptance(), PROVENANCE)

@@ -244,7 +244,17 @@ class TestBadInput:
         captures = tmp_path / "c.csv"
         captures.write_text("laser_id,standoff_mm,repeat,on\n1,500,0,on.png\n")
         outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
-        refused(outcome, 2, "no spot is left to fit")
+        refused(outcome, 2, "no spot is left to fit", "not used: row 2: laser 1 at 500 mm: expected one spot")
+
+    def test_a_rig_of_another_picture_says_what_became_of_the_rows(
+        self, workbench: Run, tmp_path: Path
+    ) -> None:
+        rig = tmp_path / "rig.yaml"
+        rig.write_text(WEBCAM_RIG.read_text().replace("height_px: 480", "height_px: 20"))
+        outcome = workbench("fit", WEBCAM, "--rig", rig, "-o", tmp_path / "c.yaml")
+        refused(
+            outcome, 2, "no spot is left", "row 3: laser 1 at 300 mm: v_px: expected -0.5 to 19.5, got 94"
+        )
 
 
 class TestAnotherModel:
@@ -299,7 +309,10 @@ def test_compare(workbench: Run, tmp_path: Path) -> None:
     workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", a)
     same = workbench("compare", a, a, "--json")
     assert (same.code, json.loads(same.out)["moved"]) == (0, False)
-    assert "same within uncertainty" in same.err
+    assert "identical" in same.err
+    again = tmp_path / "again.yaml"
+    again.write_text(a.read_text().replace("max_relative_range_sd: 0.", "max_relative_range_sd: 0.0"))
+    assert "same within uncertainty" in workbench("compare", a, again).err
     header, *rows = WEBCAM.read_text().splitlines()
     split = [row.rsplit(",", 1) for row in rows]
     c.write_text("\n".join([header, *(f"{left},{int(v_px) + 9}" for left, v_px in split)]) + "\n")
@@ -309,6 +322,25 @@ def test_compare(workbench: Run, tmp_path: Path) -> None:
     assert result["moved"]
     assert {"cy_px", "1.ty"} <= set(result["explanations"])
     assert "explained by" in outcome.err
+
+
+def test_a_file_of_a_session_is_not_written_over(workbench: Run, tmp_path: Path) -> None:
+    (tmp_path / "session.yaml").write_text("format: 1\n")
+    kept = tmp_path / "calibration.yaml"
+    kept.write_text("as it was")
+    refused(workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", kept), 2, "belongs to the session", tmp_path)
+    assert kept.read_text() == "as it was"
+    assert workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "refit.yaml").code == 0
+
+
+def test_names_are_printed_as_they_are(workbench: Run, tmp_path: Path) -> None:
+    """Brackets are how rich is told of colours."""
+    for folder in ("[red]", "["):  # the second ends as a closing tag does, [/a]
+        output = tmp_path / folder / "a].yaml"
+        output.parent.mkdir()
+        outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", output)
+        assert outcome.code == 0
+        assert f"{output} written" in outcome.err
 
 
 class TestDesign:

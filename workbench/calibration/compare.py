@@ -50,6 +50,8 @@ class Comparison:
     moved: bool
     explanations: tuple[str, ...]
     """Parameters of which one alone explains the move, the most likely first; empty: no single one does."""
+    identical: bool = False
+    """Whether both have the same numbers, to the last digit: copies of one calibration."""
 
 
 def compare(a: Calibration, b: Calibration) -> Comparison:
@@ -78,7 +80,14 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
         probability=probability,
         moved=moved,
         explanations=_explanations(sensor_a, b, pairs, whiten) if moved else (),
+        identical=_numbers(a) == _numbers(b),
     )
+
+
+def _numbers(calibration: Calibration) -> tuple[object, ...]:
+    """All that a ranger takes from it."""
+    ours = calibration.laser_ranger
+    return calibration.geometry(), ours.lasers, ours.noise, ours.parameters, ours.validity
 
 
 def _spots(sensor: Sensor, pairs: Pairs) -> FloatArray:

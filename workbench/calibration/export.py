@@ -27,16 +27,26 @@ from workbench.model.calibration import (
     ReferencePlane,
     Validity,
 )
+from workbench.model.errors import LimitFailedError
 from workbench.session.files import write_output
 
 
 def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Calibration, Assessment]:
-    """The calibration that a fit amounts to, and the verdict on it."""
+    """The calibration that a fit amounts to, and the verdict on it.
+
+    Raises:
+        LimitFailedError: by the fit no spot can be ranged.
+    """
     exported = without_idle(fit)
     values = dict(zip((p.name for p in fit.table.parameters), exported.values.tolist(), strict=True))
     provisional = _calibration(exported, values, provenance, Assessment("accepted", (), ()), 0.0)
     ranges = _ranges(Sensor(provisional))
-    worst = float(ranges.sd.max()) if len(ranges.sd) else float("inf")
+    worst = float(ranges.sd.max()) if len(ranges.sd) else float("nan")
+    if not np.isfinite(worst):
+        raise LimitFailedError(
+            "no calibration: between its nearest and farthest standoff the fit gives ranges of no spot in the"
+            " picture. Check the rig file's image size and baselines, and the standoffs"
+        )
     sensor = fit.sensor
     directions = null_directions(
         fit.rig,

@@ -51,6 +51,7 @@ class Background:
                 self._console.print(
                     f"note: no recording is kept: {self._given_up}; `workbench view` makes it again",
                     highlight=False,
+                    markup=False,
                 )
 
     def __call__(self, record: ev.Record) -> None:

@@ -23,18 +23,19 @@ def compare_calibrations(a: Path, b: Path, as_json: bool) -> None:
     result = compare(of_a, of_b)
     if as_json:
         print(json.dumps(asdict(result)))
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     console.print(difference_table(result.differences))
     console.print(verdict(result), highlight=False)
-    for note in _notes(of_a, of_b):
+    for note in _notes(of_a, of_b, result.identical):
         console.print(f"note: {note}", highlight=False)
 
 
-def _notes(a: Calibration, b: Calibration) -> list[str]:
+def _notes(a: Calibration, b: Calibration, identical: bool) -> list[str]:
     """What makes the verdict less than it seems."""
     notes = []
     of_a, of_b = a.laser_ranger, b.laser_ranger
-    if of_a.provenance.captures_sha256 == of_b.provenance.captures_sha256:
+    same_captures = of_a.provenance.captures_sha256 == of_b.provenance.captures_sha256
+    if same_captures and not identical:
         notes.append("both come from the same captures: the deviations of two sessions are too wide here")
     notes += [
         f"{name} was refused by its limits and kept because: {c.fit.accepted_because or 'no reason given'}"
@@ -46,6 +47,8 @@ def _notes(a: Calibration, b: Calibration) -> list[str]:
 
 def verdict(result: Comparison) -> str:
     """The verdict in words."""
+    if result.identical:
+        return "identical: both files have the same numbers, to the last digit"
     evidence = (
         f"chi2 {result.chi2:.1f} for {result.degrees_of_freedom} degrees of freedom,"
         f" p = {result.probability:.2g}"

@@ -67,7 +67,7 @@ def _given(rig: Rig, text: str) -> tuple[float, ...]:
 
 
 def _print(rig: Rig, result: Forecast, proposed: bool) -> None:
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     standoffs = ", ".join(f"{s:g}" for s in result.standoffs_mm)
     console.print(
         f"{'proposed standoffs' if proposed else 'standoffs'} (mm): {standoffs};"

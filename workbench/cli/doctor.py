@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from rich.console import Console
+from rich.text import Text
 
 from workbench.cli.person import whoever_is_there
 from workbench.cli.stopping import StopAfterShot
@@ -32,9 +33,9 @@ def examine_rig(rig_path: Path, no_input: bool) -> None:
         person = whoever_is_there(no_input, console, lambda: stopping.reason, nullcontext)
         for finding in examine(rig, bench, who_answers(bench, person)):
             colour, word = ("green", "ok  ") if finding.ok else ("red", "FAIL")
-            console.print(f"[{colour}]{word}[/{colour}] {finding.part}: {finding.found}")
+            console.print(Text.assemble((word, colour), f" {finding.part}: {finding.found}"))
             if not finding.ok:
                 bad.append(finding.part)
     if bad:
         raise RigNotReadyError(f"rig {rig.rig} is not ready: {', '.join(bad)}")
-    console.print(f"rig {rig.rig} is ready")
+    console.print(f"rig {rig.rig} is ready", markup=False)

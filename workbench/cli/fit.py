@@ -33,6 +33,7 @@ from workbench.session.files import check_output
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
 
 MOST_REASONS = 3
+MOST_ROWS = 12
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,9 @@ def fit_captures(request: Request, as_json: bool) -> None:
     if refused:
         raise LimitFailedError(_refusal(request.output, assessment.reasons))
     kept = "" if request.accept is None or assessment.verdict == "accepted" else f", kept: {request.accept}"
-    Console(stderr=True).print(f"{request.output} written{kept}", highlight=False, soft_wrap=True)
+    Console(stderr=True, markup=False).print(
+        f"{request.output} written{kept}", highlight=False, soft_wrap=True
+    )
 
 
 def _check_distinct(request: Request) -> None:
@@ -96,6 +99,12 @@ def _check_distinct(request: Request) -> None:
                 f"--output {request.output}: expected another file than the calibration is made from;"
                 " name a new one"
             )
+    target = request.output.resolve()
+    if target.is_file() and (target.parent / MANIFEST).is_file():
+        raise BadInputError(
+            f"--output {request.output}: expected a new file, this one belongs to the session"
+            f" {target.parent}; name another"
+        )
 
 
 def _rig(request: Request) -> Rig:
@@ -116,6 +125,11 @@ def _sightings(
     sightings, rejected, boards = sight_rows(rig, kept)
     left_out = [row for row in rows if row.standoff_mm in request.without_mm]
     rejected += [Rejected(f"row {row.row}", f"left out: standoff {row.standoff_mm:g} mm") for row in left_out]
+    if not sightings:
+        lines = [f"not used: {line}" for line in rejected_lines(rejected)]
+        more = [f"and {len(lines) - MOST_ROWS} more"] if len(lines) > MOST_ROWS else []
+        told = [f"{request.source}: no spot is left to fit: do rig file and captures belong together?"]
+        raise BadInputError("\n".join([*told, *lines[:MOST_ROWS], *more]))
     return sightings, rejected, boards
 
 
@@ -182,7 +196,7 @@ def _wrapped(label: str, text: str) -> list[str]:
 
 
 def _print_tables(fitted: Fit, assessment: Assessment) -> None:
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     console.print(parameter_table(parameter_records(fitted)))
     console.print(derived_table(derive(fitted)))
     if fitted.terms:

@@ -79,7 +79,7 @@ def _read_all(
     if request.standoff_mm is not None:
         bench.target.place(Placement(key="live", standoff_mm=request.standoff_mm))
     for warning in live.get_ready():
-        Console(stderr=True).print(f"warning: {warning}", highlight=False)
+        Console(stderr=True, markup=False).print(f"warning: {warning}", highlight=False)
     began = time.monotonic()
     try:
         for number in count() if request.readings is None else range(request.readings):
@@ -88,11 +88,13 @@ def _read_all(
             reading = live.read(f"{number}")
             _show(reading, as_json)
             if number == 0 and reading.status == "no_points":
-                Console(stderr=True).print(f"hint: {_why_nothing(request, virtual)}", highlight=False)
+                Console(stderr=True, markup=False).print(
+                    f"hint: {_why_nothing(request, virtual)}", highlight=False
+                )
     finally:
         if request.stats:
             words = latency_words(live.latencies_s, time.monotonic() - began)
-            Console(stderr=True).print(words, highlight=False)
+            Console(stderr=True, markup=False).print(words, highlight=False)
 
 
 def _why_nothing(request: LiveRequest, virtual: bool) -> str:

@@ -21,7 +21,7 @@ def check_files(files: list[Path]) -> None:
     Raises:
         BadInputError: one of them is wrong.
     """
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console = Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
     wrong = []
     for path in files:
         try:
@@ -45,7 +45,7 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
     plan = Plan.load(rig_path, procedures)
     pace = learn_pace(sessions, plan.rig.rig)
     steps = outline(plan.procedures, plan.rig)
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     console.print(_table(steps, pace))
     total = sum(step.shots for step in steps)
     console.print(

@@ -33,7 +33,7 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
         readings.append(reading)
         if as_json:
             print(json.dumps(plain(reading)), flush=True)
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     console.print(reading_table(readings))
     for reading in readings:
         for note in reading.notes:

@@ -74,7 +74,7 @@ def resume_session(session_dir: Path, accept_changes: str | None, answers: Answe
 @contextmanager
 def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     """Show a session on the terminal and in a recording while it runs, then say where everything is."""
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     asked = StopAfterShot()
     steps = outline(plan.procedures, plan.rig)
     forecast = Forecast(steps, learn_pace(session_dir.parent, plan.rig.rig))
@@ -90,7 +90,12 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
         except (RigNotReadyError, StoppedError, AnswerNeededError, LaserOffNotConfirmedError):
             if (session_dir / MANIFEST).exists():
                 with suppress(OSError):  # a terminal that was closed
-                    console.print(f"go on:   workbench resume {session_dir}", highlight=False, soft_wrap=True)
+                    console.print(
+                        f"go on:   workbench resume {session_dir}",
+                        highlight=False,
+                        soft_wrap=True,
+                        markup=False,
+                    )
             raise
     console.print(f"session: {session_dir}", highlight=False, soft_wrap=True)
     console.print(f"replay:  workbench view {session_dir}", highlight=False, soft_wrap=True)

@@ -28,7 +28,7 @@ def list_sessions(sessions: Path, as_json: bool) -> None:
         for each in found:
             print(json.dumps(asdict(each) | {"session_dir": str(each.session_dir)}))
         return
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     if not found:
         console.print(f"no sessions in {sessions}")
         return

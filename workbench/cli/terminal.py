@@ -67,7 +67,7 @@ class Terminal:
         self._forecast.take(record)
         match record.event:
             case ev.ProcedureStarted() as e:
-                self._console.print(f"[bold]{e.title}[/bold] ({e.procedure}, {e.steps} steps)")
+                self._console.print(Text.assemble((e.title, "bold"), f" ({e.procedure}, {e.steps} steps)"))
             case ev.StepStarted() as e:
                 self._print(f"{e.index}. {e.title}", indent=2)
                 if e.shots:
@@ -160,9 +160,8 @@ class Guarded:
         except Exception as error:
             self._consumer = None
             with suppress(OSError):
-                self._console.print(
-                    f"[yellow]warning: {self._name} stops here: {error}[/yellow]\nCaptures go on."
-                )
+                self._console.print(Text(f"warning: {self._name} stops here: {error}", style="yellow"))
+                self._console.print("Captures go on.")
 
 
 def _counts(capture: ev.CaptureTaken) -> bool:
