@@ -185,6 +185,8 @@ def test_each_placement_tells_how_far_the_captures_have_come(demo: Demo) -> None
     assert told[-1].relative_range_sd == pytest.approx(stated, rel=0.05)
     assert all(one.then_relative_range_sd < one.relative_range_sd for one in told)
     assert all(100 <= one.next_standoff_mm <= 5000 for one in told)
+    assert all((one.worst_residual_sd or 0.0) > 0.0 for one in told)
+    assert "; worst residual 0." in told[-1].text
     assert told[-1].text in " ".join(demo.terminal.split())
 
 

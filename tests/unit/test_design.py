@@ -330,6 +330,27 @@ class TestAdvice:
         aim = Aim.of(sensors, np.geomspace(125.0, 4500.0, 18), spot)
         return float(np.sqrt((aim.variance(covariance[None]) + aim.spot_sd**2).max()))
 
+    @pytest.mark.parametrize("seed", [1, 2])
+    def test_the_worst_residual_is_named(self, seed: int) -> None:
+        """A spot that lies 3 px off is seen while the target still stands, by the final fit's residuals."""
+        plain = World(RIG, seed).sightings(SHIPPED[:6], 10)
+        bad = ("L3", SHIPPED[4])
+        sightings = [
+            replace(s, u_px=s.u_px + 3.0) if (s.laser_id, s.standoff_mm) == bad else s for s in plain
+        ]
+        advice, without = advise(RIG, sightings, SHIPPED), advise(RIG, plain, SHIPPED)
+        assert advice is not None
+        assert without is not None
+        assert (advice.worst_laser_id, advice.worst_standoff_mm) == bad
+        assert 1.0 < advice.worst_residual_px < 3.1, "the fit takes some of it up"
+        assert without.worst_residual_px < 0.3
+        fitted = fit(RIG, plain)
+        in_sd = np.nan_to_num(np.abs(fitted.residual_px) / (fitted.cells.sd_px * fitted.noise_scale))
+        assert without.worst_residual_sd == pytest.approx(in_sd.max(), rel=0.01)
+        assert without.worst_residual_px == pytest.approx(
+            np.abs(fitted.residual_px).flat[int(in_sd.argmax())], rel=0.01
+        )
+
     def test_too_little_is_no_advice(self) -> None:
         world = World(RIG, 3)
         assert advise(RIG, [], SHIPPED) is None

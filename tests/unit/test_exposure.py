@@ -101,7 +101,7 @@ def test_a_number_that_does_not_grow_is_clipped(decade: float, clips_at: float, 
 
 @given(st.floats(-0.7, 4.7), st.sampled_from([0.3, 0.45]))
 def test_grey_that_jumps_where_a_colour_is_clipped(decade: float, jumps_at: float) -> None:
-    """The weighted mean of colours, given as clipped where one is: that colour ends well below it, and bright."""
+    """The weighted mean of colours, given as clipped where one is: that colour ends below it, and bright."""
     right = 10 ** (1.5 + decade)
     sensor = Sensor((AIM * jumps_at - 0.03) / right, jumps_at=jumps_at)
     tried = search_exposure((1.0, 1e7), sensor)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,12 @@ class Advice:
     next_standoff_mm: float
     then_relative_range_sd: float
     """With a placement there, its readings as many and as good as those so far."""
+    worst_residual_px: float
+    """Of a mean position, in the coordinate in which it is the most deviations of its noise."""
+    worst_residual_sd: float
+    """The same in those, as far as the residuals called for scaled up."""
+    worst_laser_id: str
+    worst_standoff_mm: float
 
 
 def advise(rig: Rig, sightings: Sequence[Sighting], planned_mm: Sequence[float]) -> Advice | None:
@@ -70,6 +77,7 @@ def advise(rig: Rig, sightings: Sequence[Sighting], planned_mm: Sequence[float])
         relative_range_sd=_worst(aim, fitted.covariance),
         next_standoff_mm=float(choice.standoff_mm[best]),
         then_relative_range_sd=_worst(aim, then),
+        **_worst_residual(rig, fitted),
     )
 
 
@@ -81,6 +89,11 @@ class _Fitted:
     """(1, F, F) in prior sd."""
     noise_scale: float
     """On the stated noise."""
+    residual_sd: FloatArray
+    """(M, 2) of each cell in deviations of the noise so scaled, 0 where nothing was measured."""
+    residual_px: FloatArray
+    """(M, 2)"""
+    cells: Cells
 
 
 def _fit(rig: Rig, cells: Cells, planned: int) -> _Fitted | None:
@@ -100,7 +113,27 @@ def _fit(rig: Rig, cells: Cells, planned: int) -> _Fitted | None:
     sensor = int(table.is_sensor.sum())
     free = table.free[table.free < sensor]
     values = table.prior_mean + table.prior_sd * found.y
-    return _Fitted(values[None, :sensor], found.covariance[np.ix_(free, free)][None], found.scale)
+    residual_sd = np.where(np.isfinite(whole.position_px), found.residual.reshape(-1, 2), 0.0)
+    return _Fitted(
+        values[None, :sensor],
+        found.covariance[np.ix_(free, free)][None],
+        found.scale,
+        residual_sd,
+        residual_sd * found.scale * np.nan_to_num(whole.sd_px),
+        whole,
+    )
+
+
+def _worst_residual(rig: Rig, fitted: _Fitted) -> dict[str, Any]:
+    """To three digits, for the same reason as `_worst`."""
+    cell, axis = np.unravel_index(int(np.abs(fitted.residual_sd).argmax()), fitted.residual_sd.shape)
+    placement = fitted.cells.placements[fitted.cells.placement[cell]]
+    return {
+        "worst_residual_px": float(f"{abs(fitted.residual_px[cell, axis]):.3g}"),
+        "worst_residual_sd": float(f"{abs(fitted.residual_sd[cell, axis]):.3g}"),
+        "worst_laser_id": rig.laser_ids[fitted.cells.laser[cell]],
+        "worst_standoff_mm": placement.standoff_mm,
+    }
 
 
 def _with_room(cells: Cells, lasers: int, planned: int) -> Cells:

@@ -246,14 +246,29 @@ class StandoffAdvised(FileModel):
     next_standoff_mm: float
     then_relative_range_sd: float
     """With a placement there."""
+    worst_residual_px: float | None = None
+    """Of a laser's mean position at a placement: the one that is the most deviations of noise off the fit."""
+    worst_residual_sd: float | None = None
+    worst_laser_id: str = ""
+    worst_standoff_mm: float | None = None
 
     @property
     def text(self) -> str:
-        """For people, one line."""
+        """For people, one or two lines."""
         met = "met" if self.relative_range_sd <= self.limit else "not met"
         return (
             f"target {met}: ranges to {100 * self.relative_range_sd:.2g} % (limit {100 * self.limit:g} %);"
             f" best next {self.next_standoff_mm:g} mm: to {100 * self.then_relative_range_sd:.2g} %"
+            f"{self._worst}"
+        )
+
+    @property
+    def _worst(self) -> str:
+        if self.worst_residual_px is None:
+            return ""
+        return (
+            f"; worst residual {self.worst_residual_px:.2g} px ({self.worst_residual_sd:.2g} sd),"
+            f" {self.worst_laser_id} at {self.worst_standoff_mm:g} mm"
         )
 
 
