@@ -96,6 +96,11 @@ CALIBRATION = "%YAML 1.2\n---\nimage_width: 640\ncamera_name: c\nlaser_ranger:\n
 CSV = "laser_id,standoff_mm,repeat,u_px,v_px\nL1,200,0,1,2\n"
 
 
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=r"expected a YAML file, got a folder; give the files in it"):
+        check_file(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("text", "what"),
     [

@@ -1,0 +1,133 @@
+"""What comes before what: lasers off before every question, frames before their record; and a plan."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.bench.test_guided_session import GRID, HEAD, Says, events, session
+from tests.crash.short import write_files
+from workbench.cli.plan import print_plan
+from workbench.devices.serial_lasers import SerialLaserBank
+from workbench.model import event as ev
+from workbench.model.prompt import Answer, Prompt
+from workbench.session.journal import Journal, read_journal
+
+
+def test_lasers_are_put_off_before_every_question(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Verified off, since the last question: whatever was lit in between, the operator may step in."""
+    told: list[str] = []
+    put_off = SerialLaserBank.all_off
+
+    def all_off(bank: SerialLaserBank) -> None:
+        put_off(bank)
+        told.append("off")
+
+    class Operator(Says):
+        def ask(self, prompt: Prompt) -> Answer:
+            told.append(f"ask {prompt.key}")
+            return super().ask(prompt)
+
+    monkeypatch.setattr(SerialLaserBank, "all_off", all_off)
+    question = "  - {step: ask, text: Which card?, choices: [white, grey]}\n"
+    session(tmp_path, GRID + question, Operator(("p.2", Answer(value="grey"))))
+    asked = [n for n, what in enumerate(told) if what != "off"]
+    assert len(asked) == 5, told
+    assert all(told[n - 1] == "off" for n in asked)
+    assert told[-1] == "off", "and at the end"
+
+
+def test_frames_are_on_disk_before_the_record_that_names_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Written under another name, synced, renamed, its folder synced; then one write for the record."""
+    calls: list[tuple[str, str]] = []
+    sync, write, replace, append = os.fsync, os.write, Path.replace, Journal.append
+
+    def name_of(handle: int) -> str:
+        return Path(f"/proc/self/fd/{handle}").readlink().name
+
+    def fsync(handle: int) -> None:
+        calls.append(("sync", name_of(handle)))
+        sync(handle)
+
+    def written(handle: int, data: bytes) -> int:
+        if name_of(handle) == "journal.jsonl":
+            calls.append(("record", "whole" if data.count(b"\n") == 1 and data.endswith(b"\n") else "part"))
+        return write(handle, data)
+
+    def replaced(path: Path, target: Path) -> Path:
+        calls.append(("rename", Path(target).name))
+        return replace(path, target)
+
+    def appended(journal: Journal, event: ev.Event) -> ev.Record:
+        calls.append(("append", event.kind))
+        return append(journal, event)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(os, "write", written)
+    monkeypatch.setattr(Path, "replace", replaced)
+    monkeypatch.setattr(Journal, "append", appended)
+    done = session(tmp_path, GRID, Says())
+    at = [n for n, call in enumerate(calls) if call == ("append", "capture_taken")]
+    assert len(at) == 3 * 2 * 2
+    for n in at:
+        # Two frames: each synced under a temporary name, renamed, its folder synced.
+        steps = calls[n - 6 : n]
+        assert [what for what, _ in steps] == ["sync", "rename", "sync"] * 2
+        for synced, renamed in ((steps[0], steps[1]), (steps[3], steps[4])):
+            assert synced[1].startswith(f".{renamed[1]}.")
+        assert calls[n + 1 : n + 3] == [("record", "whole"), ("sync", "journal.jsonl")]
+    appends = [n for n, (what, _) in enumerate(calls) if what == "append"]
+    assert len(appends) == len(list(read_journal(done)))
+    assert all(calls[n + 1] == ("record", "whole") for n in appends), "one write a record"
+    for kind in ("answered", "step_finished", "session_finished"):
+        where = [n for n in appends if calls[n][1] == kind]
+        assert where
+        assert all(calls[n + 2] == ("sync", "journal.jsonl") for n in where)
+
+
+def test_a_warm_up_runs_the_camera_in_the_dark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its frames are taken, nothing is lit or kept, nobody is asked."""
+    lit: list[object] = []
+    monkeypatch.setattr(SerialLaserBank, "lit", lambda *told, **for_s: lit.append(told))
+    operator = Says()
+    grabbed: list[str] = []
+    monkeypatch.setattr(
+        "workbench.emulator.camera.EmulatedCamera.grab", lambda camera: grabbed.append(camera._key)
+    )
+    done = session(tmp_path, "  - {step: warm_up, frames: 7}\n", operator)
+    assert grabbed == ["p.1"] * 7
+    assert lit == operator.asked == []
+    assert not list((done / "frames").rglob("*.png"))
+    (ended,) = [e for e in events(done, ev.StepFinished) if isinstance(e, ev.StepFinished)]
+    assert ended.outcome == "7 frames"
+
+
+def test_a_plan_prints_every_step_with_shots_emission_and_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    steps = "  - {step: warm_up, frames: 100}\n" + GRID + "  - step: fit\n"
+    rig, procedure = write_files(tmp_path, HEAD + steps)
+    print_plan([procedure], rig, tmp_path / "sessions")
+    told = capsys.readouterr().err
+    assert max(map(len, told.splitlines())) <= 80
+    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in told.splitlines() if "│" in line]
+    steps_told = [row for row in rows if row[0]]
+    # Three placings of 64 s, 12 shots of a second, 2 s of lease each.
+    assert [row[0] for row in steps_told] == ["p.1", "p.2", "p.3"]
+    assert [row[2:] for row in steps_told] == [
+        ["", "", "", "10 s"],
+        ["3", "12", "24.0 s", "3 min"],
+        ["", "", "", "10 s"],
+    ]
+    assert "12 shots, at most 24 s of emission (leases of 2 s); 4 min in all" in told
+    assert "no session of" in " ".join(told.split())
+    session(tmp_path, steps.replace("  - step: fit\n", ""), Says())
+    print_plan([procedure], rig, tmp_path)
+    told = " ".join(capsys.readouterr().err.split())
+    assert "Times as the last session of" in told
+    assert "at most" not in told.partition("Where the camera's")[0], "emission as it was measured"
