@@ -94,9 +94,7 @@ def test_any_bytes_are_read_or_refused_by_name(tmp_path: Path, body: bytes) -> N
 
 
 def test_a_session_that_has_no_captures_file_yet(tmp_path: Path) -> None:
-    with pytest.raises(
-        BadInputError, match=r"captures.csv: expected a captures file, there is none; .* resume"
-    ):
+    with pytest.raises(BadInputError, match=r"captures.csv: No such file; expected a captures file.* resume"):
         load_captures(tmp_path / "captures.csv")
 
 

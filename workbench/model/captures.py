@@ -71,7 +71,7 @@ def read_captures_file(path: Path) -> bytes:
         return path.read_bytes()
     except FileNotFoundError:
         raise BadInputError(
-            f"{path}: expected a captures file, there is none; a session has one once it came to its fit:"
+            f"{path}: No such file; expected a captures file. A session has one once it came to its fit:"
             " `workbench resume` goes on with one that was stopped before"
         ) from None
     except (OSError, ValueError) as error:
