@@ -43,12 +43,12 @@ def _weigh(usable: Bools, signal: Floats, floor: float, slope: float, out: Float
 
 @compiled
 def _moved(params: Floats, delta: Floats) -> None:
-    """A step, kept from jumping; `params` is changed."""
+    """A step, kept from jumping; after it all spots have one background and shape. `params` is changed."""
+    params[:, 0] = params[0, 0] + delta[0]
+    for j in range(2):
+        stretched = params[0, 4 + j] + min(max(delta[1 + j], -_MAX_STRETCH), _MAX_STRETCH)
+        params[:, 4 + j] = min(max(stretched, _LN_WIDTH_RANGE[0]), _LN_WIDTH_RANGE[1])
     for i in range(len(params)):
-        params[i, 0] += delta[0]
-        for j in range(2):
-            stretched = params[i, 4 + j] + min(max(delta[1 + j], -_MAX_STRETCH), _MAX_STRETCH)
-            params[i, 4 + j] = min(max(stretched, _LN_WIDTH_RANGE[0]), _LN_WIDTH_RANGE[1])
         own = SHARED + OWN * i
         params[i, 1] = max(params[i, 1] + delta[own], 0.1 * abs(params[i, 1]))
         for j in range(2):
@@ -77,7 +77,8 @@ def score_together(
         floor: Variance without signal, DN^2.
         slope: Photon-transfer slope, DN.
         fixed: Whether `weight` is given; it is filled otherwise.
-        params: (k, 6) in the order of `gaussian`, changed; background and widths are those of all spots.
+        params: (k, 6) in the order of `gaussian`, changed; background and widths are in the end those of
+            all spots, and are counted on from the first one's.
         cov: (m, m) filled: covariance of the m = 3 + 3 k parameters of the fit.
         signal: (height, width) filled: expected value above the background, DN; this and what follows where
             the last step began.
@@ -113,4 +114,4 @@ def score_together(
             break
     if not fixed:
         leverages(before, along_u, along_v, box, cov, leverage)
-    return converged
+    return converged and bool(np.isfinite(params).all())

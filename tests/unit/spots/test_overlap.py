@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from workbench.spots.fit import Windows
 from workbench.spots.gaussian import FLUX, LN_SU, LN_SV, SHEAR, U, V, derivatives
@@ -63,6 +64,54 @@ def test_the_sums_of_a_joint_fit_are_those_of_its_derivatives(k: int) -> None:
     leverages(params, along_u, along_v, box, cov, leverage)
     theirs = ((cov @ dense) * dense).sum(axis=0).reshape(shape)
     np.testing.assert_allclose(leverage, theirs, atol=1e-5 * theirs.max())
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_spots_that_start_with_shapes_of_their_own_end_with_one(seed: int) -> None:
+    """The optimum, the deviations and the sum of squares are those of scipy's."""
+    rng, shape = np.random.default_rng(seed), (25, 31)
+    true = np.zeros((3, 6))
+    true[:, FLUX], true[:, 0] = (3000.0, 2000.0, 2500.0), 1.5
+    true[:, U], true[:, V] = (9.3, 14.1, 20.4), (11.8, 13.0, 10.2)
+    true[:, LN_SU], true[:, LN_SV] = np.log(1.6), np.log(1.9)
+
+    def of(x: np.ndarray) -> np.ndarray:
+        params = np.zeros((3, 6))
+        params[:, 0], params[:, LN_SU:] = x[0], x[1:3]
+        params[:, FLUX:LN_SU] = x[3:].reshape(3, 3)
+        return params
+
+    def light(params: np.ndarray) -> np.ndarray:
+        jacobian = jacobian_of(params, shape)
+        return np.asarray(params[0, 0] + params[:, FLUX] @ jacobian[3::3])
+
+    data = light(true) + rng.normal(0.0, 2.0, shape[0] * shape[1])
+    start = true + rng.normal(0.0, 0.1, true.shape) * (1.0, 1000.0, 1.0, 1.0, 1.0, 1.0)
+    first = np.concatenate([start[0, [0, LN_SU, LN_SV]], start[:, FLUX:LN_SU].ravel()])
+
+    def misfit(x: np.ndarray) -> np.ndarray:
+        return (light(of(x)) - data) / 2.0
+
+    theirs = least_squares(misfit, first, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    win = Windows(data.reshape(1, *shape), np.ones((1, *shape), bool), np.full((1, *shape), np.inf))
+    ours = fit_joint(win, start, Noise(np.full(1, 4.0), np.full(1, 1e-12)))
+    assert ours.converged
+    assert (ours.params[:, LN_SU:] == ours.params[0, LN_SU:]).all()
+    assert (ours.params[:, 0] == ours.params[0, 0]).all()
+    expected, jacobian = of(theirs.x), np.asarray(theirs.jac)
+    cov = np.linalg.inv(jacobian.T @ jacobian)
+    sd = np.sqrt(np.diag(cov)[3:]).reshape(3, 3)
+    # The steps stop within a tenth of a deviation, and the last one that is taken squares what is left.
+    assert (np.abs((ours.params - expected)[:, FLUX:LN_SU]) < 0.03 * sd).all()
+    np.testing.assert_allclose(ours.sd, sd, rtol=0.02)
+    assert ours.chi2 == pytest.approx(2.0 * theirs.cost, rel=1e-3)
+
+
+def test_a_start_that_is_no_number_does_not_converge() -> None:
+    start = np.zeros((2, 6))
+    start[:, FLUX], start[:, U], start[:, V] = 500.0, (5.0, np.nan), 6.0
+    win = Windows(np.zeros((1, 13, 13)), np.ones((1, 13, 13), bool), np.full((1, 13, 13), np.inf))
+    assert not fit_joint(win, start, Noise(np.ones(1), np.ones(1))).converged
 
 
 def test_the_deviations_of_spots_fitted_together_are_right_to_second_order() -> None:
