@@ -59,7 +59,9 @@ def table(closest_mm: Sequence[int] = CLOSEST_MM) -> Iterator[str]:
 
 
 def _cell(surface: Callable[[float], Surface], is_right: Callable[[Shape], bool], closest_mm: float) -> str:
-    shapes = readings(surface(closest_mm), READINGS, SEED)
+    shapes = readings(
+        surface(closest_mm), READINGS, SEED + int(closest_mm)
+    )  # noise of its own in each column
     told, held = share(shapes, is_right), share(shapes, lambda shape: holds(shape, closest_mm))
     return f"{100 * told:.0f}/{100 * held:.0f}"
 
@@ -68,7 +70,7 @@ def main() -> int:
     """Run, print, write."""
     today = dt.datetime.now(tz=dt.UTC).date().isoformat()
     lines = [
-        f"Shapes, {today}: `python -m tests.proofs.shapes`, seed {SEED}, {READINGS} readings each",
+        f"Shapes, {today}: `python -m tests.proofs.shapes`, seed {SEED} + mm, {READINGS} readings each",
         f"Lasers at {', '.join(f'{x:g}' for x in X)} mm, f = {F_PX:g} px, spots of {SD_PX} px,",
         "calibration exact.",
         "How often the right shape is told / the 95 % interval of the closest range holds it, %;",

@@ -14,8 +14,9 @@ FloatArray = NDArray[np.float64]
 STEPS = 12
 MOST_RELATIVE_SIGMA = 0.5
 """A radius known worse tells nothing that a parabola does not."""
-LARGEST_MM = 1e6
-"""Of axis and radius: a circle that runs beyond is none."""
+LARGEST_MM = 1e5
+"""Of axis and radius: a circle that runs beyond is none. 60 mm aside it recedes by 0.02 mm, and its three
+parameters can hardly be told apart in 16 digits."""
 GRAZING = 0.1
 """Cosine of the steepest incidence at which a spot is believed to lie on a circle."""
 
@@ -63,9 +64,12 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
     start = _start(points)
     if start is None:
         return None
-    found = circle(start, points.x_mm, points.range_mm, *points.covariances(), STEPS, GRAZING, LARGEST_MM)
+    try:
+        found = circle(start, points.x_mm, points.range_mm, *points.covariances(), STEPS, GRAZING, LARGEST_MM)
+    except np.linalg.LinAlgError:  # so nearly a line that its three parameters are one
+        return None
     (x, z, radius), covariance, by_range, chi2 = found
-    if not math.isfinite(chi2):
+    if not (math.isfinite(chi2) and (np.diag(covariance) > 0).all()):
         return None
     by_place = by_range * ((points.x_mm - x) / (points.range_mm - z))
     freedom = len(points) - 3
@@ -87,6 +91,5 @@ def _start(points: Points) -> FloatArray | None:
     if not determinant > 1e-12 * xx * rr:
         return None
     a, b = (rr * of_x - xr * of_r) / determinant, (xx * of_r - xr * of_x) / determinant
-    if not b > 0:
-        return None
-    return np.array([a + middle_x, b + middle_r, math.sqrt(float(square.mean()) + a * a + b * b)])
+    radius = math.sqrt(float(square.mean()) + a * a + b * b)
+    return np.array([a + middle_x, b + middle_r, radius]) if b > 0 and radius < LARGEST_MM else None

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from tests.unit.ranging.surfaces import (
+    F_PX,
+    SD_PX,
     Floats,
     Surface,
     X,
@@ -153,6 +155,33 @@ def test_inclines_are_told_and_covered(range_mm: float, angle_deg: float) -> Non
 def test_near_rounds_are_told(surface: Surface, kind: str, degree: int | None) -> None:
     shapes = [s for seed in SEEDS for s in readings(surface, 300, seed)]
     assert share(shapes, lambda s: (s.kind, s.degree) == (kind, degree)) > 0.95
+
+
+@pytest.mark.parametrize(
+    "ranges",
+    [
+        # The first ran off to where three parameters are one: a singular matrix, a variance below 0.
+        (149.9630115393355, 150.05519845673516, 149.91103892060187, 150.00938792642353),
+        (149.95065849473553, 149.98451898274138, 150.06372594965464, 150.09837833002527),
+        (149.96275073216663, 149.97491801867966, 149.98454280237897, 149.9978174227135),
+        (150.0, 150.0, 150.0, 150.0),
+        (150.0, 151.0, 153.0, 154.0),
+    ],
+)
+def test_points_that_are_nearly_on_a_line_are_no_circle(ranges: tuple[float, ...]) -> None:
+    assert fit_cylinder(seen(X, np.array(ranges))) is None
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_circle_through_noisy_flats_is_none_or_a_sound_one(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for _ in range(1000):
+        range_mm = 10.0 ** rng.uniform(2.0, 3.7)
+        noise = rng.normal(0.0, 1.0, len(X)) * SD_PX / (F_PX * np.abs(X))
+        circle = fit_cylinder(seen(X, 1.0 / (1.0 / range_mm + noise)))
+        if circle is not None:
+            assert (np.linalg.eigvalsh(circle.covariance) > 0).all()
+            assert circle.radius_mm > 0
 
 
 @pytest.mark.parametrize("range_mm", [125.0, 300.0, 600.0])
