@@ -211,6 +211,9 @@ def test_ask_lets_the_operator_keep_redo_or_leave_out(tmp_path: Path) -> None:
     assert places == {"p.1/300mm", "p.1/1500mm"}
     told = [e.reason for e in events(done, ev.SetAside) if isinstance(e, ev.SetAside)]
     assert [reason.rpartition(": ")[2] for reason in told] == ["wiped the lens", "hopeless"]
+    words = [e.text for e in events(done, ev.SetAside) if isinstance(e, ev.SetAside)]
+    assert words[0].startswith("p.1/300mm is captured again: ")
+    assert words[1] == "p.1/600mm is left out: hopeless"
 
 
 def test_a_marginal_value_is_told_and_gone_on_from(tmp_path: Path) -> None:

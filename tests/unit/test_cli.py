@@ -329,8 +329,17 @@ def test_a_file_of_a_session_is_not_written_over(workbench: Run, tmp_path: Path)
     kept = tmp_path / "calibration.yaml"
     kept.write_text("as it was")
     refused(workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", kept), 2, "belongs to the session", tmp_path)
-    assert kept.read_text() == "as it was"
+    frame = tmp_path / "frames" / "a.png"
+    frame.parent.mkdir()
+    frame.write_text("a frame")
+    refused(workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", frame), 2, "belongs to the session", tmp_path)
+    assert (kept.read_text(), frame.read_text()) == ("as it was", "a frame")
     assert workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "refit.yaml").code == 0
+
+
+def test_a_source_that_is_not_there_is_named(workbench: Run, tmp_path: Path) -> None:
+    outcome = workbench("fit", tmp_path / "nope", "-o", tmp_path / "c.yaml")
+    refused(outcome, 2, "nope: expected a session's folder or a captures file, there is none")
 
 
 def test_names_are_printed_as_they_are(workbench: Run, tmp_path: Path) -> None:

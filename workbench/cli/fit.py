@@ -88,31 +88,29 @@ def fit_captures(request: Request, as_json: bool) -> None:
 
 def _check_distinct(request: Request) -> None:
     """What a calibration comes from is not written over."""
-    made_from = [request.source] if request.rig is None else [request.source, request.rig]
-    if request.source.is_dir():
-        from workbench.session.journal import JOURNAL  # with all events, which no captures file needs
-
-        made_from += [request.source / name for name in (CALIBRATION_TABLE, MANIFEST, JOURNAL)]
-    for path in made_from:
-        if request.output.resolve() == path.resolve():
-            raise BadInputError(
-                f"--output {request.output}: expected another file than the calibration is made from;"
-                " name a new one"
-            )
     target = request.output.resolve()
-    if target.is_file() and (target.parent / MANIFEST).is_file():
+    if target in {path.resolve() for path in (request.source, request.rig) if path is not None}:
         raise BadInputError(
-            f"--output {request.output}: expected a new file, this one belongs to the session"
-            f" {target.parent}; name another"
+            f"--output {request.output}: expected another file than the calibration is made from;"
+            " name a new one"
+        )
+    session = next((folder for folder in target.parents if (folder / MANIFEST).is_file()), None)
+    if session is not None and target.is_file():
+        raise BadInputError(
+            f"--output {request.output}: expected a new file, this one belongs to the session {session};"
+            " name another"
         )
 
 
 def _rig(request: Request) -> Rig:
     if request.rig is not None:
         return load_rig(request.rig)
-    if not request.source.is_dir():
-        raise BadInputError(f"{request.source}: a captures file needs --rig; only a session knows its own")
-    return load_session_rig(request.source)
+    source = request.source
+    if not source.exists():
+        raise BadInputError(f"{source}: expected a session's folder or a captures file, there is none")
+    if not source.is_dir():
+        raise BadInputError(f"{source}: a captures file needs --rig; only a session knows its own")
+    return load_session_rig(source)
 
 
 def _sightings(

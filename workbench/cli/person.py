@@ -131,4 +131,4 @@ def _answer(prompt: Prompt, typed: str) -> Answer:
     if prompt.choices:
         return Answer(value=typed)
     # A key pressed by chance confirms nothing.
-    return Answer(value=None if typed.lower() in {"y", "yes"} else typed)
+    return Answer(value=None if typed.lower() == "yes" else typed)

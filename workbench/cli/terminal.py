@@ -89,7 +89,7 @@ class Terminal:
                 value = "not measured" if e.value is None else f"{e.value:.3g}"
                 self._print(f"{e.verdict}: {e.of}: {e.quantity} {value}, limit {e.limit}", style="yellow")
             case ev.SetAside() as e:
-                self._print(f"captured again: {e.reason}", style="yellow")
+                self._print(e.text, style="yellow")
             case ev.SessionResumed() as e:
                 self._print(f"resumed, {len(e.changes)} changes accepted" if e.changes else "resumed", 2)
             case ev.StandoffAdvised() as e:

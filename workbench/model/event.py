@@ -98,7 +98,7 @@ class PlacementFinished(FileModel):
 
 
 class SetAside(FileModel):
-    """The records from `from_n` on count no more: the operator has a placement captured again."""
+    """The records from `from_n` on count no more: a placement is captured again, or left out."""
 
     kind: Literal["set_aside"] = "set_aside"
     key: str
@@ -107,6 +107,13 @@ class SetAside(FileModel):
     reason: str
     retry: bool = False
     """Whether a limit asked for it by itself (`on_fail: retry`): that is done a few times at most."""
+    left_out: bool = False
+    """Whether the placement is left out, and not captured again."""
+
+    @property
+    def text(self) -> str:
+        """For people, one line."""
+        return f"{self.key} is {'left out' if self.left_out else 'captured again'}: {self.reason}"
 
 
 class SessionResumed(FileModel):

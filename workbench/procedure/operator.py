@@ -63,7 +63,10 @@ class Scripted:
             AnswerNeededError: as `other` does.
         """
         if prompt.key not in self.answers or (prompt.at_bench and not self.at_bench):
-            return self.other.ask(prompt)
+            try:
+                return self.other.ask(prompt)
+            except AnswerNeededError as error:
+                raise AnswerNeededError(f"{error}; {self.path} answers {', '.join(self.answers)}") from None
         answer = self.answers[prompt.key]
         if (wrong := prompt.refuse(answer)) is not None:
             raise BadInputError(f"{self.path}: {prompt.key}: {wrong}")

@@ -99,13 +99,13 @@ def _work(
         try:
             return work(placed)
         except RetakeError as again:
-            _set_aside(context, placed.key, from_n, str(again), again.by_limit)
+            _set_aside(context, placed.key, from_n, str(again), retry=again.by_limit)
             if context.shooting.served is not None:
                 raise _ServedAgainError from again
             FrameStore(context.session_dir).set_aside(placed.key)
             from_n = context.emit(ev.TargetPlaced(placement=placed, by=answer.by)).n
         except _LeftOutError as left_out:
-            _set_aside(context, placed.key, from_n, left_out.answer.reason or "")
+            _set_aside(context, placed.key, from_n, left_out.answer.reason or "", left_out=True)
             raise
 
 
@@ -144,9 +144,11 @@ def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Recor
     return context.emit(ev.TargetPlaced(placement=placed, by=answer.by)), placed
 
 
-def _set_aside(context: Context, key: str, from_n: int, reason: str, retry: bool = False) -> None:
+def _set_aside(
+    context: Context, key: str, from_n: int, reason: str, *, retry: bool = False, left_out: bool = False
+) -> None:
     """Forget what was captured at a placement; its frames are kept, moved aside when it is repeated."""
-    context.emit(ev.SetAside(key=key, from_n=from_n, reason=reason, retry=retry))
+    context.emit(ev.SetAside(key=key, from_n=from_n, reason=reason, retry=retry, left_out=left_out))
     context.forget(key)
 
 

@@ -35,11 +35,11 @@ def check_same_sensor(rig: Rig, calibration: Calibration) -> None:
         ("rig", rig.rig, made.rig),
         ("serial", rig.serial, made.serial),
         ("image size", (rig.camera.width_px, rig.camera.height_px), _size(calibration)),
-        ("lasers", [(s.id, s.axis) for s in rig.lasers], [(s.id, s.axis) for s in ours.lasers]),
+        ("list of lasers", [(s.id, s.axis) for s in rig.lasers], [(s.id, s.axis) for s in ours.lasers]),
     ):
         if of_rig != of_file:
             raise BadInputError(
-                f"calibration: expected one of rig {rig.rig}: its {what} is {of_rig}, the calibration's is"
+                f"calibration: expected one of this rig, whose {what} is {of_rig}, got one whose {what} is"
                 f" {of_file}; calibrate this rig, or give its own calibration"
             )
 

@@ -170,7 +170,7 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.SetAside, moment: Moment) -> None:
-        steps.say(self.stream, f"Placement {event.key} is captured again: {event.reason}", steps.WARN)
+        steps.say(self.stream, f"Placement {event.text}", steps.WARN)
 
     @_log.register
     def _(self, event: ev.SessionResumed, moment: Moment) -> None:

@@ -270,10 +270,18 @@ def test_a_lamp_is_known_if_it_burned_before_the_first_pair(
 @pytest.mark.parametrize(
     ("was", "becomes", "words"),
     [
-        ("rig: thesis-emulated", "rig: another", "its rig is another, the calibration's is thesis-emulated"),
-        ("serial: emulated-1", "serial: emulated-9", "its serial is emulated-9"),
-        ("width_px: 640", "width_px: 320", "its image size is (320, 480), the calibration's is (640, 480)"),
-        ("  - id: L4", "  - id: L5", "its lasers is"),
+        (
+            "rig: thesis-emulated",
+            "rig: another",
+            "whose rig is another, got one whose rig is thesis-emu",
+        ),
+        ("serial: emulated-1", "serial: emulated-9", "whose serial is emulated-9"),
+        (
+            "width_px: 640",
+            "width_px: 320",
+            "size is (320, 480), got one whose image size is (640, 480)",
+        ),
+        ("  - id: L4", "  - id: L5", "got one whose list of lasers is"),
     ],
 )
 def test_the_calibration_of_another_sensor(
@@ -297,7 +305,7 @@ def test_a_session_of_another_sensor(calibration: Path, tmp_path: Path, serial: 
     create_session(folder, load_rig(rig_file), rig_file, [], **stated)
     (folder / "captures.csv").write_text("laser_id,standoff_mm,repeat,u_px,v_px\nL1,,0,250,240\n")
     if refused:
-        with pytest.raises(BadInputError, match="its serial is emulated-9"):
+        with pytest.raises(BadInputError, match="whose serial is emulated-9"):
             range_captures(folder, calibration, as_json=False)
     else:
         range_captures(folder, calibration, as_json=False)
