@@ -67,6 +67,7 @@ def test_a_step_that_is_none_is_told_with_those_there_are(tmp_path: Path) -> Non
             ["f.yaml:12: camera.f_px: expected {value: ..., sd: ...}, got 533.3"],
         ),
         ("axis: u", "axis: w", ["f.yaml:20: lasers[0].axis: expected 'u' or 'v', got 'w'"]),
+        ("id: L2", "id: L1", ["f.yaml:18: lasers: ids must differ, got L1, L1, L3, L4"]),
         (
             "seed: 2001",
             "seed: 2001\n  beam: {power_mw: 1 W, colour: red}\n  camera: {gain: 0.2}",

@@ -118,7 +118,11 @@ def direction_lines(directions: Sequence[NullDirection]) -> list[str]:
     """For people, the few combinations that matter most; what stands alone is seen in the table."""
     lines = [d.line for d in directions if len(d.change) > 1]
     left = len(lines) - SHOWN
-    return lines if left <= 0 else [*lines[:SHOWN], f"{left} more such combinations cannot be known apart"]
+    return (
+        lines
+        if left <= 0
+        else [*lines[:SHOWN], f"{left} more such combination{'s' * (left > 1)} cannot be known apart"]
+    )
 
 
 def _posterior(

@@ -67,7 +67,7 @@ class Terminal:
         self._forecast.take(record)
         match record.event:
             case ev.ProcedureStarted() as e:
-                self._console.print(Text.assemble((e.title, "bold"), f" ({e.procedure}, {e.steps} steps)"))
+                self._console.print(Text.assemble((e.title, "bold"), f" ({e.procedure}, {e.length})"))
             case ev.StepStarted() as e:
                 self._print(f"{e.index}. {e.title}", indent=2)
                 if e.shots:

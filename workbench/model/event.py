@@ -49,6 +49,11 @@ class ProcedureStarted(FileModel):
     title: str
     steps: int
 
+    @property
+    def length(self) -> str:
+        """For people."""
+        return f"{self.steps} step" if self.steps == 1 else f"{self.steps} steps"
+
 
 class StepStarted(FileModel):
     """A step is about to run. `index` counts from 1 within its procedure."""

@@ -98,5 +98,6 @@ def _say(error: ErrorDetails) -> str:
     known = EXPECTED.get(error["type"])
     if known is None:
         said = error["msg"].removeprefix("Value error, ")
-        return f"{said[:1].lower()}{said[1:]}{came}"
+        # A rule about a whole mapping says itself what came of it.
+        return f"{said[:1].lower()}{said[1:]}" + ("" if ", got " in said else came)
     return known.format(**context) + ("" if error["type"] in SELF_EVIDENT else came)

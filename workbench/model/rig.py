@@ -217,12 +217,13 @@ class Rig(FileModel):
     emulator: dict[str, Any] | None = None
     """Read by the emulated bench alone, which validates it."""
 
-    @model_validator(mode="after")
-    def _laser_ids_differ(self) -> Rig:
-        ids = [laser.id for laser in self.lasers]
+    @field_validator("lasers")
+    @classmethod
+    def _laser_ids_differ(cls, lasers: tuple[LaserSpec, ...]) -> tuple[LaserSpec, ...]:
+        ids = [laser.id for laser in lasers]
         if len(set(ids)) != len(ids):
-            raise ValueError(f"laser ids must differ, got {ids}")
-        return self
+            raise ValueError(f"ids must differ, got {', '.join(ids)}")
+        return lasers
 
     @property
     def laser_ids(self) -> tuple[str, ...]:

@@ -139,7 +139,7 @@ class _OpenRecording:
     @_log.register
     def _(self, event: ev.ProcedureStarted, moment: Moment) -> None:
         steps.lane(self.stream, at.LANE_PROCEDURE, event.procedure)
-        steps.say(self.stream, f"{event.procedure}: {event.title} ({event.steps} steps)")
+        steps.say(self.stream, f"{event.procedure}: {event.title} ({event.length})")
 
     @_log.register
     def _(self, event: ev.StepStarted, moment: Moment) -> None:
