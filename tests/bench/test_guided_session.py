@@ -275,7 +275,7 @@ def test_an_exposure_is_searched_for_on_frames_that_are_not_stale(
         session(tmp_path / "stale", GRID, Says(), late)
     assert [
         e.verdict for e in events(tmp_path / "stale/s", ev.ExposureSet) if isinstance(e, ev.ExposureSet)
-    ] == ["dim"]
+    ] == ["unseen"]
 
 
 def test_the_doctor_looks_at_the_latency_first(tmp_path: Path) -> None:
@@ -327,6 +327,10 @@ def test_latency_is_counted_whatever_the_driver_believes(tmp_path: Path, latency
         ("  camera: {exposure_s: 1.0e-5}\n", {"laser L1", "laser L4"}),
         ("  camera: {exposure_s: 0.03}\n", {"laser L1", "laser L4"}),
         ("  truth: {lasers: {L4: {x_mm: 400}}}\n", {"laser L4"}),
+        (
+            "  truth: {lasers: {L1: {x_mm: 400}, L4: {x_mm: 400}}}\n  ambient: {level_e_per_s: 2.0e6}\n",
+            {"latency", "exposure", "laser L1", "laser L4"},  # the room is no spot
+        ),
     ],
 )
 def test_the_doctor_finds_what_is_wrong(tmp_path: Path, emulator: str, bad: set[str]) -> None:

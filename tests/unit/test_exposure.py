@@ -30,9 +30,10 @@ class Sensor:
         clips_at: float = 1.0,
         gamma: float = 1.0,
         jumps_at: float = 1.0,
+        room: float = 0.0,
     ) -> None:
         self.rate, self.pedestal, self.noise_dn, self.step = rate, pedestal, noise_dn, step
-        self.clips_at, self.gamma, self.jumps_at = clips_at, gamma, jumps_at
+        self.clips_at, self.gamma, self.jumps_at, self.room = clips_at, gamma, jumps_at, room
         self.rng = np.random.default_rng(5)
         self.asked: list[float] = []
 
@@ -41,14 +42,12 @@ class Sensor:
         self.asked.append(exposure)
         taken = max(self.step * round(exposure / self.step), self.step) if self.step else exposure
         lit = FULL * (self.rate * taken) ** self.gamma
-        dn = (
-            min(FULL * self.pedestal + lit, self.clips_at * FULL) + self.noise_dn * self.rng.standard_normal()
-        )
+        dark = min(self.pedestal + self.room * taken, self.clips_at)
+        dn = min(FULL * dark + lit, self.clips_at * FULL) + self.noise_dn * self.rng.standard_normal()
         dn = FULL if dn > self.jumps_at * FULL else dn
         peak = float(np.clip(np.rint(dn), 0, FULL)) / FULL
         noise = max(self.noise_dn, 0.5) / FULL
-        seen = peak - self.pedestal > 6 * noise
-        return Trial(taken, Peak(peak, peak - self.pedestal, noise) if seen else Peak(self.pedestal))
+        return Trial(taken, Peak(peak, peak - dark, noise) if peak - dark > 6 * noise else Peak(dark))
 
 
 @given(st.floats(-1.2, 5.2), st.floats(0, 0.1), st.sampled_from([0.0, 1.5]))
@@ -107,7 +106,38 @@ def test_grey_that_jumps_where_a_colour_is_clipped(decade: float, jumps_at: floa
     tried = search_exposure((1.0, 1e7), sensor)
     best = best_of(tried)
     assert len(tried) <= MOST_TRIALS
-    assert 0.55 * jumps_at < 0.03 + sensor.rate * best.exposure <= jumps_at
+    assert 0.5 * jumps_at < 0.03 + sensor.rate * best.exposure <= 0.75 * jumps_at, "a quarter is left"
+
+
+@pytest.mark.parametrize("faint", [0.0, 1e-4, 1e-3, 0.1, 10.0])
+@pytest.mark.parametrize("clips_at", [1.0, 0.92])
+@given(decade=st.floats(0.5, 5.0), noise_dn=st.sampled_from([0.0, 1.5]))
+def test_the_light_of_the_room_alone_is_never_good(
+    faint: float, clips_at: float, decade: float, noise_dn: float
+) -> None:
+    """Lasers of that share of the room's rate: what is kept sees them, or is told as unseen."""
+    room = 0.6 / 10 ** (1.0 + decade)
+    sensor = Sensor(faint * room, room=room, noise_dn=noise_dn, clips_at=clips_at)
+    tried = search_exposure((1.0, 1e7), sensor)
+    best = best_of(tried)
+    told = verdict_of(share_of(best, tried), seen=best.seen.lit > 0)
+    assert len(tried) <= MOST_TRIALS
+    assert (told == "unseen") == (best.seen.lit == 0)
+    if faint <= 1e-3:
+        assert told == "unseen"
+        assert 0.5 < 0.03 + room * best.exposure <= GOOD[1] + 1e-9, "as long as the room lets it"
+    if faint >= 0.1:
+        assert best.seen.lit > 0
+        assert best.seen.peak < clips_at
+
+
+def test_where_nothing_is_seen_no_half_exposure_is_tried() -> None:
+    """Not in the dark, where half of the longest would tell nothing, nor in the room's light."""
+    for room in (0.0, 0.006):
+        sensor = Sensor(0.0, room=room)
+        tried = search_exposure((1.0, 1e4), sensor)
+        assert best_of(tried).seen.lit == 0
+        assert best_of(tried).exposure / 2 not in sensor.asked
 
 
 @pytest.mark.parametrize("rate", [1e-5, 1e-3, 1e-1])
@@ -191,13 +221,20 @@ def test_a_lamp_that_flickers_among_the_spots_is_seldom_taken_for_one() -> None:
     [(1.0, "clipped", "filter"), (0.99, "bright", "filter"), (0.54, "dim", "lie on"), (0.6, "good", "60 %")],
 )
 def test_what_is_not_good_is_said(peak: float, verdict: str, says: str) -> None:
-    assert verdict_of(peak) == verdict
+    assert verdict_of(peak, seen=True) == verdict
+    assert verdict_of(peak, seen=False) == "unseen"
     told = ExposureSet.model_validate(
         {"key": "p", "exposure": 20.0, "unit": "", "peak": peak, "verdict": verdict, "trials": 3}
     ).text
     assert told.startswith("exposure 20, brightest spot at")
     assert says in told
     assert (verdict in told) == (verdict != "good")
+
+
+def test_the_light_of_the_room_is_not_called_a_spot() -> None:
+    told = ExposureSet(key="p", exposure=20.0, unit="us", peak=0.6, verdict="unseen", trials=3).text
+    assert "spot" not in told
+    assert told.startswith("exposure 20 us, no laser seen, the room is at 60 % of full scale: ")
 
 
 def test_the_document_states_these_bounds() -> None:

@@ -144,7 +144,10 @@ class ExposureSet(FileModel):
     unit: str
     """Empty for the camera driver's own."""
     peak: float
-    """Brightest pixel of that trial as a share of full scale, or of where trials were clipped below it."""
+    """Brightest pixel of that trial as a share of full scale, or of where trials were clipped below it.
+
+    The room's median where no laser is seen.
+    """
     verdict: BrightnessVerdict
     """By `workbench.model.exposure`; not good where the camera's limits or steps give no better."""
     trials: int
@@ -153,6 +156,11 @@ class ExposureSet(FileModel):
     def text(self) -> str:
         """One line for people."""
         spelt = f"exposure {self.exposure:g} {self.unit}".rstrip()
+        if self.verdict == "unseen":
+            return (
+                f"{spelt}, no laser seen, the room is at {100 * self.peak:.0f} % of full scale: do the lasers"
+                " shine on the target, where the rig file expects them? Darken the room if it is bright"
+            )
         share = f"brightest spot at {100 * self.peak:.0f} % of full scale"
         remarks = {
             "clipped": ", clipped: take a darker target or a filter",

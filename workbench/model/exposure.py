@@ -11,11 +11,13 @@ CLIPPED = 1.0
 WIDEST = 1e7
 """Longest by shortest exposure that the search gets through."""
 
-Verdict = Literal["dim", "good", "bright", "clipped"]
+Verdict = Literal["unseen", "dim", "good", "bright", "clipped"]
 
 
-def verdict_of(peak: float) -> Verdict:
-    """What a share of full scale is called."""
+def verdict_of(peak: float, *, seen: bool) -> Verdict:
+    """What a share of full scale is called; where no laser is seen it is the room's, and never good."""
+    if not seen:
+        return "unseen"
     if peak >= CLIPPED:
         return "clipped"
     return "dim" if peak < GOOD[0] else "good" if peak <= GOOD[1] else "bright"

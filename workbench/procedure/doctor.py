@@ -114,7 +114,7 @@ def _exposure(rig: Rig, bench: Bench) -> Iterator[Finding]:
         yield Finding("exposure", False, str(error))
         return
     if found is not None:
-        well = BRIGHT <= found.peak < CLIPPED
+        well = found.verdict != "unseen" and BRIGHT <= found.peak < CLIPPED
         yield Finding("exposure", well, found.text.removeprefix("exposure "))
 
 

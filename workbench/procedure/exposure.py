@@ -6,6 +6,9 @@ scale, is scaled wrongly, and the next trial sees how much that was. Of a clippe
 
 Not every pixel is clipped at full scale: where a camera of colours makes grey by itself, a red spot is
 clipped when it is at 30 % of that. A longer exposure gives no more then; that number is taken for full scale.
+Or the number jumps to full scale, where the driver tells of such a pixel: the search ends below the jump.
+
+Where no laser is seen, the light is the room's alone: it is too little, or so much that it hides the lasers.
 """
 
 from __future__ import annotations
@@ -24,8 +27,8 @@ from workbench.procedure.peak import Peak, look_at_peak, searched_pixels
 
 BOLDEST = 8.0
 """Largest factor from one trial to the next."""
-MOST_TRIALS = 8
-"""Four go from the middle of a range of 1 : 10^7 to its ends; as many are left to close in."""
+MOST_TRIALS = 9
+"""Four go from the middle of a range of 1 : 10^7 to its ends; four are left to close in, one to step down."""
 LIT_FRAMES = 2
 """Of a trial."""
 TELLING = 1.4
@@ -35,8 +38,12 @@ LEAST_GROWTH = 0.3
 GROWTH_SD = 4.0
 SAME_STEP = 1.05
 """Ratio up to which two exposures are not worth two trials."""
-NEAR = 1.6
+NEAR = 1.35
 """Ratio of the shortest exposure that was clipped to the longest that was not, which is near enough."""
+STEP_DOWN = 0.7
+"""From the longest exposure below a jump, where a colour may be all but clipped, to one with room left."""
+LEFT = 0.75
+"""Of that longest exposure, at most: a quarter is left, however coarse the camera's steps."""
 SAME = 0.005
 """Relative difference below which an exposure was taken as in its trial."""
 FLAT = 0.03
@@ -96,7 +103,7 @@ def set_exposure(
         exposure=best.exposure,
         unit=camera.exposure_unit,
         peak=peak,
-        verdict=verdict_of(peak),
+        verdict=verdict_of(peak, seen=best.seen.lit > 0),
         trials=len(tried),
     )
 
@@ -133,27 +140,27 @@ def search_exposure(limits: tuple[float, float], look: Callable[[float, int], Tr
     asked: list[float] = []
     tried: list[Trial] = []
     following: float | None = math.sqrt(limits[0] * limits[1])
-    while following is not None and len(tried) < MOST_TRIALS:
-        following = _within(limits, following)
-        if following in asked:
-            break
+    while following is not None and (following := _within(limits, following)) not in asked:
         asked.append(following)
         tried.append(look(following, len(tried)))
-        following = _after(tried)
+        following = _after(tried) if len(tried) < MOST_TRIALS - 1 else None
+    longest = _longest(tried)
+    if _below_jump(longest, tried) and (lower := _within(limits, STEP_DOWN * longest.exposure)) not in asked:
+        tried.append(look(lower, len(tried)))
     return tried
 
 
 def _after(tried: Sequence[Trial]) -> float | None:
     """The exposure to try next; None: a good one is among them."""
-    best = best_of(tried)
-    if GOOD[0] <= share_of(best, tried) <= GOOD[1]:
+    best = _longest(tried)
+    if GOOD[0] <= _level(best, tried) <= GOOD[1]:
         # Half of it tells whether the number is that of a pixel clipped below full scale.
         return None if any(_tells(other, best) for other in tried) else best.exposure / 2
-    last, share = tried[-1], share_of(tried[-1], tried)
-    following = last.exposure * (1 / BOLDEST if share >= CLIPPED else AIM / max(share, AIM / BOLDEST))
-    clipped = min((t.exposure for t in tried if share_of(t, tried) >= CLIPPED), default=math.inf)
-    dimmest = best.exposure if share_of(best, tried) < GOOD[0] else 0.0
-    if clipped == math.inf or SAME_STEP * dimmest < following < clipped:
+    last, level = tried[-1], _level(tried[-1], tried)
+    following = last.exposure * (1 / BOLDEST if level >= CLIPPED else AIM / max(level, AIM / BOLDEST))
+    clipped = _shortest_clipped(tried)
+    dimmest = max((t.exposure for t in tried if _level(t, tried) < GOOD[0]), default=0.0)
+    if clipped == math.inf or SAME_STEP * dimmest < following < clipped / SAME_STEP:
         return following
     # It jumps from below the aim to clipped, as grey does where one of its colours is clipped: in between.
     return math.sqrt(dimmest * clipped) if clipped > NEAR * dimmest else None
@@ -165,9 +172,42 @@ def _within(limits: tuple[float, float], exposure: float) -> float:
 
 
 def best_of(tried: Sequence[Trial]) -> Trial:
-    """The longest exposure that was not too bright; where all were, the shortest."""
-    sound = [trial for trial in tried if share_of(trial, tried) <= GOOD[1]]
-    return max(sound, key=_exposure) if sound else min(tried, key=_exposure)
+    """The longest exposure that was not too bright; where all were, the shortest; well below a jump."""
+    longest = _longest(tried)
+    if not _below_jump(longest, tried):
+        return longest
+    lower = [t for t in tried if t.seen.lit > 0 and t.exposure < longest.exposure]
+    return max(
+        (t for t in lower if t.exposure <= LEFT * longest.exposure),
+        key=_exposure,
+        default=min(lower, key=_exposure, default=longest),
+    )
+
+
+def _longest(tried: Sequence[Trial]) -> Trial:
+    """Not too bright, with the lasers seen if any trial sees them."""
+    seen = [trial for trial in tried if trial.seen.lit > 0 and share_of(trial, tried) < CLIPPED]
+    among = seen or tried
+    sound = [trial for trial in among if _level(trial, tried) <= GOOD[1]]
+    return max(sound, key=_exposure) if sound else min(among, key=_exposure)
+
+
+def _below_jump(trial: Trial, tried: Sequence[Trial]) -> bool:
+    """Whether a dim spot was clipped at an exposure at which light in proportion would not have been."""
+    share = share_of(trial, tried)
+    growth = _shortest_clipped(tried) / trial.exposure
+    return trial.seen.lit > 0 and share < GOOD[0] and share * growth < CLIPPED
+
+
+def _shortest_clipped(tried: Sequence[Trial]) -> float:
+    return min((t.exposure for t in tried if _level(t, tried) >= CLIPPED), default=math.inf)
+
+
+def _level(trial: Trial, tried: Sequence[Trial]) -> float:
+    """How bright it is for the search: where no laser is seen dark, or clipped if it is as bright as that."""
+    if trial.seen.lit > 0:
+        return share_of(trial, tried)
+    return 0.0 if trial.seen.peak <= GOOD[1] else CLIPPED
 
 
 def share_of(trial: Trial, tried: Sequence[Trial]) -> float:
