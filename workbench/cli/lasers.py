@@ -6,7 +6,7 @@ from pathlib import Path
 
 from workbench.devices.real_bench import open_lasers
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
-from workbench.model.rig import load_rig
+from workbench.model.rig import Rig, load_rig
 
 
 def lasers_off(rig_path: Path) -> str:
@@ -18,7 +18,7 @@ def lasers_off(rig_path: Path) -> str:
     """
     rig = load_rig(rig_path)
     if rig.driver == "emulated":
-        return f"rig {rig.rig} is the virtual bench: its lasers end with the command that lights them"
+        return _virtual(rig)
     try:
         lasers = open_lasers(rig)
         lasers.close()
@@ -29,13 +29,20 @@ def lasers_off(rig_path: Path) -> str:
     return f"all lasers are off, confirmed by {lasers.identity}"
 
 
+def _virtual(rig: Rig) -> str:
+    return f"rig {rig.rig} is the virtual bench: its lasers end with the command that lights them"
+
+
 def lasers_state(rig_path: Path) -> str:
     """What the controller tells, once its port is open; that puts every laser off.
 
     Raises:
         WorkbenchError: the rig file is wrong, or the controller does not answer.
     """
-    lasers = open_lasers(load_rig(rig_path))
+    rig = load_rig(rig_path)
+    if rig.driver == "emulated":
+        return _virtual(rig)
+    lasers = open_lasers(rig)
     try:
         state = lasers.state()
     finally:

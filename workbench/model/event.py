@@ -275,9 +275,9 @@ class StandoffAdvised(FileModel):
     @property
     def text(self) -> str:
         """For people, one or two lines."""
-        met = "met" if self.relative_range_sd <= self.limit else "not met"
+        met = "reached" if self.relative_range_sd <= self.limit else "not yet"
         return (
-            f"target {met}: ranges to {100 * self.relative_range_sd:.2g} % (limit {100 * self.limit:g} %);"
+            f"so far ranges to {100 * self.relative_range_sd:.2g} % ({100 * self.limit:g} % wanted: {met});"
             f" best next {self.next_standoff_mm:g} mm: to {100 * self.then_relative_range_sd:.2g} %"
             f"{self._worst}"
         )
