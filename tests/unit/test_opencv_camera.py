@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import ClassVar, cast
+from typing import Any, ClassVar, cast
 
 import cv2
 import numpy as np
@@ -312,18 +312,26 @@ def test_a_red_spot_on_a_camera_of_colours_is_not_clipped(
         assert 0.5 < red <= 0.75, "a quarter is left"
 
 
-def test_a_pixel_that_is_clipped_in_one_colour_is_clipped(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("bits", "kind"), [(8, np.uint8), (10, np.uint16), (12, np.uint16), (16, np.uint16)])
+def test_a_pixel_that_is_clipped_in_one_colour_is_clipped(
+    monkeypatch: pytest.MonkeyPatch, bits: int, kind: type[np.unsignedinteger[Any]]
+) -> None:
+    """At the camera's full scale, which need not be that of the numbers that carry it."""
+    full = 2**bits - 1
+
     class Red(Device):
         def read(self) -> tuple[bool, Picture]:
-            shown = np.full((HEIGHT, WIDTH, 3), 20, np.uint8)
-            shown[40, 60:62] = ((20, 20, 254), (20, 20, 255))
-            return True, shown
+            shown = np.full((HEIGHT, WIDTH, 3), 20, kind)
+            shown[40, 60:62] = ((20, 20, full - 1), (20, 20, full))
+            return True, cast(Picture, shown)
 
     monkeypatch.setattr(cv2, "VideoCapture", Red)
-    camera = camera_of("/dev/video0", exposure=16)
+    camera = OpenCvCamera(
+        CameraDevice(source="/dev/video0", exposure=16), FORMAT.model_copy(update={"bits": bits})
+    )
     image = camera.grab().image
     camera.close()
-    assert image[40, 59:63].tolist() == [20, round(0.299 * 254 + 0.701 * 20), 255, 20]
+    assert image[40, 59:63].tolist() == [20, round(0.299 * (full - 1) + 0.701 * 20), full, 20]
 
 
 def test_an_exposure_that_is_another_the_next_time() -> None:

@@ -2,23 +2,34 @@
 
 A writer of YAML in general does not keep to it. OpenCV refuses a plain string that begins with a digit, one
 that goes on in the next line, an empty value, and a list of mappings that is not indented under its key;
-PyYAML takes 1e-05 for a string. So strings are quoted, numbers have a decimal point, nothing is `null`, and
-a list of numbers or words is one line.
+PyYAML takes 1e-05 for a string. So strings are quoted, floats have a decimal point, None is written as `null`
+(OpenCV reads it as a node without a value), and a list of numbers or words is one line.
+
+What no escape or length brings through all of them is not written: a control character becomes a space, and a
+string that is too long for OpenCV, which would read nothing of the whole file, ends with an ellipsis.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
 
-UNPRINTABLE = re.compile("[\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
-"""What YAML wants escaped, and JSON leaves as it is."""
+UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
+"""What YAML wants escaped by a code, which OpenCV does not read; tab and the ends of lines it does."""
+LONGEST_BYTES = 4095
+"""Of a string in UTF-8 that OpenCV reads."""
+ELLIPSIS = "…"
 
 
 def yaml_text(document: Mapping[str, Any]) -> str:
-    """A document of mappings (none of them empty), lists, strings, numbers, booleans and None."""
+    """A document of mappings (none of them empty), lists, strings, finite numbers, booleans and None.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
     return "\n".join(["%YAML 1.2", "---", *_mapping(document, ""), ""])
 
 
@@ -52,9 +63,18 @@ def _flow(value: Any) -> str:
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(_flow, value))}]"
     if isinstance(value, float):
-        text = repr(value)
+        if not math.isfinite(value):
+            raise ValueError(f"expected a finite number, got {value}")
+        text = float.__repr__(value)  # numpy's are floats too, with a text of their own
         return text if "." in text else text.replace("e", ".0e")
     if isinstance(value, str):
-        # JSON's escapes are YAML's as well; `\u` of four digits is enough for the few that JSON has none for.
-        return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(value, ensure_ascii=False))
+        return json.dumps(plain(value), ensure_ascii=False)  # JSON's escapes are YAML's as well
     return json.dumps(value)
+
+
+def plain(text: str) -> str:
+    """As much of a text as every reader reads."""
+    spaced = UNPRINTABLE.sub(" ", text)
+    if len(spaced.encode()) <= LONGEST_BYTES:
+        return spaced
+    return spaced.encode()[: LONGEST_BYTES - len(ELLIPSIS.encode())].decode(errors="ignore") + ELLIPSIS

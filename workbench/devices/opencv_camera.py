@@ -157,7 +157,7 @@ class OpenCvCamera:
                     made = self._exposure
                     _set(self._capture, self._device.source, cv2.CAP_PROP_EXPOSURE, "exposure", made)
                 came, image = self._capture.read()
-                frame = Frame(_grey(image), time.time_ns()) if came else None
+                frame = Frame(_grey(image, 2**self._format.bits - 1), time.time_ns()) if came else None
             except (RigNotReadyError, cv2.error) as error:
                 self._end(str(error))
                 return
@@ -255,7 +255,7 @@ def _set(capture: cv2.VideoCapture, source: str, number: int, name: str, value: 
         )
 
 
-def _grey(image: np.ndarray[Any, Any]) -> Image:
+def _grey(image: np.ndarray[Any, Any], full_scale: int) -> Image:
     """Of colours their weighted mean, which is linear in the light and sharper than any of them by itself.
 
     Where one of them is clipped it is not linear any more: such a pixel is given as clipped. (The mean of a
@@ -267,6 +267,5 @@ def _grey(image: np.ndarray[Any, Any]) -> Image:
         return image[:, :, 0]
     grey: Image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=image.dtype)
     blue, green, red = cv2.split(image)[:3]
-    full_scale = np.iinfo(image.dtype).max
-    grey[np.asarray(cv2.max(cv2.max(blue, green), red)) == full_scale] = full_scale
+    grey[np.asarray(cv2.max(cv2.max(blue, green), red)) >= full_scale] = full_scale
     return grey

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +11,8 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 Numbers = TypeVar("Numbers", float, Array, NDArray[np.float64])
+EitherArray = Array | NDArray[Any]
+"""JAX's, or numpy's where all inputs are numpy's arrays."""
 
 
 class Lens(NamedTuple):
@@ -26,12 +28,12 @@ class Lens(NamedTuple):
     k3: ArrayLike = 0.0
 
 
-def as_array(x: ArrayLike) -> Array:
+def as_array(x: ArrayLike) -> EitherArray:
     """JAX's, but for numpy's, which stays: so the same maths is done on complex numbers without a program."""
-    return cast("Array", x) if isinstance(x, np.ndarray) else jnp.asarray(x)
+    return x if isinstance(x, np.ndarray) else jnp.asarray(x)
 
 
-def distort(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+def distort(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[EitherArray, EitherArray]:
     """Distorted normalised coordinates of the undistorted (x, y); shapes broadcast.
 
     Source: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37 (1971), with
@@ -45,7 +47,7 @@ def distort(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
     return x_distorted, y_distorted
 
 
-def project(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+def project(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[EitherArray, EitherArray]:
     """Pixel position (u, v) of the undistorted normalised coordinates x = X/Z, y = Y/Z."""
     x_distorted, y_distorted = distort(lens, x, y)
     f_px = as_array(lens.f_px)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from workbench.optics.lens import Lens, as_array, project
+from workbench.optics.lens import EitherArray, Lens, as_array, project
 
 
 class Ray(NamedTuple):
@@ -34,7 +34,9 @@ def depth_on_plane(ray: Ray, plane: Plane) -> Array:
     return jnp.asarray(at_origin / (1.0 - plane.slope_x * ray.tx - plane.slope_y * ray.ty))
 
 
-def spot_at_inverse_depth(lens: Lens, ray: Ray, inverse_depth_per_mm: ArrayLike) -> tuple[Array, Array]:
+def spot_at_inverse_depth(
+    lens: Lens, ray: Ray, inverse_depth_per_mm: ArrayLike
+) -> tuple[EitherArray, EitherArray]:
     """Pixel position (u, v) of the ray's point at depth z = 1 / inverse_depth; 0 is the point at infinity.
 
     In inverse depth the undistorted image point moves along a straight line at constant speed, which is why
@@ -47,4 +49,5 @@ def spot_at_inverse_depth(lens: Lens, ray: Ray, inverse_depth_per_mm: ArrayLike)
 
 def spot_on_plane(lens: Lens, ray: Ray, plane: Plane) -> tuple[Array, Array]:
     """Pixel position (u, v) of the laser's spot on the plane."""
-    return spot_at_inverse_depth(lens, ray, 1.0 / depth_on_plane(ray, plane))
+    u, v = spot_at_inverse_depth(lens, ray, 1.0 / depth_on_plane(ray, plane))
+    return jnp.asarray(u), jnp.asarray(v)
