@@ -300,6 +300,20 @@ class TestAnotherModel:
             workbench("range", WEBCAM, "--calibration", output), 2, "refused because laser 1 was seen at 2"
         )
 
+    def test_opencv_reads_a_calibration_kept_with_a_long_reason(self, workbench: Run, tmp_path: Path) -> None:
+        """Its limit is 4095 bytes for any string, and the command holds the reason too."""
+        output, reason = tmp_path / "c.yaml", "only to try the ranger " * 200
+        captures = tmp_path / "c.csv"
+        captures.write_text("".join(WEBCAM.read_text().splitlines(keepends=True)[:3]))
+        arguments = ("fit", captures, "--rig", WEBCAM_RIG, "-o", output, "--accept", reason)
+        assert workbench(*arguments).code == 0
+        storage = cv2.FileStorage(str(output), cv2.FILE_STORAGE_READ)
+        kept = storage.getNode("laser_ranger").getNode("fit").getNode("accepted_because").string()
+        assert reason.startswith(kept.removesuffix("…"))
+        assert storage.getNode("camera_matrix").mat()[2, 2] == 1.0
+        storage.release()
+        assert load_calibration(output).laser_ranger.fit.accepted_because == kept
+
     def test_a_captures_file_needs_a_rig(self, workbench: Run, tmp_path: Path) -> None:
         refused(workbench("fit", WEBCAM, "-o", tmp_path / "c"), 2, "needs --rig")
 
