@@ -69,8 +69,8 @@ def level(image: Image) -> float:
 def test_a_grab_shows_what_was_switched_before_it(streams: Callable[..., Stream], latency: int) -> None:
     """Ten times, the scene changes and the next grab has to show it, however many frames are under way."""
     scene = Scene()
-    # Besides those on their way: the one that was being exposed, the one that was on the line, and what a busy
-    # computer leaves there for a tenth of a second.
+    # Besides those on their way: the one that was being exposed, the one that was on the line, and what a
+    # busy computer leaves there for a tenth of a second.
     camera = camera_of(streams(scene.picture, latency).url, latency_frames=latency + 2 + 3)
     for number in range(10):
         scene.level = 40 + 20 * number
