@@ -16,6 +16,7 @@ from workbench.session.journal import JOURNAL, read_journal
 ROOT = Path(__file__).parents[2]
 SCRIPT = Path(sys.executable).with_name("workbench")
 RIG = (ROOT / "rigs/thesis-emulated.yaml").read_text()
+IGNORES_OFF = "  controller: {fault: ignores_off}\n"
 SHORT = """\
 format: 1
 procedure: short
@@ -80,9 +81,35 @@ def test_a_beam_that_stays_on_is_seen_in_the_dark_frame(tmp_path: Path) -> None:
 
 
 def test_a_controller_that_does_not_confirm_is_not_believed(tmp_path: Path) -> None:
-    process = start(tmp_path, RIG + "  controller: {fault: ignores_off}\n")
+    process = start(tmp_path, RIG + IGNORES_OFF)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 7, err
+
+
+@pytest.mark.parametrize("after_s", [0.15, 0.5, 1.0])
+def test_stops_do_not_take_the_place_of_an_off_that_is_not_confirmed(tmp_path: Path, after_s: float) -> None:
+    process = start(tmp_path, RIG + IGNORES_OFF)
+    assert process.stderr is not None
+    while "Capture" not in process.stderr.readline():
+        assert process.poll() is None
+    time.sleep(after_s)
+    for _ in range(2):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.05)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 7, err
+    assert "treat the beams as on" in " ".join(err.split())
+
+
+def test_an_off_that_is_not_confirmed_without_standard_error(tmp_path: Path) -> None:
+    (tmp_path / "rig.yaml").write_text(RIG + IGNORES_OFF)
+    (tmp_path / "p.yaml").write_text(SHORT)
+    line = f"'{SCRIPT}' run p.yaml --rig rig.yaml --no-input 2>&-"
+    done = subprocess.run(["sh", "-c", line], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (7, "")
+    session = session_of(tmp_path)
+    assert session is not None
+    assert list(read_journal(session)), "nothing else was written into it"
 
 
 @pytest.mark.parametrize(

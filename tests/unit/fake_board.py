@@ -57,7 +57,9 @@ class Task:
         assert isinstance(data, list) == (self.number_of_channels > 1)
         assert auto_start and all(type(level) is bool for level in levels), levels
         assert len(levels) == self.number_of_channels
-        if fault() != "stuck":
+        if fault() == "stuck":
+            Path(f"{LOG}.tried").touch()
+        else:
             self.levels = levels
             mask = sum(1 << n for n, level in enumerate(levels) if level)
             with LOG.open("a") as file:

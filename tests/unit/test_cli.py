@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -15,10 +16,11 @@ import cv2
 import numpy as np
 import pytest
 
-from workbench.cli import leaving
 from workbench.cli.main import main
 from workbench.cli.stopping import SIGNALS
 from workbench.model.calibration import load_calibration
+from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, StoppedError
+from workbench.session.journal import Journal
 
 ROOT = Path(__file__).parents[2]
 WEBCAM = ROOT / "data/webcam-laser-rows.csv"
@@ -40,8 +42,7 @@ Run = Callable[..., Outcome]
 def workbench(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
     before = {number: signal.getsignal(number) for number in SIGNALS}
 
-    monkeypatch.setattr(os, "_exit", sys.exit)  # the tests' own process goes on
-    monkeypatch.setattr(leaving, "all_written", False)
+    monkeypatch.setattr(os, "_exit", sys.exit)  # a fit ends at once; the tests' own process goes on
 
     def run(*arguments: object) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["workbench", *map(str, arguments)])
@@ -314,6 +315,11 @@ class TestAnotherModel:
         storage.release()
         assert load_calibration(output).laser_ranger.fit.accepted_because == kept
 
+    def test_a_blank_reason_is_none(self, workbench: Run, tmp_path: Path) -> None:
+        fit = ("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c")
+        refused(workbench(*fit, "--accept", " "), 2, "expected a reason")
+        refused(workbench("resume", tmp_path, "--accept-changes", ""), 2, "expected a reason")
+
     def test_a_captures_file_needs_a_rig(self, workbench: Run, tmp_path: Path) -> None:
         refused(workbench("fit", WEBCAM, "-o", tmp_path / "c"), 2, "needs --rig")
 
@@ -428,12 +434,105 @@ class TestDesign:
         refused(workbench("design", "--rig", rig), 2, "bench.reach_mm", "expected [nearest, farthest] in mm")
 
 
+SCRIPT = Path(sys.executable).with_name("workbench")
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_streams_that_are_closed(tmp_path: Path, closed: str) -> None:
+    """What is opened next would get a closed one's number: a pipe, a session's journal."""
+    done = shell(f"'{SCRIPT}' sessions --sessions '{tmp_path}' {closed}")
+    assert (done.returncode, done.stdout) == (0, "")
+    assert "Traceback" not in done.stderr
+    missing = shell(f"'{SCRIPT}' sessions --sessions '{tmp_path / 'no'}' {closed}")
+    assert missing.returncode == 2
+
+
+def shell(line: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["sh", "-c", line], capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_a_signal_at_the_very_end_changes_nothing(tmp_path: Path) -> None:
+    """The interpreter's own end gives signals their default back; objects of this module end later."""
+    late = """
+import os, signal, sys
+class Late:
+    def __del__(self, kill=os.kill, me=os.getpid(), number=signal.SIGINT, write=os.write):
+        write(1, b"late")
+        kill(me, number)
+late = Late()
+from workbench.cli.main import main
+main()
+"""
+    command = [sys.executable, "-c", late, "sessions", "--sessions", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (0, "late")
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO])
+@pytest.mark.parametrize("name", [None, "calibration.yaml"])
+def test_what_cannot_be_written_is_no_defect(
+    workbench: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, number: int, name: str | None
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(number, os.strerror(number), name)
+
+    monkeypatch.setattr("workbench.cli.sessions.list_sessions", fail)
+    what = name or "what is printed, or a file"
+    refused(
+        workbench("sessions", "--sessions", tmp_path), 5, f"{what}: cannot be written", os.strerror(number)
+    )
+
+
+def test_an_error_that_is_none_of_a_full_disk_is_a_defect(
+    workbench: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.EBADF, "bad")
+
+    monkeypatch.setattr("workbench.cli.sessions.list_sessions", fail)
+    outcome = workbench("sessions")
+    assert outcome.code == 1
+    assert "internal error" in outcome.err
+    assert "Traceback" in outcome.err
+
+
+def test_a_beam_that_may_be_on_is_told_whatever_came_on_top_of_it(
+    workbench: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        try:
+            raise LaserOffNotConfirmedError("treat the beams as on")
+        finally:
+            try:
+                raise BadInputError("then this")
+            finally:
+                raise StoppedError("and that")
+
+    monkeypatch.setattr("workbench.cli.sessions.list_sessions", fail)
+    refused(workbench("sessions"), 7, "error: treat the beams as on")
+
+
+def test_output_that_is_lost_is_said(tmp_path: Path) -> None:
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s/session.yaml").write_text("format: 1\n")
+    done = shell(f"'{SCRIPT}' sessions --sessions '{tmp_path}' --json >/dev/full")
+    assert (done.returncode, done.stdout) == (5, "")
+    assert "cannot be written: No space left" in done.stderr
+
+
+def test_the_only_session_is_running(workbench: Run, tmp_path: Path) -> None:
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s/session.yaml").write_text("format: 1\n")
+    with Journal(tmp_path / "s"):
+        refused(workbench("resume", "--sessions", tmp_path), 2, tmp_path / "s", "is running")
+
+
 def test_a_fit_whose_result_nobody_reads_ends_as_stopped(tmp_path: Path) -> None:
     """The calibration is on disk; what is left of the output finds its pipe closed, or its disk full."""
     output = tmp_path / "webcam.yaml"
-    script = Path(sys.executable).with_name("workbench")
-    command: list[str | Path] = [script, "fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", output, "--json"]
+    command: list[str | Path] = [SCRIPT, "fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", output, "--json"]
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
     assert (done.returncode, output.is_file()) == (5, True), done.stderr
+    assert "cannot be written: No space left" in done.stderr
     assert "Traceback" not in done.stderr

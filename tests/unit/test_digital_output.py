@@ -6,22 +6,26 @@ import importlib
 import importlib.util
 import inspect
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.firmware.parts import hurried, hurry
 from tests.unit.fake_board import changes, write_package
+from workbench.devices.guarded import TRY_BOARD_S
 from workbench.devices.real_bench import open_lasers
 from workbench.devices.serial_lasers import LaserState, SerialLaserBank
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError
 from workbench.model.rig import CameraDevice, DeviceSpec, LaserDevice, load_rig
 
 ROOT = Path(__file__).parents[2]
+SCRIPT = Path(sys.executable).with_name("workbench")
 LINES = "Dev1/port0/line0:3"
 IDS = ("L1", "L2", "L3", "L4")
 END_MS = 50
@@ -92,9 +96,10 @@ def test_off_when_the_workbench_ends(log: Path, how: signal.Signals) -> None:
 
 def test_off_when_the_workbench_hangs(log: Path) -> None:
     """Half a second from the last beat, by the guardian's own clock: a board has no lease."""
-    assert measure(log, "bank.beat()", signal.SIGSTOP)[0] > 300
-    delays = measure(log, "pass", None)
-    assert delays[-1] <= HANG_MS
+    suspended = measure(log, "bank.beat()", signal.SIGSTOP)
+    assert suspended[0] > 300
+    assert suspended[-1] <= HANG_MS
+    assert measure(log, "pass", None)[-1] <= HANG_MS
 
 
 def measure(log: Path, beat: str, how: signal.Signals | None) -> list[float]:
@@ -123,7 +128,7 @@ def rig_file(folder: Path, lines: str) -> Path:
 
 
 def call(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [str(Path(sys.executable).with_name("workbench")), *map(str, arguments)]
+    command = [str(SCRIPT), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
@@ -170,12 +175,37 @@ def test_a_workbench_that_ends_well_leaves_the_guardian_at_it(log: Path) -> None
 def test_lines_that_are_high_when_the_board_is_opened_are_tried_again(log: Path) -> None:
     """Somebody left them high, and the board does not take it: that is told, and not left at that."""
     fail(log, "stuck")
-    with pytest.raises(LaserOffNotConfirmedError, match="goes on trying"):
+    with pytest.raises(LaserOffNotConfirmedError, match=r"lines read back as 1111 .*goes on trying"):
         bank()
     assert masks(log) == []
+    repair(log)
+
+
+def test_a_stop_does_not_take_the_place_of_what_the_board_tells(log: Path, tmp_path: Path) -> None:
+    """And a reader of the command's output is not kept by the guardian, which goes on."""
+    fail(log, "stuck")
+    command = [str(SCRIPT), "lasers", "off", "--rig", str(rig_file(tmp_path, LINES))]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    wait_for(Path(f"{log}.tried").exists)
+    time.sleep(0.5)  # it has been told by now, and waits for the guardian
+    process.send_signal(signal.SIGINT)
+    began = time.monotonic()
+    said, _ = process.communicate(timeout=60)
+    assert time.monotonic() - began < TRY_BOARD_S / 2
+    assert process.returncode == 7, said
+    assert re.search(r"error: .*lines read back as 1111 .*goes on trying", " ".join(said.split()))
+    repair(log)
+
+
+def repair(log: Path) -> None:
+    """Let the guardian come to its end."""
     fail(log, "")
+    wait_for(lambda: masks(log)[-1:] == [0])
+
+
+def wait_for(it: Callable[[], bool]) -> None:
     deadline = time.monotonic() + 10
-    while masks(log)[-1:] != [0]:
+    while not it():
         assert time.monotonic() < deadline
         time.sleep(0.01)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import gc
 import os
 import traceback
 from contextlib import suppress
@@ -12,13 +11,10 @@ from typing import Annotated
 
 import typer
 
-from workbench.cli import leaving
 from workbench.cli.leaving import leave
-from workbench.cli.stopping import stop_at_once
+from workbench.cli.stopping import ignore_signals, stop_at_once
+from workbench.cli.streams import fill_closed_streams
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
-
-# Our matrices are small: threads of the linear algebra wait for each other longer than they work.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 app = typer.Typer(
     help="Calibration and lab-measurement workbench for laser-spot range sensors.",
@@ -32,6 +28,8 @@ lasers = typer.Typer(help="The rig's lasers, without a session.", no_args_is_hel
 app.add_typer(lasers, name="lasers")
 
 INTERNAL_ERROR = 1
+NO_MORE_WRITTEN = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+"""A disk, a quota or a largest file is full, or a device fails or is gone."""
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 
 
@@ -77,6 +75,12 @@ def run(
 Sessions = Annotated[Path, typer.Option(help="Folder of sessions.")]
 
 
+def _reason(given: str | None) -> str | None:
+    if given is not None and not given.strip():
+        raise typer.BadParameter("expected a reason in words, got a blank")
+    return given
+
+
 @app.command()
 def resume(
     session: Annotated[
@@ -85,7 +89,9 @@ def resume(
     sessions: Sessions = Path("sessions"),
     accept_changes: Annotated[
         str | None,
-        typer.Option(metavar="REASON", help="Go on although rig, procedure or versions changed."),
+        typer.Option(
+            metavar="REASON", callback=_reason, help="Go on although rig, procedure or versions changed."
+        ),
     ] = None,
     answers: AnswersFile = None,
     no_input: NoInput = False,
@@ -142,7 +148,10 @@ def fit(
     output: Annotated[Path, typer.Option("-o", "--output", help="Calibration file to write (YAML).")],
     rig: Annotated[Path | None, typer.Option(help="Rig file; a session has its own.")] = None,
     accept: Annotated[
-        str | None, typer.Option(metavar="REASON", help="Write it even if a limit fails, with this reason.")
+        str | None,
+        typer.Option(
+            metavar="REASON", callback=_reason, help="Write it even if a limit fails, with this reason."
+        ),
     ] = None,
     without_standoff: Annotated[
         list[float] | None, typer.Option(metavar="MM", help="Leave this standoff out; may be repeated.")
@@ -158,16 +167,13 @@ def fit(
     json: Json = False,
 ) -> None:
     """Calibrate from a captures file or a session: images or pixel positions at known standoffs."""
-    gc.disable()  # what is imported stays: to look for garbage among it is a tenth of the time of a fit
     from workbench.cli.fit import Request, fit_captures
 
-    gc.freeze()
-    gc.enable()
     request = Request(
         source, rig, output, accept, tuple(without_standoff or ()), tuple(fix or ()), tuple(keep or ())
     )
     fit_captures(request, json)
-    leaving.all_written = True
+    leave(0, at_once=True)
 
 
 @app.command()
@@ -268,24 +274,47 @@ def main() -> None:
     """Entry point: every expected failure becomes a message and its exit code."""
     # Before numpy loads: for matrices as small as a fit's a second thread costs more than it gains.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    fill_closed_streams()
     stop_at_once()
     try:
         app()
-    except SystemExit as ended:
-        if isinstance(ended.__context__, BrokenPipeError):  # as with `| head`; typer has made a 1 of it
-            leave(StoppedError.exit_code)
-        leave(ended.code if isinstance(ended.code, int) else int(ended.code is not None))
-    except WorkbenchError as error:
-        unsafe = isinstance(error, LaserOffNotConfirmedError)
-        _say(f"error: {error}", red=unsafe)
-        leave(error.exit_code)
-    except Exception as error:
-        if isinstance(error, OSError) and error.errno == errno.ENOSPC and error.filename is None:
-            _say(f"error: what is printed cannot be written: {error.strerror}")
-            leave(StoppedError.exit_code)
-        traceback.print_exc()
-        _say("internal error: this is a defect of the workbench, please report it with the lines above")
-        leave(INTERNAL_ERROR)
+    except (Exception, SystemExit) as error:
+        ignore_signals()  # one more must not take the place of what is told now
+        leave(_tell(error))
+
+
+def _tell(error: BaseException) -> int:
+    """Say why the command ends; returns its exit code."""
+    chain = _chain(error)
+    if unsafe := [e for e in chain if isinstance(e, LaserOffNotConfirmedError)]:
+        _say(f"error: {unsafe[0]}", red=True)  # whatever came on top of it: a stop, a full disk
+        return LaserOffNotConfirmedError.exit_code
+    if isinstance(error, SystemExit):
+        if any(isinstance(e, BrokenPipeError) for e in chain):  # as with `| head`; typer has made a 1 of it
+            return StoppedError.exit_code
+        return error.code if isinstance(error.code, int) else int(error.code is not None)
+    if isinstance(error, WorkbenchError):
+        _say(f"error: {error}")
+        return error.exit_code
+    if isinstance(error, OSError) and error.errno in NO_MORE_WRITTEN:
+        _say(f"error: {error.filename or 'what is printed, or a file'}: cannot be written: {error.strerror}")
+        return StoppedError.exit_code
+    with suppress(OSError):
+        traceback.print_exception(error)
+    _say("internal error: this is a defect of the workbench, please report it with the lines above")
+    return INTERNAL_ERROR
+
+
+def _chain(error: BaseException) -> list[BaseException]:
+    """The error and all that it came from, or came on top of."""
+    found: list[BaseException] = []
+    ahead: list[BaseException | None] = [error]
+    while ahead:
+        each = ahead.pop()
+        if each is not None and each not in found:
+            found.append(each)
+            ahead += [each.__context__, each.__cause__]
+    return found
 
 
 def _say(message: str, red: bool = False) -> None:

@@ -50,8 +50,11 @@ def find_session(name: Path | None, sessions: Path) -> Path:
         if known:
             return known[0]
         raise BadInputError(f"{name}: expected a session folder, or the name of one in {sessions}")
-    unfinished = [each for each in standings(sessions) if each.unfinished]
+    found = standings(sessions)
+    unfinished = [each for each in found if each.unfinished]
     if not unfinished:
+        if running := [each for each in found if each.state == "running"]:
+            raise BadInputError(f"{running[-1].session_dir}: the session is running, in another program")
         raise BadInputError(f"{sessions}: no unfinished session to resume")
     return unfinished[-1].session_dir
 

@@ -16,6 +16,12 @@ def stop_at_once() -> None:
         signal.signal(number, _raise)
 
 
+def ignore_signals() -> None:
+    """From now on nothing stops the program: it is about to end."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
 class StopAfterShot:
     """The first signal asks for a stop between two shots, the second raises, more are ignored.
 
@@ -32,13 +38,10 @@ class StopAfterShot:
         first = self.reason is None
         self.reason = f"stopped by {signal.Signals(number).name}"
         if not first:
-            # What puts the lasers off must not be stopped by a third one.
-            for each in SIGNALS:
-                signal.signal(each, signal.SIG_IGN)
+            ignore_signals()  # what puts the lasers off must not be stopped by a third one
             raise StoppedError(self.reason)
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    for each in SIGNALS:
-        signal.signal(each, signal.SIG_IGN)
+    ignore_signals()
     raise StoppedError(f"stopped by {signal.Signals(number).name}")

@@ -13,7 +13,12 @@ import threading
 import time
 
 from workbench.model import errors
-from workbench.model.errors import LaserOffNotConfirmedError, WorkbenchError
+from workbench.model.errors import (
+    BadInputError,
+    LaserOffNotConfirmedError,
+    RigNotReadyError,
+    WorkbenchError,
+)
 from workbench.model.rig import LaserDriver
 
 ANSWER_S = 10.0
@@ -22,6 +27,8 @@ LET_GO_S = 3.0
 """For a guardian to end where an off is not confirmed and somebody has to be told soon."""
 TRY_BOARD_S = 60.0
 """How long a guardian goes on trying to put off, without its workbench, what no lease would end."""
+DARK = {0, BadInputError.exit_code, RigNotReadyError.exit_code}
+"""A guardian's exit codes that leave nothing to tell: all is off, or it never had the port."""
 
 
 class Guarded:
@@ -43,19 +50,25 @@ class Guarded:
         os.set_blocking(self._signals, False)
         call = [driver, port, str(baud), str(lasers), str(boot_s), str(hang_s), str(signals)]
         # -P: what lies in the current folder is not imported. A session of its own: no terminal reaches it.
+        said = _last_words()
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-P", "-m", "workbench.devices.guardian", *call],
             stdin=commands,
             stdout=answers,
+            stderr=said,
             pass_fds=[signals],
             start_new_session=True,
         )
-        for theirs in (commands, answers, signals):
+        for theirs in (commands, answers, signals, said):
             os.close(theirs)
         self._has_leases = driver != "nidaqmx"
         self.is_open = True
         self._heard = b""
         self._asked = 0
+        self._unconfirmed = (
+            "the lasers may be on: it was not confirmed that they are off; treat the beams as on"
+        )
+        """What the guardian told last of an off that was not confirmed, if it could."""
         self._before: int | None = None
         try:
             self.identity = str(self._answer(0, ANSWER_S + boot_s))
@@ -91,7 +104,7 @@ class Guarded:
         Where no lease of the hardware would end what is lit, one that does not come to its end is left at it.
 
         Raises:
-            LaserOffNotConfirmedError: it is.
+            LaserOffNotConfirmedError: it is, or it ended without having confirmed that all are off.
         """
         if not self.is_open:
             return
@@ -101,19 +114,29 @@ class Guarded:
         for ours in (self._signals, self._commands, self._answers):
             os.close(ours)
         try:
-            self._process.wait(ANSWER_S if self._has_leases else LET_GO_S)
+            self._wait_for_off()
+        except LaserOffNotConfirmedError:
+            raise
+        except BaseException:
+            # A stop that was asked for once more. What is still to be told counts more than that.
+            self._wait_for_off()
+            raise
+
+    def _wait_for_off(self) -> None:
+        try:
+            code = self._process.wait(ANSWER_S if self._has_leases else LET_GO_S)
         except subprocess.TimeoutExpired:
             if not self._has_leases:
                 # Something has to wait for its end.
                 threading.Thread(target=self._process.wait, daemon=True).start()
                 raise LaserOffNotConfirmedError(
-                    "the lasers may be on: the board has not confirmed that they are off; treat the beams"
-                    " as on, cut the lasers' supply. The guardian (process"
-                    f" {self._process.pid}) goes on trying for some {TRY_BOARD_S:g} s, and holds the board as"
-                    " long; then run `workbench lasers off`"
+                    f"{self._unconfirmed}. The guardian (process {self._process.pid}) goes on trying for some"
+                    f" {TRY_BOARD_S:g} s, and holds the board as long; then run `workbench lasers off`"
                 ) from None
             self._process.kill()
-            self._process.wait()
+            code = self._process.wait()
+        if code not in DARK:
+            raise LaserOffNotConfirmedError(self._unconfirmed)
 
     def _answer(self, number: int, wait_s: float) -> object:
         deadline = time.monotonic() + wait_s
@@ -121,6 +144,8 @@ class Guarded:
             pass
         if "error" in answer:
             kind: type[WorkbenchError] = getattr(errors, str(answer["error"]))
+            if kind is LaserOffNotConfirmedError:
+                self._unconfirmed = str(answer["text"])
             raise kind(answer["text"])
         return answer["value"]
 
@@ -138,3 +163,14 @@ class Guarded:
         line, _, self._heard = self._heard.partition(b"\n")
         answer: dict[str, object] = json.loads(line)
         return answer
+
+
+def _last_words() -> int:
+    """Where the guardian writes what comes too late for its pipe: the terminal, if there is one.
+
+    Not our standard error: it outlives us, and whoever reads that to its end would wait for it.
+    """
+    try:
+        return os.open("/dev/tty", os.O_WRONLY | os.O_NOCTTY)
+    except OSError:
+        return os.open(os.devnull, os.O_WRONLY)
