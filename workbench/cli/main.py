@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import traceback
 from contextlib import suppress
@@ -167,6 +168,7 @@ def fit(
     json: Json = False,
 ) -> None:
     """Calibrate from a captures file or a session: images or pixel positions at known standoffs."""
+    gc.disable()  # it ends after a second: what garbage there is ends with it
     from workbench.cli.fit import Request, fit_captures
 
     request = Request(
