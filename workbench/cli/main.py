@@ -168,7 +168,7 @@ def fit(
     json: Json = False,
 ) -> None:
     """Calibrate from a captures file or a session: images or pixel positions at known standoffs."""
-    gc.disable()  # it ends after a second: what garbage there is ends with it
+    gc.set_threshold(1_000_000)  # more than a fit makes: it ends after a second, and its garbage with it
     from workbench.cli.fit import Request, fit_captures
 
     request = Request(
