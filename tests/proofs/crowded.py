@@ -6,18 +6,16 @@ what that does to the shape. No speckle, which would hide it. Minutes; the table
 
 from __future__ import annotations
 
-import datetime as dt
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
 from tests.benchmarks.ranging import RIG, Bench
+from tests.proofs.tables import keep
 from workbench.model.rig import load_rig
 from workbench.ranging.acquire import acquire
 
-RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 READINGS, SEED = 1000, 2001
 WIDTH_PX = 1.5
 """Of the spots that the bench draws."""
@@ -62,17 +60,14 @@ def _reading(bench: Bench, flat_mm: float, rng: np.random.Generator) -> tuple[st
 
 def main() -> int:
     """Run, print, write."""
-    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
     lines = [
-        f"Crowded spots, {today}: `python -m tests.proofs.crowded`, seed {SEED}, {READINGS} readings each",
+        f"seed {SEED}, {READINGS} readings each",
         "rejected: flats called something else, 1 % is stated. scatter: of the closest range, over its sigma",
         "by the spots alone; the calibration is the same in all readings. not told: no shape was told.",
         "",
         *table(),
     ]
-    print("\n".join(lines))
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{today}-crowded.txt").write_text("\n".join(lines) + "\n")
+    keep("crowded", "Crowded spots", lines)
     return 0
 
 

@@ -5,12 +5,11 @@ Some seconds; the table goes to docs/benchmarks and from there to docs/ranging.m
 
 from __future__ import annotations
 
-import datetime as dt
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from pathlib import Path
 
+from tests.proofs.tables import keep
 from tests.unit.ranging.surfaces import (
     F_PX,
     SD_PX,
@@ -27,7 +26,6 @@ from tests.unit.ranging.surfaces import (
 )
 from workbench.ranging.shape import Shape
 
-RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 READINGS, SEED = 1000, 2001
 CLOSEST_MM = (150, 300, 600, 1000, 1500, 2000, 3000, 4500)
 
@@ -68,9 +66,8 @@ def _cell(surface: Callable[[float], Surface], is_right: Callable[[Shape], bool]
 
 def main() -> int:
     """Run, print, write."""
-    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
     lines = [
-        f"Shapes, {today}: `python -m tests.proofs.shapes`, seed {SEED} + mm, {READINGS} readings each",
+        f"seed {SEED} + mm, {READINGS} readings each",
         f"Lasers at {', '.join(f'{x:g}' for x in X)} mm, f = {F_PX:g} px, spots of {SD_PX} px,",
         "calibration exact.",
         "How often the right shape is told / the 95 % interval of the closest range holds it, %;",
@@ -78,9 +75,7 @@ def main() -> int:
         "",
         *table(),
     ]
-    print("\n".join(lines))
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{today}-shapes.txt").write_text("\n".join(lines) + "\n")
+    keep("shapes", "Shapes", lines)
     return 0
 
 

@@ -79,7 +79,7 @@ class DigitalOutputLine:
             try:
                 self._write(0)
                 mask = self._read()
-            except Exception as error:
+            except Exception as error:  # a foreign driver's, of any kind: the guardian must not end on it
                 came = str(error)
             else:
                 if mask == 0:
