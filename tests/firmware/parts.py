@@ -47,6 +47,25 @@ class Change:
     lines: int
 
 
+def can_hurry() -> bool:
+    """Whether real-time priority is allowed here."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except (AttributeError, OSError):
+        return False
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    return True
+
+
+def is_there(pid: int) -> bool:
+    """Whether a process has not ended, be it that nobody has asked yet how it did."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state not in "ZX"
+
+
 def hurry(pid: int, before: int = 20) -> None:
     """Let a process (0: this one) run before others, where that is allowed; before those of a lower number.
 

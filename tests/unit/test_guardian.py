@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.firmware.parts import KINDS, Kind, Running, build, hurried, hurry
+from tests.firmware.parts import KINDS, Kind, Running, build, hurried, hurry, is_there
 from workbench.devices.serial_lasers import SerialLaserBank
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError
 
@@ -79,7 +79,7 @@ class AtWork:
         self.process.communicate(timeout=20)
         os.close(self.terminal)
         deadline = time.monotonic() + 10
-        while Path(f"/proc/{self.guardian}").exists() and time.monotonic() < deadline:
+        while is_there(self.guardian) and time.monotonic() < deadline:
             time.sleep(0.01)  # it lets go of the port
 
 
@@ -106,12 +106,9 @@ def test_off_when_the_workbench_is_ended(controller: Running, number: signal.Sig
 
 
 def test_off_when_a_workbench_with_all_its_libraries_is_killed(controller: Running) -> None:
-    """The kernel gives back the memory of what it ends before it closes the pipe: on a busy computer that may
-    take longer, and the controller's lease is what ends it.
-    """
+    """The kernel gives back the memory of what it ends before it closes the pipe: that is not waited for."""
     delays = measure(controller, "SIGKILL", "loaded", lambda it: it.process.send_signal(signal.SIGKILL))
-    assert delays[REPEATS // 2] <= END_MS
-    assert delays[-1] <= HANG_MS
+    assert delays[-1] <= END_MS
 
 
 def test_off_when_its_terminal_closes(controller: Running) -> None:

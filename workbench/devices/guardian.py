@@ -29,6 +29,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 from workbench.devices.controller_line import ControllerLine
 from workbench.devices.digital_output import DigitalOutputLine
@@ -37,13 +38,17 @@ from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, 
 
 LOOK_S = 0.02
 """Between two looks at whether the workbench lives, while something is lit: it sees what a pipe that a stray
-child holds open does not."""
+child holds open does not, and an end that the workbench has had no turn to come to."""
 TRY_ALONE_S = 1.0
 """How long it goes on trying to put off when there is nobody left to tell: twice the longest lease."""
 RENEW = 5
 """A lease is renewed when a fifth of it has gone."""
 Line = ControllerLine | DigitalOutputLine
 AT_ONCE = {int(signal.SIGTERM), int(signal.SIGHUP)}
+STAT_FLAGS = 6
+"""In /proc/PID/stat, counted from what comes after the process's name."""
+PF_EXITING = 0x4
+"""Of the kernel's include/linux/sched.h."""
 
 
 class Workbench:
@@ -81,7 +86,31 @@ class Workbench:
             came = os.read(self._commands, 4096)
             self._heard += came
             self.gone = self.gone or not came
-        self.gone = self.gone or os.getppid() != self._pid
+        gone, told = _end_to_come(self._pid)
+        self.told_to_end = self.told_to_end or told
+        self.gone = self.gone or gone or os.getppid() != self._pid
+
+
+def _end_to_come(pid: int) -> tuple[bool, str | None]:
+    """What a process has not had a turn for: whether it is to end, and a signal that tells it to.
+
+    A process ends, and takes a signal, when the computer lets it run, and its pipes close after its memory is
+    given back. The kernel tells before (proc(5)); on a system without /proc nobody does.
+    """
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False, None
+    waiting = 0
+    for line in status.splitlines():
+        name, _, mask = line.partition(":")
+        if name in {"SigPnd", "ShdPnd"}:
+            waiting |= int(mask, 16)
+    pending = {number for number in (*AT_ONCE, signal.SIGKILL) if waiting >> (number - 1) & 1}
+    flags = int(stat.rpartition(")")[2].split()[STAT_FLAGS])
+    told = [signal.Signals(number).name for number in sorted(AT_ONCE & pending)]
+    return signal.SIGKILL in pending or bool(flags & PF_EXITING), told[0] if told else None
 
 
 @dataclass
