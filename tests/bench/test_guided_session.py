@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.crash.short import CALLER, RESUMER, go_on, results, story, write_files
-from workbench.devices.protocols import Bench, Operator, StreamingCamera
+from workbench.devices.protocols import Bench, Frame, Image, Operator, StreamingCamera
 from workbench.devices.registry import open_bench
 from workbench.emulator.camera import EmulatedCamera
 from workbench.model import event as ev
@@ -318,6 +320,53 @@ def test_latency_is_counted_whatever_the_driver_believes(tmp_path: Path, latency
         if latency > 1:
             with pytest.raises(RigNotReadyError, match="at most 1 frames"):
                 count_latency(bench.lasers, bench.camera, rig, 1)
+
+
+class Straddling:
+    """A camera that runs freely: the frame under way when a laser is switched has a share of its light.
+
+    Trial after trial another share, since nothing ties its exposures to the switch.
+    """
+
+    def __init__(self, camera: StreamingCamera, shares: Sequence[float]) -> None:
+        self._camera, self._shares = camera, iter(shares)
+        self._before = camera.read().image
+        self.discard_frames = camera.discard_frames
+
+    def grab(self) -> Frame:
+        return self._camera.grab()
+
+    def read(self) -> Frame:
+        frame = self._camera.read()
+        before, self._before = self._before, frame.image
+        if int(frame.image.max()) < int(before.max()) + 50:  # no laser came on
+            return frame
+        share = next(self._shares)
+        mixed: Image = np.rint(share * frame.image + (1 - share) * before).astype(np.uint8)
+        return replace(frame, image=mixed)
+
+    def grab_ambient(self) -> Frame:
+        return self._camera.grab_ambient()
+
+    def close(self) -> None:
+        self._camera.close()
+
+
+@pytest.mark.parametrize(
+    ("shares", "counted"),
+    [((1.0, 1.0, 1.0), 2), ((0.96, 0.96, 0.96), 2), ((0.6, 1.0, 1.0), 3), ((1.0, 1.0, 0.2), 3)],
+)
+def test_a_frame_of_which_a_part_was_lit_is_too_old(
+    tmp_path: Path, shares: tuple[float, ...], counted: int
+) -> None:
+    rig_file, _ = write_files(tmp_path)
+    rig_file.write_text(rig_file.read_text() + "  camera: {latency_frames: 2}\n")
+    rig = load_rig(rig_file)
+    with open_bench(rig, tmp_path / "s") as bench:
+        bench.target.place(Placement(key="k", standoff_mm=500.0))
+        bench.mark("k")
+        assert isinstance(bench.camera, StreamingCamera)
+        assert count_latency(bench.lasers, Straddling(bench.camera, shares), rig, 10) == counted
 
 
 @pytest.mark.parametrize(
