@@ -107,3 +107,23 @@ def test_twelve_bits_in_sixteen_clip_at_their_own_full_scale() -> None:
     assert frame.dtype == np.uint16
     assert "saturated" in spot.flags
     assert spot.u_px == pytest.approx(30, abs=5 * spot.u_sd_px)
+
+
+@pytest.mark.parametrize(("apart", "over", "seed"), [(3.0, 4.0, 31), (4.0, 1.3, 32), (6.0, 2.0, 33)])
+def test_clipped_neighbours_are_measured_as_honestly(apart: float, over: float, seed: int) -> None:
+    """Fitted together, they leave out the pixels that are clipped, but not those that might have been."""
+    rng, sensor, width, pairs = np.random.default_rng(seed), Sensor(40.0, 6.0, 8), 1.8, 150
+    electrons = over * (255 - sensor.black_dn) * sensor.electrons_per_dn * 2.0 * np.pi * width**2
+    z = []
+    for _ in range(pairs):
+        u, v = 40 + rng.uniform(-0.5, 0.5), 30 + rng.uniform(-0.5, 0.5)
+        places = ((u, v), (u + apart * width, v + rng.uniform(-0.3, 0.3)))
+        drawn = [Drawn(*place, electrons * rng.uniform(0.8, 1.2), width, width) for place in places]
+        found = find_spots(draw(drawn, rng, sensor=sensor), draw([], rng, sensor=sensor)).spots
+        spots = sorted(found, key=lambda spot: spot.u_px)
+        assert len(spots) == 2
+        assert all("saturated" in spot.flags for spot in spots)
+        outwards = zip(spots, drawn, (-1.0, 1.0), strict=True)
+        z.extend(sign * (spot.u_px - true.u) / spot.u_sd_px for spot, true, sign in outwards)
+    assert np.std(z) == pytest.approx(1.0, abs=0.05 + 4 * np.sqrt(0.5 / len(z)))
+    assert abs(np.mean(z)) < 0.1 + 4 / np.sqrt(len(z))
