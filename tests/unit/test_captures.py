@@ -45,7 +45,7 @@ def test_images_are_relative_to_the_file(tmp_path: Path) -> None:
         (HEADER.replace(",", ";") + "\n1;200;0;;42\n", ["separated by commas, got semicolons (;)"]),
         (HEADER.replace(",", "\t") + "\n", ["separated by commas, got tabs"]),
         ("laser_id,standoff_mm,u_px\n", ["row 1", "missing: repeat"]),
-        (f"{HEADER},colour\n", ["row 1", "got colour"]),
+        (f"{HEADER},colour\n", ["row 1", "no such column: colour"]),
         (f"{HEADER},u_px\n", ["row 1", "every column once"]),
         ("laser_id,standoff_mm,repeat\n", ["row 1", "on", "u_px"]),
         (f"{HEADER}\n", ["at least one row"]),
@@ -103,3 +103,30 @@ def test_the_unit_of_an_exposure(tmp_path: Path) -> None:
     assert (row.exposure, row.exposure_unit) == (224.0, "us")
     (row,) = load(tmp_path, f"{HEADER},exposure\n1,200,0,,42,8\n")
     assert (row.exposure, row.exposure_unit) == (8.0, "")
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        (b"\x89PNG\r\n\x1a\n\0\0", "got a PNG image"),
+        (b"PK\x03\x04\x14\0\x9d", "got an archive, as spreadsheets are"),
+        (
+            b"laser_id,standoff_mm,repeat\nL\xfc,1,0\n",
+            "got text in another encoding .line 2.; save it as UTF-8",
+        ),
+        (b"format: 1\nrig: r\n", "got YAML; its columns are laser_id, "),
+        (b"%YAML 1.2\n---\nimage_width: 640\n", "got YAML"),
+    ],
+)
+def test_a_file_of_another_kind_is_called_what_it_is(content: bytes, what: str, tmp_path: Path) -> None:
+    path = tmp_path / "c.csv"
+    path.write_bytes(content)
+    with pytest.raises(BadInputError, match=rf"c.csv: expected a captures file \(CSV\), {what}"):
+        load_captures(path)
+
+
+def test_a_column_mistyped_is_told_with_the_nearest(tmp_path: Path) -> None:
+    path = tmp_path / "c.csv"
+    path.write_text("laser_id,standoff_mm,repeat,u_pix\n")
+    with pytest.raises(BadInputError, match="row 1: no such column: u_pix; expected one of u_px, "):
+        load_captures(path)

@@ -274,7 +274,9 @@ def test_a_rig_of_an_unknown_driver(tmp_path: Path) -> None:
     rig.write_text(
         (ROOT / "rigs/thesis-emulated.yaml").read_text().replace("driver: emulated", "driver: robot")
     )
-    with pytest.raises(BadInputError, match=r"rig.yaml:6: rig thesis-emulated: driver: .*got robot"):
+    with pytest.raises(
+        BadInputError, match=r"rig.yaml:6: driver: expected an installed bench driver .*got robot"
+    ):
         check_file(rig)
     rig.write_text("lasers: []\n")
     with pytest.raises(BadInputError, match="expected a procedure or a rig"):

@@ -107,5 +107,5 @@ def test_procedure_errors(tmp_path: Path) -> None:
     assert "p.yaml:5: steps[0]" in lines[0]
     assert "must differ" in lines[0]
     assert "p.yaml:8: steps[1]" in lines[1]
-    assert "'message'" in lines[1]
+    assert "expected one of message, confirm" in lines[1]
     assert "dance" in lines[1]

@@ -11,6 +11,9 @@ from workbench.model.errors import BadInputError
 from workbench.model.rig import DeviceSpec, Rig
 from workbench.model.target import Placement
 
+BLOCKS = {"devices": DeviceSpec}
+"""Of a rig file, which it cannot do without; see `registry.blocks_of`."""
+
 
 class PlacedByHand:
     """The operator was asked to put the target there, and told where it stands."""

@@ -28,13 +28,9 @@ def open_bench(rig: Rig, session_dir: Path) -> Bench:
     return bench
 
 
-def blocks_of(rig: Rig) -> Mapping[str, type[FileModel]]:
-    """Blocks of the rig file that its driver alone reads: `BLOCKS` of its module, where it has that.
-
-    Raises:
-        BadInputError: see `check_driver`.
-    """
-    module = import_module(entry_points(group=GROUP)[check_driver(rig)].module)
+def blocks_of(driver: str) -> Mapping[str, type[FileModel]]:
+    """Blocks of the rig file that an installed driver reads: `BLOCKS` of its module, where it has that."""
+    module = import_module(entry_points(group=GROUP)[driver].module)
     blocks: Mapping[str, type[FileModel]] = getattr(module, "BLOCKS", {})
     return blocks
 
@@ -45,11 +41,18 @@ def check_driver(rig: Rig) -> str:
     Raises:
         BadInputError: it names none, or one that is not.
     """
-    drivers = entry_points(group=GROUP)
-    if rig.driver is None or rig.driver not in drivers.names:
-        known = ", ".join(sorted(drivers.names)) or "none"
-        raise BadInputError(
-            f"rig {rig.rig}: driver: expected an installed bench driver ({known}), got {rig.driver};"
-            " a rig without a driver can be fitted but not run"
-        )
-    return rig.driver
+    driver = rig.driver or "none"
+    if (wrong := not_installed(driver)) is not None:
+        raise BadInputError(f"rig {rig.rig}: driver: {wrong}")
+    return driver
+
+
+def not_installed(driver: str) -> str | None:
+    """What is wrong with the name of a driver; None where it is installed."""
+    known = sorted(entry_points(group=GROUP).names)
+    if driver in known:
+        return None
+    return (
+        f"expected an installed bench driver ({', '.join(known) or 'there is none'}), got {driver};"
+        " a rig without a driver can be fitted but not run"
+    )

@@ -194,6 +194,6 @@ def emulator_spec(rig: Rig) -> EmulatorSpec:
     try:
         return EmulatorSpec.model_validate(block, context=rig)
     except ValidationError as error:
-        found = problems(block, error.errors())
-        lines = [f"rig {rig.rig}: emulator.{one.key}: {one.text}" for one in found]
+        found = problems(EmulatorSpec, block, error.errors())
+        lines = [f"rig {rig.rig}: emulator.{one.told}" for one in found]
         raise BadInputError("\n".join(lines)) from None

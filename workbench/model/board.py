@@ -29,8 +29,8 @@ BOW = ("bow_x_mm", "bow_y_mm", "bow_xy_mm")
 class Board(FileModel):
     """A board as it was meant to be printed. The defaults fill an A4 page that lies on its side."""
 
-    columns: Annotated[int, Field(ge=3)] = 13
-    rows: Annotated[int, Field(ge=2)] = 4
+    columns: Annotated[int, Field(ge=3, le=1000)] = 13
+    rows: Annotated[int, Field(ge=2, le=1000)] = 4
     """Of each of the two blocks."""
     square_mm: Millimetres = 20.0
     marker_mm: Millimetres = 15.0

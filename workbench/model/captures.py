@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
 
+from workbench.model.contents import not_text
 from workbench.model.errors import BadInputError
+from workbench.model.problems import one_of
 
 ALL_LASERS = "all"
 BOARD = "board"
@@ -85,6 +87,8 @@ def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
         BadInputError: no such columns, no rows, or a wrong value; every wrong value is listed with its row
             and column, what was expected and what came.
     """
+    if (came := not_text(content)) is not None:
+        raise BadInputError(f"{path}: expected a captures file (CSV), got {came}")
     try:
         reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""))
         _check_header(path, reader.fieldnames or [])
@@ -94,8 +98,8 @@ def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
                 rows.append(_Parser(path, reader.line_num, cells).row())
             except BadInputError as error:
                 problems.append(str(error))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise BadInputError(f"{path}: expected a CSV file in UTF-8: {error}") from None
+    except csv.Error as error:
+        raise BadInputError(f"{path}: expected a captures file (CSV): {error}") from None
     if problems:
         raise BadInputError("\n".join(problems))
     if not rows:
@@ -115,11 +119,18 @@ def _check_header(path: Path, names: object) -> None:
             f"{where}: expected columns separated by commas, got {others[0]}; save it as CSV with commas, and"
             " with points in its numbers"
         )
+    if len(present) == 1 and (
+        present[0].startswith("%YAML") or present[0].rstrip().endswith(":") or ": " in present[0]
+    ):
+        raise BadInputError(
+            f"{path}: expected a captures file (CSV), got YAML; its columns are {', '.join(COLUMNS)}"
+        )
     if missing := [name for name in REQUIRED if name not in present]:
         needed = ", ".join(REQUIRED)
         raise BadInputError(f"{where}: expected the columns {needed}; missing: {', '.join(missing)}")
     if unknown := [str(name) for name in present if name not in COLUMNS]:
-        raise BadInputError(f"{where}: expected columns among {', '.join(COLUMNS)}; got {', '.join(unknown)}")
+        told = "; ".join(f"no such column: {name}; {one_of(name, COLUMNS)}" for name in unknown)
+        raise BadInputError(f"{where}: {told}")
     if len(set(present)) != len(present):
         raise BadInputError(f"{where}: expected every column once, got {', '.join(present)}")
     if "on" not in present and not set(POSITION) & set(present):

@@ -2,44 +2,65 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from datetime import date
+from difflib import get_close_matches
+from typing import Any, get_args
 
+from pydantic import BaseModel, RootModel
 from pydantic_core import ErrorDetails
 
 Location = tuple[int | str, ...]
 LONGEST = 60
+MOST_NAMES = 16
+"""So many of the names that are possible are told; the rest is counted."""
+WHOLE, NUMBER, MAPPING = "a whole number, such as {number}", "a number, such as {number}", "keys and values"
+TRUTH, LIST = "true or false", "a list, such as {items}"
 EXPECTED = {
     "missing": "is missing",
-    "extra_forbidden": "no such key",
-    "int_parsing": "expected a whole number",
-    "int_type": "expected a whole number",
-    "int_from_float": "expected a whole number",
-    "float_parsing": "expected a number",
-    "float_type": "expected a number",
-    "finite_number": "expected a finite number",
-    "string_type": "expected text",
-    "bool_parsing": "expected true or false",
-    "bool_type": "expected true or false",
-    "tuple_type": "expected a list",
-    "list_type": "expected a list",
-    "dict_type": "expected a mapping",
-    "model_type": "expected a mapping",
-    "model_attributes_type": "expected a mapping",
-    "too_short": "expected at least {min_length}, got {actual_length}",
-    "too_long": "expected at most {max_length}, got {actual_length}",
-    "greater_than": "expected more than {gt}",
-    "greater_than_equal": "expected at least {ge}",
-    "less_than": "expected less than {lt}",
-    "less_than_equal": "expected at most {le}",
-    "literal_error": "expected {expected}",
-    "union_tag_invalid": "{discriminator}: expected one of {expected_tags}, got '{tag}'",
-    "union_tag_not_found": "expected a key {discriminator}",
+    "extra_forbidden": "no such key; {names}",
+    "invalid_key": "no such key; {names}",
+    "int_parsing": WHOLE,
+    "int_parsing_size": WHOLE,
+    "int_type": WHOLE,
+    "int_from_float": WHOLE,
+    "float_parsing": NUMBER,
+    "float_type": NUMBER,
+    "finite_number": "a finite number",
+    "string_type": "text, such as {text}",
+    "string_unicode": "text in UTF-8",
+    "string_pattern_mismatch": "{spelled}",
+    "bool_parsing": TRUTH,
+    "bool_type": TRUTH,
+    "tuple_type": LIST,
+    "list_type": LIST,
+    "dict_type": MAPPING,
+    "model_type": MAPPING,
+    "model_attributes_type": MAPPING,
+    "too_short": "a list of at least {min_length}, got {actual_length}",
+    "too_long": "a list of at most {max_length}, got {actual_length}",
+    "greater_than": "more than {gt}",
+    "greater_than_equal": "at least {ge}",
+    "less_than": "less than {lt}",
+    "less_than_equal": "at most {le}",
+    "literal_error": "{expected}",
+    "union_tag_invalid": "one of {tags}",
+    "union_tag_not_found": "the key {discriminator}, which tells what it is",
 }
-SELF_EVIDENT = {
-    "missing", "extra_forbidden", "too_short", "too_long", "union_tag_invalid", "union_tag_not_found",
-}  # fmt: skip
+"""What a kind of error expects; tests hold that there is no other kind."""
+SPELLED = {
+    r"^[A-Za-z0-9_-]+$": "letters (A to z), digits, _ and - alone, such as calibrate-flat",
+    r"^[a-z0-9-]+$": "small letters (a to z), digits and - alone, such as flat-near",
+    r"^[A-Za-z0-9][A-Za-z0-9_.-]*$": "letters (A to z), digits, _ . and -, not - or . first, such as L1",
+    r"^[ -~]{4}$": "four letters, such as YUYV or GREY",
+    r"^calibration[A-Za-z0-9_.-]*\.yaml$": "a name that begins with calibration and ends with .yaml, such as"
+    " calibration-night.yaml, of letters (A to z), digits, _, . and -",
+}
+"""The patterns of the models in words."""
+AS_THEY_ARE = {"missing", "extra_forbidden", "invalid_key"}
+SELF_EVIDENT = AS_THEY_ARE | {"too_short", "too_long"}
 """What came is nothing, or is said already."""
 
 
@@ -58,46 +79,145 @@ class Problem:
         key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in self.location)
         return key.lstrip(".") or "document"
 
+    @property
+    def told(self) -> str:
+        """In one line."""
+        return f"{self.key}: {self.text}"
 
-def problems(data: Any, errors: Sequence[ErrorDetails]) -> Iterator[Problem]:
-    """Each mistake in `data` once, though pydantic may tell it of every kind of value that was possible."""
+
+def problems(model: type[BaseModel], data: Any, errors: Sequence[ErrorDetails]) -> Iterator[Problem]:
+    """Each mistake in `data`, which was to be `model`, once, though pydantic may tell it several times."""
+    places = [_in_file(data, error) for error in errors]
+    strangers = [
+        place for place, error in zip(places, errors, strict=True) if error["type"] == "extra_forbidden"
+    ]
     told: set[Location] = set()
-    places = [_in_file(data, error["loc"], error["type"]) for error in errors]
     for error, place in zip(errors, places, strict=True):
-        # A list whose items are wrong comes out too short; that is no mistake of its own.
-        follows = error["type"] == "too_short" and any(
-            len(other) > len(place) and other[: len(place)] == place for other in places
-        )
-        if place not in told and not follows:
-            told.add(place)
-            yield Problem(place, _say(error))
+        if place in told or _follows(error, place, places, strangers):
+            continue
+        told.add(place)
+        alike = [e for e, other in zip(errors, places, strict=True) if other == place]
+        yield Problem(place, _say(model, error, alike))
+
+
+def closest_first(word: str, known: Sequence[str]) -> list[str]:
+    """Names that there are, those that look like `word` before the others."""
+    near = get_close_matches(word, known, n=len(known) or 1)
+    return [*near, *(name for name in known if name not in near)]
+
+
+def one_of(word: str, known: Sequence[str]) -> str:
+    """What there is in the place of `word`, for a message."""
+    names = closest_first(word, known)
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return f"expected one of {', '.join(names[:MOST_NAMES])}{more}"
 
 
 def short(value: object) -> str:
-    """A value in a message."""
-    text = repr(value)
+    """A value in a message, as it stands in the file."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    text = str(value) if isinstance(value, date) else repr(value)
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
-def _in_file(data: Any, location: Location, kind: str) -> Location:
+def _follows(
+    error: ErrorDetails, place: Location, places: Sequence[Location], strangers: Sequence[Location]
+) -> bool:
+    """Whether a mistake is but what another one makes."""
+    if error["type"] == "too_short":  # a list whose items are wrong comes out too short
+        return any(len(other) > len(place) and other[: len(place)] == place for other in places)
+    # A key that is missing, beside one of nearly its name.
+    return error["type"] == "missing" and any(
+        other[:-1] == place[:-1] and get_close_matches(str(other[-1]), [str(place[-1])])
+        for other in strangers
+    )
+
+
+def _in_file(data: Any, error: ErrorDetails) -> Location:
+    location, missing = error["loc"], error["type"] == "missing"
     node, place = data, []
     for number, part in enumerate(location):
-        there = part in node if isinstance(node, dict) else isinstance(part, int) and isinstance(node, list)
-        if there:
+        if _has(node, part):
             node = node[part]
             place.append(part)
-        elif kind == "missing" and number == len(location) - 1:
+        elif missing and number == len(location) - 1:
             place.append(part)
+    if error["type"] == "union_tag_invalid":
+        place.append(error["ctx"]["discriminator"].strip("'"))
     return tuple(place)
 
 
-def _say(error: ErrorDetails) -> str:
-    context, came = error.get("ctx", {}), f", got {short(error['input'])}"
+def _has(node: Any, part: int | str) -> bool:
+    if isinstance(node, list):
+        return isinstance(part, int) and part < len(node)
+    return isinstance(node, dict) and part in node
+
+
+def _say(model: type[BaseModel], error: ErrorDetails, alike: Sequence[ErrorDetails]) -> str:
+    kind, context = error["type"], error.get("ctx", {})
+    came = f", got {short(context.get('tag', error['input']))}"
     if context.get("class_name") == "Prior":
-        return f"expected {{value: ..., sd: ...}}{came}"
-    known = EXPECTED.get(error["type"])
-    if known is None:
+        value = error["input"] if isinstance(error["input"], int | float) else "..."
+        return f"expected a value and its standard deviation, {{value: {value}, sd: ...}}{came}"
+    if kind == "value_error":
         said = error["msg"].removeprefix("Value error, ")
         # A rule about a whole mapping says itself what came of it.
         return f"{said[:1].lower()}{said[1:]}" + ("" if ", got " in said else came)
-    return known.format(**context) + ("" if error["type"] in SELF_EVIDENT else came)
+    expected = " or ".join(dict.fromkeys(_expected(model, one) for one in alike))
+    return (expected if kind in AS_THEY_ARE else f"expected {expected}") + (
+        "" if kind in SELF_EVIDENT else came
+    )
+
+
+def _expected(model: type[BaseModel], error: ErrorDetails) -> str:
+    """The expectation in words, with an example made of what came where that can be."""
+    kind, context, came = error["type"], dict(error.get("ctx", {})), error["input"]
+    if kind in {"extra_forbidden", "invalid_key"}:
+        context["names"] = one_of(str(error["loc"][-1]), _keys_of(model, error["loc"][:-1]))
+    if kind == "union_tag_invalid":
+        known = [tag.strip("' ") for tag in context["expected_tags"].split(",")]
+        context["tags"] = ", ".join(closest_first(context["tag"], known))
+    if kind == "string_pattern_mismatch":
+        context["spelled"] = SPELLED.get(context["pattern"], f"text that fits {context['pattern']}")
+    context |= {"number": _number_in(came, kind), "items": f"[{came}]" if _plain(came) else "[1, 2]"}
+    context["text"] = f'"{came}"' if _plain(came) else '"some words"'
+    return EXPECTED.get(kind, "something else here").format(**context)
+
+
+def _plain(value: object) -> bool:
+    return isinstance(value, int | float | str | date) and len(str(value)) < LONGEST
+
+
+def _number_in(came: object, kind: str) -> str:
+    """The number that a text with a unit or a comma seems to mean; any other where there is none."""
+    found = re.match(r"\s*([+-]?\d+)(?:[.,](\d+))?", str(came)) if _plain(came) else None
+    if kind.startswith("int"):
+        return found[1] if found else "10"
+    return "12.5" if found is None else found[1] + (f".{found[2]}" if found[2] else "")
+
+
+def _keys_of(model: type[BaseModel], location: Location) -> list[str]:
+    """Keys that there may be at a place, which pydantic tells with the names of kinds."""
+    here = _models_in(model)
+    for part in location:
+        fields = [each.model_fields for each in here]
+        named = [f.annotation for of in fields for name, f in of.items() if part in (name, f.alias)]
+        kinds = [each for each in here if _is_kind(each, part)]
+        here = [m for annotation in named for m in _models_in(annotation)] or kinds or here
+    return [field.alias or name for each in here for name, field in each.model_fields.items()]
+
+
+def _is_kind(model: type[BaseModel], name: object) -> bool:
+    """Whether one of several models in a place is the one that pydantic calls `name`."""
+    return any(name in get_args(field.annotation) for field in model.model_fields.values())
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, RootModel):
+        return _models_in(annotation.model_fields["root"].annotation)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from ruamel.yaml import YAML
+from ruamel.yaml.constructor import RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+from workbench.model.contents import not_text
 from workbench.model.errors import BadInputError
 from workbench.model.problems import Location, Problem, problems
 
@@ -29,6 +33,60 @@ class FileModel(BaseModel):
 Model = TypeVar("Model", bound=BaseModel)
 
 
+@dataclass(frozen=True)
+class Mistake:
+    """Something wrong with a file."""
+
+    line: int
+    """From 1."""
+    text: str
+
+
+@dataclass(frozen=True)
+class Document:
+    """A YAML file as it was read; mappings and lists keep their line numbers."""
+
+    path: Path
+    data: Any
+    doubled: tuple[Mistake, ...] = ()
+    """Keys that stand in one mapping twice; the first counts."""
+
+    def mistake(self, problem: Problem) -> Mistake:
+        """A problem with its line."""
+        return Mistake(line_of(self.data, problem.location), problem.told)
+
+    def mistakes(self, model: type[BaseModel], part: Location = (), context: object = None) -> list[Mistake]:
+        """All that keeps the part at the keys `part` (empty where it is not there) from being `model`.
+
+        Args:
+            model: what it is to be.
+            part: keys that lead to it.
+            context: handed to the model's validators.
+        """
+        node = self.data
+        for key in part:
+            node = node.get(key) or {}
+        try:
+            model.model_validate(node, context=context)
+        except ValidationError as error:
+            found = [
+                Problem((*part, *one.location), one.text) for one in problems(model, node, error.errors())
+            ]
+            return [self.mistake(problem) for problem in found]
+        return []
+
+
+def refuse(path: Path, mistakes: Iterable[Mistake]) -> None:
+    """Raise where there are mistakes, a line for each, in the order of the file.
+
+    Raises:
+        BadInputError: there are.
+    """
+    in_order = sorted(mistakes, key=lambda mistake: mistake.line)
+    if in_order:
+        raise BadInputError("\n".join(f"{path}:{one.line}: {one.text}" for one in in_order))
+
+
 def load_yaml_model(path: Path, model: type[Model]) -> Model:
     """Read `path` and validate it as `model`.
 
@@ -39,47 +97,38 @@ def load_yaml_model(path: Path, model: type[Model]) -> Model:
     return parse_yaml_model(_read(path), path, model)
 
 
-def load_yaml(path: Path) -> Any:
-    """Read `path` as `parse_yaml` does; the errors of `load_yaml_model`."""
-    return parse_yaml(_read(path), path)
+def read_document(path: Path) -> Document:
+    """Read `path`.
+
+    Raises:
+        BadInputError: it cannot be read, or is not one YAML document.
+    """
+    return parse_document(_read(path), path)
 
 
 def parse_yaml_model(text: str, path: Path, model: type[Model]) -> Model:
     """Validate YAML `text`, which comes from `path`, as `model`; the errors of `load_yaml_model`."""
-    data = parse_yaml(text, path)
-    _check_kind(path, data, model)
-    return validate(path, data, (), model)
-
-
-def validate(path: Path, data: Any, part: Location, model: type[Model], context: object = None) -> Model:
-    """Validate a part of `data`, which comes from `path`, as `model`; the errors of `load_yaml_model`.
-
-    Args:
-        path: for the message.
-        data: the whole document.
-        part: keys that lead to the part; one that is not there is empty.
-        model: what the part is to be.
-        context: handed to the model's validators.
-    """
-    node = data
-    for key in part:
-        node = node.get(key) or {}
+    document = parse_document(text, path)
+    _check_kind(path, document.data, model)
     try:
-        return model.model_validate(node, context=context)
-    except ValidationError as error:
-        found = [Problem((*part, *one.location), one.text) for one in problems(node, error.errors())]
-        lines = [f"{path}:{line_of(data, one.location)}: {one.key}: {one.text}" for one in found]
-        raise BadInputError("\n".join(lines)) from None
+        found = model.model_validate(document.data)
+    except ValidationError:
+        refuse(path, [*document.doubled, *document.mistakes(model)])
+        raise
+    refuse(path, document.doubled)
+    return found
 
 
-def parse_yaml(text: str, path: Path) -> Any:
-    """Read YAML's safe subset; mappings and lists keep their line numbers.
+def parse_document(text: str, path: Path) -> Document:
+    """Read YAML's safe subset.
 
     Raises:
         BadInputError: it is not one YAML document.
     """
+    yaml = YAML(typ="rt")
+    yaml.Constructor = _Constructor
     try:
-        data = YAML(typ="rt").load(text)
+        data = yaml.load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = "" if mark is None else f":{mark.line + 1}"
@@ -90,7 +139,23 @@ def parse_yaml(text: str, path: Path) -> Any:
         raise BadInputError(f"{path}: not valid YAML: nested too deep") from None
     if data is None:
         raise BadInputError(f"{path}:1: expected a YAML mapping, the file is empty")
-    return data
+    return Document(path, data, tuple(yaml.constructor.doubled))
+
+
+class _Constructor(RoundTripConstructor):
+    """Goes on after a key that stands in a mapping twice, and notes it: there may be more to tell."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.doubled: list[Mistake] = []
+
+    def check_mapping_key(self, node: Any, key_node: Any, mapping: Any, key: Any, value: Any) -> bool:
+        if key not in mapping:
+            return True
+        first = mapping.lc.data[key][0] + 1 if key in mapping.lc.data else node.start_mark.line + 1
+        line = key_node.start_mark.line + 1
+        self.doubled.append(Mistake(line, f"{key}: stands here again, after line {first}; leave one of them"))
+        return False
 
 
 def kind_of(data: Any) -> str:
@@ -109,13 +174,16 @@ def _check_kind(path: Path, data: Any, model: type[BaseModel]) -> None:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        content = path.read_bytes()
     except FileNotFoundError:
         raise BadInputError(f"{path}: no such file; expected a YAML file") from None
     except IsADirectoryError:
         raise BadInputError(f"{path}: expected a YAML file, got a folder; give the files in it") from None
     except (OSError, ValueError) as error:
-        raise BadInputError(f"{path}: expected a readable UTF-8 YAML file: {error}") from None
+        raise BadInputError(f"{path}: expected a readable YAML file: {error}") from None
+    if (came := not_text(content)) is not None:
+        raise BadInputError(f"{path}: expected a YAML file, got {came}")
+    return content.decode("utf-8")
 
 
 def line_of(data: Any, location: Location) -> int:
@@ -125,7 +193,7 @@ def line_of(data: Any, location: Location) -> int:
     for part in location:
         position = getattr(node, "lc", None)
         if position is None or part not in (position.data or {}):
-            continue  # the name of a kind of step, which pydantic puts in, or a key that is missing
+            break  # a key that is missing
         line = position.data[part][0] + 1
         node = node[part]
     return line

@@ -1,59 +1,90 @@
-"""Looking through files before anybody stands at the bench."""
+"""Looking through files before anybody stands at the bench: all that can be told, in one pass."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, get_args
 
-from workbench.devices.registry import blocks_of, check_driver
+from workbench.devices.registry import blocks_of, not_installed
 from workbench.model.errors import BadInputError
-from workbench.model.procedure import Procedure, load_procedure
-from workbench.model.rig import load_rig
-from workbench.model.yamlfile import kind_of, line_of, load_yaml, validate
+from workbench.model.problems import Problem
+from workbench.model.procedure import Procedure, Step
+from workbench.model.rig import Rig
+from workbench.model.yamlfile import Document, FileModel, Mistake, kind_of, line_of, read_document, refuse
+
+KINDS: dict[str, type[FileModel]] = {
+    get_args(kind.model_fields["step"].annotation)[0]: kind for kind in get_args(get_args(Step)[0])
+}
+"""The kinds of steps, by their names."""
+
+
+@dataclass(frozen=True)
+class _Note(Mistake):
+    """Worth knowing; no mistake, or not one of this file alone."""
 
 
 def check_file(path: Path) -> list[str]:
-    """What is worth knowing of a procedure or rig file that is right.
+    """What is worth knowing of a procedure or rig file that is right, a line each.
 
     Raises:
-        BadInputError: it is wrong; one line for each problem, with file and line.
+        BadInputError: it is wrong; one line for each mistake, with file and line, in the order of the file,
+            and for each note.
     """
-    data = load_yaml(path)
-    kinds = [kind for kind in ("procedure", "rig") if isinstance(data, dict) and kind in data]
+    document = read_document(path)
+    kinds = [
+        kind for kind in ("procedure", "rig") if isinstance(document.data, dict) and kind in document.data
+    ]
     if len(kinds) != 1:
         raise BadInputError(
-            f"{path}:1: expected a procedure or a rig, with one key of these names; this is {kind_of(data)}"
+            f"{path}:1: expected a procedure or a rig, with one key of these names; this is"
+            f" {kind_of(document.data)}"
         )
-    return _check_procedure(path) if kinds == ["procedure"] else _check_rig(path)
+    look = _in_procedure if kinds == ["procedure"] else _in_rig
+    found = [*document.doubled, *look(document)]
+    if not all(isinstance(one, _Note) for one in found):
+        refuse(path, (Mistake(n.line, f"note: {n.text}") if isinstance(n, _Note) else n for n in found))
+    return [f"{path}:{note.line}: {note.text}" for note in found]
 
 
-def _check_procedure(path: Path) -> list[str]:
-    procedure = load_procedure(path)
-    notes = []
+def _in_procedure(document: Document) -> Iterator[Mistake]:
+    yield from document.mistakes(Procedure)
+    steps = document.data.get("steps")
+    if isinstance(steps, list):
+        yield from _between_steps(document, steps)
+
+
+def _between_steps(document: Document, steps: list[Any]) -> Iterator[Mistake]:
+    """Steps that do not find what they need. One that is no known kind might have given anything."""
+    kinds = [KINDS.get(str(step.get("step"))) if isinstance(step, dict) else None for step in steps]
     made: set[str] = set()
-    for index, step in enumerate(procedure.steps):
-        needs: str | None = getattr(step, "needs", None)
+    for index, kind in enumerate(kinds):
+        if kind is None:
+            return
+        needs: str | None = getattr(kind, "needs", None)
         if needs is not None and needs not in made:
-            where = f"{path}:{line_of(load_yaml(path), ('steps', index))}: steps[{index}]: {step.step}"
-            if needs in _given_after(procedure, index):
-                raise BadInputError(f"{where} needs what gives {needs} before it, which comes after it")
-            notes.append(f"{where} needs a procedure before this one, in the same call, that gives {needs}")
+            line, where = line_of(document.data, ("steps", index)), f"steps[{index}]: {steps[index]['step']}"
+            if any(getattr(later, "gives", None) == needs for later in kinds[index:]):
+                yield Mistake(line, f"{where} needs what gives {needs} before it, which comes after it")
+            else:
+                wanted = f"needs a procedure before this one, in the same call, that gives {needs}"
+                yield _Note(line, f"{where} {wanted}")
             made.add(needs)
-        made.add(getattr(step, "gives", ""))
-    return notes
+        made.add(getattr(kind, "gives", ""))
 
 
-def _given_after(procedure: Procedure, index: int) -> set[str]:
-    return {getattr(step, "gives", "") for step in procedure.steps[index:]}
-
-
-def _check_rig(path: Path) -> list[str]:
-    rig = load_rig(path)
-    if rig.driver is None:
-        return [f"{path}:1: names no driver: it can be fitted but not run"]
-    try:
-        check_driver(rig)
-    except BadInputError as error:
-        raise BadInputError(f"{path}:{line_of(load_yaml(path), ('driver',))}: {error}") from None
-    for block, model in blocks_of(rig).items():
-        validate(path, load_yaml(path), (block,), model, context=rig)
-    return []
+def _in_rig(document: Document) -> Iterator[Mistake]:
+    of_rig = document.mistakes(Rig)
+    yield from of_rig
+    driver = document.data.get("driver")
+    if driver is None:
+        yield _Note(1, "names no driver: it can be fitted but not run")
+    if not isinstance(driver, str):
+        return
+    if (wrong := not_installed(driver)) is not None:
+        yield document.mistake(Problem(("driver",), wrong))
+        return
+    rig = None if of_rig else Rig.model_validate(document.data)
+    for block, model in blocks_of(driver).items():
+        yield from (one for one in document.mistakes(model, (block,), context=rig) if one not in of_rig)

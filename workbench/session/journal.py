@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import Event, Record, SpotsFound
+from workbench.model.problems import short
 
 JOURNAL = "journal.jsonl"
 
@@ -117,9 +118,12 @@ def read_journal(session_dir: Path) -> Iterator[Record]:
     for number, line in enumerate(whole.split(b"\n") if whole else [], start=1):
         try:
             yield Record.model_validate_json(line)
-        except ValidationError as error:
-            what = error.errors()[0]["msg"]
-            raise BadInputError(f"{path}:{number}: expected a journal record: {what}") from None
+        except ValidationError:
+            came = short(line.decode(errors="replace"))
+            raise BadInputError(
+                f"{path}:{number}: expected a journal record, got {came}; only the workbench may write in it:"
+                " put back a copy"
+            ) from None
 
 
 def is_running(session_dir: Path) -> bool:

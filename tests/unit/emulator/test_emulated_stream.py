@@ -17,7 +17,7 @@ from workbench.emulator import EmulatedBench, open_bench
 from workbench.emulator.spot import Spot
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import FlatTarget, Placement
-from workbench.model.yamlfile import parse_yaml
+from workbench.model.yamlfile import parse_document
 
 THESIS = load_rig(Path(__file__).parents[3] / "rigs" / "thesis-emulated.yaml")
 
@@ -263,4 +263,4 @@ def _predicted(truth: Any, name: str, standoff: float, key: str) -> tuple[float,
 
 
 def _read(path: Path) -> Any:
-    return parse_yaml(path.read_text(), path)
+    return parse_document(path.read_text(), path).data

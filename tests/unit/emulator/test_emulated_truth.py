@@ -17,7 +17,7 @@ from workbench.emulator.truth import Truth, draw_placement_error, draw_truth
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
-from workbench.model.yamlfile import parse_yaml
+from workbench.model.yamlfile import parse_document
 
 THESIS = load_rig(Path(__file__).parents[3] / "rigs" / "thesis-emulated.yaml")
 
@@ -146,4 +146,4 @@ def test_no_other_room_knows_the_truth() -> None:
 
 
 def _read(path: Path) -> Any:
-    return parse_yaml(path.read_text(), path)
+    return parse_document(path.read_text(), path).data

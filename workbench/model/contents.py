@@ -1,0 +1,43 @@
+"""What a file is that was expected to be text, by how it begins."""
+
+from __future__ import annotations
+
+BEGINNINGS = {
+    b"\x89PNG": "a PNG image",
+    b"\xff\xd8\xff": "a JPEG image",
+    b"GIF8": "a GIF image",
+    b"BM": "a BMP image",
+    b"II*\0": "a TIFF image",
+    b"MM\0*": "a TIFF image",
+    b"%PDF": "a PDF document",
+    b"PK\x03\x04": "an archive, as spreadsheets are (.xlsx, .ods)",
+    b"\xd0\xcf\x11\xe0": "a document of an old Excel or Word",
+    b"\x1f\x8b": "a compressed file (gzip)",
+    b"\x93NUMPY": "a NumPy array",
+    b"RRF": "a Rerun recording",
+    b"\x7fELF": "a program",
+    b"\xff\xfe": "text in UTF-16",
+    b"\xfe\xff": "text in UTF-16",
+}
+TEXT = {"text in UTF-16"}
+"""Only its encoding is wrong; a bitmap's two letters may begin a text, too."""
+
+
+def not_text(content: bytes) -> str | None:
+    """What `content` is, for people, with what to do about it; None where it is text in UTF-8."""
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+    else:
+        if b"\0" not in content:
+            return None
+        line = content[: content.index(b"\0")].count(b"\n") + 1
+    kind = next((name for start, name in BEGINNINGS.items() if content.startswith(start)), None)
+    if kind is not None and kind not in TEXT:
+        return kind
+    if kind is not None:
+        return f"{kind}; save it as UTF-8"
+    if b"\0" in content:
+        return "binary data"
+    return f"text in another encoding (line {line}); save it as UTF-8"
