@@ -22,10 +22,11 @@ from workbench.model.errors import (
     RigNotReadyError,
     StoppedError,
 )
-from workbench.model.prompt import Answer, Prompt
+from workbench.model.prompt import Answer, Prompt, Quantity
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
 from workbench.procedure.doctor import examine
+from workbench.procedure.foreseen import foreseen_prompts
 from workbench.procedure.latency import count_latency
 from workbench.procedure.operator import Scripted
 from workbench.procedure.resume import resume
@@ -58,12 +59,31 @@ class Says:
         return answer
 
 
+class Foreseen:
+    """Holds every prompt that comes against those foreseen, which answers files are held against."""
+
+    def __init__(self, other: Operator, foreseen: dict[str, Prompt]) -> None:
+        self.other, self.foreseen = other, foreseen
+
+    def ask(self, prompt: Prompt) -> Answer:
+        before = self.foreseen[prompt.key]
+        assert (before.quantity, before.choices, before.at_bench) == (
+            prompt.quantity,
+            prompt.choices,
+            prompt.at_bench,
+        )
+        assert set(before.may) >= set(prompt.may)
+        return self.other.ask(prompt)
+
+
 def session(folder: Path, steps: str, operator: Operator, emulator: str = "") -> Path:
     """Run a procedure; the bench's own operator is away."""
     folder.mkdir(exist_ok=True)
     rig, procedure = write_files(folder, HEAD + steps)
     rig.write_text(rig.read_text() + "  answers: false\n" + emulator)
-    run(Plan.load(rig, [procedure]), folder / "s", (), CALLER, lambda: None, operator)
+    plan = Plan.load(rig, [procedure])
+    held = Foreseen(operator, foreseen_prompts(plan.procedures, plan.rig))
+    run(plan, folder / "s", (), CALLER, lambda: None, held)
     return folder / "s"
 
 
@@ -123,8 +143,9 @@ def test_abort_says_who_and_why(tmp_path: Path) -> None:
 def test_nobody_at_a_real_rig_and_then_somebody(tmp_path: Path) -> None:
     answers = tmp_path / "answers.yaml"
     answers.write_text("safety: true\np.1/300mm: 300\n")
+    foreseen = (Prompt("safety", "?"), Prompt("p.1/300mm", "?", quantity=Quantity("mm", 270, 330)))
     with pytest.raises(AnswerNeededError, match="prompt safety"):
-        session(tmp_path, GRID, Scripted.load(answers, NOBODY))
+        session(tmp_path, GRID, Scripted.load(answers, {p.key: p for p in foreseen}, NOBODY))
     assert not list((tmp_path / "s/frames").iterdir()), "nothing was lit"
     operator = Says()
     resume(tmp_path / "s", (), RESUMER, lambda: None, operator)

@@ -185,3 +185,19 @@ def test_without_a_terminal_an_open_prompt_ends_it(tmp_path: Path, option: list[
     assert done.returncode == 6
     assert "prompt safety" in " ".join(done.stderr.split())
     assert why in " ".join(done.stderr.split())
+
+
+def test_an_answers_file_is_held_against_the_procedure_before_anything_begins(tmp_path: Path) -> None:
+    rig, _ = write_files(tmp_path, STEPS)
+    rig.write_text(rig.read_text() + "  answers: false\n")
+    (tmp_path / "answers.yaml").write_text("p.1: green\np.2/6000mm: 6000\np.1: white\n")
+    command = [str(SCRIPT), "run", "p.yaml", "--rig", "rig.yaml", "--answers", "answers.yaml", "--no-input"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert done.returncode == 2
+    assert done.stderr.removeprefix("error: ").splitlines() == [
+        "answers.yaml:1: p.1: expected one of white, grey, got green",
+        "answers.yaml:2: p.2/6000mm: nothing of this name is asked; expected one of p.2/600mm, p.2/300mm,"
+        " safety, p.1",
+        "answers.yaml:3: p.1: stands here again, after line 1; leave one of them",
+    ]
+    assert not (tmp_path / "sessions").exists()

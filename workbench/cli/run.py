@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -22,10 +22,11 @@ from workbench.model.errors import (
     RigNotReadyError,
     StoppedError,
 )
+from workbench.procedure.foreseen import foreseen_prompts
 from workbench.procedure.operator import Scripted
 from workbench.procedure.outline import Forecast, learn_pace, outline
-from workbench.procedure.resume import plan_of, resume
-from workbench.procedure.run import Caller, Plan, run
+from workbench.procedure.resume import files_now, plan_of, resume
+from workbench.procedure.run import NOBODY, Caller, Plan, run
 from workbench.report.thesis_figures import FigureWriter
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
@@ -66,7 +67,8 @@ def resume_session(session_dir: Path, accept_changes: str | None, answers: Answe
     Raises:
         WorkbenchError: see `workbench.procedure.resume.resume`.
     """
-    plan = plan_of(session_dir, load_manifest(session_dir))
+    now, _ = files_now(session_dir, load_manifest(session_dir))
+    plan = plan_of(session_dir, now)
     with shown(session_dir, plan, answers) as screen:
         resume(session_dir, screen.consumers, _caller(), screen.stopping, screen.operator, accept_changes)
 
@@ -76,13 +78,16 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     """Show a session on the terminal and in a recording while it runs, then say where everything is."""
     console = Console(stderr=True, markup=False)
     asked = StopAfterShot()
+    script = None
+    if answers.file is not None:
+        script = Scripted.load(answers.file, foreseen_prompts(plan.procedures, plan.rig), NOBODY)
     steps = outline(plan.procedures, plan.rig)
     forecast = Forecast(steps, learn_pace(session_dir.parent, plan.rig.rig))
     recording = RecordingConsumer(session_dir, plan.rig)
     file = session_dir / RECORDING_FILE
     with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
         person = whoever_is_there(answers.no_input, console, lambda: asked.reason, terminal.quiet)
-        operator = person if answers.file is None else Scripted.load(answers.file, person)
+        operator = person if script is None else replace(script, other=person)
         figures = Guarded(FigureWriter(session_dir), "drawing figures", console)
         consumers = (Guarded(terminal, "the progress", console), figures, beside)
         try:

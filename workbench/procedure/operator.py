@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import RootModel
+from pydantic import BeforeValidator, RootModel, ValidationError
 
 from workbench.devices.protocols import Bench, Operator
-from workbench.model.errors import AnswerNeededError, BadInputError
-from workbench.model.prompt import Answer, Prompt
-from workbench.model.yamlfile import load_yaml_model
+from workbench.model.errors import AnswerNeededError
+from workbench.model.problems import one_of
+from workbench.model.prompt import Answer, Prompt, Quantity
+from workbench.model.yamlfile import Mistake, line_of, read_document, refuse
+
+GIVEN = "true, a number, a choice, or {action: skip, reason: ...}"
 
 
-class _Answers(RootModel[dict[str, Answer | float | str | bool]]):
-    """An answers file: prompt keys, each with a number, a choice, `yes`, or an answer in full."""
+def _in_full(given: object) -> object:
+    """An answer as a mapping, where it was given as a number, a choice or `true`."""
+    if isinstance(given, dict | Answer):
+        return given
+    if given is True:
+        return {}
+    if given is None or isinstance(given, bool) or not isinstance(given, int | float | str | date):
+        raise ValueError(f"expected {GIVEN}")
+    return {"value": str(given) if isinstance(given, date) else given}
+
+
+class _Answers(RootModel[dict[str, Annotated[Answer, BeforeValidator(_in_full)]]]):
+    """An answers file: prompt keys, each with a number, a choice, `true`, or an answer in full."""
 
 
 @dataclass(frozen=True)
@@ -46,38 +63,86 @@ class Scripted:
     """Whether nobody can be hurt: on a virtual bench the file may say where the target stands."""
 
     @classmethod
-    def load(cls, path: Path, other: Operator) -> Scripted:
-        """Read the file.
+    def load(cls, path: Path, foreseen: Mapping[str, Prompt], other: Operator) -> Scripted:
+        """Read the file, and hold it against the prompts that may come.
 
         Raises:
-            BadInputError: see `load_yaml_model`.
+            BadInputError: it cannot be read, answers what nobody asks, or with what does not fit; one line
+                for each mistake, with file and line.
         """
-        given = load_yaml_model(path, _Answers).root
-        return cls(path, {key: _answer(value) for key, value in given.items()}, other)
+        document = read_document(path)
+        mistakes = [*document.doubled, *document.mistakes(_Answers)]
+        answers: dict[str, Answer] = {}
+        for key, given in document.data.items() if isinstance(document.data, dict) else ():
+            if not isinstance(key, str):
+                continue
+            if key not in foreseen:
+                wrong: str | None = f"nothing of this name is asked; {one_of(key, list(foreseen))}"
+            elif (answer := _read(key, given)) is None:
+                continue
+            else:
+                answers[key] = _fitted(foreseen[key], answer)
+                wrong = _refuse(foreseen[key], answers[key])
+            if wrong is not None:
+                mistakes.append(Mistake(line_of(document.data, (key,)), f"{key}: {wrong}"))
+        refuse(path, mistakes)
+        return cls(path, answers, other)
 
     def ask(self, prompt: Prompt) -> Answer:
         """The file's answer.
 
         Raises:
-            BadInputError: it does not fit the question.
             AnswerNeededError: as `other` does.
         """
-        if prompt.key not in self.answers or (prompt.at_bench and not self.at_bench):
-            try:
-                return self.other.ask(prompt)
-            except AnswerNeededError as error:
-                raise AnswerNeededError(f"{error}; {self.path} answers {', '.join(self.answers)}") from None
-        answer = self.answers[prompt.key]
-        if (wrong := prompt.refuse(answer)) is not None:
-            raise BadInputError(f"{self.path}: {prompt.key}: {wrong}")
+        if prompt.key in self.answers and (self.at_bench or not prompt.at_bench):
+            return self.answers[prompt.key]
+        try:
+            return self.other.ask(prompt)
+        except AnswerNeededError as error:
+            why = (
+                f"{self.path} answers it, but on a real rig only somebody at the bench can"
+                if prompt.key in self.answers
+                else f"{self.path} has no answer to it"
+            )
+            raise AnswerNeededError(f"{error}; {why}") from None
+
+
+def _read(key: str, given: object) -> Answer | None:
+    """One answer; None where it is none, which the file's schema has told."""
+    try:
+        answer = _Answers.model_validate({key: given}).root[key]
+    except ValidationError:
+        return None
+    return answer.model_copy(update={"by": "answers file"})
+
+
+def _fitted(prompt: Prompt, answer: Answer) -> Answer:
+    """The answer as a person's would be taken: `yes` confirms, `true` says as asked, 21.5 C is a number."""
+    value: float | str | None = answer.value
+    if answer.action != "done":
         return answer
+    if prompt.quantity is not None:
+        value = _number(value, prompt.quantity)
+    elif prompt.choices:
+        value = f"{value:g}" if isinstance(value, float) else value
+    elif isinstance(value, str) and value.lower() == "yes":
+        value = None
+    return answer.model_copy(update={"value": value})
 
 
-def _answer(given: Answer | float | str | bool) -> Answer:
-    if isinstance(given, Answer):
-        return given.model_copy(update={"by": "answers file"})
-    value = None if given is True else float(given) if isinstance(given, int | float) else given
-    return Answer(value=value, by="answers file")
+def _number(value: float | str | None, quantity: Quantity) -> float | str | None:
+    if value is None:
+        return quantity.usual
+    try:
+        return float(value.removesuffix(quantity.unit)) if isinstance(value, str) else value
+    except ValueError:
+        return value
+
+
+def _refuse(prompt: Prompt, answer: Answer) -> str | None:
+    if answer.action == "redo":
+        return "expected an answer, got redo: asked again, the file would say it again, without end"
+    return prompt.refuse(answer)
 
 
 def who_answers(bench: Bench, given: Operator) -> Operator:

@@ -82,23 +82,21 @@ def _(step: pr.MessageStep, context: Context, name: str) -> str:
 
 @run_step.register
 def _(step: pr.ConfirmStep, context: Context, name: str) -> str:
-    context.ask(Prompt(name, step.text, step.expect, step.otherwise))
+    context.ask(confirmation(step, name))
     return "confirmed"
 
 
 @run_step.register
 def _(step: pr.AskStep, context: Context, name: str) -> str:
-    n = step.number
-    quantity = None if n is None else Quantity(n.unit, *n.within, n.usual)
-    answer = context.ask(Prompt(name, step.text, quantity=quantity, choices=step.choices))
-    unit = "" if n is None else f" {n.unit}"
+    answer = context.ask(question(step, name))
+    unit = "" if step.number is None else f" {step.number.unit}"
     return f"{answer.value}{unit}"
 
 
 @run_step.register
 def _(step: pr.PlaceTargetStep, context: Context, name: str) -> str:
     # What needs it lit, counting the latency, sees to its own exposure: one set now may rest on old frames.
-    placed = visit(context, [_placement(name, step.standoff_mm)], lambda placement: placement, lights=False)
+    placed = visit(context, [placement_at(name, step.standoff_mm)], lambda placement: placement, lights=False)
     return f"at {placed[0].standoff_mm:g} mm" if placed else "left out"
 
 
@@ -137,7 +135,7 @@ def _(step: pr.ValidateStep, context: Context, name: str) -> str:
 
 @run_step.register
 def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
-    placements = [_placement(name, standoff_mm) for standoff_mm in step.standoffs_mm]
+    placements = [placement_at(name, standoff_mm) for standoff_mm in step.standoffs_mm]
 
     def work(placement: Placement) -> int:
         pairs = _capture_lasers(context, placement, step.repeats)
@@ -151,7 +149,7 @@ def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
 @run_step.register
 def _(step: pr.CaptureBoardStep, context: Context, name: str) -> str:
     placements = [
-        _board_placement(f"{name}/{number:02d}", placing, context.rig)
+        board_placement(name, number, placing, context.rig)
         for number, placing in enumerate(step.placings, start=1)
     ]
 
@@ -243,7 +241,7 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
             )
         return accuracy_row(placement.standoff_mm, readings, context.rig.bench)
 
-    rows = visit(context, [_placement(name, standoff_mm) for standoff_mm in step.standoffs_mm], work)
+    rows = visit(context, [placement_at(name, standoff_mm) for standoff_mm in step.standoffs_mm], work)
     trial = [c for c in context.captures if c.purpose == "trial"]
     write_capture_table(context.session_dir / TRIAL_TABLE, trial)
     table = f"{name}.csv"
@@ -271,18 +269,32 @@ def _(step: pr.ThesisSimulationStep, context: Context, name: str) -> str:
     )
 
 
-def _placement(name: str, standoff_mm: float) -> Placement:
+def confirmation(step: pr.ConfirmStep, name: str) -> Prompt:
+    """What a `confirm` step asks."""
+    return Prompt(name, step.text, step.expect, step.otherwise)
+
+
+def question(step: pr.AskStep, name: str) -> Prompt:
+    """What an `ask` step asks."""
+    n = step.number
+    quantity = None if n is None else Quantity(n.unit, *n.within, n.usual)
+    return Prompt(name, step.text, quantity=quantity, choices=step.choices)
+
+
+def placement_at(name: str, standoff_mm: float) -> Placement:
+    """Where a step of this name has a flat target placed."""
     # 12 digits: keys name files, so standoffs that differ must have keys that differ.
     return Placement(key=f"{name}/{standoff_mm:.12g}mm", standoff_mm=standoff_mm)
 
 
-def _board_placement(key: str, placing: pr.BoardPlacing, rig: Rig) -> Placement:
+def board_placement(name: str, number: int, placing: pr.BoardPlacing, rig: Rig) -> Placement:
+    """Where a step of this name has the board placed for the `number`-th time, from 1."""
     upright = all(laser.axis == "v" for laser in rig.lasers)
     target = BoardTarget(
         yaw_deg=placing.yaw_deg, pitch_deg=placing.pitch_deg, roll_deg=90.0 if upright else 0.0
     )
     return Placement(
-        key=f"{key}-{placing.standoff_mm:.12g}mm",
+        key=f"{name}/{number:02d}-{placing.standoff_mm:.12g}mm",
         standoff_mm=placing.standoff_mm,
         target=target,
         standoff_sd_mm=placing.standoff_sd_mm,
