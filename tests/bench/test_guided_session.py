@@ -147,6 +147,10 @@ def test_nobody_at_a_real_rig_and_then_somebody(tmp_path: Path) -> None:
     with pytest.raises(AnswerNeededError, match="prompt safety"):
         session(tmp_path, GRID, Scripted.load(answers, {p.key: p for p in foreseen}, NOBODY))
     assert not list((tmp_path / "s/frames").iterdir()), "nothing was lit"
+    waiting = standing(tmp_path / "s")
+    assert (waiting.state, waiting.unfinished) == ("waiting", True)
+    assert waiting.why.startswith("for an answer to safety: Lasers of class ")
+    assert "nobody" not in waiting.why
     operator = Says()
     resume(tmp_path / "s", (), RESUMER, lambda: None, operator)
     assert [p.key for p in operator.asked][:2] == ["safety", "p.1/300mm"]

@@ -22,7 +22,7 @@ from workbench.model.rig import load_rig
 from workbench.model.target import Placement
 from workbench.ranging.live import LiveRanger, check_same_sensor, latency_words
 from workbench.ranging.ranger import Ranger, Reading
-from workbench.report.tables import reading_line
+from workbench.report.readings import reading_line
 
 FIXED_EXPOSURE = (
     "the camera's exposure stays as the rig file sets it, whatever stands in the beams; a clipped spot"

@@ -106,7 +106,7 @@ def resume(
 
 @app.command(name="sessions")
 def sessions_(sessions: Sessions = Path("sessions"), json: Json = False) -> None:
-    """List sessions: finished, stopped, failed or interrupted, and how to go on."""
+    """List sessions: finished, waiting for an answer, stopped, failed, and how to go on."""
     from workbench.cli.sessions import list_sessions
 
     list_sessions(sessions, json)

@@ -14,13 +14,13 @@ from workbench.model.errors import BadInputError
 from workbench.ranging.captures import read_captures
 from workbench.ranging.live import check_same_sensor
 from workbench.ranging.ranger import Ranger
-from workbench.report.tables import reading_table
+from workbench.report.readings import reading_list
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE
 from workbench.session.manifest import MANIFEST, load_session_rig
 
 
 def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
-    """Range every scene; a line of JSON each on standard output, a table on standard error.
+    """Range every scene; a line of JSON each on standard output, a list on standard error.
 
     Raises:
         BadInputError: a file is wrong.
@@ -34,10 +34,7 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
         if as_json:
             print(json.dumps(plain(reading)), flush=True)
     console = Console(stderr=True, markup=False)
-    console.print(reading_table(readings))
-    for reading in readings:
-        for note in reading.notes:
-            console.print(f"{reading.scene}: {note}", highlight=False)
+    console.print(reading_list(readings), highlight=False)
 
 
 def _table(captures: Path) -> Path:

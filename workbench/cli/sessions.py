@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
+from textwrap import shorten
 
 from rich.console import Console
 from rich.padding import Padding
@@ -15,6 +16,10 @@ from workbench.session.manifest import MANIFEST
 from workbench.session.state import Standing, standings
 
 SHOWN = 20
+WHY_LINES = 2
+"""For how a session ended; all of it is in `--json`, and in the session's journal."""
+CUT_AT = 20
+"""Lines are broken between words, this far before their end at most."""
 
 
 def list_sessions(sessions: Path, as_json: bool) -> None:
@@ -71,4 +76,5 @@ def _show(found: list[Standing], console: Console) -> None:
         line = f"{name:{width}}  {told}" if len(name) <= room else f"{name}\n    {told}"
         console.print(line, highlight=False, soft_wrap=True)
         if each.state != "finished":
-            console.print(Padding(Text(each.why), (0, 0, 0, 4)))
+            why = shorten(each.why, WHY_LINES * (console.width - 4) - CUT_AT, placeholder=" ...")
+            console.print(Padding(Text(why), (0, 0, 0, 4)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import degrees, floor, log10
+from math import floor, log10
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -17,8 +17,6 @@ if TYPE_CHECKING:  # a table of one of them is made without the rest
     from workbench.calibration.observations import Rejected
     from workbench.model.event import LeftOutRecord, ParameterRecord, RejectedRecord, TrialRow
     from workbench.model.simulation import ClaimRow
-    from workbench.ranging.ranger import Reading
-    from workbench.ranging.shape import Shape
 
 DETERMINED_BY_WORDS = {"data": "data", "joint": "joint", "prior": "prior"}
 
@@ -127,46 +125,6 @@ def rejected_lines(rejected: Iterable[Rejected | RejectedRecord]) -> list[str]:
     return [f"{_and_more(names)}: {reason}" for reason, names in sources.items()]
 
 
-LONGEST_SCENE = 30
-"""Characters of a scene's name in one line."""
-
-
-def reading_table(readings: Iterable[Reading]) -> Table:
-    """The ranger's readings, a line a scene; names are what is looked up, so they are broken last."""
-    told = list(readings)
-    table = Table(title="Ranges (mm, 1 sigma)", title_justify="left")
-    longest = max((len(r.scene) for r in told), default=0)
-    table.add_column("scene", overflow="fold", no_wrap=longest <= LONGEST_SCENE)
-    table.add_column("closest", justify="right", no_wrap=True)
-    table.add_column("shape")
-    table.add_column("lasers", no_wrap=True)
-    for r in told:
-        closest = "-" if r.closest_mm is None or r.sigma_mm is None else _with_sd(r.closest_mm, r.sigma_mm)
-        shapes = [shape_words(line.shape) for line in r.lines]
-        status = [] if r.status == "done" else [r.status.replace("_", " ")]
-        lasers = "\n".join(f"{laser.laser_id} {laser.range_mm:.1f}" for laser in r.lasers)
-        table.add_row(r.scene, closest, "\n".join(status or shapes), lasers)
-    return table
-
-
-def reading_line(r: Reading) -> str:
-    """One reading in one line."""
-    if r.closest_mm is None or r.sigma_mm is None or r.interval_mm is None:
-        return f"{r.scene}  {r.status}  {'; '.join(r.notes)}"
-    shapes = ", ".join(shape_words(line.shape) for line in r.lines)
-    lasers = " ".join(f"{laser.laser_id} {laser.range_mm:.1f}" for laser in r.lasers)
-    return f"{r.scene}  {r.status}  {_with_sd(r.closest_mm, r.sigma_mm)} mm  {shapes}  {lasers}"
-
-
-def shape_words(shape: Shape) -> str:
-    """A shape in a few words, 1 sigma."""
-    if shape.angle_rad is not None and shape.angle_sigma_rad is not None:
-        return f"incline {_with_sd(degrees(shape.angle_rad), degrees(shape.angle_sigma_rad))} deg"
-    if shape.kind == "cylinder" and shape.cylinder is not None:
-        return f"cylinder, radius {_with_sd(shape.cylinder.radius_mm, shape.cylinder.radius_sigma_mm)}"
-    return f"round, degree {shape.degree}" if shape.kind == "round" else shape.kind
-
-
 def trial_table(rows: Sequence[TrialRow]) -> Table:
     """An accuracy trial: errors are measured - true."""
     table = Table(title="Accuracy (mm; error = measured - true)", title_justify="left")
@@ -231,6 +189,11 @@ def significant(value: float, sd: float) -> str:
     return f"{value:.{digits}f}"
 
 
+def with_sd(value: float, sd: float) -> str:
+    """A value with its standard deviation."""
+    return f"{significant(value, sd)} +- {_two_digits(sd)}"
+
+
 def _reached(row: ClaimRow, value: float | None) -> str:
     if value is None:
         return "-"
@@ -239,10 +202,6 @@ def _reached(row: ClaimRow, value: float | None) -> str:
 
 def _and_more(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
-
-
-def _with_sd(value: float, sd: float) -> str:
-    return f"{significant(value, sd)} +- {_two_digits(sd)}"
 
 
 def _two_digits(sd: float) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from workbench.model import event as ev
-from workbench.model.errors import BadInputError, StoppedError
+from workbench.model.errors import AnswerNeededError, BadInputError, StoppedError
 from workbench.session.journal import JOURNAL, is_running, read_journal
 from workbench.session.manifest import MANIFEST
 
@@ -70,13 +70,22 @@ def safe_part(records: Sequence[ev.Record]) -> list[ev.Record]:
     return kept
 
 
+STATES: dict[int, Literal["finished", "stopped", "waiting"]] = {
+    0: "finished",
+    StoppedError.exit_code: "stopped",
+    AnswerNeededError.exit_code: "waiting",
+}
+"""By the exit code that a session ended with; the others are `failed`."""
+
+
 @dataclass(frozen=True)
 class Standing:
     """Where a session stands."""
 
     session_dir: Path
-    state: Literal["finished", "running", "stopped", "failed", "interrupted", "damaged"]
-    """`stopped` by somebody, `failed` by an error or a limit, `interrupted` without a word, by a kill."""
+    state: Literal["finished", "running", "stopped", "waiting", "failed", "interrupted", "damaged"]
+    """`stopped` by somebody, `waiting` for an answer that nobody gave, `failed` by an error or a limit,
+    `interrupted` without a word, by a kill."""
     procedures: tuple[str, ...]
     captures: int
     why: str
@@ -85,7 +94,7 @@ class Standing:
     @property
     def unfinished(self) -> bool:
         """Whether `workbench resume` has something to do."""
-        return self.state in {"stopped", "failed", "interrupted"}
+        return self.state in {"stopped", "waiting", "failed", "interrupted"}
 
 
 def standings(sessions: Path) -> list[Standing]:
@@ -114,5 +123,6 @@ def standing(session_dir: Path) -> Standing:
     if not isinstance(last, ev.SessionFinished):
         return Standing(session_dir, "interrupted", procedures, captures, "killed, or the power went")
     why = (last.message.splitlines() or [""])[0]
-    states: dict[int, Literal["finished", "stopped"]] = {0: "finished", StoppedError.exit_code: "stopped"}
-    return Standing(session_dir, states.get(last.exit_code, "failed"), procedures, captures, why)
+    if last.exit_code == AnswerNeededError.exit_code:
+        why = f"for an answer to {why.removeprefix('prompt ').partition(' -- ')[0]}"
+    return Standing(session_dir, STATES.get(last.exit_code, "failed"), procedures, captures, why)

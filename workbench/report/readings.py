@@ -1,0 +1,98 @@
+"""The ranger's readings for people: a line each where that says it all, more where something is unusual."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from math import degrees
+from typing import TYPE_CHECKING
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from workbench.report.tables import with_sd
+
+if TYPE_CHECKING:  # what is printed of them is made without the rest
+    from workbench.ranging.ranger import Reading
+    from workbench.ranging.shape import Shape
+
+LONGEST_SCENE = 30
+"""Characters of a scene's name that leave room for the rest beside it."""
+CLOSEST = "closest"
+
+
+def reading_list(readings: Sequence[Reading]) -> Group:
+    """A line a scene; below it the lasers' ranges and the notes, where it is not done or has some."""
+    names = [len(r.scene) for r in readings if len(r.scene) <= LONGEST_SCENE]
+    widths = max([*names, len("scene")]), max([*(len(_closest(r)) for r in readings), len(CLOSEST)])
+    lines: list[RenderableType] = [
+        Text("Ranges (mm, 1 sigma)", style="italic"),
+        _row(widths, "scene", CLOSEST, "shape", style="bold"),
+    ]
+    for reading in readings:
+        lines += _told(reading, widths)
+    lines.append(Text(_counted(readings)))
+    return Group(*lines)
+
+
+def reading_line(r: Reading) -> str:
+    """One reading in one line."""
+    if r.closest_mm is None or r.sigma_mm is None or r.interval_mm is None:
+        return f"{r.scene}  {r.status}  {'; '.join(r.notes)}"
+    return f"{r.scene}  {r.status}  {_closest(r)} mm  {_shapes(r)}  {_lasers(r)}"
+
+
+def shape_words(shape: Shape) -> str:
+    """A shape in a few words, 1 sigma."""
+    if shape.angle_rad is not None and shape.angle_sigma_rad is not None:
+        return f"incline {with_sd(degrees(shape.angle_rad), degrees(shape.angle_sigma_rad))} deg"
+    if shape.kind == "cylinder" and shape.cylinder is not None:
+        return f"cylinder, radius {with_sd(shape.cylinder.radius_mm, shape.cylinder.radius_sigma_mm)}"
+    return f"round, degree {shape.degree}" if shape.kind == "round" else shape.kind
+
+
+def _told(r: Reading, widths: tuple[int, int]) -> Iterator[RenderableType]:
+    done = r.status == "done"
+    words = _shapes(r) if done else "; ".join(part for part in (_status(r.status), _shapes(r)) if part)
+    if len(r.scene) > LONGEST_SCENE:
+        yield Text(r.scene, overflow="fold")
+    yield _row(widths, r.scene if len(r.scene) <= LONGEST_SCENE else "", _closest(r), words)
+    if not done or r.notes:
+        for more in (_lasers(r), *r.notes):
+            if more:
+                yield Padding(Text(more), (0, 0, 0, 4))
+
+
+def _row(widths: tuple[int, int], scene: str, closest: str, words: str, style: str = "") -> Table:
+    row = Table.grid(padding=(0, 2, 0, 0))
+    row.add_column(width=widths[0], no_wrap=True)
+    row.add_column(width=widths[1], justify="right", no_wrap=True)
+    row.add_column(overflow="fold")
+    row.add_row(*(Text(cell, style=style) for cell in (scene, closest, words)))
+    return row
+
+
+def _closest(r: Reading) -> str:
+    return "-" if r.closest_mm is None or r.sigma_mm is None else with_sd(r.closest_mm, r.sigma_mm)
+
+
+def _shapes(r: Reading) -> str:
+    return ", ".join(shape_words(line.shape) for line in r.lines)
+
+
+def _lasers(r: Reading) -> str:
+    return " ".join(f"{laser.laser_id} {laser.range_mm:.1f}" for laser in r.lasers)
+
+
+def _status(status: str) -> str:
+    return status.replace("_", " ")
+
+
+def _counted(readings: Sequence[Reading]) -> str:
+    counts = Counter(_status(r.status) for r in readings)
+    scenes = "1 scene" if len(readings) == 1 else f"{len(readings)} scenes"
+    return (
+        f"{scenes}: {', '.join(f'{n} {status}' for status, n in counts.items())}; each laser's range: --json"
+    )
