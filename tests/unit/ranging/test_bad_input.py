@@ -75,7 +75,7 @@ def test_captures_without_a_row(refused: Refused, calibration: Path, tmp_path: P
 
 def test_one_frame_instead_of_captures(refused: Refused, calibration: Path, tmp_path: Path) -> None:
     said = refused(frame(tmp_path / "on.png"), calibration)
-    assert "on.png: expected a CSV file in UTF-8" in said
+    assert "on.png: expected a captures file (CSV), got a PNG image" in said
 
 
 def test_one_frame_of_a_pair(refused: Refused, calibration: Path, tmp_path: Path) -> None:
