@@ -268,6 +268,43 @@ def test_a_fit_is_held_against_limits(tmp_path: Path, step: str, quantity: str) 
     assert standing(done).state == "finished"
 
 
+UNSEEN = """\
+  - step: capture_grid
+    standoffs_mm: [210, 160, 125]
+    repeats: 2
+    limits:
+      missing: {in: [null, 0.5], on_fail: ask}
+      snr: {in: [8, null], on_fail: ask}
+      scatter_px: {in: [null, 0.2], on_fail: ask}
+"""
+
+
+def test_a_laser_out_of_the_picture_is_asked_about_once_and_in_words(tmp_path: Path) -> None:
+    """At 125 mm the spot of this bench's L4 lies at u = 654 px of 640."""
+    operator = Says()
+    done = session(tmp_path, UNSEEN, operator)
+    (asked,) = [p for p in operator.asked if "/L4/" in p.key]
+    assert asked.key == "p.1/125mm/L4/missing"
+    assert asked.do.startswith(
+        "no spot of L4 was found in 2 captures at 125 mm (missing: expected at most 0.5). Go on"
+    )
+    assert "outside the picture of 640 x 480" in asked.expect
+    assert "nothing is wrong" in asked.expect
+    assert asked.yes == "keep what the other lasers gave"
+    assert asked.may == {"redo": "125 mm again", "skip": "leave 125 mm out"}
+    failed = [e for e in events(done, ev.LimitChecked) if isinstance(e, ev.LimitChecked)]
+    assert [e.quantity for e in failed if e.verdict == "fail"] == ["missing", "snr", "scatter_px"]
+
+
+def test_a_limit_that_stops_says_so_as_well(tmp_path: Path) -> None:
+    only = UNSEEN[: UNSEEN.index("      missing")] + "      snr: {in: [8, null]}\n"
+    with pytest.raises(
+        LimitFailedError,
+        match=r"p.1/125mm/L4: snr: .* no spot of L4 was found in 2 captures\. .* outside the picture",
+    ):
+        session(tmp_path, only, Says())
+
+
 LATENCY = "  - {step: place_target, standoff_mm: 500}\n  - step: measure_latency\n" + GRID
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import re
 import select
 import signal
 import subprocess
@@ -108,6 +109,7 @@ def events(folder: Path) -> list[ev.Event]:
 
 def test_a_person_is_guided_through_a_session(terminal: Terminal, tmp_path: Path) -> None:
     os.write(terminal.master, b"grey\nyes\n\n\n\n")  # typed ahead: answers nothing
+    terminal.wait_for("Step 1 of 2")
     terminal.wait_for("Which card?")
     terminal.type("green")
     terminal.wait_for("expected one of white, grey, got green")
@@ -120,9 +122,15 @@ def test_a_person_is_guided_through_a_session(terminal: Terminal, tmp_path: Path
     terminal.type("400")
     terminal.wait_for("expected 270 to 330 mm")
     terminal.type("302.5 mm")
+    terminal.wait_for("placement 1 of 2 done")
+    terminal.wait_for("Place the target at 600 mm")
+    terminal.wait_for("or redo (300 mm again), skip (leave 600 mm out), abort (end the session)")
+    terminal.type("skip")
+    terminal.wait_for("why skip (leave 600 mm out)?")
+    terminal.type("")  # not meant so: the question comes again
     terminal.wait_for("Place the target at 600 mm")
     terminal.type("redo")
-    terminal.wait_for("why redo?")
+    terminal.wait_for("why redo (300 mm again)?")
     terminal.type("it slipped")
     terminal.wait_for("Place the target at 300 mm")
     terminal.type("")
@@ -168,6 +176,55 @@ def test_a_terminal_that_is_closed_stops_the_session_in_good_order(
     last = events(tmp_path)[-1]
     assert isinstance(last, ev.SessionFinished)
     assert last.message == f"stopped by {signal.SIGHUP.name}"
+
+
+def test_errors_at_the_end_are_wrapped_on_words(terminal: Terminal) -> None:
+    terminal.type("white")
+    terminal.type("abort")
+    terminal.type("the lamp of the door does not go green, and nobody who could tell why is in the house now")
+    assert terminal.end() == 5
+    lines = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]|\r", "", terminal.text).split("\n")
+    (first,) = [n for n, line in enumerate(lines) if line.startswith("error: aborted by the operator")]
+    error = [line for line in lines[first:] if line]
+    assert len(error) > 1
+    assert max(map(len, error)) <= 80
+    assert "the lamp of the door does not go green, and nobody who could" in " ".join(error)
+
+
+SHELL = """
+import os, subprocess, sys, time
+tty = os.open(sys.argv[1], os.O_RDWR)
+for handle in range(3):
+    os.dup2(tty, handle)
+command = subprocess.Popen(sys.argv[2:])
+command.wait()
+print("$ ", end="", flush=True)
+time.sleep(5)  # the guardian gives up after 1 s
+"""
+
+
+def test_nothing_is_printed_over_the_shell_after_a_kill(tmp_path: Path) -> None:
+    """The virtual bench dies with the workbench, so nobody is left to confirm an off; nobody is in danger."""
+    rig, _ = write_files(tmp_path, STEPS)
+    rig.write_text(rig.read_text() + "  answers: false\n")
+    master, slave = pty.openpty()
+    environment = {key: value for key, value in os.environ.items() if key != "CI"}
+    command = [str(SCRIPT), "run", "p.yaml", "--rig", "rig.yaml"]
+    shell = subprocess.Popen(
+        [sys.executable, "-c", SHELL, os.ttyname(slave), *command],
+        cwd=tmp_path,
+        env=environment,
+        start_new_session=True,
+    )
+    terminal = Terminal(shell, master)
+    terminal.wait_for("> ")
+    (workbench,) = Path(f"/proc/{shell.pid}/task/{shell.pid}/children").read_text().split()
+    os.kill(int(workbench), signal.SIGKILL)
+    terminal.wait_for("$ ")
+    assert terminal.end() == 0
+    assert terminal.text[terminal.seen :] == ""
+    os.close(slave)
+    os.close(master)
 
 
 @pytest.mark.parametrize(

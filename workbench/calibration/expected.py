@@ -93,6 +93,18 @@ class Expectation:
         """(N, J, L) whether the spot on a square target is in the picture of a lens that does not fold."""
         return self._cells(standoff_mm)[2]
 
+    def spots(self, standoff_mm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Spots on a square target at standoffs (J,) by the ruler, px, in the picture or not.
+
+        Returns:
+            (N, J, L, 2) where they are, (N, J, L, 2, S) derivatives by the parameters in prior sd, and
+            (N, J, L, 2) 1 sigma by the error of the placement and its tilt.
+        """
+        spot, slopes, _ = self._cells(standoff_mm)
+        tilt = radians(self.rig.bench.tilt_sd_deg)
+        by_error = slopes[..., SENSOR_INPUTS:] * np.array([self.rig.bench.placement_sd_mm, tilt, tilt])
+        return spot, self._spread(slopes[..., :SENSOR_INPUTS]), np.sqrt((by_error**2).sum(axis=-1))
+
     def _cells(
         self, standoff_mm: FloatArray, ranging: bool = False
     ) -> tuple[FloatArray, FloatArray, BoolArray]:

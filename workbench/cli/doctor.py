@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from contextlib import nullcontext
 from pathlib import Path
@@ -26,7 +27,7 @@ def examine_rig(rig_path: Path, no_input: bool) -> None:
         WorkbenchError: the rig file is wrong, nobody answers, or a beam stays on.
     """
     rig = load_rig(rig_path)
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console = Console(stderr=True, highlight=False, soft_wrap=not sys.stderr.isatty())
     stopping = StopAfterShot()
     bad = []
     with tempfile.TemporaryDirectory() as folder, open_bench(rig, Path(folder) / "doctor") as bench:

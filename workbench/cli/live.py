@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from rich.console import Console
-
 from workbench.cli.range import usable
 from workbench.cli.reading import plain
+from workbench.cli.saying import say
 from workbench.cli.stopping import StopAfterShot
 from workbench.devices.protocols import Bench
 from workbench.devices.registry import open_bench
@@ -75,11 +74,11 @@ def _read_all(
     live = LiveRanger(ranger, bench)
     live.warm_up()
     if not virtual:
-        Console(stderr=True).print(f"note: {FIXED_EXPOSURE}", highlight=False)
+        say(f"note: {FIXED_EXPOSURE}")
     if request.standoff_mm is not None:
         bench.target.place(Placement(key="live", standoff_mm=request.standoff_mm))
     for warning in live.get_ready():
-        Console(stderr=True, markup=False).print(f"warning: {warning}", highlight=False)
+        say(f"warning: {warning}")
     began = time.monotonic()
     try:
         for number in count() if request.readings is None else range(request.readings):
@@ -88,13 +87,10 @@ def _read_all(
             reading = live.read(f"{number}")
             _show(reading, as_json)
             if number == 0 and reading.status == "no_points":
-                Console(stderr=True, markup=False).print(
-                    f"hint: {_why_nothing(request, virtual)}", highlight=False
-                )
+                say(f"hint: {_why_nothing(request, virtual)}")
     finally:
         if request.stats:
-            words = latency_words(live.latencies_s, time.monotonic() - began)
-            Console(stderr=True, markup=False).print(words, highlight=False)
+            say(latency_words(live.latencies_s, time.monotonic() - began))
 
 
 def _why_nothing(request: LiveRequest, virtual: bool) -> str:

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from workbench.cli.leaving import leave
+from workbench.cli.saying import say
 from workbench.cli.stopping import ignore_signals, stop_at_once
 from workbench.cli.streams import fill_closed_streams
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
@@ -243,7 +244,7 @@ def target(
     """Print the board that calibrates the lens: a page of true size, with a ruler to check it."""
     from workbench.cli.target import write_target
 
-    _say(write_target(pdf, rig))
+    say(write_target(pdf, rig))
 
 
 @app.command()
@@ -289,21 +290,21 @@ def _tell(error: BaseException) -> int:
     """Say why the command ends; returns its exit code."""
     chain = _chain(error)
     if unsafe := [e for e in chain if isinstance(e, LaserOffNotConfirmedError)]:
-        _say(f"error: {unsafe[0]}", red=True)  # whatever came on top of it: a stop, a full disk
+        say(f"error: {unsafe[0]}", red=True)  # whatever came on top of it: a stop, a full disk
         return LaserOffNotConfirmedError.exit_code
     if isinstance(error, SystemExit):
         if any(isinstance(e, BrokenPipeError) for e in chain):  # as with `| head`; typer has made a 1 of it
             return StoppedError.exit_code
         return error.code if isinstance(error.code, int) else int(error.code is not None)
     if isinstance(error, WorkbenchError):
-        _say(f"error: {error}")
+        say(f"error: {error}")
         return error.exit_code
     if isinstance(error, OSError) and error.errno in NO_MORE_WRITTEN:
-        _say(f"error: {error.filename or 'what is printed, or a file'}: cannot be written: {error.strerror}")
+        say(f"error: {error.filename or 'what is printed, or a file'}: cannot be written: {error.strerror}")
         return StoppedError.exit_code
     with suppress(OSError):
         traceback.print_exception(error)
-    _say("internal error: this is a defect of the workbench, please report it with the lines above")
+    say("internal error: this is a defect of the workbench, please report it with the lines above")
     return INTERNAL_ERROR
 
 
@@ -317,8 +318,3 @@ def _chain(error: BaseException) -> list[BaseException]:
             found.append(each)
             ahead += [each.__context__, each.__cause__]
     return found
-
-
-def _say(message: str, red: bool = False) -> None:
-    with suppress(OSError):  # a terminal that was closed
-        typer.secho(message, err=True, fg="red" if red else None, bold=red)

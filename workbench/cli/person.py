@@ -62,32 +62,36 @@ class Person:
             self._show(prompt)
             while True:
                 answer = self._read(prompt)
-                if (wrong := prompt.refuse(answer)) is None:
+                if answer is None:
+                    self._show(prompt)
+                elif (wrong := prompt.refuse(answer)) is None:
                     return answer
-                self._say(wrong)
+                else:
+                    self._say(wrong)
 
     def _show(self, prompt: Prompt) -> None:
         self._console.print(Padding(Text(prompt.do, style="bold"), (1, 0, 0, 2)))
         for text in (prompt.expect, prompt.otherwise and f"If not: {prompt.otherwise}"):
             if text:
                 self._console.print(Padding(Text(text), (0, 0, 0, 2)))
-        self._console.print(Padding(Text(_how_to_answer(prompt), style="dim"), (0, 0, 0, 2)))
+        for text in (_how_to_answer(prompt), _or(prompt)):
+            self._console.print(Padding(Text(text, style="dim"), (0, 0, 0, 2)))
 
-    def _read(self, prompt: Prompt) -> Answer:
+    def _read(self, prompt: Prompt) -> Answer | None:
+        """What is answered; None where it was taken back."""
         typed = self._line(prompt)
         if typed.lower() in ACTIONS:
             return self._action(prompt, typed.lower())
         return _answer(prompt, typed)
 
-    def _action(self, prompt: Prompt, action: str) -> Answer:
+    def _action(self, prompt: Prompt, action: str) -> Answer | None:
         answer = Answer.model_validate({"action": action})
-        if action != "abort" and action not in prompt.may:
+        instead = _instead(prompt)
+        if action not in instead:
             return answer
-        reason = ""
-        while not reason:
-            self._say(f"why {action}? It loses data; the reason is kept.")
-            reason = self._line(prompt)
-        return answer.model_copy(update={"reason": reason})
+        self._say(f"why {action} ({instead[action]})? The reason is kept; Enter alone takes it back.")
+        reason = self._line(prompt)
+        return answer.model_copy(update={"reason": reason}) if reason else None
 
     def _line(self, prompt: Prompt) -> str:
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
@@ -110,13 +114,19 @@ class Person:
 
 
 def _how_to_answer(prompt: Prompt) -> str:
-    more = f"; {', '.join((*prompt.may, 'abort'))}"
     if (quantity := prompt.quantity) is not None:
         usual = "" if quantity.usual is None else f"Enter: {quantity.usual:g} {quantity.unit}; or "
-        return f"{usual}the number in {quantity.unit}, {quantity.low:g} to {quantity.high:g}{more}"
-    if prompt.choices:
-        return " | ".join(prompt.choices) + more
-    return f"yes{more}"
+        return f"{usual}the number in {quantity.unit}, {quantity.low:g} to {quantity.high:g}"
+    return " | ".join(prompt.choices) if prompt.choices else f"type yes{prompt.yes and f' ({prompt.yes})'}"
+
+
+def _or(prompt: Prompt) -> str:
+    return "or " + ", ".join(f"{action} ({what})" for action, what in _instead(prompt).items())
+
+
+def _instead(prompt: Prompt) -> dict[str, str]:
+    """Everything that can be done instead of an answer, and what it does here."""
+    return {**{str(action): what for action, what in prompt.may.items()}, "abort": "end the session"}
 
 
 def _answer(prompt: Prompt, typed: str) -> Answer:

@@ -11,7 +11,8 @@ from workbench.model.errors import BadInputError
 from workbench.procedure.check import check_file
 from workbench.procedure.exposure import LIT_FRAMES, MOST_TRIALS
 from workbench.procedure.latency import LEASE_S
-from workbench.procedure.outline import Pace, PlannedStep, learn_pace, outline
+from workbench.procedure.outline import PlannedStep, outline
+from workbench.procedure.pace import Pace, learn_pace
 from workbench.procedure.run import Plan
 
 
@@ -54,7 +55,7 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
     )
     if trials := MOST_TRIALS * sum(step.placements for step in steps):
         console.print(
-            f"Where the camera's exposure is set, each placing takes up to {MOST_TRIALS} trials more, of"
+            f"Where the camera's exposure is set, each placement takes up to {MOST_TRIALS} trials more, of"
             f" all lasers at once: at most {trials}, {emission(trials, pace, LIT_FRAMES)}.",
             highlight=False,
         )
@@ -81,7 +82,7 @@ def _table(steps: list[PlannedStep], pace: Pace) -> Table:
     table = Table(title="Plan", title_justify="left")
     table.add_column("step", overflow="fold")
     table.add_column("", overflow="fold")
-    for column in ("placings", "shots", "emission", "time"):
+    for column in ("placements", "shots", "emission", "time"):
         table.add_column(column, justify="right")
     for step in steps:
         lit_s = step.shots * (LEASE_S if pace.lit_s is None else pace.lit_s)
@@ -94,8 +95,8 @@ def _table(steps: list[PlannedStep], pace: Pace) -> Table:
 def _told_by(pace: Pace, rig: str) -> str:
     if pace.sessions == 0:
         return (
-            f"Times are guesses: {pace.placing_s:g} s a placing, {pace.exposing_s:g} s for its exposure,"
-            f" {pace.shot_s:g} s a shot; no session of {rig} has told them yet."
+            f"Times are guesses: {pace.placing_s:g} s to place the target, {pace.exposing_s:g} s for the"
+            f" exposure, {pace.shot_s:g} s a shot; no session of {rig} has told them yet."
         )
     sessions = "the last session" if pace.sessions == 1 else f"the last {pace.sessions} sessions"
-    return f"Times as {sessions} of {rig} told them: medians of placings, means of the rest."
+    return f"Times as {sessions} of {rig} told them, in the mean, without breaks while placing the target."

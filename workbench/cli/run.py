@@ -24,7 +24,9 @@ from workbench.model.errors import (
 )
 from workbench.procedure.foreseen import foreseen_prompts
 from workbench.procedure.operator import Scripted
-from workbench.procedure.outline import Forecast, learn_pace, outline
+from workbench.procedure.outline import outline
+from workbench.procedure.pace import learn_pace
+from workbench.procedure.progress import Forecast
 from workbench.procedure.resume import files_now, plan_of, resume
 from workbench.procedure.run import NOBODY, Caller, Plan, run
 from workbench.report.thesis_figures import FigureWriter

@@ -15,7 +15,7 @@ from rich.text import Text
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.model.simulation import SceneSimulated, SimulationFinished
-from workbench.procedure.outline import Forecast
+from workbench.procedure.progress import Forecast
 from workbench.procedure.quality import Quality, quality_of
 from workbench.report.tables import (
     claim_table,
@@ -67,9 +67,10 @@ class Terminal:
         self._forecast.take(record)
         match record.event:
             case ev.ProcedureStarted() as e:
+                self._length = e.steps
                 self._console.print(Text.assemble((e.title, "bold"), f" ({e.procedure}, {e.length})"))
             case ev.StepStarted() as e:
-                self._print(f"{e.index}. {e.title}", indent=2)
+                self._print(f"Step {e.index} of {self._length}: {e.title}", indent=2)
                 if e.shots:
                     self._task = self._progress.add_task("     capturing", total=e.shots)
             case ev.TargetPlaced(placement=placed):
@@ -84,9 +85,10 @@ class Terminal:
             case ev.SpotsFound() as e if e.key in self._captures:
                 self._show_capture(self._captures.pop(e.key), e)
             case ev.PlacementFinished() as e if self._spots:
-                self._print(f"{self._placement}. {self.how_far()}")
+                self._print(self._placement)
+                self._print(self.how_far())
             case ev.LimitChecked() as e if e.verdict != "pass":
-                value = "not measured" if e.value is None else f"{e.value:.3g}"
+                value = "needs a spot" if e.value is None else f"{e.value:.3g}"
                 self._print(f"{e.verdict}: {e.of}: {e.quantity} {value}, limit {e.limit}", style="yellow")
             case ev.SetAside() as e:
                 self._print(e.text, style="yellow")
@@ -116,10 +118,9 @@ class Terminal:
                 pass
 
     def how_far(self) -> str:
-        """`Step 7 of 48, ~11 min left`."""
-        left_s = self._forecast.seconds_left
-        left = f"{left_s:.0f} s" if left_s < 90 else f"{left_s / 60:.0f} min"
-        return f"Step {self._forecast.done} of {self._forecast.total}, ~{left} left"
+        """`placement 7 of 48 done, about 11 min left`."""
+        left = about(self._forecast.seconds_left)
+        return f"placement {self._forecast.done} of {self._forecast.total} done, {left} left"
 
     def _show_capture(self, capture: ev.CaptureTaken, found: ev.SpotsFound) -> None:
         """The live line: this laser here, over its repeats so far."""
@@ -131,6 +132,7 @@ class Terminal:
             self._progress.update(self._task, description=f"     {name} {seen}")
 
     _placement = _placed = ""
+    _length = 0
 
     def _end_step(self, outcome: str) -> None:
         if self._task is not None:
@@ -162,6 +164,15 @@ class Guarded:
             with suppress(OSError):
                 self._console.print(Text(f"warning: {self._name} stops here: {error}", style="yellow"))
                 self._console.print("Captures go on.")
+
+
+def about(seconds: float) -> str:
+    """For people, no finer than an estimate is."""
+    if seconds < 10:
+        return "a few seconds"
+    if seconds < 95:
+        return f"about {10 * round(seconds / 10)} s"
+    return f"about {seconds / 60:.0f} min" if seconds < 5400 else f"about {seconds / 3600:.1f} h"
 
 
 def _counts(capture: ev.CaptureTaken) -> bool:

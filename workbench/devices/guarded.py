@@ -35,9 +35,18 @@ class Guarded:
     """A guardian process, see `guardian.py`. It holds the port until this is closed, or its process ends."""
 
     def __init__(
-        self, driver: LaserDriver, port: str, baud: int, lasers: int, boot_s: float, hang_s: float
+        self,
+        driver: LaserDriver,
+        port: str,
+        baud: int,
+        lasers: int,
+        boot_s: float,
+        hang_s: float,
+        virtual: bool = False,
     ) -> None:
         """Start it, and wait until every laser is off.
+
+        Where the lasers are `virtual` it has nothing to tell whoever sits at the terminal once we are gone.
 
         Raises:
             BadInputError: a board's port names fewer lines than there are `lasers`.
@@ -50,7 +59,7 @@ class Guarded:
         os.set_blocking(self._signals, False)
         call = [driver, port, str(baud), str(lasers), str(boot_s), str(hang_s), str(signals)]
         # -P: what lies in the current folder is not imported. A session of its own: no terminal reaches it.
-        said = _last_words()
+        said = os.open(os.devnull, os.O_WRONLY) if virtual else _last_words()
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-P", "-m", "workbench.devices.guardian", *call],
             stdin=commands,

@@ -41,10 +41,12 @@ class SerialLaserBank:
         boot_s: float = 3.0,
         hang_s: float = HANG_S,
         driver: LaserDriver = "serial",
+        virtual: bool = False,
     ) -> None:
         """Open the port and put every laser off.
 
         A controller that starts anew when its port is opened (an Arduino does) has `boot_s` to answer.
+        Nobody stands in the beams of `virtual` lasers.
 
         Raises:
             BadInputError: a board's port names fewer lines than lasers.
@@ -52,7 +54,7 @@ class SerialLaserBank:
             LaserOffNotConfirmedError: the controller answers, but not that all are off.
         """
         self.ids = tuple(ids)
-        self._guardian = Guarded(driver, port, baud, len(ids), boot_s, hang_s)
+        self._guardian = Guarded(driver, port, baud, len(ids), boot_s, hang_s, virtual)
         self.identity = self._guardian.identity
         self._lit = False
 

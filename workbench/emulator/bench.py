@@ -56,7 +56,7 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
     server = PtyServer(controller.receive)
     try:
         # A frame of this bench is computed, which takes as long as it takes. Nobody stands in its beams.
-        lasers = SerialLaserBank(server.port, rig.laser_ids, hang_s=LONGEST_LEASE_S)
+        lasers = SerialLaserBank(server.port, rig.laser_ids, hang_s=LONGEST_LEASE_S, virtual=True)
     except BaseException:
         server.close()
         raise

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -10,7 +11,7 @@ from pydantic import Field
 from workbench.model.yamlfile import FileModel
 
 Action = Literal["done", "redo", "skip", "abort"]
-"""`redo` has the placement before this one captured again, `skip` leaves out what is asked for."""
+"""`redo` has a placement captured again, `skip` leaves one out; a prompt says which (`Prompt.may`)."""
 By = Literal["person", "answers file", "emulator"]
 
 
@@ -37,10 +38,12 @@ class Prompt:
     """What to do if it is not so."""
     quantity: Quantity | None = None
     choices: tuple[str, ...] = ()
+    yes: str = ""
+    """What confirming does, where it is not plain."""
     at_bench: bool = False
     """Only somebody who sees the bench can answer: on a real rig no file does."""
-    may: tuple[Action, ...] = ()
-    """What is possible besides `done` and `abort`."""
+    may: Mapping[Action, str] = field(default_factory=dict)
+    """What is possible besides `done` and `abort`, and what each does here, in a few words."""
 
     def refuse(self, answer: Answer) -> str | None:
         """What is wrong with an answer; None where it fits."""

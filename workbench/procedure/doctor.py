@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol, runtime_checkable
 
@@ -159,4 +159,4 @@ def _placement() -> Placement:
 
 
 def _target_prompt() -> Prompt:
-    return placement_prompt(_placement(), can_redo=False)
+    return replace(placement_prompt(_placement(), before=None), may={})  # it is all that there is

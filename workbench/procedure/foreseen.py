@@ -11,7 +11,7 @@ from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
-from workbench.procedure.prompts import placement_prompt, safety_prompt
+from workbench.procedure.prompts import captures_prompt, placement_prompt, safety_prompt
 from workbench.procedure.steps import board_placement, confirmation, placement_at, question
 
 
@@ -48,10 +48,10 @@ def _(step: pr.PlaceTargetStep, name: str, rig: Rig) -> list[Prompt]:
 @_prompts.register
 def _(step: pr.CaptureGridStep, name: str, rig: Rig) -> list[Prompt]:
     placements = [placement_at(name, standoff_mm) for standoff_mm in step.standoffs_mm]
-    keys = [f"{placement.key}/{laser_id}" for placement in placements for laser_id in rig.laser_ids]
     about = [
-        Prompt(f"{key}/{limit}", "Keep these captures?", may=("redo", "skip"))
-        for key in keys
+        captures_prompt(f"{placement.key}/{laser_id}/{limit}", limit, placement)
+        for placement in placements
+        for laser_id in rig.laser_ids
         for limit in _asked_about(step.limits)
     ]
     return [*_placings(placements), *about]
@@ -75,7 +75,7 @@ def _(step: pr.CheckLimitsStep | pr.ValidateStep, name: str, rig: Rig) -> list[P
 
 
 def _placings(placements: Sequence[Placement]) -> list[Prompt]:
-    return [placement_prompt(placement, can_redo=index > 0) for index, placement in enumerate(placements)]
+    return [placement_prompt(*pair) for pair in zip(placements, [None, *placements], strict=False)]
 
 
 def _asked_about(limits: FileModel) -> Iterator[str]:

@@ -12,7 +12,9 @@ from workbench.model.prompt import Prompt
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
 from workbench.procedure.context import Context
+from workbench.procedure.prompts import captures_prompt
 from workbench.procedure.quality import quality_of
+from workbench.procedure.unseen import where_it_should_be, why_not_measured
 from workbench.procedure.visiting import RetakeError, settle
 
 RETRIES = 2
@@ -34,18 +36,24 @@ def check_captures(context: Context, step: str, placement: Placement, limits: Gr
     """
     for laser_id in context.rig.laser_ids:
         keys = [c.key for c in context.captures if (c.placement_key, c.laser_id) == (placement.key, laser_id)]
-        quality = quality_of([context.findings[key].spots for key in keys])
+        found = [context.findings[key].spots for key in keys]
+        quality = quality_of(found)
+        unseen, answered = quality.u_px is None, False
         for name, limit in _stated(limits):
             of = f"{placement.key}/{laser_id}"
-            failed = _check(context, step, of, name, getattr(quality, name), limit)
-            if failed is None:
-                continue
+            why = why_not_measured(name, laser_id, [len(spots) for spots in found])
+            failed = _check(context, step, of, name, getattr(quality, name), limit, f"none: {why}")
+            if failed is None or (unseen and answered and limit.on_fail == "ask"):
+                continue  # a spot that is not there is asked about once
             if limit.on_fail == "retry" and context.recorder.retries(placement.key) < RETRIES:
                 raise RetakeError(failed, by_limit=True)
-            if limit.on_fail == "ask":
-                settle(context, _about_captures(f"{of}/{name}", failed), failed)
-            else:
-                raise LimitFailedError(failed)
+            where = where_it_should_be(context, laser_id, placement) if unseen else ""
+            if limit.on_fail != "ask":
+                raise LimitFailedError(f"{failed}. {where}" if unseen else failed)
+            shown = f"{why} at {placement.standoff_mm:g} mm ({name}: expected {limit.describe()})"
+            question = captures_prompt(f"{of}/{name}", shown if unseen else failed, placement, where)
+            settle(context, question, failed)
+            answered = True
 
 
 def check_fit(context: Context, step: str, values: Mapping[str, float], limits: FileModel) -> str:
@@ -70,28 +78,24 @@ def check_fit(context: Context, step: str, values: Mapping[str, float], limits: 
 
 
 def _check(
-    context: Context, step: str, of: str, quantity: str, value: float | None, limit: Limit
+    context: Context,
+    step: str,
+    of: str,
+    quantity: str,
+    value: float | None,
+    limit: Limit,
+    otherwise: str = "",
 ) -> str | None:
-    """Journal the verdict; what failed, in words."""
+    """Journal the verdict; what failed, in words, `otherwise` where nothing was measured."""
     verdict = limit.judge(value)
     context.emit(
         ev.LimitChecked(
             step=step, of=of, quantity=quantity, value=value, limit=limit.describe(), verdict=verdict
         )
     )
-    came = "not measured" if value is None else f"{value:.4g}"
+    came = otherwise if value is None else f"{value:.4g}"
     return f"{of}: {quantity}: expected {limit.describe()}, got {came}" if verdict == "fail" else None
 
 
 def _stated(limits: FileModel) -> Iterator[tuple[str, Limit]]:
     return ((name, limit) for name, limit in limits if limit is not None)
-
-
-def _about_captures(key: str, failed: str) -> Prompt:
-    return Prompt(
-        key=key,
-        do=f"{failed}. Keep these captures?",
-        expect="The spot is whole, lies on the target, and nothing reflects it.",
-        otherwise="Put right what is wrong, then `redo`; `skip` leaves the placement out.",
-        may=("redo", "skip"),
-    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from workbench.model.prompt import Prompt, Quantity
+from workbench.model.prompt import Action, Prompt, Quantity
 from workbench.model.rig import Rig
 from workbench.model.target import BoardTarget, Placement
 from workbench.procedure.recorder import SAFETY
@@ -23,8 +23,8 @@ def safety_prompt(rig: Rig) -> Prompt:
     )
 
 
-def placement_prompt(placement: Placement, can_redo: bool) -> Prompt:
-    """Have the target placed, and read its standoff."""
+def placement_prompt(placement: Placement, before: Placement | None) -> Prompt:
+    """Have the target placed, and read its standoff; `before` may be captured again instead."""
     at = placement.standoff_mm
     return Prompt(
         key=placement.key,
@@ -33,8 +33,32 @@ def placement_prompt(placement: Placement, can_redo: bool) -> Prompt:
         otherwise="As near as it goes is good: give the standoff that the ruler shows.",
         quantity=Quantity("mm", (1 - MISREAD) * at, (1 + MISREAD) * at, at),
         at_bench=True,
-        may=("redo", "skip") if can_redo else ("skip",),
+        may=_instead(placement, before),
     )
+
+
+def captures_prompt(key: str, failed: str, placement: Placement, where: str = "") -> Prompt:
+    """What to do about a limit that failed; `where` is of a spot that was not seen."""
+    here = f"{placement.standoff_mm:g} mm"
+    return Prompt(
+        key=key,
+        do=f"{failed}. {'Go on without this laser here?' if where else 'Keep these captures?'}",
+        expect=where or "The spot is whole, lies on the target, and nothing reflects it.",
+        otherwise="Put right what is wrong, then `redo`.",
+        yes="keep what the other lasers gave" if where else "keep them",
+        may={"redo": f"{here} again", "skip": f"leave {here} out"},
+    )
+
+
+def _instead(placement: Placement, before: Placement | None) -> dict[Action, str]:
+    """What else can be done, by the standoffs: at this prompt `redo` is of the placement before."""
+    here = f"{placement.standoff_mm:g} mm"
+    if before is None:
+        return {"skip": f"leave {here} out"}
+    again = f"{before.standoff_mm:g} mm"
+    if again == here:  # of a board, turned otherwise
+        again, here = "the placement before", "this one"
+    return {"redo": f"{again} again", "skip": f"leave {here} out"}
 
 
 def _protect(laser_class: str) -> str:

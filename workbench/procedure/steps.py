@@ -20,7 +20,7 @@ from workbench.calibration.export import calibrate, render
 from workbench.calibration.next_standoff import advise
 from workbench.calibration.observations import PlacementInfo, Rejected, Sighting
 from workbench.calibration.records import fit_finished
-from workbench.calibration.sightings import prior_scanline, sight
+from workbench.calibration.sightings import prior_scanline
 from workbench.calibration.significance import fit_chosen
 from workbench.model import event as ev
 from workbench.model import procedure as pr
@@ -32,6 +32,7 @@ from workbench.model.simulation import SimulationFinished
 from workbench.model.target import BoardTarget, Placement
 from workbench.procedure.context import Context
 from workbench.procedure.limits import check_captures, check_fit
+from workbench.procedure.sighted import sight_capture, sighted
 from workbench.procedure.visiting import visit
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
@@ -181,7 +182,7 @@ def _(step: pr.FitStep, context: Context, name: str) -> str:
     if not captures:
         raise BadInputError(f"step {name}: nothing to fit; expected a capture_grid step before it")
     sha256 = write_capture_table(context.session_dir / CALIBRATION_TABLE, captures)
-    spots = [_sight(context, capture) for capture in captures if capture.laser_id != BOARD]
+    spots = [sight_capture(context, capture) for capture in captures if capture.laser_id != BOARD]
     found = on_boards(context.rig.board, context.boards, spots)
     sightings = [f for f in found if isinstance(f, Sighting)]
     rejected = [f for f in (*found, *context.boards.values()) if isinstance(f, Rejected)]
@@ -315,10 +316,7 @@ def _advise(context: Context) -> None:
     """Tell how far the captures have come; not where the board was seen: its corners would not count."""
     if context.ahead is None or context.boards:
         return
-    captures = [c for c in context.captures if c.purpose == "calibration"]
-    found = [_sight(context, capture) for capture in captures]
-    sightings = [f for f in found if isinstance(f, Sighting)]
-    if (advice := advise(context.rig, sightings, context.ahead.planned_mm)) is not None:
+    if (advice := advise(context.rig, sighted(context), context.ahead.planned_mm)) is not None:
         context.emit(ev.StandoffAdvised(limit=context.ahead.limit, **asdict(advice)))
 
 
@@ -333,18 +331,3 @@ def _shooter(
         return context.capture(key, ids, placement, number, scanlines, scene=shown)
 
     return shoot
-
-
-def _sight(context: Context, capture: ev.CaptureTaken) -> Sighting | Rejected:
-    laser = context.rig.lasers[context.rig.laser_ids.index(capture.laser_id)]
-    sighting = Sighting(
-        source=capture.on.path,
-        laser_id=capture.laser_id,
-        placement=capture.placement_key,
-        standoff_mm=capture.standoff_mm,
-        repeat=capture.repeat,
-        u_px=nan,
-        v_px=nan,
-        standoff_sd_mm=nan if capture.standoff_sd_mm is None else capture.standoff_sd_mm,
-    )
-    return sight(context.findings[capture.key], laser, sighting)

@@ -62,12 +62,12 @@ def visit(
     index = 0
     while index < len(placements):
         asked = placements[index]
-        before = placements[index - 1].key if index and placements[index - 1].key in began else None
+        before = placements[index - 1] if index and placements[index - 1].key in began else None
         context.shooting.served = context.recorder.group(asked.key)
         answer = _place_answer(context, asked, before)
         if answer.action == "redo" and before is not None:
-            _set_aside(context, before, began.pop(before), answer.reason or "")
-            results.pop(before, None)
+            _set_aside(context, before.key, began.pop(before.key), answer.reason or "")
+            results.pop(before.key, None)
             index -= 1
             continue
         index += 1
@@ -124,14 +124,14 @@ def _tell_skipped(context: Context, asked: Placement, answer: Answer) -> None:
     context.emit(ev.Answered(key=asked.key, question=f"{asked.standoff_mm:g} mm", answer=answer))
 
 
-def _place_answer(context: Context, asked: Placement, before: str | None) -> Answer:
+def _place_answer(context: Context, asked: Placement, before: Placement | None) -> Answer:
     if context.shooting.served is not None:
         return Answer()
     known = context.recorder.answer(asked.key)
     if known is not None and known.action == "skip":
         return known
     context.confirm_safety()
-    return context.ask_now(placement_prompt(asked, can_redo=before is not None))
+    return context.ask_now(placement_prompt(asked, before))
 
 
 def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Record, Placement]:
