@@ -71,7 +71,7 @@ def test_the_focal_length_is_the_truth_s_and_the_data_s(session: Path) -> None:
 def test_a_board_too_far_away_is_named_and_the_rest_goes_on(session: Path) -> None:
     events = [record.event for record in read_journal(session)]
     board = next(e.outcome for e in events if isinstance(e, StepFinished))
-    assert "in 4 of 5 placings; board at 900 mm: expected at least 12" in board
+    assert "in 4 of 5 placements; board at 900 mm: expected at least 12" in board
     frames = [e for e in events if isinstance(e, CaptureTaken) and e.laser_id == "board"]
     assert len(frames) == 5 * 8
     assert all(e.off is None and (session / e.on.path).is_file() for e in frames)

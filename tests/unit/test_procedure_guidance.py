@@ -390,7 +390,7 @@ def test_a_placement_repeated_or_left_out_counts_once() -> None:
     [
         (900.0, None, {"skip": "leave 900 mm out"}),
         (900.0, 600.0, {"redo": "600 mm again", "skip": "leave 900 mm out"}),
-        (900.0, 900.0, {"redo": "the placement before again", "skip": "leave this one out"}),
+        (900.0, 900.0, {"redo": "the one before", "skip": "leave this one out"}),
     ],
 )
 def test_a_placement_prompt_says_which_is_captured_again_and_which_left_out(

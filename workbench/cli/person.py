@@ -116,8 +116,12 @@ class Person:
 def _how_to_answer(prompt: Prompt) -> str:
     if (quantity := prompt.quantity) is not None:
         usual = "" if quantity.usual is None else f"Enter: {quantity.usual:g} {quantity.unit}; or "
-        return f"{usual}the number in {quantity.unit}, {quantity.low:g} to {quantity.high:g}"
-    return " | ".join(prompt.choices) if prompt.choices else f"type yes{prompt.yes and f' ({prompt.yes})'}"
+        return f"{usual}type the number in {quantity.unit}, {quantity.low:g} to {quantity.high:g}"
+    return (
+        f"type {' or '.join(prompt.choices)}"
+        if prompt.choices
+        else f"type yes{prompt.yes and f' ({prompt.yes})'}"
+    )
 
 
 def _or(prompt: Prompt) -> str:

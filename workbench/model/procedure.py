@@ -165,7 +165,7 @@ class CaptureBoardStep(FileModel):
     @property
     def title(self) -> str:
         """For the progress line."""
-        return f"Capture the board in {len(self.placings)} placings"
+        return f"Capture the board in {len(self.placings)} placements"
 
 
 class FitStep(FileModel):

@@ -57,7 +57,7 @@ def _instead(placement: Placement, before: Placement | None) -> dict[Action, str
         return {"skip": f"leave {here} out"}
     again = f"{before.standoff_mm:g} mm"
     if again == here:  # of a board, turned otherwise
-        again, here = "the placement before", "this one"
+        return {"redo": "the one before", "skip": "leave this one out"}
     return {"redo": f"{again} again", "skip": f"leave {here} out"}
 
 

@@ -173,7 +173,7 @@ def _(step: pr.CaptureBoardStep, context: Context, name: str) -> str:
     mine = [seen for key, seen in context.boards.items() if key.startswith(f"{name}/")]
     corners = sum(len(seen.corners.ids) for seen in mine if isinstance(seen, BoardView))
     missed = [seen.reason for seen in mine if isinstance(seen, Rejected)]
-    return "; ".join([f"{corners} corners in {len(mine) - len(missed)} of {len(mine)} placings", *missed])
+    return "; ".join([f"{corners} corners in {len(mine) - len(missed)} of {len(mine)} placements", *missed])
 
 
 @run_step.register
