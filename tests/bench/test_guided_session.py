@@ -157,6 +157,16 @@ def test_nobody_at_a_real_rig_and_then_somebody(tmp_path: Path) -> None:
     assert standing(tmp_path / "s").state == "finished"
 
 
+def test_a_session_whose_folder_was_renamed(tmp_path: Path) -> None:
+    with pytest.raises(StoppedError):
+        session(tmp_path, GRID, Says(("p.1/600mm", Answer(action="abort", reason="lunch"))))
+    renamed = (tmp_path / "s").rename(tmp_path / "mine")
+    with pytest.raises(
+        BadInputError, match=r"mine: expected the session's folder to be called s, .*its name back"
+    ):
+        resume(renamed, (), RESUMER, lambda: None, Says())
+
+
 def test_a_resumed_session_asks_for_safety_and_the_placement_under_way(tmp_path: Path) -> None:
     with pytest.raises(StoppedError):
         session(tmp_path, GRID, Says(("p.1/1500mm", Answer(action="abort", reason="lunch"))))

@@ -90,7 +90,7 @@ def test_a_step_that_is_none_is_told_with_those_there_are(tmp_path: Path) -> Non
                 "f.yaml:58: emulator.beam.power_mw: expected a number, such as 1, got '1 W'",
                 "f.yaml:58: emulator.beam.colour: no such key; expected one of power_mw, exit_diameter_mm,"
                 " divergence_mrad, wavelength_nm, speckle_contrast",
-                "f.yaml:59: emulator.camera.gain: expected at least 1.0, got 0.2",
+                "f.yaml:59: emulator.camera.gain: expected at least 1, got 0.2",
             ],
         ),
         (

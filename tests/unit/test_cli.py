@@ -188,7 +188,11 @@ class TestBadInput:
         refused(fit, 2, no, "No such file")
         refused(workbench("range", WEBCAM, "--calibration", no), 2, no)
         refused(workbench("run", no, "--rig", WEBCAM_RIG, "--sessions", tmp_path), 2, no)
-        refused(workbench("view", tmp_path), 2, "session.yaml: no such file")
+        refused(
+            workbench("view", tmp_path),
+            2,
+            f"{tmp_path}: expected a session's folder, with session.yaml in it",
+        )
         assert list(tmp_path.iterdir()) == []
 
     def test_a_rig_without_a_driver(self, workbench: Run, tmp_path: Path) -> None:
@@ -408,8 +412,8 @@ class TestDesign:
             (("--standoffs", "50,200"), "100 to 5000 mm (bench.reach_mm of the rig file), got 50"),
             (("--standoffs", "200,300,200"), "every standoff once, got 200 twice"),
             (("--standoffs", "200", "--count", 3), "--standoffs or --count, not both"),
-            (("--repeats", 0), "--repeats: expected at least 1, got 0"),
-            (("--count", 0), "--count: expected at least 1, got 0"),
+            (("--repeats", 0), "'--repeats': expected a whole number of at least 1, such as 10, got 0"),
+            (("--count", 0), "'--count': expected a whole number of at least 1, such as 10, got 0"),
             (("--count", 100), "got 100: so many of the"),
         ],
     )
@@ -536,3 +540,149 @@ def test_a_fit_whose_result_nobody_reads_ends_as_stopped(tmp_path: Path) -> None
     assert (done.returncode, output.is_file()) == (5, True), done.stderr
     assert "cannot be written: No space left" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+SHORT = """\
+format: 1
+procedure: p
+title: P
+steps:
+"""
+PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 2
+
+
+class TestNastyInput:
+    """What a tired or a nasty user gives: told in plain words, exit 2, and nothing is made."""
+
+    @pytest.mark.parametrize("command", ["fit {} -o c.yaml --rig {rig}", "range {} --calibration {cal}"])
+    def test_what_is_no_captures_file(self, workbench: Run, tmp_path: Path, command: str) -> None:
+        cal, wrong = tmp_path / "cal.yaml", tmp_path / "wrong"
+        workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", cal)
+        line = command.format(wrong, rig=WEBCAM_RIG, cal=cal).split()
+        wrong.write_bytes(PNG)
+        refused(workbench(*line), 2, f"{wrong}: expected a captures file (CSV), got a PNG image")
+        wrong.write_bytes(cal.read_bytes())
+        refused(workbench(*line), 2, "expected a captures file (CSV), got YAML; its columns are laser_id")
+
+    @pytest.mark.parametrize(
+        "line", ["check {}", "plan {} --rig {rig}", "run {} --rig {rig}", "design --rig {}", "doctor {}",
+                 "compare {} {}", "range --rig {rig} --calibration {}", "target --pdf a.pdf --rig {}",
+                 "lasers off --rig {}"],
+    )  # fmt: skip
+    def test_a_picture_is_no_yaml(self, workbench: Run, tmp_path: Path, line: str) -> None:
+        wrong = tmp_path / "wrong"
+        wrong.write_bytes(PNG)
+        told = workbench(*line.format(wrong, wrong, rig=ROOT / "rigs/thesis-emulated.yaml").split())
+        refused(told, 2, f"{wrong}: expected a YAML file, got a PNG image")
+
+    def test_a_rig_is_no_calibration(self, workbench: Run) -> None:
+        outcome = workbench("range", WEBCAM, "--calibration", WEBCAM_RIG)
+        refused(outcome, 2, "expected a calibration, with the key laser_ranger; this is a rig")
+        assert len(outcome.err.splitlines()) == 1
+
+    def test_every_image_that_is_not_there_is_told(self, workbench: Run, tmp_path: Path) -> None:
+        captures = tmp_path / "c.csv"
+        captures.write_text("laser_id,standoff_mm,repeat,on,off\n1,200,0,a.png,\n1,300,0,.,b.png\n")
+        outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
+        refused(outcome, 2, f"{captures}: row 2, column on: expected an image, there is no file")
+        assert [line.split(": ")[-2] for line in outcome.err.splitlines()] == [
+            "row 2, column on", "row 3, column on", "row 3, column off",
+        ]  # fmt: skip
+
+    def test_what_is_no_image_is_called_what_it_is(self, workbench: Run, tmp_path: Path) -> None:
+        captures = tmp_path / "c.csv"
+        captures.write_text("laser_id,standoff_mm,repeat,on\n1,200,0,c.csv\n")
+        outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
+        refused(outcome, 2, f"{captures}: row 2: {captures}: expected an image", "it is text, or truncated")
+
+    def test_every_laser_that_there_is_not_is_told(self, workbench: Run, tmp_path: Path) -> None:
+        calibration, captures = tmp_path / "c.yaml", tmp_path / "c.csv"
+        workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", calibration)
+        captures.write_text("laser_id,standoff_mm,repeat,u_px,v_px\n8,,0,,99\n1,,0,,99\n9,,0,,99\n")
+        outcome = workbench("range", captures, "--calibration", calibration)
+        refused(outcome, 2, f"{captures}: row 2, column laser_id", f"{captures}: row 4, column laser_id")
+
+    @pytest.mark.parametrize(
+        ("line", "says"),
+        [
+            ("range --rig r --calibration c --readings 0", "a whole number of at least 1, such as 10, got 0"),
+            ("range --rig r --calibration c --readings x", "a whole number of at least 1, such as 10, got x"),
+            (
+                "range --rig r --calibration c --standoff nan",
+                "millimetres from 1 to 1e+06, such as 500, got nan",
+            ),
+            (
+                "range --rig r --calibration c --standoff 1e300",
+                "millimetres from 1 to 1e+06, such as 500, got 1e300",
+            ),
+            (
+                "fit c.csv -o c.yaml --without-standoff far",
+                "millimetres from 0 to 1e+06, such as 500, got far",
+            ),
+            ("design --rig r --count few", "a whole number of at least 1, such as 10, got few"),
+        ],
+    )
+    def test_numbers_that_are_none(self, workbench: Run, line: str, says: str) -> None:
+        outcome = workbench(*line.split())
+        refused(outcome, 2, f"expected {says}")
+        assert "Input should" not in outcome.err
+
+    def test_folders_that_are_none(self, workbench: Run, tmp_path: Path) -> None:
+        file = tmp_path / "f"
+        file.write_text("")
+        rig, procedure = ROOT / "rigs/thesis-emulated.yaml", ROOT / "procedures/calibrate-flat.yaml"
+        refused(
+            workbench("view", tmp_path),
+            2,
+            f"{tmp_path}: expected a session's folder, with session.yaml in it",
+        )
+        refused(
+            workbench("fit", tmp_path, "-o", file), 2, "expected a session's folder, with session.yaml in it"
+        )
+        refused(workbench("sessions", "--sessions", file), 2, "expected a folder of sessions, this is a file")
+        refused(
+            workbench("plan", procedure, "--rig", rig, "--sessions", file),
+            2,
+            f"{file}: expected a folder of sess",
+        )
+
+    @pytest.mark.parametrize(
+        ("step", "says"),
+        [
+            ("{step: ask, text: a, number: {unit: C, in: [50, 10]}}", "`in`: expected [lowest, highest]"),
+            ("{step: ask, text: a, number: {unit: C, in: [50]}}", "steps[0].number.in[1]: is missing"),
+            ("{step: ask, text: a, number: {unit: C, in: [1, 5], usual: 9}}", "`usual`: expected 1 to 5"),
+            ("{step: ask, text: a, choices: [b, b]}", "`choices`: expected each once, got b, b"),
+            (
+                "{step: ask, text: a, choices: [b, Skip]}",
+                "expected other words than redo, skip, abort, got skip",
+            ),
+            ("{step: accuracy_trial, standoffs_mm: [300, 300], readings: 1}", "standoffs_mm must differ"),
+            ("{step: capture_grid, standoffs_mm: [300, 300.00000000000006], repeats: 1}", "must differ"),
+            (
+                "{step: capture_grid, standoffs_mm: [1.0e+300], repeats: 1}",
+                "expected at most 1000000, got 1e+300",
+            ),
+            (f"{{step: warm_up, frames: 1{'0' * 400}}}", "frames: expected at most 1000000, got 1000"),
+            ("{step: null}", "steps[0].step: expected one of message, "),
+            ("fit", "steps[0]: expected keys and values, got 'fit'"),
+            ("{step: message, text: a: b}", "put text with a colon in it in quotes"),
+        ],
+    )
+    def test_steps_that_cannot_be(self, workbench: Run, tmp_path: Path, step: str, says: str) -> None:
+        path = tmp_path / "p.yaml"
+        path.write_text(f"{SHORT}  - {step}\n")
+        rig = ROOT / "rigs/thesis-emulated.yaml"
+        refused(workbench("check", path), 2, "p.yaml:5: ", says)
+        refused(workbench("plan", path, "--rig", rig), 2, "p.yaml:5: ", says)
+
+    def test_a_rig_of_the_virtual_bench_that_cannot_be(self, workbench: Run, tmp_path: Path) -> None:
+        rig = tmp_path / "rig.yaml"
+        text = (ROOT / "rigs/thesis-emulated.yaml").read_text()
+        rig.write_text(text.replace("seed: 2001", "seed: -1").replace("width_px: 640", "width_px: 9999999"))
+        refused(
+            workbench("check", rig),
+            2,
+            "width_px: expected at most 100000",
+            "seed: expected at least 0, got -1",
+        )

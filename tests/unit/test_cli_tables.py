@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from workbench.cli import sessions
-from workbench.cli.sessions import list_sessions
+from workbench.cli.sessions import find_session, list_sessions
 from workbench.ranging.ranger import Reading
 from workbench.report.readings import reading_list
 from workbench.session.state import Standing
@@ -54,6 +54,17 @@ def test_a_session_with_a_name_as_long_as_the_line_has_two(
         [names[1]],
         ["finished", "440", "captures"],
     ]
+
+
+def test_a_session_is_found_by_the_folder_that_one_stands_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "s/frames").mkdir(parents=True)
+    (tmp_path / "s/session.yaml").write_text("")
+    monkeypatch.chdir(tmp_path / "s")
+    assert find_session(Path(), Path("sessions")) == tmp_path / "s"
+    monkeypatch.chdir("frames")
+    assert find_session(Path(".."), Path("sessions")) == tmp_path / "s"
 
 
 def test_how_a_session_ended_takes_two_lines_at_most(

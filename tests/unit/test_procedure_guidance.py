@@ -170,9 +170,19 @@ def test_an_answer_that_cannot_fit_is_told_with_its_line(
     assert says in line
 
 
+@pytest.mark.parametrize(
+    ("text", "came"), [("- 1", "no mapping"), ("procedure: p\nsteps: []", "a procedure"), ("rig: r", "a rig")]
+)
+def test_a_file_of_another_kind_is_no_answers_file(tmp_path: Path, text: str, came: str) -> None:
+    path = tmp_path / "answers.yaml"
+    path.write_text(text)
+    with pytest.raises(BadInputError, match=f":1: expected answers to prompts by their keys, got {came}"):
+        Scripted.load(path, by_key(PLACE), Nobody("no terminal"))
+
+
 def test_answers_that_nobody_asks_for_are_told_with_the_nearest_key(tmp_path: Path) -> None:
     path = tmp_path / "answers.yaml"
-    path.write_text("card: green\nsafty: true\np: 500\nsafety: true\np: 510\n7: 1\n")
+    path.write_text("card: green\nsafty: true\np: 500\nsafety: true\np: 510\n7: [1]\n")
     with pytest.raises(BadInputError) as caught:
         Scripted.load(path, by_key(PLACE, CHOICE, CONFIRM), Nobody("no terminal"))
     lines = str(caught.value).replace(f"{path}:", "").splitlines()

@@ -28,8 +28,6 @@ def design_calibration(
         BadInputError: the rig file or an option is wrong.
     """
     rig = load_rig(rig_path)
-    if repeats < 1:
-        raise BadInputError(f"--repeats: expected at least 1, got {repeats}")
     if standoffs is not None and count is not None:
         raise BadInputError("--count: expected --standoffs or --count, not both: they are counted already")
     if standoffs is None:

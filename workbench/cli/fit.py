@@ -23,7 +23,7 @@ from workbench.calibration.significance import fit_chosen
 from workbench.cli.call import command_line, now, operator
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
-from workbench.model.captures import CaptureRow, parse_captures, read_captures_file
+from workbench.model.captures import CaptureRow, check_images, of_file, parse_captures, read_captures_file
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.nested import hold
 from workbench.model.rig import Rig, load_rig
@@ -67,7 +67,9 @@ def fit_captures(request: Request, as_json: bool) -> None:
     rig = hold(_rig(request), request.fixed)
     captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
     content = read_captures_file(captures)
-    data = _sightings(rig, parse_captures(captures, content), request)
+    rows = parse_captures(captures, content)
+    check_images(captures, rows)
+    data = _sightings(rig, rows, captures, request)
     fitted = fit_chosen(rig, *data, keep=request.kept)
     calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
     refused = assessment.verdict == "refused" and request.accept is None
@@ -114,13 +116,14 @@ def _rig(request: Request) -> Rig:
 
 
 def _sightings(
-    rig: Rig, rows: Sequence[CaptureRow], request: Request
+    rig: Rig, rows: Sequence[CaptureRow], captures: Path, request: Request
 ) -> tuple[list[Sighting], list[Rejected], list[BoardView]]:
     known = {row.standoff_mm for row in rows}
     if unknown := [s for s in request.without_mm if s not in known]:
         raise BadInputError(f"--without-standoff: no row has the standoff {unknown[0]:g} mm")
     kept = [row for row in rows if row.standoff_mm not in request.without_mm]
-    sightings, rejected, boards = sight_rows(rig, kept)
+    with of_file(captures):
+        sightings, rejected, boards = sight_rows(rig, kept)
     left_out = [row for row in rows if row.standoff_mm in request.without_mm]
     rejected += [Rejected(f"row {row.row}", f"left out: standoff {row.standoff_mm:g} mm") for row in left_out]
     if not sightings:

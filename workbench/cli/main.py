@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from workbench.cli.leaving import leave
+from workbench.cli.numbers import millimetres, whole
 from workbench.cli.saying import say
 from workbench.cli.stopping import ignore_signals, stop_at_once
 from workbench.cli.streams import fill_closed_streams
@@ -156,7 +157,8 @@ def fit(
         ),
     ] = None,
     without_standoff: Annotated[
-        list[float] | None, typer.Option(metavar="MM", help="Leave this standoff out; may be repeated.")
+        list[float] | None,
+        typer.Option(metavar="MM", parser=millimetres(0), help="Leave this standoff out; may be repeated."),
     ] = None,
     fix: Annotated[
         list[str] | None,
@@ -185,8 +187,12 @@ def design(
     standoffs: Annotated[
         str | None, typer.Option(metavar="MM,MM,...", help="Without them the best ones are proposed.")
     ] = None,
-    count: Annotated[int | None, typer.Option(help="How many to propose (11).")] = None,
-    repeats: Annotated[int, typer.Option(help="Readings of each laser at each standoff.")] = 10,
+    count: Annotated[
+        int | None, typer.Option(metavar="N", parser=whole, help="How many to propose (11).")
+    ] = None,
+    repeats: Annotated[
+        int, typer.Option(metavar="N", parser=whole, help="Readings of each laser at each standoff.")
+    ] = 10,
     json: Json = False,
 ) -> None:
     """Predict, before any data, what a calibration will determine; propose standoffs."""
@@ -213,10 +219,12 @@ def range_(
     captures: Annotated[Path | None, typer.Argument(help="Captures file (CSV), or a session.")] = None,
     rig: Annotated[Path | None, typer.Option(help="Rig file: range live on its bench instead.")] = None,
     readings: Annotated[
-        int | None, typer.Option(min=1, help="Live: stop after so many; else by a signal (Ctrl-C).")
+        int | None,
+        typer.Option(metavar="N", parser=whole, help="Live: stop after so many; else by a signal (Ctrl-C)."),
     ] = None,
     standoff: Annotated[
-        float | None, typer.Option(metavar="MM", min=1, help="Live: have the bench's target placed there.")
+        float | None,
+        typer.Option(metavar="MM", parser=millimetres(1), help="Live: have the bench's target placed there."),
     ] = None,
     stats: Annotated[bool, typer.Option("--stats", help="Live: print the latency at the end.")] = False,
     json: Json = False,

@@ -44,6 +44,8 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
         BadInputError: a file is wrong.
     """
     plan = Plan.load(rig_path, procedures)
+    if sessions.exists() and not sessions.is_dir():
+        raise BadInputError(f"{sessions}: expected a folder of sessions, this is a file")
     pace = learn_pace(sessions, plan.rig.rig)
     steps = outline(plan.procedures, plan.rig)
     console = Console(stderr=True, markup=False)

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from workbench.cli.reading import plain
 from workbench.model.calibration import Calibration, load_calibration
-from workbench.model.captures import load_captures
+from workbench.model.captures import check_images, load_captures, of_file
 from workbench.model.errors import BadInputError
 from workbench.ranging.captures import read_captures
 from workbench.ranging.live import check_same_sensor
@@ -29,10 +29,14 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
     if (captures / MANIFEST).is_file():
         check_same_sensor(load_session_rig(captures), ranger.calibration)
     readings = []
-    for reading in read_captures(ranger, load_captures(_table(captures))):
-        readings.append(reading)
-        if as_json:
-            print(json.dumps(plain(reading)), flush=True)
+    table = _table(captures)
+    rows = load_captures(table)
+    check_images(table, rows)
+    with of_file(table):
+        for reading in read_captures(ranger, rows):
+            readings.append(reading)
+            if as_json:
+                print(json.dumps(plain(reading)), flush=True)
     console = Console(stderr=True, markup=False)
     console.print(reading_list(readings), highlight=False)
 

@@ -52,8 +52,8 @@ def find_session(name: Path | None, sessions: Path) -> Path:
     """
     if name is not None:
         known = [path for path in (name, sessions / name) if (path / MANIFEST).is_file()]
-        if known:
-            return known[0]
+        if known:  # `.` is the folder that somebody stands in, and its name is told by its path alone
+            return known[0] if known[0].name not in {"", ".."} else known[0].resolve()
         raise BadInputError(f"{name}: expected a session folder, or the name of one in {sessions}")
     found = standings(sessions)
     unfinished = [each for each in found if each.unfinished]

@@ -162,7 +162,7 @@ class ControllerSpec(FileModel):
 class EmulatorSpec(FileModel):
     """The `emulator:` block."""
 
-    seed: int
+    seed: Count
     beam: BeamSpec = BeamSpec()
     lens: LensSpec = LensSpec()
     sensor: SensorSpec = SensorSpec()

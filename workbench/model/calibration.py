@@ -188,6 +188,8 @@ class LaserRanger(FileModel):
 class Calibration(FileModel):
     """A calibration file."""
 
+    told_by = "laser_ranger"
+
     image_width: Annotated[int, Field(gt=0)]
     image_height: Annotated[int, Field(gt=0)]
     camera_name: str

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
 
 from workbench.model.contents import not_text
 from workbench.model.errors import BadInputError
-from workbench.model.problems import one_of
+from workbench.model.problems import one_of, short
 
 ALL_LASERS = "all"
 BOARD = "board"
@@ -107,6 +109,35 @@ def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
     return tuple(rows)
 
 
+def check_images(path: Path, rows: Sequence[CaptureRow]) -> None:
+    """See that all images are there.
+
+    Raises:
+        BadInputError: some are not; a line for each.
+    """
+    wrong = [
+        f"{path}: row {row.row}, column {column}: expected an image, there is no file {image}"
+        for row in rows
+        for column, image in (("on", row.on), ("off", row.off))
+        if image is not None and not image.is_file()
+    ]
+    if wrong:
+        raise BadInputError("\n".join(wrong))
+
+
+@contextmanager
+def of_file(path: Path) -> Iterator[None]:
+    """What is said of rows is said with the file that they stand in.
+
+    Raises:
+        BadInputError: as within.
+    """
+    try:
+        yield
+    except BadInputError as error:
+        raise BadInputError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from None
+
+
 def _check_header(path: Path, names: object) -> None:
     present = list(names) if isinstance(names, list) else []
     where = f"{path}: row 1"
@@ -126,8 +157,10 @@ def _check_header(path: Path, names: object) -> None:
             f"{path}: expected a captures file (CSV), got YAML; its columns are {', '.join(COLUMNS)}"
         )
     if missing := [name for name in REQUIRED if name not in present]:
-        needed = ", ".join(REQUIRED)
-        raise BadInputError(f"{where}: expected the columns {needed}; missing: {', '.join(missing)}")
+        needed, came = ", ".join(REQUIRED), ", ".join(map(str, present))
+        raise BadInputError(
+            f"{where}: expected the columns {needed}; missing: {', '.join(missing)}; got {short(came)}"
+        )
     if unknown := [str(name) for name in present if name not in COLUMNS]:
         told = "; ".join(f"no such column: {name}; {one_of(name, COLUMNS)}" for name in unknown)
         raise BadInputError(f"{where}: {told}")

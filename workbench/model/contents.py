@@ -38,6 +38,6 @@ def not_text(content: bytes) -> str | None:
         return kind
     if kind is not None:
         return f"{kind}; save it as UTF-8"
-    if b"\0" in content:
+    if any(byte < 32 and byte not in b"\t\n\r\f" for byte in content):
         return "binary data"
     return f"text in another encoding (line {line}); save it as UTF-8"

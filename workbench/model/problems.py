@@ -158,17 +158,20 @@ def _has(node: Any, part: int | str) -> bool:
 
 def _say(model: type[BaseModel], error: ErrorDetails, alike: Sequence[ErrorDetails]) -> str:
     kind, context = error["type"], error.get("ctx", {})
-    came = f", got {short(context.get('tag', error['input']))}"
+    came = error["input"]
+    if kind == "union_tag_invalid" and isinstance(came, dict):
+        came = came.get(context["discriminator"].strip("'"))
+    got = f", got {short(came)}"
     if context.get("class_name") == "Prior":
         value = error["input"] if isinstance(error["input"], int | float) else "..."
-        return f"expected a value and its standard deviation, {{value: {value}, sd: ...}}{came}"
+        return f"expected a value and its standard deviation, {{value: {value}, sd: ...}}{got}"
     if kind == "value_error":
         said = error["msg"].removeprefix("Value error, ")
         # A rule about a whole mapping says itself what came of it.
-        return f"{said[:1].lower()}{said[1:]}" + ("" if ", got " in said else came)
+        return f"{said[:1].lower()}{said[1:]}" + ("" if ", got " in said else got)
     expected = " or ".join(dict.fromkeys(_expected(model, one) for one in alike))
     return (expected if kind in AS_THEY_ARE else f"expected {expected}") + (
-        "" if kind in SELF_EVIDENT else came
+        "" if kind in SELF_EVIDENT else got
     )
 
 
@@ -182,6 +185,7 @@ def _expected(model: type[BaseModel], error: ErrorDetails) -> str:
         context["tags"] = ", ".join(closest_first(context["tag"], known))
     if kind == "string_pattern_mismatch":
         context["spelled"] = SPELLED.get(context["pattern"], f"text that fits {context['pattern']}")
+    context |= {name: f"{value:.12g}" for name, value in context.items() if isinstance(value, float)}
     context |= {"number": _number_in(came, kind), "items": f"[{came}]" if _plain(came) else "[1, 2]"}
     context["text"] = f'"{came}"' if _plain(came) else '"some words"'
     return EXPECTED.get(kind, "something else here").format(**context)

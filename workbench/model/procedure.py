@@ -9,12 +9,22 @@ from pydantic import Field, model_validator
 
 from workbench.model.acceptance import Acceptance
 from workbench.model.limit import Limit
-from workbench.model.rig import NonNegativeFloat, PositiveFloat
+from workbench.model.rig import LARGEST, NonNegativeFloat
 from workbench.model.simulation import SimulatedScene
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 LimitedStep = TypeVar("LimitedStep", "CheckLimitsStep", "ValidateStep")
-Standoffs = Annotated[tuple[PositiveFloat, ...], Field(min_length=1)]
+Standoff = Annotated[float, Field(gt=0, le=LARGEST)]
+Standoffs = Annotated[tuple[Standoff, ...], Field(min_length=1)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+KEPT_FOR_ACTIONS = {"redo", "skip", "abort"}
+"""Whoever types one of these does it, and chooses nothing."""
+
+
+def _differ(standoffs_mm: tuple[float, ...], more: str) -> None:
+    """Standoffs name frames, by 12 digits."""
+    if len({f"{one:.12g}" for one in standoffs_mm}) != len(standoffs_mm):
+        raise ValueError(f"standoffs_mm must differ: more at one standoff are more `{more}`")
 
 
 class MessageStep(FileModel):
@@ -52,6 +62,15 @@ class NumberAsked(FileModel):
     within: Annotated[tuple[float, float], Field(alias="in")]
     usual: float | None = None
 
+    @model_validator(mode="after")
+    def _can_be_answered(self) -> NumberAsked:
+        low, high = self.within
+        if low > high:
+            raise ValueError(f"`in`: expected [lowest, highest], got [{low:g}, {high:g}]")
+        if self.usual is not None and not low <= self.usual <= high:
+            raise ValueError(f"`usual`: expected {low:g} to {high:g}, as `in` says, got {self.usual:g}")
+        return self
+
 
 class AskStep(FileModel):
     """Ask for a number or for one of some choices; the answer is kept in the journal."""
@@ -65,6 +84,12 @@ class AskStep(FileModel):
     def _asks_for_one_thing(self) -> AskStep:
         if (self.number is None) == (not self.choices):
             raise ValueError("expected either `number` or `choices`")
+        if len(set(self.choices)) != len(self.choices):
+            raise ValueError(f"`choices`: expected each once, got {', '.join(self.choices)}")
+        if taken := KEPT_FOR_ACTIONS.intersection(choice.lower() for choice in self.choices):
+            raise ValueError(
+                f"`choices`: expected other words than redo, skip, abort, got {', '.join(taken)}"
+            )
         return self
 
     @property
@@ -78,7 +103,7 @@ class PlaceTargetStep(FileModel):
 
     gives: ClassVar = "target"
     step: Literal["place_target"]
-    standoff_mm: PositiveFloat
+    standoff_mm: Standoff
 
     @property
     def title(self) -> str:
@@ -90,7 +115,7 @@ class WarmUpStep(FileModel):
     """Let the camera run for some frames with the lasers off: its focal length drifts while it warms."""
 
     step: Literal["warm_up"]
-    frames: Annotated[int, Field(ge=1)]
+    frames: Count
 
     @property
     def title(self) -> str:
@@ -126,13 +151,12 @@ class CaptureGridStep(FileModel):
     gives: ClassVar = "captures"
     step: Literal["capture_grid"]
     standoffs_mm: Standoffs
-    repeats: Annotated[int, Field(ge=1)]
+    repeats: Count
     limits: GridLimits = GridLimits()
 
     @model_validator(mode="after")
     def _standoffs_differ(self) -> CaptureGridStep:
-        if len(set(self.standoffs_mm)) != len(self.standoffs_mm):
-            raise ValueError("standoffs_mm must differ: more pairs at one standoff are more `repeats`")
+        _differ(self.standoffs_mm, "repeats")
         return self
 
     @property
@@ -144,7 +168,7 @@ class CaptureGridStep(FileModel):
 class BoardPlacing(FileModel):
     """How the board is to stand: at a standoff, turned about the vertical and the horizontal."""
 
-    standoff_mm: PositiveFloat
+    standoff_mm: Standoff
     yaw_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
     """Positive moves its right side away."""
     pitch_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
@@ -159,8 +183,8 @@ class CaptureBoardStep(FileModel):
     gives: ClassVar = "captures"
     step: Literal["capture_board"]
     placings: Annotated[tuple[BoardPlacing, ...], Field(min_length=1)]
-    frames: Annotated[int, Field(ge=1)]
-    repeats: Annotated[int, Field(ge=1)]
+    frames: Count
+    repeats: Count
 
     @property
     def title(self) -> str:
@@ -257,7 +281,12 @@ class AccuracyTrialStep(FileModel):
     needs: ClassVar = "calibration"
     step: Literal["accuracy_trial"]
     standoffs_mm: Standoffs
-    readings: Annotated[int, Field(ge=1)]
+    readings: Count
+
+    @model_validator(mode="after")
+    def _standoffs_differ(self) -> AccuracyTrialStep:
+        _differ(self.standoffs_mm, "readings")
+        return self
 
     @property
     def title(self) -> str:
@@ -269,7 +298,7 @@ class ThesisSimulationStep(FileModel):
     """Range simulated scenes as the thesis did and as the workbench does; no camera takes part."""
 
     step: Literal["thesis_simulation"]
-    points: Annotated[int, Field(ge=2)]
+    points: Annotated[int, Field(ge=2, le=1_000_000)]
     """Distances of each scene that does not say its own number."""
     scenes: Annotated[tuple[SimulatedScene, ...], Field(min_length=1)]
 

@@ -22,6 +22,8 @@ LaserId = Annotated[Name, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 """Part of file names: letters, digits, `_`, `.` and `-`."""
 LARGEST = 1e6
 """Of any millimetres or pixels in a rig file."""
+MOST_PX = 100_000
+"""Of a picture's side."""
 SMALLEST_SD = 1e-9
 
 
@@ -50,8 +52,8 @@ def exactly(value: float) -> Prior:
 class CameraSpec(FileModel):
     """Camera: image format, and the lens as the data sheet tells it (OpenCV's pinhole and Brown-Conrady)."""
 
-    width_px: Annotated[int, Field(gt=0)]
-    height_px: Annotated[int, Field(gt=0)]
+    width_px: Annotated[int, Field(gt=0, le=MOST_PX)]
+    height_px: Annotated[int, Field(gt=0, le=MOST_PX)]
     bits: Annotated[int, Field(ge=8, le=16)] = 8
     f_px: Prior
     cx_px: Prior

@@ -43,7 +43,7 @@ class SimulatedScene(FileModel):
     lost: tuple[Annotated[int, Field(ge=1)], ...] = ()
     """Lasers of each line, counted from 1, whose spot nobody sees."""
     set_mm: Span
-    points: Annotated[int, Field(ge=2)] | None = None
+    points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
     """Distances to put it at; as many as the step says if not given."""
     claims: Annotated[tuple[Claim, ...], Field(min_length=1)]
 

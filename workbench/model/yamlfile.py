@@ -20,6 +20,19 @@ KINDS = {"procedure": "a procedure", "rig": "a rig", "laser_ranger": "a calibrat
 """The keys that tell what a file is."""
 
 
+HINTS = {
+    "that cannot start any token": "; indent with spaces, and put text that begins so in quotes",
+    "but got ':'": "; put text with a colon in it in quotes",
+    "mapping values are not allowed here": "; put text with a colon in it in quotes",
+    "another document": "; a file holds one document: take out the later ---",
+    "expected <block end>": "; indent what belongs together by the same number of spaces",
+    "while scanning a quoted scalar": "; close the quotes",
+    "found unexpected end of stream": "; close the quotes or brackets",
+    "could not find expected ':'": "; after a key there is a colon and a space",
+}
+"""What to do about YAML's usual mistakes."""
+
+
 class FileModel(BaseModel):
     """Base of everything read from a file: unknown keys are mistakes, values do not change after reading."""
 
@@ -132,7 +145,8 @@ def parse_document(text: str, path: Path) -> Document:
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = "" if mark is None else f":{mark.line + 1}"
-        raise BadInputError(f"{path}{line}: not valid YAML: {error.problem or error.context}") from None
+        hint = next((words for part, words in HINTS.items() if part in str(error.problem)), "")
+        raise BadInputError(f"{path}{line}: not valid YAML: {error.problem or error.context}{hint}") from None
     except (YAMLError, ValueError) as error:
         raise BadInputError(f"{path}: not valid YAML: {error}") from None
     except RecursionError:
@@ -162,7 +176,8 @@ def kind_of(data: Any) -> str:
     """What a document is, for people."""
     if not isinstance(data, dict):
         return "no mapping of keys to values"
-    return next((name for key, name in KINDS.items() if key in data), "a mapping of other keys")
+    kinds = [name for key, name in KINDS.items() if key in data]
+    return " and ".join(kinds) or "a mapping of other keys"
 
 
 def _check_kind(path: Path, data: Any, model: type[BaseModel]) -> None:

@@ -11,10 +11,10 @@ from typing import Annotated
 from pydantic import BeforeValidator, RootModel, ValidationError
 
 from workbench.devices.protocols import Bench, Operator
-from workbench.model.errors import AnswerNeededError
+from workbench.model.errors import AnswerNeededError, BadInputError
 from workbench.model.problems import one_of
 from workbench.model.prompt import Answer, Prompt, Quantity
-from workbench.model.yamlfile import Mistake, line_of, read_document, refuse
+from workbench.model.yamlfile import Mistake, kind_of, line_of, read_document, refuse
 
 GIVEN = "true, a number, a choice, or {action: skip, reason: ...}"
 
@@ -71,13 +71,16 @@ class Scripted:
                 for each mistake, with file and line.
         """
         document = read_document(path)
-        mistakes = [*document.doubled, *document.mistakes(_Answers)]
+        if not isinstance(document.data, dict) or "steps" in document.data or "rig" in document.data:
+            came = kind_of(document.data)
+            raise BadInputError(f"{path}:1: expected answers to prompts by their keys, got {came}")
+        strangers = {line_of(document.data, (key,)) for key in document.data if key not in foreseen}
+        malformed = [one for one in document.mistakes(_Answers) if one.line not in strangers]
+        mistakes = [*document.doubled, *malformed]
         answers: dict[str, Answer] = {}
-        for key, given in document.data.items() if isinstance(document.data, dict) else ():
-            if not isinstance(key, str):
-                continue
+        for key, given in document.data.items():
             if key not in foreseen:
-                wrong: str | None = f"nothing of this name is asked; {one_of(key, list(foreseen))}"
+                wrong: str | None = f"nothing of this name is asked; {one_of(str(key), list(foreseen))}"
             elif (answer := _read(key, given)) is None:
                 continue
             else:

@@ -61,8 +61,8 @@ class Recorder:
             return self._show(self._kept.popleft())
         if self._kept and isinstance(event, ev.SessionStarted):
             raise BadInputError(
-                f"session {event.session}: expected the rig and the procedures that it began with,"
-                f" {self._kept[0].event}, got {event}; run these anew"
+                f"session {event.session}: expected what it began with, {_what(self._kept[0].event)}, got"
+                f" {_what(event)}; run these anew"
             )
         if self._kept and isinstance(event, ev.SessionFinished) and event.exit_code != 0:
             # It ended again before anything was new: what was there already still counts, all of it.
@@ -102,6 +102,12 @@ class Recorder:
         for consumer in self._consumers:
             consumer(record)
         return record
+
+
+def _what(started: ev.Event) -> str:
+    if not isinstance(started, ev.SessionStarted):
+        return started.kind
+    return f"{', '.join(started.procedures)} on {started.rig} in {started.session}"
 
 
 def _is_retry(event: ev.Event) -> TypeGuard[ev.SetAside]:

@@ -125,6 +125,11 @@ def _now(session_dir: Path, entry: Entry, model: type[FileModel]) -> tuple[Entry
 
 def _check_unfinished(session_dir: Path) -> None:
     records = list(read_journal(session_dir)) if (session_dir / JOURNAL).exists() else []
-    last = records[-1].event if records else None
+    first, last = (records[0].event, records[-1].event) if records else (None, None)
+    if isinstance(first, ev.SessionStarted) and first.session != session_dir.name:
+        raise BadInputError(
+            f"{session_dir}: expected the session's folder to be called {first.session}, as when it began;"
+            " give it its name back"
+        )
     if isinstance(last, ev.SessionFinished) and last.exit_code == 0:
         raise BadInputError(f"{session_dir}: the session is finished, there is nothing to resume")

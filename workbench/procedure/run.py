@@ -122,7 +122,7 @@ def run(
         session_dir.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInputError(
-            f"{session_dir.parent}: expected a folder for sessions: {error.strerror}"
+            f"{session_dir.parent}: expected a folder for sessions, which cannot be made: {error.strerror}"
         ) from None
     with ExitStack() as stack:
         # The bench first: one that does not open leaves no empty session behind.

@@ -45,13 +45,15 @@ def read_captures(ranger: Ranger, rows: Sequence[CaptureRow]) -> Iterator[Readin
     Raises:
         BadInputError: an image cannot be used, or a row names a laser that the calibration does not have.
     """
-    for row in rows:
-        if row.laser_id not in (*ranger.sensor.ids, ALL_LASERS):
-            known = ", ".join(ranger.sensor.ids)
-            raise BadInputError(
-                f"row {row.row}, column laser_id: expected {ALL_LASERS} or one of the calibration's"
-                f" lasers ({known}), got {row.laser_id}"
-            )
+    lasers, known = (*ranger.sensor.ids, ALL_LASERS), ", ".join(ranger.sensor.ids)
+    strangers = [
+        f"row {row.row}, column laser_id: expected {ALL_LASERS} or one of the calibration's lasers ({known}),"
+        f" got {row.laser_id}"
+        for row in rows
+        if row.laser_id not in lasers
+    ]
+    if strangers:
+        raise BadInputError("\n".join(strangers))
     for scene, members in scenes(rows).items():
         if members[0].laser_id == ALL_LASERS:
             finding = find_row_spots(

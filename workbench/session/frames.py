@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.model.contents import not_text
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import FrameRef
 from workbench.session.files import sync_folder, write_record
@@ -90,7 +91,8 @@ def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
     except cv2.error as error:
         raise BadInputError(f"{path}: expected an image, OpenCV refuses it: {error.err}") from None
     if image is None:
-        raise BadInputError(f"{path}: expected an image, OpenCV cannot decode it; is it truncated?")
+        came = not_text(content) or "text"
+        raise BadInputError(f"{path}: expected an image, OpenCV cannot decode it; it is {came}, or truncated")
     if image.dtype not in (np.uint8, np.uint16):
         raise BadInputError(f"{path}: expected 8 or 16 bits a pixel, got {image.dtype}")
     if size_px is not None and (image.shape[1], image.shape[0]) != size_px:

@@ -101,6 +101,9 @@ def load_manifest(session_dir: Path) -> Manifest:
     Raises:
         BadInputError: this is no session folder, or its manifest is damaged.
     """
+    if not (session_dir / MANIFEST).is_file():
+        came = "there is none" if session_dir.is_dir() else "there is no such folder"
+        raise BadInputError(f"{session_dir}: expected a session's folder, with {MANIFEST} in it; {came}")
     return load_yaml_model(session_dir / MANIFEST, Manifest)
 
 

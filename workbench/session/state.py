@@ -104,7 +104,8 @@ def standings(sessions: Path) -> list[Standing]:
         BadInputError: there is no such folder.
     """
     if not sessions.is_dir():
-        raise BadInputError(f"{sessions}: expected a folder of sessions, there is none")
+        came = "this is a file" if sessions.exists() else "there is none"
+        raise BadInputError(f"{sessions}: expected a folder of sessions, {came}")
     return [standing(path.parent) for path in sorted(sessions.glob(f"*/{MANIFEST}"))]
 
 
