@@ -686,3 +686,14 @@ class TestNastyInput:
             "width_px: expected at most 100000",
             "seed: expected at least 0, got -1",
         )
+
+    def test_numbers_that_no_computation_holds(self, workbench: Run, tmp_path: Path) -> None:
+        rig, calibration = tmp_path / "rig.yaml", tmp_path / "c.yaml"
+        rig.write_text(WEBCAM_RIG.read_text() + "board: {columns: 1" + 400 * "0" + "}\n")
+        refused(workbench("check", rig), 2, "board.columns: expected at most 1000, got 1000")
+        workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", calibration)
+        text = calibration.read_text()
+        assert "image_width: 640" in text
+        calibration.write_text(text.replace("image_width: 640", "image_width: 1" + 400 * "0"))
+        outcome = workbench("range", WEBCAM, "--calibration", calibration)
+        refused(outcome, 2, "image_width: expected at most 100000, got 1000")

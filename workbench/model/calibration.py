@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from workbench.model.rig import LaserId, NonNegativeFloat, PositiveFloat
+from workbench.model.rig import LARGEST, MOST_PX, LaserId, NonNegativeFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 DeterminedBy = Literal["data", "joint", "prior"]
@@ -75,7 +75,7 @@ class LaserRay(FileModel):
 class Noise(FileModel):
     """What a ranger adds to a spot's stated deviation, pixels, 1 sigma."""
 
-    spot_sd_px: PositiveFloat
+    spot_sd_px: Annotated[float, Field(gt=0, le=LARGEST)]
     """For a spot whose own deviation is not known."""
     speckle_sd_px: NonNegativeFloat
     """In every spot, however often a target that stands still is read."""
@@ -190,8 +190,8 @@ class Calibration(FileModel):
 
     told_by = "laser_ranger"
 
-    image_width: Annotated[int, Field(gt=0)]
-    image_height: Annotated[int, Field(gt=0)]
+    image_width: Annotated[int, Field(gt=0, le=MOST_PX)]
+    image_height: Annotated[int, Field(gt=0, le=MOST_PX)]
     camera_name: str
     camera_matrix: Matrix
     distortion_model: Literal["plumb_bob"]

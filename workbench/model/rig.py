@@ -109,7 +109,7 @@ class BenchSpec(FileModel):
     """Nearest and farthest standoff at which the target can stand with its spots not saturated."""
     print_scale: Prior = Prior(value=0.0, sd=0.002)
     """Relative error of the printed board: true length = printed length by the file x (1 + print_scale)."""
-    board_flatness_sd_mm: NonNegativeFloat = 0.1
+    board_flatness_sd_mm: Annotated[float, Field(ge=0, le=LARGEST)] = 0.1
     """How far the board's paper may lie off its plane at 100 mm from its middle."""
 
     @field_validator("reach_mm")
