@@ -19,7 +19,7 @@ from workbench.procedure.exposure import set_exposure
 from workbench.procedure.latency import LEASE_S
 from workbench.session.frames import FrameStore, read_image
 from workbench.session.state import Group
-from workbench.spots import Finding, Image, Scanline, find_spots
+from workbench.spots import Finding, Image, Scanline, Spot, find_spots, lasting
 
 
 @dataclass
@@ -83,9 +83,13 @@ class Shooting:
     def look_at_dark(self, key: str, off: Image, finding: Finding, scanlines: Sequence[Scanline]) -> None:
         """Keep the dark frame of a capture; where its pair shows no spot, look for one in it.
 
+        What is on disk already was looked at when it was taken.
+
         Raises:
             LaserOffNotConfirmedError: there is a spot in it.
         """
+        if self.served is not None:
+            return
         if not finding.spots:
             self._search(key, off, scanlines)
         self._dark = off
@@ -175,7 +179,11 @@ class Shooting:
         Raises:
             LaserOffNotConfirmedError: there is a spot in it.
         """
-        if stuck := find_spots(off, scanlines=scanlines).spots:
+
+        def look_again() -> Sequence[Spot]:
+            return find_spots(self.bench.camera.grab().image, scanlines=scanlines).spots
+
+        if stuck := lasting(find_spots(off, scanlines=scanlines).spots, look_again):
             at = f"u = {stuck[0].u_px:.0f}, v = {stuck[0].v_px:.0f} px"
             raise LaserOffNotConfirmedError(
                 f"capture {key}: the frame with all lasers off shows a spot at {at}. A beam may be on"

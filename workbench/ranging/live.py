@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import hypot
 
 import numpy as np
 
@@ -15,13 +14,11 @@ from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.rig import Rig
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
-from workbench.spots import Finding, Image, Spot, SpotFinder
+from workbench.spots import Finding, Image, Spot, SpotFinder, is_same, lasting
 
 LEASE_S = 2.0
 """Longest time that a laser stays lit for one frame."""
 FEWEST_TO_TELL_P99 = 100
-SAME_LIGHT_PX = 3.0
-"""A light in a dark frame that lies so near to one seen before anything was fired is the same."""
 
 
 def check_same_sensor(rig: Rig, calibration: Calibration) -> None:
@@ -67,7 +64,7 @@ class LiveRanger:
         Returns:
             What to warn of: lights that burn already.
         """
-        self._lamps = self._find(self.ranger.sensor.ids, self.bench.camera.grab().image, None).spots
+        self._lamps = tuple(lasting(self._look_again(), self._look_again))
         return tuple(_burned(lamp) for lamp in self._lamps)
 
     def warm_up(self) -> None:
@@ -117,13 +114,18 @@ class LiveRanger:
         if self._dark is None:
             return reading
         lights = self._find(self.ranger.sensor.ids, self._dark, None).spots
-        if new := [light for light in lights if not any(_same(light, lamp) for lamp in self._lamps)]:
+        known = [light for light in lights if any(is_same(light, lamp) for lamp in self._lamps)]
+        if new := lasting([light for light in lights if light not in known], self._look_again):
             raise LaserOffNotConfirmedError(
                 f"reading {reading.scene}: the frame with all lasers off shows a spot at {_at(new[0])}. A"
                 " beam may be on although the controller says that it is off: cut the lasers' supply and keep"
                 " out of the beams. If a lamp stands there, cover it"
             )
-        return replace(reading, notes=(*reading.notes, *map(_burned, lights)))
+        return replace(reading, notes=(*reading.notes, *map(_burned, known)))
+
+    def _look_again(self) -> Sequence[Spot]:
+        """Lights in the next frame; all lasers are off."""
+        return self._find(self.ranger.sensor.ids, self.bench.camera.grab().image, None).spots
 
     def _find(self, ids: tuple[str, ...], on: Image, off: Image | None) -> Finding:
         width, height = self.ranger.size_px
@@ -136,10 +138,6 @@ class LiveRanger:
             lines = self.ranger.searched(ids)
             self._finders[ids] = SpotFinder((height, width), lines, expected=len(ids), reasons=False)
         return self._finders[ids].find(on, off)
-
-
-def _same(light: Spot, lamp: Spot) -> bool:
-    return hypot(light.u_px - lamp.u_px, light.v_px - lamp.v_px) < SAME_LIGHT_PX
 
 
 def _at(light: Spot) -> str:

@@ -2,6 +2,18 @@
 
 from workbench.spots.explain import explain
 from workbench.spots.finder import SpotFinder, find_spots
+from workbench.spots.lights import is_same, lasting
 from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
 
-__all__ = ["Failure", "Finding", "Image", "Scanline", "Spot", "SpotFinder", "explain", "find_spots"]
+__all__ = [
+    "Failure",
+    "Finding",
+    "Image",
+    "Scanline",
+    "Spot",
+    "SpotFinder",
+    "explain",
+    "find_spots",
+    "is_same",
+    "lasting",
+]
