@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
 from workbench.procedure.doctor import examine
 from workbench.procedure.foreseen import foreseen_prompts
-from workbench.procedure.latency import count_latency
+from workbench.procedure.latency import WHOLE, count_latency
 from workbench.procedure.operator import Scripted
 from workbench.procedure.resume import resume
 from workbench.procedure.run import NOBODY, Plan, run
@@ -394,51 +395,75 @@ def test_latency_is_counted_whatever_the_driver_believes(tmp_path: Path, latency
                 count_latency(bench.lasers, bench.camera, rig, 1)
 
 
-class Straddling:
-    """A camera that runs freely: the frame under way when a laser is switched has a share of its light.
+class Clocked:
+    """A camera that runs freely, and its laser; time passes while a frame is waited for, or somebody sleeps.
 
-    Trial after trial another share, since nothing ties its exposures to the switch.
+    Frame n was exposed for `exposure` until `delay` before it comes, at n (times: frames).
     """
 
-    def __init__(self, camera: StreamingCamera, shares: Sequence[float]) -> None:
-        self._camera, self._shares = camera, iter(shares)
-        self._before = camera.read().image
-        self.discard_frames = camera.discard_frames
+    discard_frames = 0
 
-    def grab(self) -> Frame:
-        return self._camera.grab()
+    def __init__(self, exposure: float, delay: float) -> None:
+        self._exposure, self._delay = exposure, delay
+        self.now = 0.0
+        self._on: list[tuple[float, float]] = []
+        self._rng = np.random.default_rng(1)
+        v, u = np.mgrid[:480, :640]
+        self._spot = 150.0 * np.exp(-((u - 200) ** 2 + (v - 240) ** 2) / (2 * 1.5**2))
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, frames: float) -> None:
+        self.now += frames
+
+    @contextmanager
+    def lit(self, ids: Sequence[str], for_s: float) -> Iterator[None]:
+        self._on.append((self.now, math.inf))
+        yield
+        self._on[-1] = (self._on[-1][0], self.now)
+
+    def all_off(self) -> None:
+        pass
+
+    def share(self) -> float:
+        """Of its exposure for which the frame that comes next is lit; waits for it."""
+        self.now = math.floor(self.now + 1 + 1e-9)
+        end = self.now - self._delay
+        lit = sum(max(0.0, min(off, end) - max(on, end - self._exposure)) for on, off in self._on)
+        return lit / self._exposure
 
     def read(self) -> Frame:
-        frame = self._camera.read()
-        before, self._before = self._before, frame.image
-        if int(frame.image.max()) < int(before.max()) + 50:  # no laser came on
-            return frame
-        share = next(self._shares)
-        mixed: Image = np.rint(share * frame.image + (1 - share) * before).astype(np.uint8)
-        return replace(frame, image=mixed)
+        light = 8.0 + self.share() * self._spot + self._rng.normal(0.0, 1.5, (480, 640))
+        image: Image = np.clip(np.rint(light), 0, 255).astype(np.uint8)
+        return Frame(image, 0)
 
-    def grab_ambient(self) -> Frame:
-        return self._camera.grab_ambient()
+    grab = grab_ambient = read
+    ids: tuple[str, ...] = ("L1", "L4")
 
     def close(self) -> None:
-        self._camera.close()
+        pass
 
 
 @pytest.mark.parametrize(
-    ("shares", "counted"),
-    [((1.0, 1.0, 1.0), 2), ((0.96, 0.96, 0.96), 2), ((0.6, 1.0, 1.0), 3), ((1.0, 1.0, 0.2), 3)],
+    ("exposure", "delay"), [(0.17, 0.0), (0.17, 0.33), (0.17, 0.67), (0.9, 0.0), (0.9, 0.5), (0.5, 2.2)]
 )
-def test_a_frame_of_which_a_part_was_lit_is_too_old(
-    tmp_path: Path, shares: tuple[float, ...], counted: int
+def test_frames_older_than_the_latency_are_lit_whenever_the_laser_is_switched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exposure: float, delay: float
 ) -> None:
     rig_file, _ = write_files(tmp_path)
-    rig_file.write_text(rig_file.read_text() + "  camera: {latency_frames: 2}\n")
-    rig = load_rig(rig_file)
-    with open_bench(rig, tmp_path / "s") as bench:
-        bench.target.place(Placement(key="k", standoff_mm=500.0))
-        bench.mark("k")
-        assert isinstance(bench.camera, StreamingCamera)
-        assert count_latency(bench.lasers, Straddling(bench.camera, shares), rig, 10) == counted
+    camera = Clocked(exposure, delay)
+    monkeypatch.setattr("workbench.procedure.latency.time", camera)
+    counted = count_latency(camera, camera, load_rig(rig_file), 10)
+    assert counted == math.ceil(exposure + delay)
+    worst = 1.0
+    for phase in np.random.default_rng(2).random(200):
+        camera.sleep(3 + phase)
+        with camera.lit(["L1"], 2.0):
+            for _ in range(counted):
+                camera.share()
+            worst = min(worst, camera.share())
+    assert worst >= WHOLE
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,8 +16,9 @@ from workbench.spots import Spot, find_spots
 
 LEASE_S = 2.0
 """Longest time that a laser may stay lit for one capture: many frames, and short for an eye."""
-TRIALS = 3
-"""A camera that runs freely is switched at another moment of an exposure each time."""
+PHASES = (0.0, 0.5, 0.95)
+"""When a trial switches, in frames after one has come. A camera that runs freely has begun the next by then:
+the later, the less of it is lit. Captures are switched whenever it is their turn."""
 WHOLE = 0.9
 """Least share of the next frame's light in one that was not begun before the switch."""
 NOISE_SD = 3.0
@@ -40,9 +42,9 @@ def count_latency(lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_fra
     some = camera.grab().image
     find_spots(some, some, scanlines=[prior_scanline(rig, first)], expected=1)
     for _ in _exposures(camera):
-        if (frames := _count(lasers, camera, rig, most_frames)) is not None:
-            again = [_count(lasers, camera, rig, most_frames) for _ in range(1, TRIALS)]
-            return max([frames, *(more for more in again if more is not None)])
+        if (frames := _count(lasers, camera, rig, most_frames, PHASES[0])) is not None:
+            later = [_count(lasers, camera, rig, most_frames, phase) for phase in PHASES[1:]]
+            return max([frames, *(more for more in later if more is not None)])
     raise RigNotReadyError(
         f"camera: expected to see laser {first.id} at most {most_frames} frames after it was switched on, saw"
         " no spot; look whether it shines on the target, and into the picture"
@@ -62,7 +64,9 @@ def _exposures(camera: StreamingCamera) -> Iterator[None]:
             yield
 
 
-def _count(lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_frames: int) -> int | None:
+def _count(
+    lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_frames: int, phase: float
+) -> int | None:
     first = rig.lasers[0]
     scanlines = [prior_scanline(rig, first)]
     # Drops what has piled up; then whatever a laser lit before this call passes.
@@ -70,13 +74,16 @@ def _count(lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_frames: in
     for _ in range(most_frames + 1):
         camera.read()
     # A lamp that flickers is no brighter later than in the brightest of them.
+    began = time.monotonic()
     dark: Image = np.maximum.reduce([camera.read().image for _ in range(most_frames + 1)])
+    time.sleep(phase * (time.monotonic() - began) / (most_frames + 1))
     before: Spot | None = None
     with lasers.lit([first.id], for_s=LEASE_S):
         for frames in range(most_frames + 2):
             spots = find_spots(camera.read().image, dark, scanlines=scanlines, expected=1).spots
             if before and spots:
-                return frames - 1 if _is_whole(before, spots[0]) else frames
+                counted = frames - 1 if _is_whole(before, spots[0]) else frames
+                return counted if counted <= most_frames else None
             before = spots[0] if spots else None
     return None
 
