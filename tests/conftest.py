@@ -25,5 +25,6 @@ class Schedule(LoadFileScheduling):  # type: ignore[misc]
         return "real time" if file in REAL_TIME else file
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Schedule:
     return Schedule(config, log)

@@ -88,7 +88,7 @@ def test_a_board_of_one_line(log: Path) -> None:
     lasers.close()
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGSEGV])
 def test_off_when_the_workbench_ends(log: Path, how: signal.Signals) -> None:
     delays = measure(log, "bank.beat()", how)
     assert delays[0] > 0
@@ -103,12 +103,16 @@ def test_off_when_the_workbench_gets_no_turn_to_end(log: Path, how: signal.Signa
     for _ in range(REPEATS):
         log.unlink(missing_ok=True)
         with lit_elsewhere("bank.beat()") as process:
-            arguments = [str(process.pid), str(int(how)), str(BUSY_S)]
-            said = subprocess.run([*IN_ITS_WAY, *arguments], stdout=subprocess.PIPE, cwd=ROOT, check=True)
-            began_ns, still_there = map(int, said.stdout.split())
-            assert still_there
-            delays.append((wait_for_dark(log) - began_ns) / 1e6)
-            process.kill()
+            try:
+                arguments = [str(process.pid), str(int(how)), str(BUSY_S)]
+                said = subprocess.run(
+                    [*IN_ITS_WAY, *arguments], stdout=subprocess.PIPE, cwd=ROOT, check=True, timeout=60
+                )
+                began_ns, still_there = map(int, said.stdout.split())
+                assert still_there
+                delays.append((wait_for_dark(log) - began_ns) / 1e6)
+            finally:
+                process.kill()
     print(f"{how.name}, no turn: off after", ", ".join(f"{d:.1f}" for d in delays), "ms")
     assert min(delays) > 0
     assert max(delays) <= END_MS

@@ -47,8 +47,8 @@ Line = ControllerLine | DigitalOutputLine
 AT_ONCE = {int(signal.SIGTERM), int(signal.SIGHUP)}
 STAT_FLAGS = 6
 """In /proc/PID/stat, counted from what comes after the process's name."""
-PF_EXITING = 0x4
-"""Of the kernel's include/linux/sched.h."""
+ENDING = 0x4 | 0x200 | 0x400
+"""PF_EXITING, PF_DUMPCORE, PF_SIGNALED of the kernel's include/linux/sched.h."""
 
 
 class Workbench:
@@ -94,23 +94,25 @@ class Workbench:
 def _end_to_come(pid: int) -> tuple[bool, str | None]:
     """What a process has not had a turn for: whether it is to end, and a signal that tells it to.
 
-    A process ends, and takes a signal, when the computer lets it run, and its pipes close after its memory is
-    given back. The kernel tells before (proc(5)); on a system without /proc nobody does.
+    A process ends, and takes a signal, when the computer lets it run, and its pipes close after its core is
+    dumped and its memory given back. The kernel tells before (proc(5)); without a /proc of ours nobody does.
     """
     try:
-        status = Path(f"/proc/{pid}/status").read_text()
-        stat = Path(f"/proc/{pid}/stat").read_text()
+        if Path("/proc/self").readlink() != Path(str(os.getpid())):
+            return False, None  # of another namespace: that number is another process there
+        status = Path(f"/proc/{pid}/status").read_bytes()
+        stat = Path(f"/proc/{pid}/stat").read_bytes()
     except OSError:
         return False, None
     waiting = 0
     for line in status.splitlines():
-        name, _, mask = line.partition(":")
-        if name in {"SigPnd", "ShdPnd"}:
+        name, _, mask = line.partition(b":")
+        if name in {b"SigPnd", b"ShdPnd"}:
             waiting |= int(mask, 16)
     pending = {number for number in (*AT_ONCE, signal.SIGKILL) if waiting >> (number - 1) & 1}
-    flags = int(stat.rpartition(")")[2].split()[STAT_FLAGS])
+    flags = int(stat.rpartition(b")")[2].split()[STAT_FLAGS])
     told = [signal.Signals(number).name for number in sorted(AT_ONCE & pending)]
-    return signal.SIGKILL in pending or bool(flags & PF_EXITING), told[0] if told else None
+    return signal.SIGKILL in pending or bool(flags & ENDING), told[0] if told else None
 
 
 @dataclass
