@@ -7,6 +7,7 @@ import pytest
 
 from tests.unit.spots.draw import Drawn, Sensor, draw
 from workbench.spots import Scanline, Spot, find_spots, is_same, lasting
+from workbench.spots.lights import CLEAR, clearness
 
 SENSOR = Sensor(electrons_per_dn=156.0, read_sd=225.0, bits=8)
 EVERYWHERE = [Scanline(0.0, 239.5, 1.0, 0.0, 240.0)]
@@ -23,6 +24,7 @@ def test_noise_is_taken_for_a_spot_now_and_then_and_never_for_a_light() -> None:
     for _ in range(FRAMES):
         found = find_spots(dark(rng, []), scanlines=EVERYWHERE).spots
         spots += bool(found)
+        assert all(clearness(spot) < CLEAR for spot in found)
         lights += bool(lasting(found, lambda: find_spots(dark(rng, []), scanlines=EVERYWHERE).spots))
     print(f"spots in {spots} of {FRAMES} dark frames")
     assert spots > 0, "otherwise there is nothing to tell apart"
@@ -53,3 +55,14 @@ def test_the_clear_ones_need_no_second_look() -> None:
     lights = lasting(find_spots(frame, scanlines=EVERYWHERE).spots, lambda: pytest.fail("not asked for"))
     assert len(lights) == 2
     assert not is_same(*lights)
+
+
+def test_a_faint_one_beside_a_clear_one_is_a_light_as_well() -> None:
+    """Of the lamps that burn before anything is fired none may be forgotten."""
+    rng = np.random.default_rng(4)
+    lamps = [Drawn(100.0, 100.0, 1e5), Drawn(400.0, 300.0, 1.0e4)]
+    found, again = (find_spots(dark(rng, lamps), scanlines=EVERYWHERE).spots for _ in range(2))
+    clear, faint = sorted(found, key=clearness, reverse=True)
+    assert clearness(faint) < CLEAR < clearness(clear)
+    assert lasting(found, lambda: again) == list(found)
+    assert lasting(found, list) == [clear]
