@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from tests.proofs import bound, report, shapes, simulate, study
+from tests.proofs import bound, report, sessions, shapes, simulate, study
 from tests.proofs.ranging import ranges
 from tests.proofs.solve import at_once, one_by_one
 from tests.unit.rigs import STANDOFFS_MM, World, thesis_rig
@@ -87,6 +88,27 @@ def test_one_by_one_is_at_once_where_every_term_stays() -> None:
     free = sd > 0
     np.testing.assert_allclose((single.sensor - many.sensor)[free] / sd[free], 0.0, atol=1e-5)
     np.testing.assert_allclose(single.covariance, many.covariance, atol=1e-6 * many.covariance.max())
+
+
+@pytest.mark.parametrize(
+    ("scale", "bias", "missed"), [(1.0, 0.0, set()), (1.5, 0.0, {"rms", "within"}), (1.0, 0.6, {"mean"})]
+)
+def test_sessions_are_missed_where_their_intervals_are_wrong(
+    scale: float, bias: float, missed: set[str]
+) -> None:
+    rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
+    rng, free = np.random.default_rng(8), 23
+    drawn = []
+    for _ in range(100):
+        z, ranges = scale * rng.normal(size=26) + bias, scale * rng.normal(size=(10, 4)) + bias
+        ranges[0, 0] = np.nan
+        drawn.append(sessions.Outcome(z, ranges, 0.01 * ranges, float((z[:free] ** 2).sum()), free))
+    lines, misses = sessions.scores(rig, drawn)
+    assert len(lines) == 1 + 26 + 39 + 3
+    told = {what for what in ("rms", "within", "mean") if sum(what in miss for miss in misses) > 30}
+    assert told >= missed
+    assert bool(misses) == bool(missed)
+    assert any("all parameters together" in miss for miss in misses) == (scale > 1 or bias > 0)
 
 
 def test_the_table_of_shapes_in_the_docs_is_what_comes_out() -> None:
