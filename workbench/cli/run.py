@@ -12,6 +12,7 @@ from rich.console import Console
 from workbench.cli.background import Background
 from workbench.cli.call import command_line, now, operator
 from workbench.cli.person import whoever_is_there
+from workbench.cli.saying import say
 from workbench.cli.stopping import StopAfterShot
 from workbench.cli.terminal import Guarded, Terminal
 from workbench.devices.protocols import Operator
@@ -31,6 +32,7 @@ from workbench.procedure.resume import files_now, plan_of, resume
 from workbench.procedure.run import NOBODY, Caller, Plan, run
 from workbench.report.thesis_figures import FigureWriter
 from workbench.session.manifest import MANIFEST, load_manifest
+from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
 
 
@@ -84,6 +86,8 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     if answers.file is not None:
         script = Scripted.load(answers.file, foreseen_prompts(plan.procedures, plan.rig), NOBODY)
     steps = outline(plan.procedures, plan.rig)
+    if not is_compiled():
+        say("note: the search for spots is compiled at the first capture: a minute or two, this once")
     forecast = Forecast(steps, learn_pace(session_dir.parent, plan.rig.rig))
     recording = RecordingConsumer(session_dir, plan.rig)
     file = session_dir / RECORDING_FILE

@@ -1,7 +1,7 @@
 """From a pair of frames to laser spots with their uncertainty."""
 
 from workbench.spots.explain import explain
-from workbench.spots.finder import SpotFinder, find_spots
+from workbench.spots.finder import SpotFinder, find_spots, is_compiled
 from workbench.spots.lights import is_same, lasting
 from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
 
@@ -14,6 +14,7 @@ __all__ = [
     "SpotFinder",
     "explain",
     "find_spots",
+    "is_compiled",
     "is_same",
     "lasting",
 ]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from pathlib import Path
 
 from workbench.model.errors import BadInputError
 from workbench.spots.frames import check_pair, default_saturation_dn
@@ -83,3 +85,8 @@ def find_spots(
         saturation_dn=saturation_dn,
     )
     return finder.find(on, off)
+
+
+def is_compiled(folder: Path = Path(__file__).parent) -> bool:
+    """Whether the loops of this package are kept as machine code, or it cannot be told (they are elsewhere)."""
+    return not os.access(folder, os.W_OK) or any((folder / "__pycache__").glob("*.nbi"))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from tests.unit.spots.draw import Drawn, Sensor, draw, profile
 from workbench.model.errors import BadInputError
-from workbench.spots import Failure, Scanline, SpotFinder, explain, find_spots
+from workbench.spots import Failure, Scanline, SpotFinder, explain, find_spots, is_compiled
 from workbench.spots.thesis import thesis_centres
 
 ROW = [Scanline(0, 30, 1, 0, 3)]
@@ -257,3 +259,10 @@ def test_the_chain_of_the_thesis_finds_the_same_spots_less_exactly() -> None:
     on, off = draw(true, rng(1), sensor=sensor), draw([], rng(2), sensor=sensor)
     centres = thesis_centres(on, off, scanlines=ROW, expected=2)
     assert sorted(np.round(centres[:, 0])) == [30, 80]
+
+
+def test_it_is_known_whether_the_loops_are_compiled(tmp_path: Path) -> None:
+    """A technician is told what the first capture waits for."""
+    assert not is_compiled(tmp_path)
+    find_spots(draw([Drawn(60, 30)], rng()))
+    assert is_compiled()
