@@ -88,5 +88,5 @@ def find_spots(
 
 
 def is_compiled(folder: Path = Path(__file__).parent) -> bool:
-    """Whether the loops of this package are kept as machine code, or it cannot be told (they are elsewhere)."""
+    """Whether the loops of this package are kept as machine code, or elsewhere, where it cannot be told."""
     return not os.access(folder, os.W_OK) or any((folder / "__pycache__").glob("*.nbi"))
