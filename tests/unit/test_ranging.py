@@ -282,6 +282,8 @@ def test_a_range_beyond_the_calibrated_ones_is_marked(ranger: Ranger) -> None:
     assert reading.status == "done"
     assert reading.notes[0] == "L1: 4600 mm lies outside the calibrated 125 to 4500 mm"
     assert ranger.read_lit("s", spots(ranger, dict.fromkeys(IDS, 4400.0))).notes == ()
+    near = ranger.read_lit("s", spots(ranger, dict.fromkeys(IDS, 4500.2)))
+    assert near.notes[0] == "L1: 4500.2 mm lies outside the calibrated 125 to 4500 mm"
 
 
 @pytest.mark.parametrize(("range_mm", "end_mm"), [(7000.0, 4500.0), (110.0, 125.0)])

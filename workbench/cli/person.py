@@ -106,7 +106,9 @@ class Person:
             time.sleep(LOOK_S)  # where the terminal was closed, its signal may still be on the way
             if (reason := self._stopping()) is not None:
                 raise StoppedError(reason)
-            raise AnswerNeededError(f"prompt {prompt.key}: {prompt.do} -- the terminal was closed")
+            raise AnswerNeededError(
+                f"prompt {prompt.key}: {prompt.do} -- the terminal was closed, or its end typed (^D)"
+            )
         return typed.strip()
 
     def _say(self, text: str) -> None:

@@ -74,7 +74,10 @@ def outside_validity(
         if nearest <= laser.range_mm <= farthest:
             continue
         calibrated = f"{nearest:g} to {farthest:g}"
-        remark = f"{laser.laser_id}: {laser.range_mm:.0f} mm lies outside the calibrated {calibrated} mm"
+        rounded = f"{laser.range_mm:.0f}"
+        if nearest <= float(rounded) <= farthest:
+            rounded = f"{laser.range_mm:.1f}"
+        remark = f"{laser.laser_id}: {rounded} mm lies outside the calibrated {calibrated} mm"
         beyond = _beyond_px(laser, *calibrated_px[laser.laser_id])
         remarks.append(
             remark
