@@ -7,6 +7,7 @@ process is ended to the moment, on the same clock, when the pins of the chip are
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import REAL_TIME
 from tests.firmware.parts import KINDS, Kind, Running, build, hurried, hurry, is_there
 from workbench.devices.serial_lasers import SerialLaserBank
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError
@@ -225,6 +227,16 @@ def test_the_port_is_the_guardians_alone(controller: Running, bank: SerialLaserB
     assert controller.port not in ours
     with pytest.raises(RigNotReadyError, match="no other program holds"):
         SerialLaserBank(controller.port, IDS)
+
+
+def test_files_with_real_time_priority_run_one_after_the_other() -> None:
+    root = Path(__file__).parents[2]
+    users = {
+        path.relative_to(root).as_posix()
+        for path in root.glob("tests/**/test_*.py")
+        if re.search(r"import .*\b(hurry|hurried|Running)\b", path.read_text())
+    }
+    assert users == REAL_TIME
 
 
 def test_the_interlock_is_told(controller: Running, bank: SerialLaserBank) -> None:

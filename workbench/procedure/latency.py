@@ -22,6 +22,7 @@ the later, the less of it is lit. Captures are switched whenever it is their tur
 WHOLE = 0.9
 """Least share of the next frame's light in one that was not begun before the switch."""
 NOISE_SD = 3.0
+"""By so much noise may a whole frame seem to have less."""
 STEP = 16.0
 """Between two exposures: from too dim to be found to clipped is more than that."""
 
