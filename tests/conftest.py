@@ -9,9 +9,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 REAL_TIME = {
     "tests/bench/test_unplugged.py",
     "tests/firmware/test_pins.py",
-    "tests/unit/test_digital_output.py",
-    "tests/unit/test_guardian.py",
-    "tests/unit/test_real_bench.py",
+    "tests/unit/devices/test_digital_output.py",
+    "tests/unit/devices/test_guardian.py",
+    "tests/unit/devices/test_real_bench.py",
 }
 """They run processes of real-time priority: two that compute keep each other from running, as nothing does at
 a bench."""

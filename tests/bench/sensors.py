@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from tests.unit.rigs import World
-from tests.unit.test_calibration_file import PROVENANCE
-from workbench.calibration.export import calibrate
-from workbench.calibration.fit import fit
+from tests.support.rigs import PROVENANCE, World
+from workbench.calibration.estimation.fit import fit
+from workbench.calibration.verdict.export import calibrate
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.truth import draw_truth
 from workbench.model.acceptance import Acceptance

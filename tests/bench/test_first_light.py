@@ -18,7 +18,6 @@ import yaml as pyyaml
 
 from tests.viewer.harness import distinct_colors, headless_viewer
 from tests.viewer.readback import Contents
-from workbench.calibration.sensor import Sensor
 from workbench.model.calibration import load_calibration
 from workbench.model.event import (
     CaptureTaken,
@@ -30,6 +29,7 @@ from workbench.model.event import (
     TrialFinished,
 )
 from workbench.model.rig import load_rig
+from workbench.sensor.calibrated import Sensor
 from workbench.session.journal import read_journal
 from workbench.viewer.recording import rebuild
 

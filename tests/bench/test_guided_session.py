@@ -26,12 +26,12 @@ from workbench.model.errors import (
 from workbench.model.prompt import Answer, Prompt, Quantity
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
+from workbench.procedure.capture.latency import WHOLE, count_latency
 from workbench.procedure.doctor import examine
-from workbench.procedure.foreseen import foreseen_prompts
-from workbench.procedure.latency import WHOLE, count_latency
-from workbench.procedure.operator import Scripted
-from workbench.procedure.resume import resume
-from workbench.procedure.run import NOBODY, Plan, run
+from workbench.procedure.engine.expected_prompts import foreseen_prompts
+from workbench.procedure.engine.operator import Scripted
+from workbench.procedure.engine.resume import resume
+from workbench.procedure.engine.run import NOBODY, Plan, run
 from workbench.session.journal import Journal, read_journal
 from workbench.session.state import effective, standing
 
@@ -338,7 +338,7 @@ def test_an_exposure_is_searched_for_on_frames_that_are_not_stale(
     """Whatever the rig file says of the latency: its measurement comes first, and rests on no search."""
     late = "  camera: {latency_frames: 3}\n"
     right = session(tmp_path / "right", LATENCY, Says(), late)
-    monkeypatch.setattr("workbench.procedure.run.open_bench", too_hopeful)
+    monkeypatch.setattr("workbench.procedure.engine.run.open_bench", too_hopeful)
     hopeful = session(tmp_path / "hopeful", LATENCY, Says(), late)
     assert events(hopeful, ev.LatencyMeasured) == [ev.LatencyMeasured(frames=3)]
     found = [e for e in events(hopeful, ev.ExposureSet) if isinstance(e, ev.ExposureSet)]
@@ -453,7 +453,7 @@ def test_frames_older_than_the_latency_are_lit_whenever_the_laser_is_switched(
 ) -> None:
     rig_file, _ = write_files(tmp_path)
     camera = Clocked(exposure, delay)
-    monkeypatch.setattr("workbench.procedure.latency.time", camera)
+    monkeypatch.setattr("workbench.procedure.capture.latency.time", camera)
     counted = count_latency(camera, camera, load_rig(rig_file), 10)
     assert counted == math.ceil(exposure + delay)
     worst = 1.0

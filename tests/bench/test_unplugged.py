@@ -19,13 +19,13 @@ from tests.bench.test_guided_session import Says
 from tests.bench.test_person import AT_TERMINAL, SCRIPT, Terminal
 from tests.crash.short import CALLER, RESUMER
 from tests.firmware.parts import Running, build, hurried
-from tests.unit.mjpeg import Picture, Stream
-from tests.unit.test_check import PROCEDURE
-from tests.unit.test_real_bench import Scene, write_rig
+from tests.support.mjpeg import Picture, Stream
+from tests.unit.devices.test_real_bench import Scene, write_rig
+from tests.unit.procedure.engine.test_check import PROCEDURE
 from workbench.model import event as ev
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, WorkbenchError
-from workbench.procedure.resume import resume
-from workbench.procedure.run import Plan, run
+from workbench.procedure.engine.resume import resume
+from workbench.procedure.engine.run import Plan, run
 from workbench.session.journal import read_journal
 from workbench.session.state import effective, groups, standing
 

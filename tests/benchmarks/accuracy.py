@@ -10,7 +10,7 @@ import numpy as np
 from tests.benchmarks.others import OTHERS, cut_out
 from tests.benchmarks.render import Floats, Sensor, spot
 from workbench.spots import find_spots
-from workbench.spots.fisher import Camera, position_bound_px
+from workbench.spots.crlb import Camera, position_bound_px
 
 WIDTHS_PX = (0.6, 1.0, 1.5, 2.5, 4.0)
 ELECTRONS = (1e3, 1e4, 1e5)

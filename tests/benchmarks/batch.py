@@ -23,7 +23,7 @@ from scipy.optimize import least_squares
 
 from tests.proofs import simulate, study
 from tests.proofs.simulate import Floats
-from workbench.calibration.batch import BatchFit, fit_batch
+from workbench.calibration.estimation.batch import BatchFit, fit_batch
 from workbench.model.rig import Rig, load_rig
 
 ROOT = Path(__file__).parents[2]

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from tests.benchmarks.render import spot
 from tests.benchmarks.speed import SENSOR, SHAPE, Frame
-from tests.unit.rigs import World
-from tests.unit.test_calibration_file import PROVENANCE
-from workbench.calibration.export import calibrate
-from workbench.calibration.fit import fit
+from tests.support.rigs import PROVENANCE, World
+from workbench.calibration.estimation.fit import fit
+from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
 from workbench.model.rig import Rig, load_rig
 from workbench.ranging.acquire import acquire

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from workbench.model import event as ev
-from workbench.procedure.resume import resume
-from workbench.procedure.run import Caller, Plan, run
+from workbench.procedure.engine.resume import resume
+from workbench.procedure.engine.run import Caller, Plan, run
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
 

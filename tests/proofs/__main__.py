@@ -31,7 +31,7 @@ def main() -> int:
     rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
     today = dt.datetime.now(tz=dt.UTC).date().isoformat()
     whole = study.joined(list(_blocks(rig, asked.thousands, at_once)))
-    lines, misses = report.tables(rig, whole, "fitted by workbench.calibration.batch, the whole model")
+    lines, misses = report.tables(rig, whole, "fitted by calibration.estimation.batch, the whole model")
     if asked.chosen:
         wider = _with_k3(rig)
         chosen = study.joined(list(_blocks(wider, asked.chosen, one_by_one)))

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import yaml as pyyaml
 
-from workbench.calibration.assess import determined_by
-from workbench.calibration.fit import Fit, fit
-from workbench.calibration.sightings import sight_rows
+from workbench.calibration.data.spot_rows import sight_rows
+from workbench.calibration.estimation.fit import Fit, fit
+from workbench.calibration.verdict.assessment import determined_by
 from workbench.model.captures import load_captures
 from workbench.model.procedure import Procedure, load_procedure
 from workbench.model.rig import Rig, load_rig
-from workbench.procedure.run import Caller, Plan, run
+from workbench.procedure.engine.run import Caller, Plan, run
 
 ROOT = Path(__file__).parents[2]
 RIG = ROOT / "rigs/thesis-emulated.yaml"

@@ -1,4 +1,4 @@
-"""The ranges of `workbench.calibration.sensor.Sensor`, for many calibrations at once."""
+"""The ranges of `workbench.sensor.calibrated.Sensor`, for many calibrations at once."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import numpy as np
 from tests.proofs import simulate
 from tests.proofs.score import HEADER, Score, score
 from tests.proofs.study import HELD_MM, RANGES_MM, Outcome
-from workbench.calibration.assess import PRIOR_UNMOVED
+from workbench.calibration.verdict.assessment import PRIOR_UNMOVED
 from workbench.model.rig import Rig
 
 BANDS = ((125.0, 2000.0, 0.5, 2.5), (2000.0, 4500.0, 1.0, 3.5))

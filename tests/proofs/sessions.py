@@ -25,12 +25,12 @@ from tests.proofs.score import NORMAL_95
 from tests.proofs.simulate import Floats
 from tests.proofs.study import RANGES_MM
 from tests.proofs.tables import keep
-from workbench.calibration.assess import PRIOR_UNMOVED
-from workbench.calibration.sensor import Sensor
+from workbench.calibration.verdict.assessment import PRIOR_UNMOVED
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import WorkbenchError
 from workbench.model.rig import Rig, load_rig
-from workbench.procedure.run import Plan, run
+from workbench.procedure.engine.run import Plan, run
+from workbench.sensor.calibrated import Sensor
 
 ROOT = Path(__file__).parents[2]
 RIG = ROOT / "rigs" / "thesis-emulated.yaml"

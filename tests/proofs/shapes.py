@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from tests.proofs.tables import keep
-from tests.unit.ranging.surfaces import (
+from tests.support.surfaces import (
     F_PX,
     SD_PX,
     Surface,

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.proofs.simulate import Calibrations, Floats
-from workbench.calibration.batch import fit_batch
-from workbench.calibration.observations import PlacementInfo, Sighting
-from workbench.calibration.significance import fit_chosen, without_idle
+from workbench.calibration.data.observations import PlacementInfo, Sighting
+from workbench.calibration.estimation.batch import fit_batch
+from workbench.calibration.selection.model_terms import fit_chosen, without_idle
 from workbench.model.rig import Rig
 
 

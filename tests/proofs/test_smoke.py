@@ -10,14 +10,13 @@ import pytest
 from tests.proofs import bound, report, sessions, shapes, simulate, study
 from tests.proofs.ranging import ranges
 from tests.proofs.solve import at_once, one_by_one
-from tests.unit.rigs import STANDOFFS_MM, World, thesis_rig
-from tests.unit.test_calibration_file import PROVENANCE
-from workbench.calibration.batch import as_grid, fit_batch
-from workbench.calibration.export import calibrate
-from workbench.calibration.fit import fit
-from workbench.calibration.sensor import Sensor
+from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, thesis_rig
+from workbench.calibration.estimation.batch import as_grid, fit_batch
+from workbench.calibration.estimation.fit import fit
+from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
 from workbench.model.rig import load_rig
+from workbench.sensor.calibrated import Sensor
 
 ROOT = Path(__file__).parents[2]
 

@@ -1,6 +1,6 @@
 """`python -m tests.proofs.validation`: how often the checks of a fit cry wolf, and how often they see one.
 
-Sound calibrations by `tests.unit.rigs.World` (truth, placement errors, tilts, speckle and noise drawn from
+Sound calibrations by `tests.support.rigs.World` (truth, placement errors, tilts, speckle and noise drawn from
 the rig's tolerances), and the same with one standoff 10 mm off.
 """
 
@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.unit.rigs import STANDOFFS_MM, World, thesis_rig
-from workbench.calibration import residuals, validation
-from workbench.calibration.faults import find_faults
-from workbench.calibration.robust import fit_without_outliers
+from tests.support.rigs import STANDOFFS_MM, World, thesis_rig
+from workbench.calibration.checks import cross_validation, residuals
+from workbench.calibration.checks.faults import find_faults
+from workbench.calibration.selection.outliers import fit_without_outliers
 
 RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 FIRST_SEED = 20_000
@@ -38,7 +38,7 @@ def main() -> None:
         lines.append(line)
         print(line, flush=True)
     RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{today}-validation.txt").write_text("\n".join(lines) + "\n")
+    (RESULTS / f"{today}-cross_validation.txt").write_text("\n".join(lines) + "\n")
 
 
 def _sound(fits: int) -> Iterator[str]:
@@ -46,8 +46,8 @@ def _sound(fits: int) -> Iterator[str]:
     chances: dict[str, list[float]] = {}
     for number in range(fits):
         fit = fit_without_outliers(thesis_rig(), World(thesis_rig(), FIRST_SEED + number).sightings())
-        folds, tests = validation.leave_each_out(fit), residuals.residual_tests(fit)
-        found["cross-validation alarm"] += bool(validation.alarms(folds))
+        folds, tests = cross_validation.leave_each_out(fit), residuals.residual_tests(fit)
+        found["cross-validation alarm"] += bool(cross_validation.alarms(folds))
         found["residual test alarm"] += bool(residuals.alarms(tests))
         found["fault named"] += bool(find_faults(fit, folds))
         found["spot rejected"] += bool(fit.rejected)
@@ -85,8 +85,8 @@ def _mistaken(fits: int) -> Iterator[str]:
             off = standoff_mm + MISTAKE_MM
             told = [replace(s, standoff_mm=off) if s.standoff_mm == standoff_mm else s for s in seen]
             fit = fit_without_outliers(thesis_rig(), told)
-            folds = validation.leave_each_out(fit)
-            alarmed += off in {fold.standoff_mm for fold in validation.alarms(folds)}
+            folds = cross_validation.leave_each_out(fit)
+            alarmed += off in {fold.standoff_mm for fold in cross_validation.alarms(folds)}
             names = [f for f in find_faults(fit, folds) if f.name == "standoff"]
             named += len(names) == 1 and f"captures at {off:g} mm" in names[0].message
         yield f"  {standoff_mm:6g} mm   {100 * alarmed / fits:5.0f} %   {100 * named / fits:5.0f} %"

@@ -10,7 +10,7 @@ from types import TracebackType
 
 from rich.console import Console
 
-from workbench.cli import leaving
+from workbench.cli import exit as exit_
 from workbench.model import event as ev
 from workbench.viewer.recording import RecordingConsumer
 
@@ -43,7 +43,7 @@ class Background:
             self._records.put_nowait(None)
         self._thread.join(PATIENCE_S)
         if self._thread.is_alive():
-            leaving.hung = True
+            exit_.hung = True
             self._given_up = "its file cannot be written"
         if self._given_up is not None:
             self._path.unlink(missing_ok=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from workbench.calibration.compare import Comparison, compare
+from workbench.calibration.verdict.comparison import Comparison, compare
 from workbench.model.calibration import Calibration, load_calibration
 from workbench.report.tables import difference_table
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from workbench.calibration.design import best_standoffs
-from workbench.calibration.forecast import Forecast, forecast
-from workbench.calibration.observability import direction_lines
+from workbench.calibration.design.forecast import Forecast, forecast
+from workbench.calibration.design.standoffs import best_standoffs
+from workbench.calibration.verdict.observability import direction_lines
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig, load_rig
 from workbench.report.forecast_tables import parameter_forecast_table, range_forecast_table

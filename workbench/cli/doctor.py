@@ -10,13 +10,13 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from workbench.cli.person import whoever_is_there
 from workbench.cli.stopping import StopAfterShot
+from workbench.cli.terminal_operator import whoever_is_there
 from workbench.devices.registry import open_bench
 from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import load_rig
 from workbench.procedure.doctor import examine
-from workbench.procedure.operator import who_answers
+from workbench.procedure.engine.operator import who_answers
 
 
 def examine_rig(rig_path: Path, no_input: bool) -> None:

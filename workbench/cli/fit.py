@@ -12,15 +12,15 @@ from typing import Any
 
 from rich.console import Console
 
-from workbench.calibration.assess import Assessment, derive
-from workbench.calibration.boards import BoardView
-from workbench.calibration.export import calibrate, kept_because, write_calibration
-from workbench.calibration.fit import Fit
-from workbench.calibration.observations import Rejected, Sighting
-from workbench.calibration.records import left_out_records, parameter_records, term_summaries
-from workbench.calibration.sightings import sight_rows
-from workbench.calibration.significance import fit_chosen
-from workbench.cli.call import command_line, now, operator
+from workbench.calibration.data.boards import BoardView
+from workbench.calibration.data.observations import Rejected, Sighting
+from workbench.calibration.data.spot_rows import sight_rows
+from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.selection.model_terms import fit_chosen
+from workbench.calibration.verdict.assessment import Assessment, derive
+from workbench.calibration.verdict.export import calibrate, kept_because, write_calibration
+from workbench.calibration.verdict.records import left_out_records, parameter_records, term_summaries
+from workbench.cli.invocation import command_line, now, operator
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
 from workbench.model.captures import CaptureRow, check_images, of_file, parse_captures, read_captures_file

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
+from workbench.cli.console import say
 from workbench.cli.range import usable
-from workbench.cli.reading import plain
-from workbench.cli.saying import say
+from workbench.cli.reading_json import plain
 from workbench.cli.stopping import StopAfterShot
 from workbench.devices.protocols import Bench
 from workbench.devices.registry import open_bench

@@ -12,11 +12,11 @@ from typing import Annotated
 
 import typer
 
-from workbench.cli.leaving import leave
-from workbench.cli.numbers import millimetres, whole
-from workbench.cli.saying import say
+from workbench.cli.console import say
+from workbench.cli.exit import leave
+from workbench.cli.option_types import millimetres, whole
+from workbench.cli.stdio import fill_closed_streams
 from workbench.cli.stopping import ignore_signals, stop_at_once
-from workbench.cli.streams import fill_closed_streams
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
 
 app = typer.Typer(

@@ -8,12 +8,12 @@ from rich.console import Console
 from rich.table import Table
 
 from workbench.model.errors import BadInputError
-from workbench.procedure.check import check_file
-from workbench.procedure.exposure import LIT_FRAMES, MOST_TRIALS
-from workbench.procedure.latency import LEASE_S
-from workbench.procedure.outline import PlannedStep, outline
-from workbench.procedure.pace import Pace, learn_pace
-from workbench.procedure.run import Plan
+from workbench.procedure.capture.exposure import LIT_FRAMES, MOST_TRIALS
+from workbench.procedure.capture.latency import LEASE_S
+from workbench.procedure.engine.check import check_file
+from workbench.procedure.engine.durations import Pace, learn_pace
+from workbench.procedure.engine.plan import PlannedStep, outline
+from workbench.procedure.engine.run import Plan
 
 
 def check_files(files: list[Path]) -> None:

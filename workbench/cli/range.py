@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from workbench.cli.reading import plain
+from workbench.cli.reading_json import plain
 from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.captures import check_images, load_captures, of_file
 from workbench.model.errors import BadInputError

@@ -10,11 +10,11 @@ from pathlib import Path
 from rich.console import Console
 
 from workbench.cli.background import Background
-from workbench.cli.call import command_line, now, operator
-from workbench.cli.person import whoever_is_there
-from workbench.cli.saying import say
+from workbench.cli.console import say
+from workbench.cli.invocation import command_line, now, operator
 from workbench.cli.stopping import StopAfterShot
 from workbench.cli.terminal import Guarded, Terminal
+from workbench.cli.terminal_operator import whoever_is_there
 from workbench.devices.protocols import Operator
 from workbench.model import event as ev
 from workbench.model.errors import (
@@ -23,13 +23,13 @@ from workbench.model.errors import (
     RigNotReadyError,
     StoppedError,
 )
-from workbench.procedure.foreseen import foreseen_prompts
-from workbench.procedure.operator import Scripted
-from workbench.procedure.outline import outline
-from workbench.procedure.pace import learn_pace
-from workbench.procedure.progress import Forecast
-from workbench.procedure.resume import files_now, plan_of, resume
-from workbench.procedure.run import NOBODY, Caller, Plan, run
+from workbench.procedure.engine.durations import learn_pace
+from workbench.procedure.engine.expected_prompts import foreseen_prompts
+from workbench.procedure.engine.operator import Scripted
+from workbench.procedure.engine.plan import outline
+from workbench.procedure.engine.progress import Forecast
+from workbench.procedure.engine.resume import files_now, plan_of, resume
+from workbench.procedure.engine.run import NOBODY, Caller, Plan, run
 from workbench.report.thesis_figures import FigureWriter
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.spots import is_compiled
@@ -57,7 +57,7 @@ def run_procedures(procedures: list[Path], rig_path: Path, sessions: Path, answe
     """Run, show the progress, and say where everything is.
 
     Raises:
-        WorkbenchError: see `workbench.procedure.run.run`.
+        WorkbenchError: see `workbench.procedure.engine.run.run`.
     """
     plan = Plan.load(rig_path, procedures)
     session_dir = plan.new_session(sessions)
@@ -69,7 +69,7 @@ def resume_session(session_dir: Path, accept_changes: str | None, answers: Answe
     """Go on with a session that ended early.
 
     Raises:
-        WorkbenchError: see `workbench.procedure.resume.resume`.
+        WorkbenchError: see `workbench.procedure.engine.resume.resume`.
     """
     now, _ = files_now(session_dir, load_manifest(session_dir))
     plan = plan_of(session_dir, now)

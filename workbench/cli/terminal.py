@@ -15,8 +15,8 @@ from rich.text import Text
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.model.simulation import SceneSimulated, SimulationFinished
-from workbench.procedure.progress import Forecast
-from workbench.procedure.quality import Quality, quality_of
+from workbench.procedure.capture.quality import Quality, quality_of
+from workbench.procedure.engine.progress import Forecast
 from workbench.report.tables import (
     claim_table,
     left_out_table,

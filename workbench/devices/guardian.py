@@ -33,7 +33,7 @@ from pathlib import Path
 
 from workbench.devices.controller_line import ControllerLine
 from workbench.devices.digital_output import DigitalOutputLine
-from workbench.devices.guarded import TRY_BOARD_S
+from workbench.devices.guardian_client import TRY_BOARD_S
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError, WorkbenchError
 
 LOOK_S = 0.02

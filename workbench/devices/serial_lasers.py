@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import cast
 
-from workbench.devices.guarded import Guarded
+from workbench.devices.guardian_client import Guarded
 from workbench.model.errors import BadInputError
 from workbench.model.rig import LaserDriver
 

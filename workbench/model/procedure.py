@@ -137,7 +137,7 @@ class MeasureLatencyStep(FileModel):
 
 
 class GridLimits(FileModel):
-    """Limits on the captures of one laser at one placement; `workbench.procedure.quality` says of what."""
+    """Limits on the captures of one laser at one placement; see `procedure.capture.quality`."""
 
     missing: Limit | None = None
     saturated: Limit | None = None

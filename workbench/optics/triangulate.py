@@ -1,6 +1,6 @@
 """From a spot to the depth of the point that made it, and how that depth depends on everything.
 
-For many sensors at once, and the reference of `workbench.calibration.curves`, which inverts one sensor fast.
+For many sensors at once, and the reference of `workbench.sensor.curves`, which inverts one sensor fast.
 """
 
 from __future__ import annotations

@@ -9,16 +9,16 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from workbench.calibration.sightings import prior_scanline
+from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.devices.protocols import Bench, Operator, StreamingCamera
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError
 from workbench.model.exposure import CLIPPED
 from workbench.model.prompt import Prompt
 from workbench.model.rig import LaserSpec, Rig
 from workbench.model.target import Placement
-from workbench.procedure.exposure import set_exposure
-from workbench.procedure.latency import LEASE_S, count_latency
-from workbench.procedure.prompts import placement_prompt, safety_prompt
+from workbench.procedure.capture.exposure import set_exposure
+from workbench.procedure.capture.latency import LEASE_S, count_latency
+from workbench.procedure.engine.prompts import placement_prompt, safety_prompt
 from workbench.spots import Failure, find_spots
 
 STANDOFF_MM = 500.0

@@ -15,13 +15,13 @@ from zlib import crc32
 
 import numpy as np
 
-from workbench.calibration.boards import BoardView, on_boards, see_board
-from workbench.calibration.export import calibrate, render
-from workbench.calibration.next_standoff import advise
-from workbench.calibration.observations import PlacementInfo, Rejected, Sighting
-from workbench.calibration.records import fit_finished
-from workbench.calibration.sightings import prior_scanline
-from workbench.calibration.significance import fit_chosen
+from workbench.calibration.data.boards import BoardView, on_boards, see_board
+from workbench.calibration.data.observations import PlacementInfo, Rejected, Sighting
+from workbench.calibration.data.spot_rows import prior_scanline
+from workbench.calibration.design.next_standoff import advise
+from workbench.calibration.selection.model_terms import fit_chosen
+from workbench.calibration.verdict.export import calibrate, render
+from workbench.calibration.verdict.records import fit_finished
 from workbench.model import event as ev
 from workbench.model import procedure as pr
 from workbench.model.captures import BOARD
@@ -30,17 +30,17 @@ from workbench.model.prompt import Prompt, Quantity
 from workbench.model.rig import Rig
 from workbench.model.simulation import SimulationFinished
 from workbench.model.target import BoardTarget, Placement
-from workbench.procedure.context import Context
-from workbench.procedure.limits import check_captures, check_fit
-from workbench.procedure.sighted import sight_capture, sighted
-from workbench.procedure.visiting import visit
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.limits import check_captures, check_fit
+from workbench.procedure.engine.observed import sight_capture, sighted
+from workbench.procedure.engine.placements import visit
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE, write_capture_table
 from workbench.session.files import write_record
 from workbench.spots import Finding
 from workbench.trials.accuracy import accuracy_csv, accuracy_row
-from workbench.trials.thesis_simulation import claim_rows, claims_csv, readings_csv, simulate
+from workbench.trials.thesis.simulation import claim_rows, claims_csv, readings_csv, simulate
 
 SIMULATION_SEED = 2001
 """With a scene's name it draws the scene's noise: adding a scene leaves the others as they were."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from workbench.calibration.sensor import Ranges, Sensor
+from workbench.sensor.calibrated import Ranges, Sensor
 
 FloatArray = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.averaging import scatter_chi2, strays, weighted_mean
-from workbench.calibration.scatter import scale_called_for
+from workbench.calibration.data.averaging import scatter_chi2, strays, weighted_mean
+from workbench.calibration.estimation.noise_scale import scale_called_for
 from workbench.model.captures import ALL_LASERS, CaptureRow
 from workbench.model.errors import BadInputError
 from workbench.ranging.ranger import Ranger, Reading

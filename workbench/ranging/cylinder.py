@@ -59,7 +59,7 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
     None too where a spot would lie at grazing incidence or the radius would hardly be known: with as many
     parameters as a parabola, a circle is worth telling only where it differs from one.
     """
-    from workbench.ranging.kernels import circle  # loads the compiler, which only a fit needs
+    from workbench.ranging.shape_kernels import circle  # loads the compiler, which only a fit needs
 
     start = _start(points)
     if start is None:

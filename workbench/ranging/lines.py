@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.sensor import Ranges, Sensor
 from workbench.ranging.points import Points
 from workbench.ranging.shape import Shape, fit_shape
+from workbench.sensor.calibrated import Ranges, Sensor
 
 FloatArray = NDArray[np.float64]
 Axis = Literal["u", "v"]

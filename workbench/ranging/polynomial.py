@@ -70,7 +70,7 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
     the same wherever a spot lies: in ranges, the spots that noise put too near would get too much weight. An
     error of a place counts by the slope of the polynomial there.
     """
-    from workbench.ranging.kernels import polynomial  # loads the compiler, which only a fit needs
+    from workbench.ranging.shape_kernels import polynomial  # loads the compiler, which only a fit needs
 
     scale = float(np.abs(points.x_mm).max()) or 1.0
     coefficients, covariance, by_range, by_place, chi2 = polynomial(

@@ -10,14 +10,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.sensor import Ranges, Sensor
 from workbench.model.calibration import Calibration
 from workbench.model.event import LaserRange
 from workbench.ranging.assignment import MOST_MISFIT_SD, Pairs, assign, pair_up
-from workbench.ranging.bands import band
 from workbench.ranging.lines import NAMES, Axis, Line, Weights, line_of, mean_of_lines
-from workbench.ranging.objections import objections, outside_validity
 from workbench.ranging.records import flag_notes, flat_range, laser_ranges
+from workbench.ranging.search_band import band
+from workbench.ranging.validity_checks import objections, outside_validity
+from workbench.sensor.calibrated import Ranges, Sensor
 from workbench.spots import Scanline, Spot
 
 FloatArray = NDArray[np.float64]

@@ -8,9 +8,9 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.sensor import Ranges
 from workbench.model.event import LaserRange
 from workbench.ranging.points import interval_mm
+from workbench.sensor.calibrated import Ranges
 from workbench.spots import Failure, Spot
 
 FloatArray = NDArray[np.float64]

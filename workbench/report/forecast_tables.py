@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from rich.table import Table
 
-from workbench.calibration.forecast import ParameterForecast, RangeForecast
+from workbench.calibration.design.forecast import ParameterForecast, RangeForecast
 
 
 def parameter_forecast_table(parameters: Iterable[ParameterForecast]) -> Table:

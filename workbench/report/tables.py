@@ -12,9 +12,9 @@ from rich.table import Table
 from workbench.model.calibration import TERM_VERDICTS, TermSummary
 
 if TYPE_CHECKING:  # a table of one of them is made without the rest
-    from workbench.calibration.assess import Derived
-    from workbench.calibration.compare import Difference
-    from workbench.calibration.observations import Rejected
+    from workbench.calibration.data.observations import Rejected
+    from workbench.calibration.verdict.assessment import Derived
+    from workbench.calibration.verdict.comparison import Difference
     from workbench.model.event import LeftOutRecord, ParameterRecord, RejectedRecord, TrialRow
     from workbench.model.simulation import ClaimRow
 

@@ -2,7 +2,7 @@
 
 from workbench.spots.explain import explain
 from workbench.spots.finder import SpotFinder, find_spots, is_compiled
-from workbench.spots.lights import is_same, lasting
+from workbench.spots.persistence import is_same, lasting
 from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
 
 __all__ = [

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.spots.pixels import peaks_of
+from workbench.spots.kernels.strip_pixels import peaks_of
 from workbench.spots.strip import Strip
 from workbench.spots.types import Floats
 

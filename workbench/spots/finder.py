@@ -87,6 +87,6 @@ def find_spots(
     return finder.find(on, off)
 
 
-def is_compiled(folder: Path = Path(__file__).parent) -> bool:
+def is_compiled(folder: Path = Path(__file__).parent / "kernels") -> bool:
     """Whether the loops of this package are kept as machine code, or elsewhere, where it cannot be told."""
     return not os.access(folder, os.W_OK) or any((folder / "__pycache__").glob("*.nbi"))

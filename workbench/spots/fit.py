@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from workbench.spots.kernels.single import JUDGED, score
 from workbench.spots.noise import Noise
-from workbench.spots.scoring import JUDGED, score
 from workbench.spots.types import Bools, Floats
 
 

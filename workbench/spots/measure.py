@@ -7,12 +7,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from workbench.spots.cutting import HALVES_PX, flag_codes, guess, halves_for
 from workbench.spots.detect import FINE_PX, Peaks
 from workbench.spots.fit import Windows
-from workbench.spots.gaussian import FLUX, LN_SU, U, V
-from workbench.spots.judging import COLUMNS, NEXT_HALF, U_SD, fit_group
+from workbench.spots.kernels.acceptance import COLUMNS, NEXT_HALF, U_SD, fit_group
+from workbench.spots.kernels.windows import HALVES_PX, flag_codes, guess, halves_for
 from workbench.spots.pair import Scene
+from workbench.spots.psf import FLUX, LN_SU, U, V
 from workbench.spots.types import NO_FLAGS, Failure, Floats, Spot
 
 # First guesses of the width scatter upwards; a window too small is cut anew.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.spots.pixels import level_of
-from workbench.spots.transfer import transfer_slope
+from workbench.spots.kernels.photon_transfer import transfer_slope
+from workbench.spots.kernels.strip_pixels import level_of
 from workbench.spots.types import Floats
 
 _SAMPLES = 1200

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.spots.cutting import cut
 from workbench.spots.fit import Windows
+from workbench.spots.kernels.windows import cut
 from workbench.spots.noise import level_and_variance
 from workbench.spots.strip import Strip
 from workbench.spots.types import Floats, Image, Ints

@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from workbench.spots.crowd import fitted_together, grown, split
+from workbench.spots.deblending.blend import fitted_together, grown, split
+from workbench.spots.deblending.clusters import CLEAR_SD, are_apart, clearest, clusters, without_duplicates
 from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
 from workbench.spots.measure import Trace, measure
 from workbench.spots.pair import Pair, Scene, look
-from workbench.spots.resolve import CLEAR_SD, are_apart, clearest, clusters, without_duplicates
 from workbench.spots.strip import Strip, is_on, strip_of
 from workbench.spots.types import NO_FLAGS, Failure, Finding, Image, Scanline, Spot
 

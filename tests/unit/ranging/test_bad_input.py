@@ -12,10 +12,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.unit.rigs import World, thesis_rig
-from tests.unit.test_calibration_file import PROVENANCE
-from workbench.calibration.export import calibrate, write_calibration
-from workbench.calibration.fit import fit
+from tests.support.rigs import PROVENANCE, World, thesis_rig
+from workbench.calibration.estimation.fit import fit
+from workbench.calibration.verdict.export import calibrate, write_calibration
 from workbench.cli.main import main
 from workbench.cli.stopping import SIGNALS
 from workbench.model.acceptance import Acceptance

@@ -17,7 +17,7 @@ import pytest
 
 from tests.bench.sensors import calibration_of
 from workbench import emulator
-from workbench.calibration.export import write_calibration
+from workbench.calibration.verdict.export import write_calibration
 from workbench.cli.main import main
 from workbench.cli.range import range_captures
 from workbench.cli.stopping import SIGNALS

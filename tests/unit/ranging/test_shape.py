@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from tests.unit.ranging.surfaces import (
+from tests.support.surfaces import (
     F_PX,
     SD_PX,
     Floats,

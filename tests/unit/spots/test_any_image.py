@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from tests.unit.spots.draw import Frame
+from tests.support.draw import Frame
 from workbench.model.errors import BadInputError
 from workbench.spots import Failure, Finding, Scanline, find_spots
 

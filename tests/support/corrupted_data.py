@@ -1,0 +1,55 @@
+"""Simulated calibrations with something wrong in them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from tests.support.rigs import World
+from workbench.calibration.data.observations import Sighting
+
+
+def exchanged(sightings: list[Sighting], a: str, b: str) -> list[Sighting]:
+    """Two lasers wired the wrong way round."""
+    other = {a: b, b: a}
+    return [replace(s, laser_id=other.get(s.laser_id, s.laser_id)) for s in sightings]
+
+
+def mirrored(world: World, sightings: list[Sighting]) -> list[Sighting]:
+    return [replace(s, u_px=world.rig.camera.width_px - 1 - s.u_px) for s in sightings]
+
+
+def told_as(sightings: list[Sighting], standoff_mm: float, told_mm: float) -> list[Sighting]:
+    return [replace(s, standoff_mm=told_mm) if s.standoff_mm == standoff_mm else s for s in sightings]
+
+
+def shifted(
+    sightings: list[Sighting],
+    laser_id: str,
+    standoff_mm: float,
+    by_px: float,
+    repeats: Collection[int] = range(99),
+) -> list[Sighting]:
+    """Some repeats of one spot seen elsewhere, across and along alike."""
+    return [
+        replace(s, u_px=s.u_px + by_px, v_px=s.v_px + 0.1 * by_px)
+        if (s.laser_id, s.standoff_mm) == (laser_id, standoff_mm) and s.repeat in repeats
+        else s
+        for s in sightings
+    ]
+
+
+def moved(
+    world: World, sightings: list[Sighting], standoff_mm: float, after: int, step_mm: float
+) -> list[Sighting]:
+    """A target that moves by `step_mm` after so many captures of its placement."""
+    found, seen = [], 0
+    z0 = standoff_mm + world.values["offset_mm"]
+    for s in sightings:
+        if s.standoff_mm == standoff_mm:
+            seen += 1
+            if seen > after:
+                du, dv = world.pixel(s.laser_id, z0 + step_mm) - world.pixel(s.laser_id, z0)
+                s = replace(s, u_px=s.u_px + float(du), v_px=s.v_px + float(dv))
+        found.append(s)
+    return found

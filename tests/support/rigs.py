@@ -1,0 +1,133 @@
+"""Rigs and made-up measurements for the unit tests, by numpy alone: independent of `workbench.optics`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.calibration.data.observations import Sighting
+from workbench.model.calibration import Provenance
+from workbench.model.rig import BenchSpec, CameraSpec, LaserSpec, NoiseSpec, Prior, Rig
+
+STANDOFFS_MM = (125.0, 160.0, 210.0, 280.0, 400.0, 600.0, 900.0, 1400.0, 2200.0, 3200.0, 4500.0)
+
+
+PROVENANCE = Provenance(
+    session="20261122-120000-calibrate-flat",
+    captures_sha256="00" * 32,
+    rig="thesis",
+    serial="1e5",
+    command="workbench fit captures.csv --rig 'my rig.yaml'",
+    version="0.1.0",
+    operator="A. Technician",
+    created="2026-11-22T12:00:00+0000",
+)
+
+
+def prior(value: float, sd: float) -> Prior:
+    return Prior(value=value, sd=sd)
+
+
+def thesis_rig(noise_px: float = 0.03, speckle_px: float = 0.04) -> Rig:
+    """Four horizontal lasers, with the tolerances of the design."""
+    lasers = tuple(
+        LaserSpec(
+            id=name,
+            axis="u",
+            x_mm=prior(x, 0.2),
+            y_mm=prior(0.0, 0.2),
+            tx=prior(0.0, 0.005),
+            ty=prior(0.0, 0.005),
+        )
+        for name, x in (("L1", -60.0), ("L2", -30.0), ("L3", 30.0), ("L4", 60.0))
+    )
+    return Rig(
+        format=1,
+        rig="thesis",
+        camera=CameraSpec(
+            width_px=640,
+            height_px=480,
+            f_px=prior(533.3, 26.7),
+            cx_px=prior(319.5, 40.0),
+            cy_px=prior(239.5, 40.0),
+            k1=prior(0.0, 0.3),
+            k2=prior(0.0, 0.3),
+        ),
+        lasers=lasers,
+        bench=BenchSpec(
+            offset_mm=prior(0.0, 5.0),
+            ruler_scale=prior(0.0, 0.0005),
+            placement_sd_mm=0.3,
+            tilt_sd_deg=0.5,
+        ),
+        noise=NoiseSpec(spot_sd_px=noise_px, speckle_sd_px=speckle_px),
+    )
+
+
+def draw(rng: np.random.Generator, spread: Prior) -> float:
+    return float(rng.normal(spread.value, spread.sd)) if spread.sd else spread.value
+
+
+@dataclass
+class World:
+    """A true sensor drawn from a rig's tolerances, and what it sees of a flat."""
+
+    rig: Rig
+    seed: int
+    values: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        rng = np.random.default_rng(self.seed)
+        for name in ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"):
+            self.values[name] = draw(rng, getattr(self.rig.camera, name))
+        self.values["offset_mm"] = draw(rng, self.rig.bench.offset_mm)
+        self.values["ruler_scale"] = draw(rng, self.rig.bench.ruler_scale)
+        for laser in self.rig.lasers:
+            for name in ("x_mm", "y_mm", "tx", "ty"):
+                self.values[f"{laser.id}.{name}"] = draw(rng, getattr(laser, name))
+
+    def pixel(self, laser_id: str, z0_mm: float, yaw: float = 0.0, pitch: float = 0.0) -> NDArray[np.float64]:
+        """(2,) where the laser's spot on a tilted flat appears, by linear algebra and OpenCV's lens."""
+        x, y, tx, ty = (self.values[f"{laser_id}.{name}"] for name in ("x_mm", "y_mm", "tx", "ty"))
+        system = np.array([[1, 0, -tx], [0, 1, -ty], [-np.tan(yaw), -np.tan(pitch), 1.0]])
+        point = np.linalg.solve(system, [x, y, z0_mm])
+        v = self.values
+        camera = np.array([[v["f_px"], 0, v["cx_px"]], [0, v["f_px"], v["cy_px"]], [0, 0, 1]])
+        lens = np.array([v[k] for k in ("k1", "k2", "p1", "p2", "k3")])
+        pixel, _ = cv2.projectPoints(point, np.zeros(3), np.zeros(3), camera, lens)
+        return np.asarray(pixel, np.float64).reshape(2)
+
+    def sightings(
+        self, standoffs_mm: tuple[float, ...] = STANDOFFS_MM, repeats: int = 5, session: int = 1
+    ) -> list[Sighting]:
+        """A whole calibration: placement errors, tilts, speckle and noise drawn from the rig's tolerances."""
+        rng = np.random.default_rng([self.seed, session])
+        bench, noise = self.rig.bench, self.rig.noise
+        found = []
+        for standoff in standoffs_mm:
+            error = rng.normal(0.0, bench.placement_sd_mm)
+            yaw, pitch = np.radians(rng.normal(0.0, bench.tilt_sd_deg, 2))
+            z0 = standoff * (1 + self.values["ruler_scale"]) + error + self.values["offset_mm"]
+            for laser in self.rig.lasers:
+                centre = self.pixel(laser.id, z0, yaw, pitch) + rng.normal(0, noise.speckle_sd_px, 2)
+                for repeat in range(repeats):
+                    u, v = centre + rng.normal(0.0, noise.spot_sd_px, 2)
+                    if 0 <= u <= 639 and 0 <= v <= 479:
+                        source = f"{laser.id} {standoff:g} {repeat}"
+                        found.append(
+                            Sighting(source, laser.id, f"{standoff:g}", standoff, repeat, float(u), float(v))
+                        )
+        return found
+
+
+def board_rig(print_scale: Prior | None = None) -> Rig:
+    """The design's tolerances, lenses that do not fold in the picture, and the print by a steel rule."""
+    rig = thesis_rig()
+    bench = rig.bench.model_copy(
+        update={"print_scale": print_scale or prior(0.0, 0.0005), "board_flatness_sd_mm": 0.05}
+    )
+    camera = rig.camera.model_copy(update={"k1": prior(0.0, 0.1), "k2": prior(0.0, 0.05)})
+    return rig.model_copy(update={"bench": bench, "camera": camera})

@@ -1,0 +1,137 @@
+"""Leave-one-standoff-out: against refits, against simulated truth, and what it says of a wrong standoff."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.corrupted_data import told_as
+from tests.support.rigs import STANDOFFS_MM, World, thesis_rig
+from workbench.calibration.checks.cross_validation import LeftOut, alarms, leave_each_out
+from workbench.calibration.data.spot_rows import sight_rows
+from workbench.calibration.estimation.fit import fit
+from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit, rows_of
+from workbench.calibration.verdict.assessment import judge
+from workbench.model.acceptance import Acceptance
+from workbench.model.captures import load_captures
+from workbench.model.rig import load_rig
+
+ROOT = Path(__file__).parents[4]
+RIG = thesis_rig()
+SEEDS = (1, 2, 3)
+FITS = 40
+
+
+@pytest.fixture(scope="module")
+def sound() -> list[tuple[LeftOut, ...]]:
+    """The folds of simulated calibrations in which nothing is wrong."""
+    return [leave_each_out(fit(RIG, World(RIG, seed).sightings())) for seed in range(500, 500 + FITS)]
+
+
+@pytest.mark.parametrize("standoff_mm", [125.0, 600.0, 4500.0])
+def test_a_fold_is_the_fit_without_the_placement(standoff_mm: float) -> None:
+    sightings = World(RIG, 1).sightings()
+    whole = fit(RIG, sightings)
+    without = fit(RIG, [s for s in sightings if s.standoff_mm != standoff_mm])
+    problem = problem_of(whole)
+    cells = np.array([whole.cells.placements[i].standoff_mm == standoff_mm for i in whole.cells.placement])
+    left = refit(problem, measured(problem) & ~rows_of(cells, problem), optimum_of(whole))
+    sensor = whole.sensor
+    values = (whole.table.prior_mean + whole.table.prior_sd * left.y)[sensor]
+    free = whole.table.prior_sd[sensor] > 0
+    off = (values - without.values[sensor])[free] / without.sd[sensor][free]
+    assert np.abs(off).max() < 1e-3
+    sd = whole.table.prior_sd[sensor] * np.sqrt(np.diag(left.covariance)[sensor])
+    np.testing.assert_allclose(sd, without.sd[sensor], rtol=1e-3)
+
+
+def test_what_a_standoff_moves_is_its_difference() -> None:
+    problem, y = (
+        problem_of(fit(RIG, World(RIG, 1).sightings())),
+        optimum_of(fit(RIG, World(RIG, 1).sightings())),
+    )
+    step_mm = 1e-3
+    ahead, behind = (
+        Problem(
+            problem.layout,
+            problem.data._replace(standoff_mm=np.asarray(problem.data.standoff_mm) + sign * step_mm),
+        ).linearise(y, 2.0)[0]
+        for sign in (1, -1)
+    )
+    np.testing.assert_allclose(
+        problem.by_standoff(y, 2.0), (ahead - behind) / (2 * step_mm), rtol=1e-6, atol=1e-8
+    )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_range_errors_are_those_of_a_fit_whose_standoff_is_free(seed: int) -> None:
+    """A placement whose ruler may be a metre off: what its error is fitted to, is what its spots range."""
+    sightings = World(RIG, seed).sightings()
+    folds = {fold.standoff_mm: fold for fold in leave_each_out(fit(RIG, sightings))}
+    for standoff in (160.0, 600.0, 3200.0):
+        told = [replace(s, standoff_sd_mm=1e3) if s.standoff_mm == standoff else s for s in sightings]
+        freed = fit(RIG, told)
+        index = [p.name for p in freed.table.parameters].index(f"{standoff:g}.error_mm")
+        sd = np.hypot(freed.sd[index], RIG.bench.placement_sd_mm)
+        assert folds[standoff].sd_mm == pytest.approx(sd, rel=0.01)
+        assert folds[standoff].error_mm == pytest.approx(freed.values[index], abs=0.02 * sd)
+
+
+def test_errors_are_as_large_as_promised(sound: list[tuple[LeftOut, ...]]) -> None:
+    folds = [fold for folds in sound for fold in folds]
+    z2 = np.array([fold.z**2 for fold in folds])
+    by_laser = np.array([(i.error_mm / i.sd_mm) ** 2 for fold in folds for i in fold.lasers])
+    chi2 = np.array([fold.chi2 / fold.coordinates for fold in folds])
+    # Each fit counts once: its folds, and the lasers of a placement, share errors.
+    for square in (z2, chi2, by_laser):
+        assert square.mean() == pytest.approx(1.0, abs=4 * np.sqrt(2 / len(folds)))
+    assert {fold.coordinates for fold in folds} <= {4, 6, 8}
+
+
+def test_chances_are_chances(sound: list[tuple[LeftOut, ...]]) -> None:
+    """A tenth of all chances lie below 0.1."""
+    for name in ("range_p", "spots_p"):
+        chances = np.array([getattr(fold, name) for folds in sound for fold in folds])
+        assert (chances < 0.1).mean() == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / len(chances)))
+
+
+def test_sound_calibrations_raise_no_alarm(sound: list[tuple[LeftOut, ...]]) -> None:
+    """One in 1000 does: that one of 40 would is a chance of 4 %, and the seeds are fixed."""
+    assert not any(alarms(folds) for folds in sound)
+
+
+@pytest.mark.parametrize("standoff_mm", STANDOFFS_MM[:7])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_ten_millimetres_are_found_up_to_900(seed: int, standoff_mm: float) -> None:
+    result = fit(RIG, told_as(World(RIG, seed).sightings(), standoff_mm, standoff_mm + 10))
+    found = alarms(leave_each_out(result))
+    worst = min(found, key=lambda fold: min(fold.range_p, fold.spots_p))
+    assert worst.standoff_mm == standoff_mm + 10
+    # The ruler says 10 mm more than the spots do.
+    assert worst.error_mm == pytest.approx(-10.0, abs=4 * worst.sd_mm)
+
+
+def test_an_alarm_refuses_and_says_what_to_do() -> None:
+    """12 mm at 1400: seen, though not so clearly that it could have no other name."""
+    assessment = judge(fit(RIG, told_as(World(RIG, 5).sightings(), 1400.0, 1412.0)), Acceptance(), 0.01)
+    assert (assessment.verdict, assessment.faults) == ("refused", ())
+    (told,) = assessment.reasons
+    assert "the captures at 1412 mm contradict the others" in told
+    assert "mm off in range" in told
+    assert "--without-standoff 1412" in told
+
+
+def test_two_placements_leave_nothing_to_predict_with() -> None:
+    assert leave_each_out(fit(RIG, World(RIG, 1).sightings((200.0, 800.0)))) == ()
+
+
+def test_noise_that_nobody_stated_rightly_is_no_alarm() -> None:
+    """Real readings, scattering 2.4 times as much as their rounding: the noise is then the others'."""
+    rig = load_rig(ROOT / "rigs/webcam-laser.yaml")
+    folds = leave_each_out(fit(rig, *sight_rows(rig, load_captures(ROOT / "data/webcam-laser-rows.csv"))))
+    assert all(np.isfinite(fold.freedom) for fold in folds)
+    assert not alarms(folds)

@@ -1,0 +1,308 @@
+"""Faults put into simulated calibrations are named, each by its own name, and sound ones name none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.support.board_world import PLACINGS, BoardWorld
+from tests.support.corrupted_data import exchanged, mirrored, moved, shifted, told_as
+from tests.support.rigs import World, board_rig, prior, thesis_rig
+from workbench.calibration.checks import hypotheses
+from workbench.calibration.checks.cross_validation import leave_each_out, rows_at
+from workbench.calibration.checks.faults import Fault, find_faults
+from workbench.calibration.checks.hypotheses import explain_misfit
+from workbench.calibration.data.observations import Rejected, Sighting
+from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit
+from workbench.calibration.selection.outliers import fit_without_outliers
+from workbench.calibration.verdict.assessment import Assessment, judge
+from workbench.model.acceptance import Acceptance
+from workbench.model.rig import Rig
+
+RIG = thesis_rig()
+SEEDS = (1, 2)
+SOUND = 20
+
+
+def named(sightings: list[Sighting], rejected: list[Rejected] | None = None, rig: Rig = RIG) -> list[Fault]:
+    fit = fit_without_outliers(rig, sightings, rejected or [])
+    return list(find_faults(fit, leave_each_out(fit)))
+
+
+def judged(sightings: list[Sighting]) -> Assessment:
+    return judge(fit_without_outliers(RIG, sightings), Acceptance(), 0.01)
+
+
+def the(faults: list[Fault], name: str) -> str:
+    assert [fault.name for fault in faults] == [name]
+    return faults[0].message
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+class TestFaults:
+    @pytest.mark.parametrize(("a", "b"), [("L1", "L2"), ("L1", "L4")])
+    def test_two_lasers_exchanged(self, seed: int, a: str, b: str) -> None:
+        message = the(named(exchanged(World(RIG, seed).sightings(), a, b)), "lasers_swapped")
+        assert f"lasers {a} and {b} are exchanged" in message
+
+    def test_a_mirrored_picture(self, seed: int) -> None:
+        world = World(RIG, seed)
+        assert "left to right" in the(named(mirrored(world, world.sightings())), "mirrored")
+
+    @pytest.mark.parametrize(
+        ("standoff_mm", "told_mm", "slip"),
+        [(600.0, 6000.0, "a digit too many"), (160.0, 1600.0, "too many"), (400.0, 40.0, "a digit too few")],
+    )
+    def test_a_standoff_mistyped(self, seed: int, standoff_mm: float, told_mm: float, slip: str) -> None:
+        message = the(named(told_as(World(RIG, seed).sightings(), standoff_mm, told_mm)), "standoff")
+        assert f"the captures at {told_mm:g} mm fit a standoff of" in message
+        assert slip in message
+        fitted = float(message.split("standoff of ")[1].split(" mm")[0])
+        assert fitted == pytest.approx(standoff_mm, abs=5 * RIG.bench.placement_sd_mm + 0.005 * standoff_mm)
+
+    @pytest.mark.parametrize("standoff_mm", [125.0, 400.0, 900.0])
+    def test_a_standoff_ten_millimetres_off(self, seed: int, standoff_mm: float) -> None:
+        message = the(named(told_as(World(RIG, seed).sightings(), standoff_mm, standoff_mm + 10)), "standoff")
+        assert f"at {standoff_mm + 10:g} mm" in message
+
+    @pytest.mark.parametrize(
+        ("standoff_mm", "after", "step_mm"),
+        [(160.0, 8, 2.0), (400.0, 12, -5.0), (600.0, 7, 8.0), (900.0, 4, 20.0)],
+    )
+    def test_a_target_that_moved(self, seed: int, standoff_mm: float, after: int, step_mm: float) -> None:
+        world = World(RIG, seed)
+        sightings = moved(world, world.sightings(), standoff_mm, after, step_mm)
+        message = the(named(sightings), "moved")
+        assert f"the target at {standoff_mm:g} mm moved by {step_mm:+.2g}"[:30] in message
+        of_it = [s.source for s in sightings if s.standoff_mm == standoff_mm]
+        assert f"after {after} of its {len(of_it)} captures" in message
+        assert f"between {of_it[after - 1]} and {of_it[after]}" in message
+
+    @pytest.mark.parametrize("by_px", [2.0, -100.0])
+    @pytest.mark.parametrize("repeats", [range(5), (1, 3), (1, 3, 4)])
+    def test_a_reflection(self, seed: int, by_px: float, repeats: range | tuple[int, ...]) -> None:
+        sightings = shifted(World(RIG, seed).sightings(), "L2", 600.0, by_px, repeats)
+        fit = fit_without_outliers(RIG, sightings)
+        message = the(list(find_faults(fit, leave_each_out(fit))), "reflection")
+        assert f"laser L2 at 600 mm: {len(repeats)} of its captures" in message
+        assert {r.source for r in fit.rejected} == {f"L2 600 {k}" for k in repeats}
+        assert fit.noise_scale == 1.0
+
+    def test_a_laser_that_never_lit(self, seed: int) -> None:
+        sightings = World(RIG, seed).sightings()
+        dark = [s for s in sightings if s.laser_id == "L3"]
+        missing = [Rejected(s.source, "no spot", s) for s in dark]
+        message = the(named([s for s in sightings if s not in dark], missing), "never_lit")
+        assert f"laser L3 never lit: none of its {len(dark)} captures" in message
+
+    def test_spots_saturated(self, seed: int) -> None:
+        sightings = [replace(s, saturated=s.standoff_mm < 300) for s in World(RIG, seed).sightings()]
+        assert "at 125, 160, 210, 280 mm" in the(named(sightings), "saturated")
+
+    def test_all_standoffs_far(self, seed: int) -> None:
+        message = the(named(World(RIG, seed).sightings((1400.0, 2200.0, 3200.0, 4500.0))), "all_far")
+        assert "from 1400 mm on" in message
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("standoffs_mm", [(200.0,), (200.0, 200.0), (200.0, 230.0)])
+def test_few_standoffs_that_are_near_are_not_called_far(seed: int, standoffs_mm: tuple[float, ...]) -> None:
+    fit = fit_without_outliers(RIG, World(RIG, seed).sightings(standoffs_mm))
+    assert find_faults(fit, ()) == ()
+
+
+def test_lasers_read_across_their_line_alone_are_not_called_far() -> None:
+    sightings = [replace(s, u_px=float("nan")) for s in World(RIG, 1).sightings()]
+    assert find_faults(fit_without_outliers(RIG, sightings), ()) == ()
+
+
+def test_what_leaving_a_placement_out_gains_is_known_to_first_order() -> None:
+    fit = fit_without_outliers(RIG, World(RIG, 3).sightings())
+    problem = problem_of(fit)
+    state = refit(problem, measured(problem), optimum_of(fit))
+    for index in range(len(fit.cells.placements)):
+        rows = rows_at(problem, index)
+        gain = state.cost - refit(problem, state.used & ~rows, np.zeros(len(state.y))).cost
+        assert hypotheses._gain_without(state, rows) == pytest.approx(gain, rel=0.1)
+
+
+@pytest.mark.parametrize(("standoff_mm", "off_mm"), [(900.0, 4.5), (900.0, 5.0), (1400.0, 12.0)])
+def test_nothing_is_missed_where_no_refit_is_made(
+    standoff_mm: float, off_mm: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sightings = told_as(World(RIG, 20_001).sightings(), standoff_mm, standoff_mm + off_mm)
+    fit = fit_without_outliers(RIG, sightings)
+    quick = explain_misfit(fit)
+    monkeypatch.setattr(hypotheses, "CLEARLY_LESS", 0.0)
+    assert [(h.kind, h.subject) for h in quick] == [(h.kind, h.subject) for h in explain_misfit(fit)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_two_standoffs_mistyped(seed: int) -> None:
+    sightings = told_as(told_as(World(RIG, seed).sightings(), 600.0, 6000.0), 160.0, 170.0)
+    faults = named(sightings)
+    assert {fault.name for fault in faults} == {"standoff"}
+    assert {fault.message.split(" mm")[0] for fault in faults} == {
+        "the captures at 6000",
+        "the captures at 170",
+    }
+
+
+def test_a_camera_on_its_head_where_lasers_stand_above_and_below() -> None:
+    upright = tuple(
+        laser.model_copy(
+            update={"axis": "v", "x_mm": prior(0.0, 0.2), "y_mm": prior(0.5 * laser.x_mm.value + 8, 0.2)}
+        )
+        for laser in RIG.lasers
+    )
+    rig = RIG.model_copy(update={"lasers": upright})
+    sightings = [replace(s, v_px=479 - s.v_px) for s in World(rig, 1).sightings()]
+    assert "top to bottom" in the(named(sightings, rig=rig), "upside_down")
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda world, s: exchanged(s, "L1", "L2"),
+        mirrored,
+        lambda world, s: told_as(s, 600.0, 6000.0),
+        lambda world, s: moved(world, s, 160.0, 8, 2.0),
+    ],
+)
+def test_a_fault_that_spoils_everything_refuses(
+    spoil: Callable[[World, list[Sighting]], list[Sighting]],
+) -> None:
+    world = World(RIG, 4)
+    assessment = judged(spoil(world, world.sightings()))
+    assert assessment.verdict == "refused"
+    assert assessment.reasons[0] == assessment.faults[0].message
+    assert not any("contradict the others" in reason for reason in assessment.reasons)
+
+
+def test_a_reflection_left_out_does_not_refuse() -> None:
+    assessment = judged(shifted(World(RIG, 4).sightings(), "L2", 600.0, 12.0))
+    assert (assessment.verdict, [f.name for f in assessment.faults]) == ("accepted", ["reflection"])
+    assert assessment.faults[0].message in assessment.warnings
+
+
+def test_sound_calibrations_name_no_fault_and_lose_no_spot() -> None:
+    """2000 are tried by `python -m tests.proofs.validation`."""
+    for seed in range(700, 700 + SOUND):
+        fit = fit_without_outliers(RIG, World(RIG, seed).sightings())
+        assert fit.rejected == ()
+        assert find_faults(fit, ()) == ()
+
+
+def test_noise_that_nobody_stated_rightly_is_no_fault() -> None:
+    """Noise and speckle three times the stated: the fit scales its deviations, and nothing is named."""
+    for seed in range(2):
+        sightings = World(thesis_rig(0.09, 0.12), seed).sightings()
+        fit = fit_without_outliers(RIG, sightings)
+        assert fit.noise_scale > 1.5
+        assert fit.rejected == ()
+        assert find_faults(fit, leave_each_out(fit)) == ()
+        assert explain_misfit(fit) == ()
+    assert np.isfinite(fit.values).all()
+
+
+@pytest.mark.parametrize(("factor", "seed"), [(2, 4), (3, 2), (3, 6), (4, 1), (4, 3)])
+def test_repeats_noisier_than_stated_are_no_fault(factor: int, seed: int) -> None:
+    """Speckle is as stated: the fit's own scale stays 1, and the repeats' must serve every test."""
+    sightings = World(thesis_rig(0.03 * factor), seed).sightings(repeats=10)
+    fit = fit_without_outliers(RIG, sightings)
+    assert fit.cells.repeat_scale == pytest.approx(factor, rel=0.1)
+    assert fit.noise_scale == 1.0
+    assert find_faults(fit, leave_each_out(fit)) == ()
+
+
+@pytest.mark.parametrize("seed", [1, 8, 9])
+def test_one_spot_that_flickers_is_no_movement(seed: int) -> None:
+    """Three times the noise of all others in the repeats of one spot: its own deviation is the measure."""
+    rng = np.random.default_rng(seed)
+    sightings = [
+        replace(s, u_px=s.u_px + rng.normal(0, 0.1), v_px=s.v_px + rng.normal(0, 0.1))
+        if (s.laser_id, s.standoff_mm) == ("L2", 600.0)
+        else s
+        for s in World(RIG, seed).sightings(repeats=8)
+    ]
+    fit = fit_without_outliers(RIG, sightings)
+    assert len(fit.cells.torn) == 1
+    assert find_faults(fit, leave_each_out(fit)) == ()
+
+
+@pytest.mark.parametrize(
+    ("u_px", "v_px", "agree"),
+    [
+        ((250.0, 250.01), (240.0, 240.01), True),
+        ((250.0, 250.01), (np.nan, np.nan), True),
+        ((250.0, 300.0), (np.nan, 240.0), False),
+        ((250.0, np.nan), (np.nan, 240.0), False),
+        ((np.nan, np.nan), (np.nan, np.nan), False),
+        ((250.0, 300.0), (240.0, 240.01), False),
+    ],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_strays_agree_only_where_they_were_measured(
+    seed: int, u_px: tuple[float, ...], v_px: tuple[float, ...], agree: bool
+) -> None:
+    sightings = World(RIG, seed).sightings(repeats=2)
+    template = next(s for s in sightings if (s.laser_id, s.standoff_mm) == ("L2", 600.0))
+    strays = [replace(template, u_px=u, v_px=v) for u, v in zip(u_px, v_px, strict=True)]
+    fit = fit_without_outliers(RIG, sightings, [Rejected(s.source, "away", stray=s) for s in strays])
+    assert [fault.name for fault in find_faults(fit, ())] == ["reflection"] * agree
+
+
+def without_v(world: World) -> list[Sighting]:
+    return [replace(s, v_px=float("nan")) for s in world.sightings()]
+
+
+ONE_LASER = RIG.model_copy(update={"lasers": RIG.lasers[:1]})
+SHAPES: list[tuple[str, Rig, Rig, Callable[[World], list[Sighting]]]] = [
+    ("repeats noisier", RIG, thesis_rig(0.09), World.sightings),
+    ("speckle larger", RIG, thesis_rig(0.03, 0.12), World.sightings),
+    ("one laser", ONE_LASER, ONE_LASER, World.sightings),
+    ("u alone", RIG, RIG, without_v),
+    ("one placement", RIG, RIG, lambda world: world.sightings((400.0,))),
+    ("two placements", RIG, RIG, lambda world: world.sightings((200.0, 800.0))),
+    ("one row", ONE_LASER, ONE_LASER, lambda world: world.sightings((400.0,), repeats=1)),
+]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    ("told", "true", "seen"), [shape[1:] for shape in SHAPES], ids=[n for n, *_ in SHAPES]
+)
+def test_sound_data_of_any_shape_are_judged_without_a_fault(
+    seed: int, told: Rig, true: Rig, seen: Callable[[World], list[Sighting]]
+) -> None:
+    sightings = seen(World(true, seed))
+    assessment = judge(fit_without_outliers(told, sightings), Acceptance(), 0.001)
+    assert assessment.faults == ()
+    few = len({s.standoff_mm for s in sightings}) < Acceptance().min_standoffs
+    assert (assessment.verdict == "refused") == few
+    assert all("standoffs, expected at least" in reason for reason in assessment.reasons)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("off_mm", [0.0, 10.0])
+def test_a_boards_standoff_mistyped(seed: int, off_mm: float) -> None:
+    """Its corners and its spots agree with one another and contradict the ruler."""
+    world = World(board_rig(), seed)
+    sightings, views = BoardWorld(world).measure(PLACINGS[:5])
+    told = [
+        replace(s, standoff_mm=s.standoff_mm + off_mm) if s.placement == "B1" else s for s in sightings
+    ] + world.sightings((600.0, 1400.0))
+    boards = [
+        replace(view, placement=replace(view.placement, standoff_mm=view.placement.standoff_mm + off_mm))
+        if view.placement.key == "B1"
+        else view
+        for view in views
+    ]
+    faults = find_faults(fit_without_outliers(world.rig, told, (), boards), ())
+    if not off_mm:
+        assert faults == ()
+    else:
+        assert "the captures at 310 mm fit a standoff of 30" in the(list(faults), "standoff")

@@ -1,0 +1,258 @@
+"""The YAML as other programs read it, and what the reader refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import yaml as pyyaml
+
+from tests.support.rigs import PROVENANCE, World, thesis_rig
+from workbench.calibration.estimation.fit import Fit, fit
+from workbench.calibration.verdict.assessment import Assessment, judge
+from workbench.calibration.verdict.export import calibrate, render, write_calibration
+from workbench.model.acceptance import Acceptance
+from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.errors import BadInputError, LimitFailedError
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Fit:
+    return fit(thesis_rig(), World(thesis_rig(), 1).sightings())
+
+
+@pytest.fixture(scope="module")
+def calibration(fitted: Fit) -> Calibration:
+    return calibrate(fitted, Acceptance(), PROVENANCE)[0]
+
+
+@pytest.fixture
+def path(calibration: Calibration, tmp_path: Path) -> Path:
+    path = tmp_path / "calibration.yaml"
+    write_calibration(path, calibration)
+    return path
+
+
+def test_what_is_written_is_read_to_the_last_digit(calibration: Calibration, path: Path) -> None:
+    assert load_calibration(path) == calibration
+
+
+def test_the_header_and_ros_s_keys(path: Path) -> None:
+    lines = path.read_text().splitlines()
+    assert lines[0] == "%YAML 1.2"
+    keys = [line.split(":")[0] for line in lines if line[:1].isalpha()]
+    assert keys == [
+        "image_width",
+        "image_height",
+        "camera_name",
+        "camera_matrix",
+        "distortion_model",
+        "distortion_coefficients",
+        "rectification_matrix",
+        "projection_matrix",
+        "laser_ranger",
+    ]
+
+
+def numbers(value: Any) -> list[Any]:
+    if isinstance(value, dict):
+        return [n for item in value.values() for n in numbers(item)]
+    if isinstance(value, list | tuple):
+        return [n for item in value for n in numbers(item)]
+    return [value]
+
+
+def test_pyyaml_reads_the_same(calibration: Calibration, path: Path) -> None:
+    """PyYAML takes 1e-3 for a string and 2026-11-22 for a date: every type must come back."""
+    read = pyyaml.safe_load(path.read_text())
+    assert numbers(read) == numbers(calibration.model_dump())
+    assert [type(n) for n in numbers(read)] == [type(n) for n in numbers(calibration.model_dump())]
+
+
+def test_opencv_reads_the_same(calibration: Calibration, path: Path) -> None:
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+    ours = storage.getNode("laser_ranger")
+
+    def reals(node: cv2.FileNode) -> list[float]:
+        return [node.at(i).real() for i in range(node.size())]
+
+    parameters = calibration.laser_ranger.parameters
+    assert storage.getNode("image_width").real() == 640
+    assert reals(storage.getNode("camera_matrix").getNode("data")) == list(calibration.camera_matrix.data)
+    assert reals(ours.getNode("parameters").getNode("values")) == list(parameters.values)
+    covariance = ours.getNode("parameters").getNode("covariance")
+    assert reals(covariance.getNode("data")) == list(parameters.covariance.data)
+    first = ours.getNode("lasers").at(0)
+    assert first.getNode("id").string() == "L1"
+    assert reals(first.getNode("origin_mm")) == list(calibration.laser_ranger.lasers[0].origin_mm)
+    assert ours.getNode("provenance").getNode("created").string() == PROVENANCE.created
+    storage.release()
+
+
+def test_ros_s_rules_for_camera_info(path: Path) -> None:
+    """As camera_calibration_parsers demands: these keys, matrices with rows, cols, data of that size."""
+    read = pyyaml.safe_load(path.read_text())
+    for key, rows, cols in (
+        ("camera_matrix", 3, 3),
+        ("distortion_coefficients", 1, 5),
+        ("rectification_matrix", 3, 3),
+        ("projection_matrix", 3, 4),
+    ):
+        assert (read[key]["rows"], read[key]["cols"]) == (rows, cols)
+        assert np.shape(read[key]["data"]) == (rows * cols,)
+    assert read["distortion_model"] == "plumb_bob"
+    projection = np.reshape(read["projection_matrix"]["data"], (3, 4))
+    np.testing.assert_array_equal(projection[:, :3], np.reshape(read["camera_matrix"]["data"], (3, 3)))
+
+
+def edited(path: Path, change: Callable[[dict[str, Any]], None]) -> str:
+    """The reader's complaint about the file after a change."""
+    data = pyyaml.safe_load(path.read_text())
+    change(data)
+    path.write_text(json.dumps(data))
+    with pytest.raises(BadInputError) as caught:
+        load_calibration(path)
+    assert str(path) in str(caught.value)
+    return str(caught.value)
+
+
+def test_a_number_that_says_two_things(path: Path) -> None:
+    def change(data: dict[str, Any]) -> None:
+        data["camera_matrix"]["data"][0] = data["camera_matrix"]["data"][4] = 600.0
+
+    assert "f_px is 600.0" in edited(path, change)
+
+
+def test_a_covariance_with_a_negative_variance(path: Path) -> None:
+    def change(data: dict[str, Any]) -> None:
+        data["laser_ranger"]["parameters"]["covariance"]["data"][0] = -1.5e-12
+
+    assert "no negative variance, got -1.5e-12" in edited(path, change)
+
+
+def test_a_covariance_that_is_none(path: Path) -> None:
+    def change(data: dict[str, Any]) -> None:
+        matrix = data["laser_ranger"]["parameters"]["covariance"]
+        cells, n = matrix["data"], matrix["cols"]
+        cells[1] = cells[n] = 1.1 * (cells[0] * cells[n + 1]) ** 0.5  # more than fully correlated
+
+    assert "no negative eigenvalue" in edited(path, change)
+
+
+def test_a_covariance_that_is_not_symmetric(path: Path) -> None:
+    def change(data: dict[str, Any]) -> None:
+        data["laser_ranger"]["parameters"]["covariance"]["data"][1] += 1.0
+
+    assert "symmetric" in edited(path, change)
+
+
+def test_a_matrix_with_a_number_missing(path: Path) -> None:
+    def change(data: dict[str, Any]) -> None:
+        data["camera_matrix"]["data"].pop()
+
+    assert "camera_matrix: expected 3 x 3 numbers, got 8" in edited(path, change)
+
+
+def test_lists_of_different_lengths(path: Path) -> None:
+    def change(data: dict[str, Any]) -> None:
+        data["laser_ranger"]["parameters"]["sd"].pop()
+
+    assert "sd: expected one for each of 26 names, got 25" in edited(path, change)
+
+
+def test_pixels_that_are_not_square(path: Path) -> None:
+    def change(data: dict[str, Any]) -> None:
+        data["camera_matrix"]["data"][4] *= 1.01
+
+    assert "square pixels" in edited(path, change)
+
+
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
+def test_a_truncated_file(path: Path, part: float) -> None:
+    text = path.read_text()
+    path.write_text(text[: int(part * len(text))])
+    with pytest.raises(BadInputError, match=str(path)):
+        load_calibration(path)
+
+
+def test_a_failed_write_leaves_the_old_file(
+    calibration: Calibration, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = path.read_bytes()
+
+    def no_space(handle: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("workbench.session.files.os.fsync", no_space)
+    with pytest.raises(BadInputError, match="No space left"):
+        write_calibration(path, calibration)
+    assert path.read_bytes() == before
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+def test_a_folder_that_is_not_there(calibration: Calibration, tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="cannot be written"):
+        write_calibration(tmp_path / "no" / "cal.yaml", calibration)
+
+
+def test_rendering_is_reproducible(calibration: Calibration) -> None:
+    assert render(calibration) == render(calibration.model_copy())
+
+
+def judged(fitted: Fit, worst: float = 0.01, **limits: float) -> Assessment:
+    return judge(fitted, Acceptance.model_validate(limits), worst)
+
+
+def test_a_good_fit_is_accepted(fitted: Fit, calibration: Calibration) -> None:
+    found = judged(fitted)
+    assert (found.verdict, found.reasons) == ("accepted", ())
+    assert calibration.laser_ranger.validity.standoff_mm == (125.0, 4500.0)
+    assert 0.001 < calibration.laser_ranger.validity.max_relative_range_sd < 0.03
+
+
+def test_limits_that_fail_are_named(fitted: Fit) -> None:
+    assert "expected at most 0.001 px" in judged(fitted, max_rms_px=0.001).reasons[0]
+    assert "up to 30 % of it, expected at most 5 %" in judged(fitted, worst=0.3).reasons[0]
+    assert "seen at 11 standoffs, expected at least 12" in judged(fitted, min_standoffs=12).reasons[1]
+    assert judged(fitted, worst=float("nan")).verdict == "refused"
+
+
+def test_a_laser_that_never_lit_is_named() -> None:
+    rig = thesis_rig()
+    sightings = [s for s in World(rig, 1).sightings(repeats=1) if s.laser_id != "L2"]
+    (reason,) = judged(fit(rig, sightings)).reasons
+    assert reason.startswith("laser L2 never lit: no capture is of it. Do: check its supply")
+
+
+def test_the_warnings_say_what_the_data_cannot_tell(fitted: Fit) -> None:
+    text = " ".join(calibrate(fitted, Acceptance(), PROVENANCE)[1].warnings)
+    assert "(f_px) and all baselines cannot be known apart" in text
+    assert "the rig file's value stands: ruler_scale" in text
+
+
+def test_a_link_is_followed_and_a_special_file_is_left_alone(calibration: Calibration, path: Path) -> None:
+    link, pipe = path.with_name("link.yaml"), path.with_name("pipe")
+    link.symlink_to(path)
+    path.write_text("old")
+    write_calibration(link, calibration)
+    assert link.is_symlink()
+    assert load_calibration(path) == calibration
+    os.mkfifo(pipe)
+    for other in (pipe, path.parent):
+        with pytest.raises(BadInputError, match="expected the name of a file"):
+            write_calibration(other, calibration)
+    assert pipe.is_fifo()
+
+
+def test_a_fit_that_puts_every_spot_outside_the_picture_is_refused(fitted: Fit) -> None:
+    values = fitted.values.copy()
+    values[1] += 5000.0
+    with pytest.raises(LimitFailedError, match="no spot in the picture"):
+        calibrate(replace(fitted, values=values), Acceptance(), PROVENANCE)

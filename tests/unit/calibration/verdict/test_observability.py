@@ -1,0 +1,185 @@
+"""Null directions: exact ones of the pinhole by hand, their names, and what they do to ranges."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from tests.support.rigs import PROVENANCE, World, prior, thesis_rig
+from workbench.calibration.estimation.fit import Fit, data_share, fit
+from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.model.prediction import Layout, SpotData, predict_spots
+from workbench.calibration.verdict.export import calibrate
+from workbench.calibration.verdict.observability import (
+    NullDirection,
+    direction_lines,
+    information_of,
+)
+from workbench.model.acceptance import Acceptance
+from workbench.model.nested import hold
+from workbench.model.rig import Rig
+
+SEEDS = (1, 2, 3)
+
+
+def directions_of(fitted: Fit) -> tuple[NullDirection, ...]:
+    return calibrate(fitted, Acceptance(), PROVENANCE)[1].directions
+
+
+def pinhole() -> Rig:
+    return hold(thesis_rig(), ("k1", "k2"))
+
+
+def by_first(directions: tuple[NullDirection, ...]) -> dict[str, NullDirection]:
+    return {next(iter(one.change)): one for one in directions}
+
+
+@pytest.fixture(scope="module", params=SEEDS)
+def fitted(request: pytest.FixtureRequest) -> Fit:
+    return fit(pinhole(), World(pinhole(), request.param).sightings())
+
+
+def test_a_pinhole_leaves_open_what_algebra_says(fitted: Fit) -> None:
+    """u = cx + f (b / z + t): f with b, cx with all t, cy likewise, the ruler with f or b; nothing else."""
+    found = by_first(directions_of(fitted))
+    assert set(found) == {"ruler_scale", "f_px", "cx_px", "cy_px"}
+    f = fitted.values[0]
+    of_f = found["f_px"].change
+    assert set(of_f) == {"f_px", "L1.x_mm", "L2.x_mm", "L3.x_mm", "L4.x_mm"}
+    names = [p.name for p in fitted.table.parameters]
+    for name in list(of_f)[1:]:
+        value = fitted.values[names.index(name)]
+        assert of_f[name] / value == pytest.approx(-of_f["f_px"] / f, rel=0.05)
+    for first, pointing in (("cx_px", "tx"), ("cy_px", "ty")):
+        change = found[first].change
+        assert set(change) == {first, *(f"L{i}.{pointing}" for i in (1, 2, 3, 4))}
+        for i in (1, 2, 3, 4):
+            assert change[f"L{i}.{pointing}"] == pytest.approx(-change[first] / f, rel=0.05)
+
+
+def test_a_named_direction_shows_in_no_spot(fitted: Fit) -> None:
+    """By the model itself, not by its derivatives: all spots move by far less than one sd in all."""
+    cells = fitted.cells
+    layout = Layout(4, len(cells.placements), 0)
+    spots = SpotData(cells.laser, cells.placement)
+    standoffs = jnp.array([p.standoff_mm for p in cells.placements])
+    names = [p.name for p in fitted.table.parameters]
+
+    def moved_sd(change: dict[str, float]) -> float:
+        moved = fitted.values.copy()
+        for name, step in change.items():
+            moved[names.index(name)] += step
+        here, there = (
+            np.asarray(predict_spots(jnp.asarray(values), layout, spots, standoffs))
+            for values in (fitted.values, moved)
+        )
+        return float(np.linalg.norm((there - here) / cells.sd_px))
+
+    for one in directions_of(fitted):
+        first = next(iter(one.change))
+        alone = moved_sd({first: one.change[first]})
+        if first != "ruler_scale":  # which the error of the placements hides as well
+            assert alone > 10
+        assert moved_sd(one.change) < max(0.5, 0.1 * alone)
+
+
+def test_ranges_are_hurt_where_a_direction_moves_them(fitted: Fit) -> None:
+    found = by_first(directions_of(fitted))
+    for name in ("f_px", "cx_px", "cy_px"):
+        assert not found[name].hurts_ranges
+        assert found[name].relative_range_change < 1e-4
+        assert "Ranges do not suffer" in found[name].line
+    # A ruler that is wrong by 0.05 % makes every range wrong by 0.05 %.
+    assert found["ruler_scale"].relative_range_change == pytest.approx(0.0005, rel=0.02)
+    assert "Ranges suffer, by up to 0.05 %. Do: check the ruler" in found["ruler_scale"].line
+
+
+def test_words_and_remedies(fitted: Fit) -> None:
+    found = by_first(directions_of(fitted))
+    assert found["f_px"].words.startswith(
+        "the focal length (f_px) and all baselines cannot be known apart: changed together by +0.2"
+    )
+    assert "measure a baseline" in found["f_px"].remedy
+    assert "workbench target" in found["f_px"].remedy
+    assert "(cx_px) and the pointing along u of all lasers cannot be known apart" in found["cx_px"].words
+    assert "(cy_px) and the pointing along v of all lasers cannot be known apart" in found["cy_px"].words
+    assert found["ruler_scale"].remedy == "check the ruler against a better one"
+
+
+def test_a_baseline_known_exactly_resolves_f() -> None:
+    rig = hold(pinhole(), ("L1.x_mm",))
+    found = by_first(directions_of(fit(rig, World(rig, 1).sightings())))
+    # Only the ruler's scale is left to trade with it.
+    assert "f_px" not in found
+    assert "f_px" in found["ruler_scale"].change
+
+
+def test_lasers_that_are_each_open_by_themselves_are_one_line() -> None:
+    rig = pinhole()
+    found = directions_of(fit(rig, World(rig, 1).sightings((2000.0, 2500.0, 3000.0))))
+    (one,) = [d for d in found if d.words.startswith("the baseline and the")]
+    assert one.lasers == ("L1", "L2", "L3", "L4")
+    assert "each by itself" in one.words
+    assert one.remedy == "place the target at standoffs farther apart"
+    for i in (1, 2, 3, 4):
+        # b / z + t stays what it is at some depth among the three.
+        depth_mm = -one.change[f"L{i}.x_mm"] / one.change[f"L{i}.tx"]
+        assert 2000 < depth_mm < 3000
+
+
+def test_a_laser_above_has_its_baseline_along_v() -> None:
+    lasers = thesis_rig().lasers
+    turned = tuple(
+        laser.model_copy(update={"axis": "v", "x_mm": prior(0.0, 0.2), "y_mm": laser.x_mm})
+        for laser in lasers[2:]
+    )
+    rig = pinhole().model_copy(update={"lasers": turned})
+    found = by_first(directions_of(fit(rig, World(rig, 1).sightings())))
+    assert set(found["f_px"].change) == {"f_px", "L3.y_mm", "L4.y_mm"}
+    assert "all baselines" in found["f_px"].words
+
+
+def test_what_no_spot_shows_stands_alone() -> None:
+    rig = pinhole().model_copy(
+        update={"camera": pinhole().camera.model_copy(update={"k3": prior(0.0, 1e-3)})}
+    )
+    found = by_first(directions_of(fit(rig, World(rig, 1).sightings((1000.0, 2000.0, 4000.0)))))
+    assert found["k3"].change.keys() == {"k3"}
+    assert "the lens term k3 cannot be known" in found["k3"].words
+    assert not any("k3" in line for line in direction_lines(tuple(found.values())))
+
+
+def test_the_reader_is_not_drowned() -> None:
+    rig = thesis_rig()
+    found = directions_of(fit(rig, World(rig, 1).sightings((300.0, 301.0, 302.0))))
+    lines = direction_lines(found)
+    assert len(found) > 5
+    assert len(lines) == 5
+    assert "more such combinations" in lines[-1]
+    changes = [one.relative_range_change for one in found]
+    assert changes == sorted(changes, reverse=True)
+
+
+def test_information_is_that_of_the_data_alone() -> None:
+    """Against the normal equations with the placements eliminated, and the share that they give."""
+    world = World(thesis_rig(), 1)
+    fitted = fit(world.rig, world.sightings())
+    free = fitted.table.free[fitted.table.is_sensor[fitted.table.free]]
+    sd = fitted.table.prior_sd[free]
+    scaled = fitted.covariance[np.ix_(free, free)] / np.outer(sd, sd)
+    problem = Problem.of(4, fitted.table, fitted.cells, (), world.rig.board)
+    jacobian = problem.solve(fitted.noise_scale).jacobian
+    ours, theirs = jacobian[:, free], jacobian[:, ~fitted.table.is_sensor]
+    noise = np.eye(len(jacobian)) + theirs @ theirs.T
+    np.testing.assert_allclose(
+        information_of(scaled), ours.T @ np.linalg.solve(noise, ours), rtol=1e-6, atol=1e-4
+    )
+    assert data_share(jacobian, fitted.table)[free] == pytest.approx(fitted.data_share[free])
+
+
+def test_a_rig_of_constants_has_none() -> None:
+    rig = thesis_rig()
+    everything = [p.name for p in fit(rig, World(rig, 1).sightings()).table.parameters if p.kind == "sensor"]
+    fixed = hold(rig, everything)
+    assert directions_of(fit(fixed, World(fixed, 1).sightings())) == ()

@@ -1,0 +1,68 @@
+"""Dark frames: noise looks like a spot now and then, and must not pass for a beam."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.draw import Drawn, Sensor, draw
+from workbench.spots import Scanline, Spot, find_spots, is_same, lasting
+from workbench.spots.persistence import CLEAR, clearness
+
+SENSOR = Sensor(electrons_per_dn=156.0, read_sd=225.0, bits=8)
+EVERYWHERE = [Scanline(0.0, 239.5, 1.0, 0.0, 240.0)]
+FRAMES = 300
+
+
+def dark(rng: np.random.Generator, spots: list[Drawn]) -> np.ndarray:
+    return draw(spots, rng, (480, 640), SENSOR)
+
+
+def test_noise_is_taken_for_a_spot_now_and_then_and_never_for_a_light() -> None:
+    rng = np.random.default_rng(1)
+    spots, lights = 0, 0
+    for _ in range(FRAMES):
+        found = find_spots(dark(rng, []), scanlines=EVERYWHERE).spots
+        spots += bool(found)
+        assert all(clearness(spot) < CLEAR for spot in found)
+        lights += bool(lasting(found, lambda: find_spots(dark(rng, []), scanlines=EVERYWHERE).spots))
+    print(f"spots in {spots} of {FRAMES} dark frames")
+    assert spots > 0, "otherwise there is nothing to tell apart"
+    assert lights == 0
+
+
+@pytest.mark.parametrize(("electrons", "looks"), [(1.0e4, 1), (4e4, 0)])
+def test_a_beam_is_a_light_be_it_faint(electrons: float, looks: int) -> None:
+    """Six standard deviations, which noise does not reach twice at one place; and more than twenty."""
+    rng = np.random.default_rng(2)
+    beam, seen, looked = Drawn(200.3, 300.4, electrons), 0, 0
+
+    def look_again() -> tuple[Spot, ...]:
+        nonlocal looked
+        looked += 1
+        return find_spots(dark(rng, [beam]), scanlines=EVERYWHERE).spots
+
+    for _ in range(50):
+        lights = lasting(find_spots(dark(rng, [beam]), scanlines=EVERYWHERE).spots, look_again)
+        seen += any(abs(light.u_px - beam.u) < 2 and abs(light.v_px - beam.v) < 2 for light in lights)
+    assert seen >= 49
+    assert looked / 50 == pytest.approx(looks, abs=0.1)
+
+
+def test_the_clear_ones_need_no_second_look() -> None:
+    rng = np.random.default_rng(3)
+    frame = dark(rng, [Drawn(100.0, 100.0, 1e5), Drawn(400.0, 300.0, 1e5)])
+    lights = lasting(find_spots(frame, scanlines=EVERYWHERE).spots, lambda: pytest.fail("not asked for"))
+    assert len(lights) == 2
+    assert not is_same(*lights)
+
+
+def test_a_faint_one_beside_a_clear_one_is_a_light_as_well() -> None:
+    """Of the lamps that burn before anything is fired none may be forgotten."""
+    rng = np.random.default_rng(4)
+    lamps = [Drawn(100.0, 100.0, 1e5), Drawn(400.0, 300.0, 1.0e4)]
+    found, again = (find_spots(dark(rng, lamps), scanlines=EVERYWHERE).spots for _ in range(2))
+    clear, faint = sorted(found, key=clearness, reverse=True)
+    assert clearness(faint) < CLEAR < clearness(clear)
+    assert lasting(found, lambda: again) == list(found)
+    assert lasting(found, list) == [clear]

@@ -1,0 +1,1 @@
+"""Tests of a fit: residuals, cross-validation, target motion, and named faults."""

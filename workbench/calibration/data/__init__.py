@@ -1,0 +1,1 @@
+"""From captures to the observations that a fit uses."""

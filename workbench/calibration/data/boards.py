@@ -1,0 +1,150 @@
+"""The printed board at a placement: what was seen of it, and a first guess of how it stood."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import atan2
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.calibration.data.observations import Cells, PlacementInfo, Rejected, Sighting
+from workbench.model.board import Board
+from workbench.model.errors import BadInputError
+from workbench.model.rig import Rig
+
+# OpenCV is imported where there is a board: a fit of spots alone starts without it.
+if TYPE_CHECKING:
+    from workbench.corners.board import BoardCorners
+    from workbench.spots.types import Image
+
+Floats = NDArray[np.float64]
+BAND_EDGE_MM = 3.0
+"""A spot's middle must lie this far inside the band: beams are some 2.5 mm wide where a board is read."""
+
+
+@dataclass(frozen=True)
+class BoardView:
+    """What was seen of the board at one placement."""
+
+    placement: PlacementInfo
+    corners: BoardCorners
+
+
+@dataclass(frozen=True)
+class PoseGuess:
+    """The board's pose by the rig file's lens: a start for the fit, some millimetres and degrees off."""
+
+    slope_x: float
+    slope_y: float
+    x_mm: float
+    y_mm: float
+    roll_rad: float
+
+
+def see_board(frames: Sequence[Image], board: Board, placement: PlacementInfo) -> BoardView | Rejected:
+    """The board in frames of one placement, or why it is not found."""
+    from workbench.corners.board import find_board
+
+    try:
+        return BoardView(placement, find_board(frames, board))
+    except BadInputError as error:
+        return Rejected(placement.source, f"board at {placement.standoff_mm:g} mm: {error}")
+
+
+def on_band(view: BoardView, board: Board, sighting: Sighting) -> Sighting | Rejected:
+    """The sighting of a spot, or its rejection where it lies on the print or beside the board.
+
+    The spot's place on the board comes from the corners around it; lens distortion over their distance
+    shifts it by less than a millimetre.
+    """
+    if not np.isfinite([sighting.u_px, sighting.v_px]).all():
+        return sighting
+    import cv2
+
+    printed = board.corners_mm[view.corners.ids]
+    to_board, _ = cv2.findHomography(view.corners.position_px, printed)
+    x, y, w = to_board @ [sighting.u_px, sighting.v_px, 1.0]
+    half_height, half_width = board.band_mm / 2 - BAND_EDGE_MM, board.page_mm[0] / 2
+    if abs(y / w) <= half_height and abs(x / w) <= half_width:
+        return sighting
+    return Rejected(
+        sighting.source,
+        f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm: the spot lies {y / w:.0f} mm from the"
+        f" middle of the board's blank band, expected at most {half_height:g} mm: shift the board",
+    )
+
+
+def on_boards(
+    board: Board, seen: Mapping[str, BoardView | Rejected], found: Sequence[Sighting | Rejected]
+) -> list[Sighting | Rejected]:
+    """What was found of spots, without those that a board as their target spoils.
+
+    Args:
+        board: the board.
+        seen: by placement, what was seen of the board where it was the target.
+        found: sightings of any placement, and what was rejected already.
+    """
+    return [_on_board(board, seen.get(f.placement), f) if isinstance(f, Sighting) else f for f in found]
+
+
+def _on_board(board: Board, seen: BoardView | Rejected | None, sighting: Sighting) -> Sighting | Rejected:
+    if seen is None:
+        return sighting
+    if isinstance(seen, BoardView):
+        return on_band(seen, board, sighting)
+    where = f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm"
+    return Rejected(sighting.source, f"{where}: the board that it fell on was not found")
+
+
+def with_placements(cells: Cells, boards: Sequence[BoardView]) -> Cells:
+    """The cells with the boards' placements among theirs.
+
+    Raises:
+        BadInputError: two boards at one placement, or a board and a spot that say different things of it.
+    """
+    known = {p.key: p for p in cells.placements}
+    seen: set[str] = set()
+    for view in boards:
+        mine = view.placement
+        first = known.setdefault(mine.key, mine)
+        if mine.key in seen or first.told != mine.told:
+            raise BadInputError(
+                f"{mine.source}: standoff_mm: expected what {first.source} says of the same placement"
+                f" {mine.key} ({first.describe}) and one board, got {mine.describe}; give other placements"
+                " other names"
+            )
+        seen.add(mine.key)
+    return replace(cells, placements=tuple(known.values()))
+
+
+def guess_pose(rig: Rig, view: BoardView) -> PoseGuess:
+    """The pose that fits the corners best with the rig file's lens.
+
+    Raises:
+        BadInputError: no pose does.
+    """
+    import cv2
+
+    camera = rig.camera
+    matrix = np.array(
+        [[camera.f_px.value, 0, camera.cx_px.value], [0, camera.f_px.value, camera.cy_px.value], [0, 0, 1]]
+    )
+    distortion = np.array([p.value for p in (camera.k1, camera.k2, camera.p1, camera.p2, camera.k3)])
+    printed = rig.board.corners_mm[view.corners.ids]
+    points = np.column_stack([printed, np.zeros(len(printed))])
+    found, turn, shift = cv2.solvePnP(
+        points, view.corners.position_px, matrix, distortion, flags=cv2.SOLVEPNP_IPPE
+    )
+    axes = cv2.Rodrigues(turn)[0]
+    if not found or axes[2, 2] <= 0:
+        raise BadInputError(
+            f"{view.placement.source}: the board's corners fit no pose; is the image mirrored, or the board"
+            " not the one of the rig file?"
+        )
+    slope_x, slope_y = float(-axes[0, 2] / axes[2, 2]), float(-axes[1, 2] / axes[2, 2])
+    across = np.array([1.0, 0.0, slope_x]) / np.hypot(1.0, slope_x)
+    roll = atan2(float(axes[:, 0] @ np.cross(axes[:, 2], across)), float(axes[:, 0] @ across))
+    return PoseGuess(slope_x, slope_y, float(shift[0, 0]), float(shift[1, 0]), roll)

@@ -1,0 +1,151 @@
+"""From captures to sightings: which spot of which laser, at which standoff, and what was left out.
+
+What finds spots in images is imported where there are images: positions need none of it.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isnan
+from typing import TYPE_CHECKING
+
+from workbench.calibration.data.boards import BoardView, on_boards, see_board
+from workbench.calibration.data.observations import PlacementInfo, Rejected, Sighting
+from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
+from workbench.model.rig import LaserSpec, Rig
+
+if TYPE_CHECKING:
+    from workbench.spots import Finding, Scanline
+
+NO_STANDOFF = "standoff_mm is empty: a calibration needs known standoffs"
+PRIOR_REACH_SD = 4.0
+BEAM_HALF_WIDTH_PX = 8.0
+
+
+def sight_rows(
+    rig: Rig, rows: Sequence[CaptureRow]
+) -> tuple[list[Sighting], list[Rejected], list[BoardView]]:
+    """The sightings in a captures file, the rows that show none, with their reasons, and the board's views.
+
+    Raises:
+        BadInputError: an image cannot be used.
+    """
+    boards = _see_boards(rig, [row for row in rows if row.laser_id == BOARD])
+    spots = [_sight_row(rig, row) for row in rows if row.laser_id != BOARD]
+    found = on_boards(rig.board, boards, spots)
+    sightings = [f for f in found if isinstance(f, Sighting)]
+    rejected = [f for f in (*found, *boards.values()) if isinstance(f, Rejected)]
+    return sightings, rejected, [b for b in boards.values() if isinstance(b, BoardView)]
+
+
+def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | Rejected:
+    """The one spot of a capture that fired one laser, put into `sighting`, or why there is none."""
+    from workbench.spots import Failure, explain
+
+    source = sighting.source
+    where = f"laser {laser.id} at {sighting.standoff_mm:g} mm"
+    if len(finding.spots) != 1:
+        cause = explain(finding.failures[0]) if finding.failures else ""
+        reason = f"{where}: expected one spot, got {len(finding.spots)}. {cause}"
+        return Rejected(source, reason, None if finding.spots else sighting)
+    spot = finding.spots[0]
+    # Cut by the border or grown together with another, its centre is not the laser's.
+    if bad := [flag for flag in (Failure.AT_EDGE, Failure.MERGED) if flag in spot.flags]:
+        return Rejected(source, f"{where}: {bad[0]}: {explain(bad[0])}")
+    return replace(
+        sighting,
+        u_px=spot.u_px,
+        v_px=spot.v_px,
+        u_sd_px=spot.u_sd_px,
+        v_sd_px=spot.v_sd_px,
+        saturated=Failure.SATURATED in spot.flags,
+    )
+
+
+def _in_picture(rig: Rig, sighting: Sighting) -> Sighting | Rejected:
+    for name, value, size in (
+        ("u_px", sighting.u_px, rig.camera.width_px),
+        ("v_px", sighting.v_px, rig.camera.height_px),
+    ):
+        if value < -0.5 or value >= size - 0.5:
+            where = f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm"
+            return Rejected(sighting.source, f"{where}: {name}: expected -0.5 to {size - 0.5}, got {value:g}")
+    return sighting
+
+
+def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
+    """Where the rig file lets the laser's spots lie: along the projection of its baseline."""
+    from workbench.spots import Scanline
+
+    camera = rig.camera
+    x, y = laser.x_mm.value, laser.y_mm.value
+    du, dv = x / (x**2 + y**2) ** 0.5, y / (x**2 + y**2) ** 0.5
+    # Spread across the line: principal point and pointing, both in the direction (-dv, du).
+    across = [
+        camera.cx_px.sd * dv,
+        camera.cy_px.sd * du,
+        camera.f_px.value * laser.tx.sd * dv,
+        camera.f_px.value * laser.ty.sd * du,
+    ]
+    reach = PRIOR_REACH_SD * sum(part**2 for part in across) ** 0.5
+    u = camera.cx_px.value + camera.f_px.value * laser.tx.value
+    v = camera.cy_px.value + camera.f_px.value * laser.ty.value
+    return Scanline(u, v, du, dv, BEAM_HALF_WIDTH_PX + reach)
+
+
+def _see_boards(rig: Rig, rows: Sequence[CaptureRow]) -> dict[str, BoardView | Rejected]:
+    """By placement, the board in the mean of its frames."""
+    placed: dict[str, list[CaptureRow]] = defaultdict(list)
+    for row in rows:
+        placed[_placement(row)].append(row)
+    return {key: _see_board(rig, key, of_one) for key, of_one in placed.items()}
+
+
+def _see_board(rig: Rig, key: str, rows: Sequence[CaptureRow]) -> BoardView | Rejected:
+    from workbench.session.frames import read_image
+
+    first, size = rows[0], (rig.camera.width_px, rig.camera.height_px)
+    source = f"row {first.row}"
+    if isnan(first.standoff_mm):
+        return Rejected(source, NO_STANDOFF)
+    tilt = 0.0 if isnan(first.tilt_deg) else first.tilt_deg
+    placement = PlacementInfo(key, first.standoff_mm, first.standoff_sd_mm, tilt, source)
+    frames = [read_image(row.on, size) for row in rows if row.on is not None]
+    return see_board(frames, rig.board, placement)
+
+
+def _placement(row: CaptureRow) -> str:
+    return row.scene or f"{row.standoff_mm:g} mm"
+
+
+def _sight_row(rig: Rig, row: CaptureRow) -> Sighting | Rejected:
+    source = f"row {row.row}"
+    if row.laser_id == ALL_LASERS:
+        return Rejected(source, "a calibration needs captures of one laser at a time, got all")
+    if isnan(row.standoff_mm):
+        return Rejected(source, NO_STANDOFF)
+    if row.laser_id not in rig.laser_ids:
+        known = ", ".join(rig.laser_ids)
+        return Rejected(source, f"laser_id: expected one of {known} (rig {rig.rig}), got {row.laser_id}")
+    sighting = Sighting(
+        source=source,
+        laser_id=row.laser_id,
+        placement=_placement(row),
+        standoff_mm=row.standoff_mm,
+        repeat=row.repeat,
+        u_px=row.u_px,
+        v_px=row.v_px,
+        u_sd_px=row.u_sd_px,
+        v_sd_px=row.v_sd_px,
+        standoff_sd_mm=row.standoff_sd_mm,
+        yaw_deg=0.0 if isnan(row.tilt_deg) else row.tilt_deg,
+    )
+    if row.on is None:
+        return _in_picture(rig, sighting)
+    from workbench.session.capture_spots import find_row_spots
+
+    laser = rig.lasers[rig.laser_ids.index(row.laser_id)]
+    size = rig.camera.width_px, rig.camera.height_px
+    return sight(find_row_spots(row, size, [prior_scanline(rig, laser)], 1), laser, sighting)

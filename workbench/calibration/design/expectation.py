@@ -1,0 +1,161 @@
+"""What spots at a standoff, and ranges, will tell of a sensor's parameters: first-order, before any data.
+
+Parameters are counted in units of their prior sd, so that the prior's information is the unit matrix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from workbench.calibration.estimation.jit_cache import kept
+from workbench.calibration.model.parameters import (
+    LENS,
+    PLACEMENT,
+    RAY,
+    REFERENCE,
+    ParameterTable,
+    sensor_parameters,
+)
+from workbench.calibration.model.prediction import predict_cell
+from workbench.model.rig import Rig
+from workbench.optics.lens import Lens, radial_slope
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+COMMON = len(LENS) + len(REFERENCE)
+SENSOR_INPUTS = COMMON + len(RAY)
+BLOCK = 4096
+RULER = COMMON - 1
+"""Input of `predict_cell` that a ranger does not have: it reads no ruler."""
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """First-order view of N sensors of one rig: values (N, S), all S parameters in the order of the table."""
+
+    rig: Rig
+    sensors: FloatArray
+
+    @property
+    def table(self) -> ParameterTable:
+        """The S parameters."""
+        return ParameterTable(sensor_parameters(self.rig))
+
+    def spot_rows(self, standoff_mm: FloatArray, sd_px: float) -> FloatArray:
+        """(N, J, 2 L, S) derivatives of spots on a target at standoffs (J,), whitened; 0 if out of frame.
+
+        The error of a placement and its tilts are noise that its spots share. Rows A are scaled so that
+        A^T A is the placement's information on the parameters.
+
+        Args:
+            standoff_mm: by the ruler.
+            sd_px: 1 sigma of a mean position, in either coordinate.
+        """
+        _, slopes, seen = self._cells(standoff_mm)
+        slopes = slopes * np.where(seen, 1.0 / sd_px, 0.0)[..., None, None]
+        tilt = radians(self.rig.bench.tilt_sd_deg)
+        error_sd = np.array([self.rig.bench.placement_sd_mm, tilt, tilt])
+        shape = (*slopes.shape[:2], slopes.shape[2] * slopes.shape[3])
+        by_error = (slopes[..., SENSOR_INPUTS:] * error_sd).reshape(*shape, len(PLACEMENT))
+        noise = np.linalg.cholesky(np.eye(shape[2]) + by_error @ np.swapaxes(by_error, 2, 3))
+        by_sensor = self._spread(slopes[..., :SENSOR_INPUTS]).reshape(*shape, self.sensors.shape[1])
+        return np.asarray(np.linalg.solve(noise, by_sensor), float)
+
+    def range_rows(self, range_mm: FloatArray, sd_px: float) -> tuple[FloatArray, FloatArray]:
+        """How ranges (K,) of each laser depend on the parameters, relative to the range.
+
+        Args:
+            range_mm: from the reference plane.
+            sd_px: 1 sigma of a single spot, in either coordinate.
+
+        Returns:
+            (N, K, L, S) derivatives of ln(range) and (N, K, L) relative sd by the spot's own noise; both NaN
+            where the spot is out of frame.
+        """
+        _, slopes, seen = self._cells(range_mm, ranging=True)
+        by_range = slopes[..., SENSOR_INPUTS]
+        strength = (by_range**2).sum(axis=-1)
+        gradient = -(by_range[..., None] * slopes[..., :SENSOR_INPUTS]).sum(axis=-2) / strength[..., None]
+        gradient[..., RULER] = 0.0
+        rows = self._spread(gradient[..., None, :])[..., 0, :]
+        at = range_mm[:, None]
+        own = sd_px / np.sqrt(strength) / at
+        return np.where(seen[..., None], rows / at[..., None], np.nan), np.where(seen, own, np.nan)
+
+    def in_frame(self, standoff_mm: FloatArray) -> BoolArray:
+        """(N, J, L) whether the spot on a square target is in the picture of a lens that does not fold."""
+        return self._cells(standoff_mm)[2]
+
+    def spots(self, standoff_mm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Spots on a square target at standoffs (J,) by the ruler, px, in the picture or not.
+
+        Returns:
+            (N, J, L, 2) where they are, (N, J, L, 2, S) derivatives by the parameters in prior sd, and
+            (N, J, L, 2) 1 sigma by the error of the placement and its tilt.
+        """
+        spot, slopes, _ = self._cells(standoff_mm)
+        tilt = radians(self.rig.bench.tilt_sd_deg)
+        by_error = slopes[..., SENSOR_INPUTS:] * np.array([self.rig.bench.placement_sd_mm, tilt, tilt])
+        return spot, self._spread(slopes[..., :SENSOR_INPUTS]), np.sqrt((by_error**2).sum(axis=-1))
+
+    def _cells(
+        self, standoff_mm: FloatArray, ranging: bool = False
+    ) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """(N, J, L, 2) spots, (N, J, L, 2, 17) their derivatives by the inputs, (N, J, L) in frame."""
+        common = np.array(self.sensors[:, :COMMON])
+        if ranging:
+            common[:, RULER] = 0.0
+        rays = self.sensors[:, COMMON:].reshape(len(common), -1, len(RAY))
+        shape = (len(common), len(standoff_mm), rays.shape[1])
+        parts = [
+            *common.T[:, :, None, None],
+            *np.moveaxis(rays, -1, 0)[:, :, None, :],
+            *np.zeros(len(PLACEMENT)),
+        ]
+        inputs = np.stack([np.broadcast_to(p, shape) for p in parts], axis=-1)
+        standoff = np.broadcast_to(standoff_mm[:, None], shape)
+        spot, slopes, unfolded = _in_blocks(inputs.reshape(-1, inputs.shape[-1]), standoff.ravel())
+        size = np.array([self.rig.camera.width_px, self.rig.camera.height_px])
+        inside = ((spot > -0.5) & (spot < size - 0.5)).all(axis=-1) & unfolded
+        return spot.reshape(*shape, 2), slopes.reshape(*shape, 2, -1), inside.reshape(shape)
+
+    def _spread(self, by_input: FloatArray) -> FloatArray:
+        """(N, J, L, C, 14) derivatives by a laser's inputs as (..., S) by all parameters, in prior sd."""
+        lasers = by_input.shape[2]
+        whole = np.zeros((*by_input.shape[:-1], self.sensors.shape[1]))
+        whole[..., :COMMON] = by_input[..., :COMMON]
+        for laser in range(lasers):
+            start = COMMON + len(RAY) * laser
+            whole[:, :, laser, :, start : start + len(RAY)] = by_input[:, :, laser, :, COMMON:]
+        return whole * self.table.prior_sd
+
+
+def _in_blocks(inputs: FloatArray, standoff_mm: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """`_slopes` of any number of cells by one compiled program; the last block is filled up."""
+    count = len(inputs)
+    indices = np.arange(-(-count // BLOCK) * BLOCK) % count
+    blocks = [_slopes(inputs[i], standoff_mm[i]) for i in np.split(indices, len(indices) // BLOCK)]
+    spot, slopes, unfolded = (np.concatenate([np.asarray(b) for b in p]) for p in zip(*blocks, strict=True))
+    return spot[:count], slopes[:count], unfolded[:count]
+
+
+@kept()
+def _slopes(inputs: Array, standoff_mm: Array) -> tuple[Array, Array, Array]:
+    """(n, 2) spots, (n, 2, 17) their derivatives by the inputs, (n,) whether the lens is unfolded there."""
+
+    def spot(inputs: Array) -> Array:
+        return jnp.stack(predict_cell(tuple(inputs.T), standoff_mm), axis=1)
+
+    directions = jnp.eye(inputs.shape[1])
+    slopes = jax.vmap(lambda d: jax.jvp(spot, (inputs,), (jnp.broadcast_to(d, inputs.shape),))[1])(directions)
+    x, y, tx, ty = inputs.T[COMMON:SENSOR_INPUTS]
+    depth = standoff_mm * (1.0 + inputs[:, RULER]) + inputs[:, RULER - 1]
+    unfolded = (depth > 0) & (radial_slope(Lens(*inputs.T[: len(LENS)]), tx + x / depth, ty + y / depth) > 0)
+    return spot(inputs), jnp.moveaxis(slopes, 0, -1), unfolded

@@ -1,0 +1,1 @@
+"""Which terms of the model and which observations a fit keeps."""

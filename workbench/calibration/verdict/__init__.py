@@ -1,0 +1,1 @@
+"""What a fit amounts to: assessment, null directions, the calibration file."""

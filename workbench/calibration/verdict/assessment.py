@@ -1,0 +1,232 @@
+"""Is the calibration good enough, and what can it not tell?"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.calibration.checks.cross_validation import LeftOut, alarms, leave_each_out
+from workbench.calibration.checks.faults import Fault, find_faults
+from workbench.calibration.checks.residuals import ResidualTest, explain, residual_tests
+from workbench.calibration.checks.residuals import alarms as residual_alarms
+from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.model.parameters import LENS, RAY, REFERENCE
+from workbench.calibration.verdict.observability import NullDirection, direction_lines
+from workbench.model.acceptance import Acceptance
+from workbench.model.calibration import DeterminedBy
+
+CONTRADICTION_SD = 5.0
+"""By chance one parameter in 2 million lies so far from its prior."""
+DATA_SHARE_DETERMINED = 0.9
+PRIOR_UNMOVED = 0.9
+"""A posterior sd above this part of the prior's: neither data nor other priors told anything."""
+
+
+@dataclass(frozen=True)
+class Derived:
+    """What a laser's data do determine whatever the priors say. 1 sigma."""
+
+    laser_id: str
+    f_b_px_mm: float
+    """Focal length times the baseline: its distance from the pinhole, positive on either side."""
+    f_b_sd: float
+    infinity_px: float
+    """Where the spot of a target at infinity would lie, along the laser's axis."""
+    infinity_sd: float
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """The verdict on a fit."""
+
+    verdict: Literal["accepted", "refused"]
+    reasons: tuple[str, ...]
+    """Why refused; empty when accepted."""
+    warnings: tuple[str, ...]
+    left_out: tuple[LeftOut, ...] = ()
+    """Cross-validation, a placement each."""
+    faults: tuple[Fault, ...] = ()
+    residual_tests: tuple[ResidualTest, ...] = ()
+    directions: tuple[NullDirection, ...] = ()
+    """What the data leave open."""
+
+
+def determined_by(fit: Fit) -> tuple[DeterminedBy, ...]:
+    """For each parameter, what it rests on."""
+    columns = zip(fit.data_share.tolist(), fit.sd.tolist(), fit.table.prior_sd.tolist(), strict=True)
+    return tuple(basis(share, sd, prior_sd) for share, sd, prior_sd in columns)
+
+
+def basis(data_share: float, sd: float, prior_sd: float) -> DeterminedBy:
+    """What a parameter rests on.
+
+    `data`: on the data alone. `prior`: on its own prior, hardly narrowed. `joint`: the data tie it to other
+    parameters and those parameters' priors do the rest.
+    """
+    if data_share >= DATA_SHARE_DETERMINED:
+        return "data"
+    return "prior" if prior_sd == 0 or sd > PRIOR_UNMOVED * prior_sd else "joint"
+
+
+def derive(fit: Fit) -> tuple[Derived, ...]:
+    """`Derived` of every laser, with the full covariance."""
+    return tuple(_derive_one(fit, index) for index in range(len(fit.rig.lasers)))
+
+
+def judge(
+    fit: Fit, limits: Acceptance, max_relative_range_sd: float, directions: Sequence[NullDirection] = ()
+) -> Assessment:
+    """Hold a fit against the limits.
+
+    Args:
+        fit: the fit.
+        limits: what to hold it against.
+        max_relative_range_sd: as in the calibration's `validity`.
+        directions: what the data leave open, for the warnings.
+    """
+    reasons = _too_few_standoffs(fit, limits)
+    if not fit.converged:
+        reasons.append("the solver did not converge. Do: check the standoffs and the laser ids")
+    left_out = leave_each_out(fit)
+    faults = find_faults(fit, left_out)
+    tests = residual_tests(fit)
+    named = [fault.message for fault in faults if fault.refuses]
+    warnings = [fault.message for fault in faults if not fault.refuses]
+    # What has a name needs no list of its consequences.
+    if named:
+        reasons = [*named, *reasons]
+    else:
+        warnings = [*direction_lines(directions), *warnings, *_warnings(fit)]
+        reasons += [
+            *_contradictions(fit),
+            *map(_alarm, alarms(left_out)),
+            *_beyond(fit, limits, max_relative_range_sd),
+        ]
+        warnings += [explain(test) for test in residual_alarms(tests)]
+    return Assessment(
+        verdict="refused" if reasons else "accepted",
+        reasons=tuple(reasons),
+        warnings=tuple(warnings),
+        left_out=left_out,
+        faults=faults,
+        residual_tests=tests,
+        directions=tuple(directions),
+    )
+
+
+def _beyond(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> list[str]:
+    """The limits' own figures that are not met."""
+    reasons = []
+    if not fit.rms_px <= limits.max_rms_px:
+        reasons.append(
+            f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px. Do: look at what"
+            f" lies farthest off ({_largest_residual(fit)}), and capture it again"
+        )
+    if not max_relative_range_sd <= limits.max_relative_range_sd:
+        reasons.append(
+            f"standard deviation of a range up to {100 * max_relative_range_sd:.2g} % of it,"
+            f" expected at most {100 * limits.max_relative_range_sd:g} %. Do: add standoffs (workbench design"
+            " proposes them) or repeats"
+        )
+    return reasons
+
+
+def _derive_one(fit: Fit, index: int) -> Derived:
+    laser = fit.rig.lasers[index]
+    start = len(LENS) + len(REFERENCE) + len(RAY) * index
+    origin = slice(start, start + 2)
+
+    baseline = float(np.hypot(*fit.values[origin]))
+    product = np.zeros(len(fit.values))
+    product[0] = baseline
+    product[origin] = fit.values[0] * fit.values[origin] / baseline
+
+    this, infinity = np.array([index]), np.zeros(1)
+    axis = "uv".index(laser.axis)
+    own = [*range(len(LENS)), *range(start, start + len(RAY))]
+    vanishing = np.zeros(len(fit.values))
+    vanishing[own] = fit.curves.gradients(this, infinity)[0, axis, : len(own)]
+    return Derived(
+        laser_id=laser.id,
+        f_b_px_mm=float(fit.values[0]) * baseline,
+        f_b_sd=_sd(fit, product),
+        infinity_px=float(fit.curves.spots(this, infinity)[0, axis]),
+        infinity_sd=_sd(fit, vanishing),
+    )
+
+
+def _sd(fit: Fit, gradient: NDArray[np.float64]) -> float:
+    return float(np.sqrt(gradient @ fit.covariance @ gradient))
+
+
+def _too_few_standoffs(fit: Fit, limits: Acceptance) -> list[str]:
+    seen: dict[str, set[float]] = defaultdict(set)
+    captured = {s.laser_id for s in fit.cells.captures}
+    for s in fit.used:
+        seen[s.laser_id].add(s.standoff_mm)
+    return [
+        f"laser {i} was seen at {len(seen[i])} standoffs, expected at least {limits.min_standoffs}."
+        " Do: capture it at more of them"
+        for i in fit.rig.laser_ids
+        if len(seen[i]) < limits.min_standoffs and (seen[i] or i in captured)  # never lit: a fault by name
+    ]
+
+
+def _contradictions(fit: Fit) -> list[str]:
+    """Priors that the data contradict: a rig file that is wrong, or a standoff that was mistyped."""
+    return [
+        f"the data pull {p.name} {abs(pull):.1f} sd away from what the rig file says ({p.prior.value:g} +-"
+        f" {p.prior.sd:g} {p.unit}), to {value:.5g}. Do: check it, and the standoffs"
+        for p, pull, value in zip(fit.table.parameters, fit.prior_pull, fit.values, strict=True)
+        if abs(pull) > CONTRADICTION_SD
+    ]
+
+
+def _alarm(one: LeftOut) -> str:
+    if one.range_p <= one.spots_p:
+        off = f"lie {one.error_mm:+.2f} mm off in range, where it promises {one.sd_mm:.2g} mm (1 sigma)"
+    else:
+        off = f"lie apart from its prediction (chi2 {one.chi2:.0f} for {one.coordinates} coordinates)"
+    return (
+        f"the captures at {one.standoff_mm:g} mm contradict the others: to the fit without them they {off}."
+        f" Do: check that standoff and its captures, or leave it out (--without-standoff {one.standoff_mm:g})"
+    )
+
+
+def _largest_residual(fit: Fit) -> str:
+    size = np.abs(fit.residual_px / fit.cells.sd_px)
+    cell, axis = np.unravel_index(np.nanargmax(size), size.shape)
+    laser = fit.rig.laser_ids[fit.cells.laser[cell]]
+    standoff = fit.cells.placements[fit.cells.placement[cell]].standoff_mm
+    return f"{fit.residual_px[cell, axis]:+.2f} px in {'uv'[axis]} of laser {laser} at {standoff:g} mm"
+
+
+def _warnings(fit: Fit) -> list[str]:
+    sensor = [(p, by) for p, by in zip(fit.table.parameters, determined_by(fit), strict=True) if p.prior.sd]
+    prior = [p.name for p, by in sensor if by == "prior" and p.kind == "sensor"]
+    warnings: list[str] = []
+    if prior:
+        warnings.append(f"these captures say nothing of it, the rig file's value stands: {', '.join(prior)}")
+    warnings += [
+        f"the data call for {term.name} (p {term.p_value:.1g}), which the rig file holds constant:"
+        " give it an sd there"
+        for term in fit.terms
+        if term.verdict == "called for"
+    ]
+    if fit.cells.repeat_scale > 1:
+        warnings.append(
+            f"repeats scatter {fit.cells.repeat_scale:.2f} times more than the stated noise of the spots;"
+            " their sd was enlarged to match"
+        )
+    if fit.noise_scale > 1:
+        warnings.append(
+            f"residuals are {fit.noise_scale:.2f} times larger than the stated noise of the spots"
+            f" (chi2 {fit.chi2:.1f} for {fit.degrees_of_freedom:.1f} degrees of freedom);"
+            f" every sd was enlarged to match. The largest residual is {_largest_residual(fit)}"
+        )
+    return warnings

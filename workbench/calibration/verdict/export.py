@@ -1,0 +1,167 @@
+"""From a fit to the calibration YAML on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from workbench.calibration.data.observations import positions, stated_sd
+from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.selection.model_terms import without_idle
+from workbench.calibration.verdict.assessment import Assessment, determined_by, judge
+from workbench.calibration.verdict.observability import Ranges, null_directions
+from workbench.calibration.verdict.records import term_summaries
+from workbench.calibration.verdict.yaml_text import yaml_text
+from workbench.model.acceptance import Acceptance
+from workbench.model.calibration import (
+    Calibration,
+    FitSummary,
+    LaserRanger,
+    LaserRay,
+    Matrix,
+    Noise,
+    Parameters,
+    Provenance,
+    ReferencePlane,
+    Validity,
+)
+from workbench.model.errors import LimitFailedError
+from workbench.sensor.calibrated import Sensor
+from workbench.session.files import write_output
+
+
+def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Calibration, Assessment]:
+    """The calibration that a fit amounts to, and the verdict on it.
+
+    Raises:
+        LimitFailedError: by the fit no spot can be ranged.
+    """
+    exported = without_idle(fit)
+    values = dict(zip((p.name for p in fit.table.parameters), exported.values.tolist(), strict=True))
+    provisional = _calibration(exported, values, provenance, Assessment("accepted", (), ()), 0.0)
+    ranges = _ranges(Sensor(provisional))
+    worst = float(ranges.sd.max()) if len(ranges.sd) else float("nan")
+    if not np.isfinite(worst):
+        raise LimitFailedError(
+            "no calibration: between its nearest and farthest standoff the fit gives ranges of no spot in the"
+            " picture. Check the rig file's image size and baselines, and the standoffs"
+        )
+    sensor = fit.sensor
+    directions = null_directions(
+        fit.rig,
+        fit.table.parameters[sensor],
+        fit.values[sensor],
+        fit.covariance[sensor, sensor],
+        ranges,
+    )
+    assessment = judge(fit, limits, worst, directions)
+    return _calibration(exported, values, provenance, assessment, worst), assessment
+
+
+def kept_because(calibration: Calibration, reason: str) -> Calibration:
+    """A refused calibration with somebody's reason for using it all the same."""
+    ranger = calibration.laser_ranger
+    summary = ranger.fit.model_copy(update={"accepted_because": reason})
+    return calibration.model_copy(update={"laser_ranger": ranger.model_copy(update={"fit": summary})})
+
+
+def write_calibration(path: Path, calibration: Calibration) -> None:
+    """Write the YAML where the user wants it.
+
+    Raises:
+        BadInputError: see `write_output`.
+    """
+    write_output(path, render(calibration).encode())
+
+
+def render(calibration: Calibration) -> str:
+    """The YAML text."""
+    return yaml_text(calibration.model_dump())
+
+
+def _calibration(
+    fit: Fit, values: dict[str, float], provenance: Provenance, assessment: Assessment, worst: float
+) -> Calibration:
+    f, cx, cy = values["f_px"], values["cx_px"], values["cy_px"]
+    camera = fit.rig.camera
+    standoffs = [s.standoff_mm for s in fit.used]
+    return Calibration(
+        image_width=camera.width_px,
+        image_height=camera.height_px,
+        camera_name=fit.rig.rig,
+        camera_matrix=Matrix(rows=3, cols=3, data=(f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0)),
+        distortion_model="plumb_bob",
+        distortion_coefficients=Matrix(
+            rows=1, cols=5, data=tuple(values[name] for name in ("k1", "k2", "p1", "p2", "k3"))
+        ),
+        rectification_matrix=Matrix(rows=3, cols=3, data=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)),
+        projection_matrix=Matrix(rows=3, cols=4, data=(f, 0.0, cx, 0.0, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0)),
+        laser_ranger=LaserRanger(
+            format=1,
+            reference_plane=ReferencePlane(offset_mm=values["offset_mm"]),
+            lasers=tuple(
+                LaserRay(
+                    id=laser.id,
+                    axis=laser.axis,
+                    origin_mm=(values[f"{laser.id}.x_mm"], values[f"{laser.id}.y_mm"], 0.0),
+                    direction=(values[f"{laser.id}.tx"], values[f"{laser.id}.ty"], 1.0),
+                )
+                for laser in fit.rig.lasers
+            ),
+            noise=Noise(
+                spot_sd_px=_typical_spot_sd(fit),
+                speckle_sd_px=fit.rig.noise.speckle_sd_px * fit.noise_scale,
+            ),
+            parameters=_parameters(fit),
+            validity=Validity(standoff_mm=(min(standoffs), max(standoffs)), max_relative_range_sd=worst),
+            fit=FitSummary(
+                rms_px=fit.rms_px,
+                observations=len(fit.used),
+                rejected=len(fit.rejected),
+                noise_scale=fit.noise_scale,
+                verdict=assessment.verdict,
+                reasons=assessment.reasons,
+                warnings=assessment.warnings,
+                terms=term_summaries(fit),
+            ),
+            provenance=provenance,
+        ),
+    )
+
+
+def _parameters(fit: Fit) -> Parameters:
+    sensor = fit.sensor
+    table = fit.table.parameters[sensor]
+    covariance = fit.covariance[sensor, sensor]
+    symmetric = (covariance + covariance.T) / 2
+    return Parameters(
+        names=tuple(p.name for p in table),
+        units=tuple(p.unit for p in table),
+        values=tuple(fit.values[sensor].tolist()),
+        sd=tuple(fit.sd[sensor].tolist()),
+        prior_sd=tuple(p.prior.sd for p in table),
+        data_share=tuple(fit.data_share[sensor].tolist()),
+        determined_by=determined_by(fit)[sensor],
+        covariance=Matrix(rows=len(table), cols=len(table), data=tuple(symmetric.ravel().tolist())),
+    )
+
+
+def _typical_spot_sd(fit: Fit) -> float:
+    """Root mean square deviation of a single spot, as stated and enlarged to match what was seen."""
+    sd, seen = stated_sd(fit.used, fit.rig.noise), np.isfinite(positions(fit.used))
+    return float(np.sqrt((sd[seen] ** 2).mean()) * fit.cells.repeat_scale * fit.noise_scale)
+
+
+def _ranges(sensor: Sensor) -> Ranges:
+    """Of every laser, wherever its spot is in frame between the nearest and the farthest standoff."""
+    nearest, farthest = sensor.calibration.laser_ranger.validity.standoff_mm
+    grid = np.geomspace(nearest, farthest, 30)
+    rows, sd = [], []
+    # The whole grid at once, seen or not: arrays of one shape are one compiled program.
+    with np.errstate(invalid="ignore", over="ignore"):
+        for laser_id in sensor.ids:
+            found, seen = sensor.typical_ranges(laser_id, grid), sensor.in_frame(laser_id, grid)
+            rows.append((found.by_parameter / grid[:, None])[seen])
+            sd.append((found.sigma_mm / grid)[seen])
+    return Ranges(np.concatenate(rows), np.concatenate(sd))

@@ -1,0 +1,150 @@
+"""A person at the terminal answers a procedure's questions."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import termios
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+
+from rich.console import Console
+from rich.padding import Padding
+from rich.text import Text
+
+from workbench.devices.protocols import Operator
+from workbench.model.errors import AnswerNeededError, StoppedError
+from workbench.model.prompt import Answer, Prompt
+from workbench.procedure.engine.operator import Nobody
+
+LOOK_S = 0.1
+"""A stop that is asked for while nobody types is seen after this."""
+ACTIONS = ("redo", "skip", "abort")
+
+
+def whoever_is_there(
+    no_input: bool,
+    console: Console,
+    stopping: Callable[[], str | None],
+    quiet: Callable[[], AbstractContextManager[None]],
+) -> Operator:
+    """The person at the terminal; nobody where there is none, on CI, or with --no-input."""
+    if no_input:
+        return Nobody("--no-input was given")
+    if os.environ.get("CI"):
+        return Nobody("CI is set")
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return Nobody("there is no terminal")
+    return Person(console, stopping, quiet)
+
+
+class Person:
+    """One question at a time; what was typed before it is asked does not answer it."""
+
+    def __init__(
+        self,
+        console: Console,
+        stopping: Callable[[], str | None],
+        quiet: Callable[[], AbstractContextManager[None]],
+    ) -> None:
+        self._console, self._stopping, self._quiet = console, stopping, quiet
+
+    def ask(self, prompt: Prompt) -> Answer:
+        """Show the question and wait for an answer that fits.
+
+        Raises:
+            StoppedError: a stop was asked for.
+            AnswerNeededError: the terminal was closed, or its end typed (^D).
+        """
+        with self._quiet():
+            self._show(prompt)
+            while True:
+                answer = self._read(prompt)
+                if answer is None:
+                    self._show(prompt)
+                elif (wrong := prompt.refuse(answer)) is None:
+                    return answer
+                else:
+                    self._say(wrong)
+
+    def _show(self, prompt: Prompt) -> None:
+        self._console.print(Padding(Text(prompt.do, style="bold"), (1, 0, 0, 2)))
+        for text in (prompt.expect, prompt.otherwise and f"If not: {prompt.otherwise}"):
+            if text:
+                self._console.print(Padding(Text(text), (0, 0, 0, 2)))
+        for text in (_how_to_answer(prompt), _or(prompt)):
+            self._console.print(Padding(Text(text, style="dim"), (0, 0, 0, 2)))
+
+    def _read(self, prompt: Prompt) -> Answer | None:
+        """What is answered; None where it was taken back."""
+        typed = self._line(prompt)
+        if typed.lower() in ACTIONS:
+            return self._action(prompt, typed.lower())
+        return _answer(prompt, typed)
+
+    def _action(self, prompt: Prompt, action: str) -> Answer | None:
+        answer = Answer.model_validate({"action": action})
+        instead = _instead(prompt)
+        if action not in instead:
+            return answer
+        self._say(f"why {action} ({instead[action]})? The reason is kept; Enter alone takes it back.")
+        reason = self._line(prompt)
+        return answer.model_copy(update={"reason": reason}) if reason else None
+
+    def _line(self, prompt: Prompt) -> str:
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
+        self._console.print("  > ", end="")
+        while True:
+            if (reason := self._stopping()) is not None:
+                raise StoppedError(reason)
+            if select.select([sys.stdin], [], [], LOOK_S)[0]:
+                break
+        typed = sys.stdin.readline()
+        if not typed:
+            time.sleep(LOOK_S)  # where the terminal was closed, its signal may still be on the way
+            if (reason := self._stopping()) is not None:
+                raise StoppedError(reason)
+            raise AnswerNeededError(
+                f"prompt {prompt.key}: {prompt.do} -- the terminal was closed, or its end typed (^D)"
+            )
+        return typed.strip()
+
+    def _say(self, text: str) -> None:
+        self._console.print(Padding(Text(text, style="yellow"), (0, 0, 0, 2)))
+
+
+def _how_to_answer(prompt: Prompt) -> str:
+    if (quantity := prompt.quantity) is not None:
+        usual = "" if quantity.usual is None else f"Enter: {quantity.usual:g} {quantity.unit}; or "
+        return f"{usual}type the number in {quantity.unit}, {quantity.low:g} to {quantity.high:g}"
+    return (
+        f"type {' or '.join(prompt.choices)}"
+        if prompt.choices
+        else f"type yes{prompt.yes and f' ({prompt.yes})'}"
+    )
+
+
+def _or(prompt: Prompt) -> str:
+    return "or " + ", ".join(f"{action} ({what})" for action, what in _instead(prompt).items())
+
+
+def _instead(prompt: Prompt) -> dict[str, str]:
+    """Everything that can be done instead of an answer, and what it does here."""
+    return {**{str(action): what for action, what in prompt.may.items()}, "abort": "end the session"}
+
+
+def _answer(prompt: Prompt, typed: str) -> Answer:
+    """What was typed, where it can be an answer; else one that the prompt refuses."""
+    if prompt.quantity is not None:
+        if not typed and prompt.quantity.usual is not None:
+            return Answer(value=prompt.quantity.usual)
+        try:
+            return Answer(value=float(typed.removesuffix(prompt.quantity.unit).replace(",", ".")))
+        except ValueError:
+            return Answer(value=typed)
+    if prompt.choices:
+        return Answer(value=typed)
+    # A key pressed by chance confirms nothing.
+    return Answer(value=None if typed.lower() == "yes" else typed)

@@ -1,0 +1,1 @@
+"""Corners of the printed board in an image, with their standard deviations."""

@@ -1,0 +1,146 @@
+"""The printed board in frames: which of its corners are seen, where, and how well."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.corners.subpixel import fit_saddles
+from workbench.model.board import Board
+from workbench.model.errors import BadInputError
+from workbench.spots.types import Image
+
+Floats = NDArray[np.float64]
+Ids = NDArray[np.intp]
+FEWEST_CORNERS = 12
+"""A pose has six unknowns; this many corners over-determine it with room for a bad one."""
+ENLARGED = 2
+"""Markers are looked for in the frame enlarged: a cell of one needs some four pixels."""
+NEIGHBOURS = 8
+"""Corners of markers that tell a board corner's surroundings: those of the two markers that touch it."""
+
+
+@dataclass(frozen=True)
+class BoardCorners:
+    """Corners of the board that were found, k of them."""
+
+    ids: Ids
+    """(k,) their rows in `Board.corners_mm`."""
+    position_px: Floats
+    """(k, 2)"""
+    sd_px: Floats
+    """(k, 2) 1 sigma."""
+    spoiled: int
+    """Corners that were seen and are left out: something lay on them, or they lie at the frame's border."""
+
+
+def find_board(frames: Sequence[Image], board: Board) -> BoardCorners:
+    """Find the board in the mean of frames, (height, width) each, taken while nothing moved.
+
+    Raises:
+        BadInputError: the board cannot be found, with what was seen instead.
+    """
+    if not frames:
+        raise BadInputError("expected at least one frame of the board, got none")
+    if len({frame.shape for frame in frames}) > 1:
+        raise BadInputError("expected frames of the board of one size")
+    mean = np.mean([frame.astype(np.float64) for frame in frames], axis=0)
+    markers = _markers(mean, board)
+    ids, start_px = _corners(mean, board, markers)
+    if len(ids) < FEWEST_CORNERS:
+        raise BadInputError(
+            f"expected at least {FEWEST_CORNERS} corners of the board, got {len(ids)} (from"
+            f" {len(markers.ids)} of its markers): more light on it, nearer, more of it in the frame?"
+        )
+    around = _surroundings(board.corners_mm[ids], markers)
+    fitted = fit_saddles(mean, start_px, around, board.square_mm, (board.square_mm - board.marker_mm) / 2)
+    good = fitted.good
+    if int(good.sum()) < FEWEST_CORNERS:
+        raise BadInputError(
+            f"expected at least {FEWEST_CORNERS} clear corners of the board, got {int(good.sum())} of"
+            f" {len(ids)} that its markers point to: is it near enough, in focus, and evenly lit?"
+        )
+    return BoardCorners(ids[good], fitted.position_px[good], fitted.sd_px[good], int((~good).sum()))
+
+
+@dataclass(frozen=True)
+class _Markers:
+    """Markers of the board that were seen, m of them."""
+
+    ids: Ids
+    corners_px: Floats
+    """(m, 4, 2)"""
+    corners_mm: Floats
+    """(m, 4, 2)"""
+
+
+def _markers(mean: Floats, board: Board) -> _Markers:
+    dictionary = _dictionary(board)
+    detector = cv2.aruco.ArucoDetector(dictionary)
+    picture = cv2.resize(_stretched(mean), None, fx=ENLARGED, fy=ENLARGED, interpolation=cv2.INTER_CUBIC)
+    found, found_ids, _ = detector.detectMarkers(picture)
+    places = np.concatenate([_marker_places(board, block) for block in (0, 1)])
+    ids = _ids(found_ids)
+    corners = np.array(found, np.float64).reshape(-1, 4, 2)
+    known = (ids < len(places)) & (np.bincount(ids, minlength=1)[ids] == 1)
+    return _Markers(ids[known], (corners[known] + 0.5) / ENLARGED - 0.5, places[ids[known]])
+
+
+def _corners(mean: Floats, board: Board, markers: _Markers) -> tuple[Ids, Floats]:
+    """Ids and places (to a pixel) of the corners between markers that were seen."""
+    picture = _stretched(mean)
+    ids, places = [np.array([], np.intp)], [np.zeros((0, 2))]
+    for block in (0, 1):
+        mine = markers.ids // board.markers == block
+        if not mine.any():
+            continue
+        detector = cv2.aruco.CharucoDetector(_charuco(board, block))
+        seen = tuple(markers.corners_px[mine].astype(np.float32)[:, None])
+        named = markers.ids[mine].astype(np.int32)[:, None]
+        found, found_ids, _, _ = detector.detectBoard(picture, markerCorners=seen, markerIds=named)
+        if numbers := _ids(found_ids).tolist():
+            ids.append(np.array(numbers, np.intp) + block * board.corners_per_block)
+            places.append(np.asarray(found, np.float64).reshape(-1, 2))
+    return np.concatenate(ids), np.concatenate(places)
+
+
+def _surroundings(corners_mm: Floats, markers: _Markers) -> Floats:
+    """(k, 2, 2) derivatives of the pixel position by the board's x, y at its corners, from what is near."""
+    points_mm, points_px = markers.corners_mm.reshape(-1, 2), markers.corners_px.reshape(-1, 2)
+    matrices = []
+    for corner in corners_mm:
+        near = np.argsort(((points_mm - corner) ** 2).sum(axis=1))[:NEIGHBOURS]
+        design = np.column_stack([points_mm[near] - corner, np.ones(len(near))])
+        matrices.append(np.linalg.lstsq(design, points_px[near], rcond=None)[0][:2].T)
+    return np.array(matrices)
+
+
+def _stretched(mean: Floats) -> NDArray[np.uint8]:
+    """The frame with its tones spread over 8 bits: room light may leave the board in a few of them."""
+    dark, bright = np.percentile(mean, (1, 99))
+    return np.asarray(np.clip((mean - dark) / max(bright - dark, 1e-9) * 255, 0, 255), np.uint8)
+
+
+def _ids(found: object) -> Ids:
+    """OpenCV says None where it found none."""
+    return np.array([], np.intp) if found is None else np.asarray(found, np.intp).ravel()
+
+
+def _dictionary(board: Board) -> cv2.aruco.Dictionary:
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
+
+
+def _charuco(board: Board, block: int) -> cv2.aruco.CharucoBoard:
+    ids = np.arange(board.markers) + block * board.markers
+    size = (board.columns, board.rows)
+    return cv2.aruco.CharucoBoard(size, board.square_mm, board.marker_mm, _dictionary(board), ids)
+
+
+def _marker_places(board: Board, block: int) -> Floats:
+    """(markers, 4, 2) corners of a block's markers, mm, clockwise from their top left."""
+    places = np.array(_charuco(board, block).getObjPoints(), np.float64)[:, :, :2]
+    return np.asarray(places + np.array([board.left_mm, board.block_tops_mm[block]]), np.float64)

@@ -1,0 +1,1 @@
+"""One capture: exposure, frame pair, stuck-beam check, brightness, quality."""

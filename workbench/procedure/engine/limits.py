@@ -1,0 +1,101 @@
+"""Holding measured quantities against a procedure's limits, and what follows where one fails."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from workbench.model import event as ev
+from workbench.model.errors import LimitFailedError
+from workbench.model.limit import Limit
+from workbench.model.procedure import GridLimits
+from workbench.model.prompt import Prompt
+from workbench.model.target import Placement
+from workbench.model.yamlfile import FileModel
+from workbench.procedure.capture.quality import quality_of
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.missing_spot import where_it_should_be, why_not_measured
+from workbench.procedure.engine.placements import RetakeError, settle
+from workbench.procedure.engine.prompts import captures_prompt
+
+RETRIES = 2
+"""`on_fail: retry` captures a placement again so often in a session before it stops."""
+
+
+def check_captures(context: Context, step: str, placement: Placement, limits: GridLimits) -> None:
+    """Hold what each laser gave at a placement against the limits.
+
+    Args:
+        context: the session; its operator is asked where a limit says so.
+        step: name of the step.
+        placement: where the captures were taken.
+        limits: of the step.
+
+    Raises:
+        RetakeError: the placement is to be captured again.
+        LimitFailedError: a limit failed, and the session ends.
+    """
+    for laser_id in context.rig.laser_ids:
+        keys = [c.key for c in context.captures if (c.placement_key, c.laser_id) == (placement.key, laser_id)]
+        found = [context.findings[key].spots for key in keys]
+        quality = quality_of(found)
+        unseen, answered = quality.u_px is None, False
+        for name, limit in _stated(limits):
+            of = f"{placement.key}/{laser_id}"
+            why = why_not_measured(name, laser_id, [len(spots) for spots in found])
+            failed = _check(context, step, of, name, getattr(quality, name), limit, f"none: {why}")
+            if failed is None or (unseen and answered and limit.on_fail == "ask"):
+                continue  # a spot that is not there is asked about once
+            if limit.on_fail == "retry" and context.recorder.retries(placement.key) < RETRIES:
+                raise RetakeError(failed, by_limit=True)
+            where = where_it_should_be(context, laser_id, placement) if unseen else ""
+            if limit.on_fail != "ask":
+                raise LimitFailedError(f"{failed}. {where}" if unseen else failed)
+            shown = f"{why} at {placement.standoff_mm:g} mm ({name}: expected {limit.describe()})"
+            question = captures_prompt(f"{of}/{name}", shown if unseen else failed, placement, where)
+            settle(context, question, failed)
+            answered = True
+
+
+def check_fit(context: Context, step: str, values: Mapping[str, float], limits: FileModel) -> str:
+    """Hold what is known of a fit against limits of the same names; returns how it went.
+
+    Raises:
+        LimitFailedError: a limit failed, and the session ends.
+        StoppedError: the operator, asked about it, stops.
+    """
+    remarks = []
+    for name, limit in _stated(limits):
+        failed = _check(context, step, "fit", name, float(values[name]), limit)
+        if failed is None:
+            continue
+        if limit.on_fail == "stop":
+            raise LimitFailedError(failed)
+        context.ask(
+            Prompt(f"{step}/{name}", f"{failed}. Go on all the same?", otherwise="Abort, and say why.")
+        )
+        remarks.append(failed)
+    return "; ".join(remarks) or "within the limits"
+
+
+def _check(
+    context: Context,
+    step: str,
+    of: str,
+    quantity: str,
+    value: float | None,
+    limit: Limit,
+    otherwise: str = "",
+) -> str | None:
+    """Journal the verdict; what failed, in words, `otherwise` where nothing was measured."""
+    verdict = limit.judge(value)
+    context.emit(
+        ev.LimitChecked(
+            step=step, of=of, quantity=quantity, value=value, limit=limit.describe(), verdict=verdict
+        )
+    )
+    came = otherwise if value is None else f"{value:.4g}"
+    return f"{of}: {quantity}: expected {limit.describe()}, got {came}" if verdict == "fail" else None
+
+
+def _stated(limits: FileModel) -> Iterator[tuple[str, Limit]]:
+    return ((name, limit) for name, limit in limits if limit is not None)

@@ -1,0 +1,1 @@
+"""A calibrated sensor: spot curves, ranges and their covariance."""

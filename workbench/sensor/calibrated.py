@@ -1,0 +1,205 @@
+"""A calibrated sensor: the numbers of a calibration, ready to turn spots into ranges and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.calibration.model.parameters import LENS, RAY
+from workbench.model.calibration import Calibration
+from workbench.optics.lens import Lens, radial_slope
+from workbench.sensor.curves import SpotCurves
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Ranges from the reference plane of n spots, mm; not finite where a spot admits none."""
+
+    range_mm: FloatArray
+    """(n,)"""
+    spot_sd_mm: FloatArray
+    """(n,) 1 sigma from the spots alone, independent between spots."""
+    by_parameter: FloatArray
+    """(n, P) derivatives of the ranges by the parameters of the calibration, in the order of its names."""
+    covariance_mm2: FloatArray
+    """(n, n) of everything: spots and calibration. Ranges from one calibration share its error."""
+    misfit_sd: FloatArray
+    """(n,) distance of each spot from its laser's line, in standard deviations of spot and line together."""
+
+    @property
+    def sigma_mm(self) -> FloatArray:
+        """(n,) 1 sigma of each range."""
+        return np.sqrt(np.diag(self.covariance_mm2))
+
+    def only(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Ranges:
+        """Some of them."""
+        return Ranges(
+            self.range_mm[index],
+            self.spot_sd_mm[index],
+            self.by_parameter[index],
+            self.covariance_mm2[index][:, index],
+            self.misfit_sd[index],
+        )
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A calibration as arrays."""
+
+    calibration: Calibration
+    moved: Mapping[str, float] = field(default_factory=dict)
+    """Parameters with another value than the calibration's, by name."""
+
+    @cached_property
+    def ids(self) -> tuple[str, ...]:
+        """Laser ids in the order of the file."""
+        return tuple(laser.id for laser in self.calibration.laser_ranger.lasers)
+
+    @cached_property
+    def _geometry(self) -> dict[str, float]:
+        return self.calibration.geometry() | dict(self.moved)
+
+    @cached_property
+    def _lens(self) -> FloatArray:
+        return np.array([self._geometry[name] for name in LENS])
+
+    @cached_property
+    def _rays(self) -> FloatArray:
+        """(lasers, 4)."""
+        return np.array([[self._geometry[f"{i}.{name}"] for name in RAY] for i in self.ids])
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.calibration.laser_ranger.parameters.names)}
+
+    @cached_property
+    def _own_columns(self) -> NDArray[np.intp]:
+        """(lasers, 12) columns of the lens and of each laser's ray."""
+        lens = [self._columns[name] for name in LENS]
+        return np.array([[*lens, *(self._columns[f"{i}.{name}"] for name in RAY)] for i in self.ids])
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """(P, P) of the calibration's parameters."""
+        return self.calibration.laser_ranger.parameters.covariance_array
+
+    def lasers_on(self, axis: Literal["u", "v"]) -> NDArray[np.intp]:
+        """Indices of the lasers whose spots move along an image axis."""
+        lasers = self.calibration.laser_ranger.lasers
+        return np.array([n for n, laser in enumerate(lasers) if laser.axis == axis], np.intp)
+
+    def front_mm(self, axis: Literal["u", "v"]) -> tuple[float, float]:
+        """From the first to the last laser of a line, mm along x or y."""
+        origins = self._rays[self.lasers_on(axis), RAY.index("x_mm" if axis == "u" else "y_mm")]
+        return float(origins.min()), float(origins.max())
+
+    @cached_property
+    def _curves(self) -> SpotCurves:
+        return SpotCurves(self._lens, self._rays)
+
+    @property
+    def offset_mm(self) -> float:
+        """Distance of the pinhole behind the reference plane."""
+        return self._geometry["offset_mm"]
+
+    def spot_px(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
+        """(n, 2) where the laser's spot appears at ranges (n,); infinity allowed."""
+        return self._curves.spots(*self._points(laser_id, range_mm))
+
+    def spot_gradient(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
+        """(n, 2, P) derivatives of `spot_px` by the calibration's parameters, in the order of its names."""
+        laser, w = self._points(laser_id, range_mm)
+        by = self._curves.gradients(laser, w)
+        gradient = np.zeros((len(w), 2, len(self._columns)))
+        gradient[:, :, self._own_columns[self.ids.index(laser_id)]] = by[:, :, :-1]
+        gradient[:, :, self._columns["offset_mm"]] = -by[:, :, -1] * w[:, None] ** 2
+        return gradient
+
+    def ranges(self, laser_ids: Sequence[str], position_px: FloatArray, sd_px: FloatArray) -> Ranges:
+        """Ranges of n spots with known lasers.
+
+        Args:
+            laser_ids: which laser made each spot, n of them.
+            position_px: (n, 2) u, v; NaN where a coordinate was not measured.
+            sd_px: (n, 2) 1 sigma of the spot's own noise; NaN where not known: the calibration's is used.
+                The speckle's is added here.
+        """
+        return self.ranges_of(np.array([self.ids.index(i) for i in laser_ids], np.intp), position_px, sd_px)
+
+    def ranges_of(self, laser: NDArray[np.intp], position_px: FloatArray, sd_px: FloatArray) -> Ranges:
+        """As `ranges`, of lasers by their indices (n,) in the order of `ids`."""
+        noise = self.calibration.laser_ranger.noise
+        measured = np.isfinite(position_px)
+        own_sd = np.where(np.isfinite(sd_px), sd_px, noise.spot_sd_px)
+        inverse_sd = measured / np.hypot(own_sd, noise.speckle_sd_px)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # at infinity, or nowhere
+            found = self._curves.invert(laser, np.where(measured, position_px, 0.0), inverse_sd)
+            w = found.inverse_depth_per_mm
+            range_mm = np.where(w <= 0, np.inf, 1.0 / w) - self.offset_mm
+        gradient = self._by_parameter(laser, found.dz)
+        gradient[:, self._columns["offset_mm"]] = -1.0
+        covariance = gradient @ self.covariance @ gradient.T
+        covariance[np.diag_indices(len(laser))] += found.z_sd_of_spot_mm**2
+        line = self._by_parameter(laser, found.dacross)
+        line_variance = ((line @ self.covariance) * line).sum(axis=1)
+        misfit_sd = np.abs(found.across_sd) / np.sqrt(1 + line_variance)
+        return Ranges(range_mm, found.z_sd_of_spot_mm, gradient, covariance, misfit_sd)
+
+    def places(
+        self, laser_ids: Sequence[str], axis: Literal["u", "v"], ranges: Ranges
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Where n spots lie along x (axis u) or y (axis v), origin + tangent x depth.
+
+        Returns:
+            (n,) places, mm; (n, P) their derivatives by the parameters of the calibration; (n,) tangents,
+            which are their derivatives by range.
+        """
+        names = ("x_mm", "tx") if axis == "u" else ("y_mm", "ty")
+        laser = [self.ids.index(i) for i in laser_ids]
+        origin, tangent = (self._rays[laser, RAY.index(name)] for name in names)
+        depth = ranges.range_mm + self.offset_mm
+        gradient = ranges.by_parameter * tangent[:, None]
+        gradient[:, self._columns["offset_mm"]] = (
+            0.0  # the spot stays where the plane is counted from elsewhere
+        )
+        rows = np.arange(len(laser))
+        for name, slope in zip(names, (np.ones(len(laser)), depth), strict=True):
+            gradient[rows, [self._columns[f"{i}.{name}"] for i in laser_ids]] += slope
+        return origin + tangent * depth, gradient, tangent
+
+    def relative_range_sd(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
+        """(n,) 1 sigma of a single range over the range, for spots of the calibration's typical noise."""
+        return np.asarray(self.typical_ranges(laser_id, range_mm).sigma_mm / range_mm)
+
+    def typical_ranges(self, laser_id: str, range_mm: FloatArray) -> Ranges:
+        """What spots of the calibration's typical noise at (n,) ranges would give."""
+        typical = np.full((len(range_mm), 2), np.nan)
+        return self.ranges([laser_id] * len(range_mm), self.spot_px(laser_id, range_mm), typical)
+
+    def in_frame(self, laser_id: str, range_mm: FloatArray) -> NDArray[np.bool_]:
+        """(n,) whether the laser's spot lies in the image, where the lens model does not fold over."""
+        u, v = self.spot_px(laser_id, range_mm).T
+        laser, w = self._points(laser_id, range_mm)
+        x, y, tx, ty = self._rays[laser].T
+        unfolded = radial_slope(Lens(*self._lens), tx + x * w, ty + y * w) > 0
+        width, height = self.calibration.image_width, self.calibration.image_height
+        inside = (u > -0.5) & (u < width - 0.5) & (v > -0.5) & (v < height - 0.5) & unfolded
+        return np.asarray(inside, bool)
+
+    def _points(self, laser_id: str, range_mm: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+        """Index of the laser, n times, and the inverse depths of ranges (n,)."""
+        index = np.full(len(range_mm), self.ids.index(laser_id), np.intp)
+        return index, 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
+
+    def _by_parameter(self, laser: NDArray[np.intp], own: FloatArray) -> FloatArray:
+        """(n, P) from (n, 12) derivatives by lens and own ray; those by other lasers' rays are 0."""
+        gradient = np.zeros((len(laser), len(self._columns)))
+        gradient[np.arange(len(laser))[:, None], self._own_columns[laser]] = own
+        return gradient

@@ -1,0 +1,98 @@
+"""The Fisher bound: how well any unbiased estimator can know the centre of a spot.
+
+Derivation: docs/spots.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.special import gammaln, ndtr, xlogy
+
+from workbench.spots.psf import FLUX, derivatives
+from workbench.spots.types import Floats
+
+# Above this many electrons a Poisson count is Gaussian to 1e-3 of its information.
+_MANY_ELECTRONS = 400.0
+_REACH_WIDTHS = 7.0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """What turns light into numbers; the numbers are whole."""
+
+    electrons_per_dn: float
+    read_sd_electrons: float
+    background_electrons: float
+
+
+def pixel_information(electrons: float, camera: Camera) -> float:
+    """Fisher information (1 / electrons^2) of one pixel's number about its mean number of electrons.
+
+    Exact for Poisson electrons, Gaussian read noise and rounding, averaged over the position of the mean
+    between two numbers; above 400 electrons the inverse of the variance.
+    """
+    read = camera.read_sd_electrons
+    least = 1.0 / _variance(electrons, camera)
+    if electrons > _MANY_ELECTRONS:
+        return least
+    # Rounding finer than the read noise or than single electrons takes nothing away.
+    step = max(camera.electrons_per_dn, 0.25 * read, 0.25)
+    count = np.arange(0, int(electrons + 10.0 * np.sqrt(electrons) + 20.0))
+    mass = np.exp(xlogy(count, electrons) - electrons - gammaln(count + 1.0))
+    by_mean = np.concatenate([[0.0], mass[:-1]]) - mass
+    reach = 6.0 * np.sqrt(electrons + read**2) + step
+    told = []
+    for phase in np.linspace(0.0, 1.0, 5)[:-1]:
+        numbers = np.arange(np.floor((electrons - reach) / step), np.ceil((electrons + reach) / step)) + phase
+        edges = (np.append(numbers, numbers[-1] + 1.0) - 0.5) * step
+        share = np.diff(ndtr((edges[:, None] - count) / read), axis=0)
+        chance = share @ mass
+        seen = chance > 1e-12
+        told.append(float((((share @ by_mean)[seen]) ** 2 / chance[seen]).sum()))
+    return float(np.mean(told))
+
+
+def _variance(electrons: float, camera: Camera) -> float:
+    """Of a pixel's number, electrons^2: shot, read, rounding."""
+    return electrons + camera.read_sd_electrons**2 + camera.electrons_per_dn**2 / 12.0
+
+
+@lru_cache(maxsize=16)
+def _excess_curve(camera: Camera) -> tuple[Floats, Floats]:
+    """How much more than the inverse variance a pixel tells, over the mean; 1 above `_MANY_ELECTRONS`."""
+    means = np.geomspace(0.05, _MANY_ELECTRONS, 24)
+    excess = np.array([pixel_information(float(m), camera) * _variance(float(m), camera) for m in means])
+    return means, np.append(excess[:-1], 1.0)
+
+
+def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera) -> Floats:
+    """(6, 6) information about background, flux, u, v, ln width along u and along v of a round spot.
+
+    Args:
+        electrons: Of the whole spot.
+        width_px: Standard deviation of its profile.
+        phase_px: Its centre from the centre of a pixel.
+        camera: Noise.
+    """
+    half = int(np.ceil(_REACH_WIDTHS * width_px)) + 2
+    params = np.array([[0.0, electrons, half + phase_px[0], half + phase_px[1], *[np.log(width_px)] * 2]])
+    rows = derivatives(params, (2 * half + 1, 2 * half + 1))[0].reshape(6, -1)
+    mean = camera.background_electrons + electrons * rows[FLUX]
+    jacobian = rows.copy()
+    jacobian[2:] *= electrons
+    means, excess = _excess_curve(camera)
+    variance = mean + camera.read_sd_electrons**2 + camera.electrons_per_dn**2 / 12.0
+    matrix: Floats = (jacobian * np.interp(mean, means, excess) / variance) @ jacobian.T
+    return matrix
+
+
+def position_bound_px(
+    electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera
+) -> Floats:
+    """(2,) lowest standard deviation of u and v for an unbiased estimator to which nothing else is known."""
+    cov = np.linalg.inv(fisher_matrix(electrons, width_px, phase_px, camera))
+    bound: Floats = np.sqrt(np.diag(cov)[2:4])
+    return bound

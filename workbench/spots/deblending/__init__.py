@@ -1,0 +1,1 @@
+"""Spots whose images overlap: which belong together, and their joint fit."""

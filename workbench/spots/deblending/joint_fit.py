@@ -1,0 +1,127 @@
+"""Several spots in one window, fitted together: overlapping neighbours, and a blob that is really two."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from workbench.spots.fit import Windows
+from workbench.spots.kernels.joint import score_together
+from workbench.spots.kernels.joint_sums import OWN, SHARED
+from workbench.spots.noise import Noise, photon_transfer_slope
+from workbench.spots.psf import FLUX, LN_SU, SHEAR, U, V, principal_axes
+from workbench.spots.types import Bools, Floats
+
+_HIDDEN_SD = 5.0
+_AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
+# As in `judging`; less, for the widths are known from all spots together (docs/spots.md).
+_SECOND_ORDER = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """Spots of one window that share their widths: lasers of one kind on one target."""
+
+    params: Floats
+    """(k, 6) in the order of `gaussian`; background and widths are the same in all rows."""
+    sd: Floats
+    """(k, 3): of flux, u, v."""
+    chi2: float
+    """Sum of squared residuals over the variance of the fit that the evidence is asked of."""
+    signal: Floats
+    """(height, width) expected value above the background, DN."""
+    residual: Floats
+    """(height, width), DN."""
+    weight: Floats
+    """(height, width) inverse variance, 0 where unused."""
+    noise: Noise
+    """With the photon-transfer slope that the residuals tell, unless the weights were fixed."""
+    converged: bool
+
+
+def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None = None) -> Joint:
+    """Fit k spots in a single window (n = 1).
+
+    Args:
+        win: The window.
+        start: (k, 6) first guesses.
+        noise: Of the window.
+        weight: (height, width) fixed weights; None: those that the model predicts.
+    """
+    params, m = start.copy(), SHARED + OWN * len(start)
+    cov, used = np.empty((m, m)), np.empty(win.shape) if weight is None else weight
+    signal, residual, leverage = np.empty(win.shape), np.empty(win.shape), np.empty(win.shape)
+    floor, slope = float(noise.floor_dn2[0]), float(noise.slope_dn[0])
+    converged = score_together(
+        win.data[0],
+        win.usable[0],
+        floor,
+        slope,
+        weight is not None,
+        params,
+        cov,
+        signal,
+        residual,
+        used,
+        leverage,
+    )
+    sd = np.sqrt(np.maximum(np.diag(cov)[SHARED:], 0.0)).reshape(-1, OWN)
+    sd[:, 1:] = _with_second_order(sd[:, 1:], np.exp(params[:, LN_SU:SHEAR]))
+    if weight is None:
+        measured = photon_transfer_slope(signal[None], residual[None], used[None], leverage[None], noise)
+        noise = Noise(noise.floor_dn2, measured)
+    return Joint(params, sd, float(np.vdot(used, residual**2)), signal, residual, used, noise, converged)
+
+
+def _with_second_order(sd_px: Floats, width_px: Floats) -> Floats:
+    """(k, 2) deviations of u and v, with the next term of their series in 1 / A, as in `judging`.
+
+    The variance of a spot alone in white noise is 2 width^2 / A; so A is taken from it, for a neighbour that
+    overlaps takes a part of what tells away.
+    """
+    widened: Floats = sd_px * np.sqrt(1.0 + 0.5 * _SECOND_ORDER * (sd_px / width_px) ** 2)
+    return widened
+
+
+def halves(params: Floats) -> Floats:
+    """(2, 6) first guess for two spots from the fit (6,) or (7,) of their sum: apart along its long axis."""
+    widths, axes = principal_axes(params)
+    apart = max(np.sqrt(widths[1] ** 2 - widths[0] ** 2), 0.4 * widths[1])
+    start = np.stack([params[:SHEAR], params[:SHEAR]])
+    start[:, FLUX] *= 0.5
+    start[:, LN_SU:] = np.log(widths[0])
+    start[0, U:LN_SU] -= apart * axes[:, 1]
+    start[1, U:LN_SU] += apart * axes[:, 1]
+    return start
+
+
+def evidence(one: float, two: float, pixels: int, parameters: int) -> float:
+    """F statistic for three more parameters (a second spot) that lower chi2 from `one` to `two`.
+
+    Dividing by what the larger model leaves unexplained keeps speckle from passing as a second spot.
+    """
+    left = two / max(pixels - parameters, 1)
+    return (one - two) / 3.0 / max(left, 1e-12)
+
+
+def hidden_spot(joint: Joint, win: Windows, allowed: Bools) -> Floats | None:
+    """(6,) first guess of a spot of the same widths that stands out of the residuals; None without one."""
+    su, sv = np.exp(joint.params[0, LN_SU:SHEAR])
+    weight, residual = joint.weight, joint.residual
+    # A pixel that towers over all its neighbours is hot: it counts no more than the highest of them.
+    excess = weight * np.minimum(residual, cv2.dilate(residual, _AROUND))
+    matched = cv2.GaussianBlur(excess, (0, 0), sigmaX=su, sigmaY=sv, borderType=cv2.BORDER_CONSTANT)
+    # The square of a Gaussian is a Gaussian narrower by sqrt(2), of the sum 1 / (4 pi su sv).
+    told = cv2.GaussianBlur(
+        weight, (0, 0), sigmaX=su / 2**0.5, sigmaY=sv / 2**0.5, borderType=cv2.BORDER_CONSTANT
+    )
+    told = np.maximum(told / (4.0 * np.pi * su * sv), 1e-12)
+    height = np.where(allowed, matched / np.sqrt(told), 0.0)
+    row, col = np.unravel_index(int(height.argmax()), win.shape)
+    if height[row, col] < _HIDDEN_SD:
+        return None
+    hidden: Floats = joint.params[0].copy()
+    hidden[FLUX], hidden[U], hidden[V] = matched[row, col] / told[row, col], col, row
+    return hidden

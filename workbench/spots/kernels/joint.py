@@ -1,0 +1,117 @@
+"""Fisher scoring of several spots in one window that share their widths, compiled. Derivation: docs/spots.md.
+
+Order of the parameters as in `shared_sums`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from workbench.spots.kernels.compiled import compiled
+from workbench.spots.kernels.joint_sums import OWN, SHARED, add_pairs, leverages, profiles, sums_alone
+from workbench.spots.kernels.single_sums import invert
+from workbench.spots.types import Bools, Floats, Ints
+
+_MAX_STEPS: Final = 30
+_MAX_MOVE_PX: Final = 0.7
+_MAX_STRETCH: Final = 0.3
+_LN_WIDTH_RANGE: Final = (math.log(0.3), math.log(12.0))
+_TOLERANCE_SD: Final = 0.1
+
+
+@compiled
+def _signal(params: Floats, along_u: Floats, along_v: Floats, box: Ints, out: Floats) -> None:
+    """Fill (height, width): expected value above the background, DN."""
+    out[:] = 0.0
+    for i in range(len(params)):
+        for y in range(box[i, 2], box[i, 3]):
+            height = params[i, 1] * along_v[i, 0, y]
+            for x in range(box[i, 0], box[i, 1]):
+                out[y, x] += height * along_u[i, 0, x]
+
+
+@compiled
+def _weigh(usable: Bools, signal: Floats, floor: float, slope: float, out: Floats) -> None:
+    """Inverse of the variance that the model predicts, 0 where a pixel is not to be used."""
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            out[y, x] = usable[y, x] / (floor + slope * max(signal[y, x], 0.0))
+
+
+@compiled
+def _moved(params: Floats, delta: Floats) -> None:
+    """A step, kept from jumping; after it all spots have one background and shape. `params` is changed."""
+    params[:, 0] = params[0, 0] + delta[0]
+    for j in range(2):
+        stretched = params[0, 4 + j] + min(max(delta[1 + j], -_MAX_STRETCH), _MAX_STRETCH)
+        params[:, 4 + j] = min(max(stretched, _LN_WIDTH_RANGE[0]), _LN_WIDTH_RANGE[1])
+    for i in range(len(params)):
+        own = SHARED + OWN * i
+        params[i, 1] = max(params[i, 1] + delta[own], 0.1 * abs(params[i, 1]))
+        for j in range(2):
+            params[i, 2 + j] += min(max(delta[own + 1 + j], -_MAX_MOVE_PX), _MAX_MOVE_PX)
+
+
+@compiled
+def score_together(
+    data: Floats,
+    usable: Bools,
+    floor: float,
+    slope: float,
+    fixed: bool,
+    params: Floats,
+    cov: Floats,
+    signal: Floats,
+    residual: Floats,
+    weight: Floats,
+    leverage: Floats,
+) -> bool:
+    """Fit k spots to a window (height, width), starting at `params`; whether that converged.
+
+    Args:
+        data: (height, width), DN.
+        usable: (height, width).
+        floor: Variance without signal, DN^2.
+        slope: Photon-transfer slope, DN.
+        fixed: Whether `weight` is given; it is filled otherwise.
+        params: (k, 6) in the order of `gaussian`, changed; background and widths are in the end those of
+            all spots, and are counted on from the first one's.
+        cov: (m, m) filled: covariance of the m = 3 + 3 k parameters of the fit.
+        signal: (height, width) filled: expected value above the background, DN; this and what follows where
+            the last step began.
+        residual: (height, width) filled, DN.
+        weight: (height, width) inverse variance, 0 where unused.
+        leverage: (height, width) filled: variance of the fitted pixel values, DN^2; left alone where
+            the weights are fixed.
+    """
+    k, m = len(params), len(cov)
+    along_u, along_v = np.empty((k, 4, data.shape[1])), np.empty((k, 4, data.shape[0]))
+    box, information, gradient = np.empty((k, 4), np.intp), np.empty((m, m)), np.empty(m)
+    delta = np.empty(m)
+    before, converged = params.copy(), False
+    for _ in range(_MAX_STEPS):
+        before[:] = params
+        profiles(params, along_u, along_v, box)
+        _signal(params, along_u, along_v, box, signal)
+        residual[:] = data - signal - params[0, 0]
+        if not fixed:
+            _weigh(usable, signal, floor, slope, weight)
+        sums_alone(params, along_u, along_v, box, weight, residual, information, gradient)
+        add_pairs(params, along_u, along_v, box, weight, information)
+        invert(information, cov)
+        converged = True
+        for a in range(m):
+            delta[a] = 0.0
+            for b in range(m):
+                delta[a] += cov[a, b] * gradient[b]
+            if not abs(delta[a]) <= _TOLERANCE_SD * math.sqrt(max(cov[a, a], 0.0)):
+                converged = False
+        _moved(params, delta)
+        if converged:
+            break
+    if not fixed:
+        leverages(before, along_u, along_v, box, cov, leverage)
+    return converged and bool(np.isfinite(params).all())

@@ -1,0 +1,154 @@
+"""Sums over a window's pixels that a step of a joint fit needs, compiled.
+
+The parameters of such a fit, in order: background, ln of both widths, then flux, u and v of each spot.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from workbench.spots.kernels.compiled import compiled
+from workbench.spots.kernels.profiles import ALONG_U, ALONG_V, profile
+from workbench.spots.types import Floats, Ints
+
+SHARED: Final = 3
+"""Parameters before those of the single spots: background and both widths."""
+OWN: Final = 3
+"""Parameters of each spot: flux, u, v."""
+# Beyond so many widths along an axis a spot has a millionth of its light.
+_REACH_WIDTHS: Final = 5.0
+
+
+@compiled
+def profiles(params: Floats, along_u: Floats, along_v: Floats, box: Ints) -> None:
+    """Fill (k, 4, width) and (k, 4, height), see `shapes.profile`, and the boxes (k, 4) of the spots' light.
+
+    A box has the first column, the one after the last, the first row and the one after the last.
+    """
+    for i in range(len(params)):
+        profile(params[i, 2], params[i, 4], along_u[i])
+        profile(params[i, 3], params[i, 5], along_v[i])
+        for j, size in enumerate((along_u.shape[2], along_v.shape[2])):
+            reach = _REACH_WIDTHS * math.exp(params[i, 4 + j]) + 0.5
+            box[i, 2 * j] = min(max(math.floor(params[i, 2 + j] - reach), 0), size)
+            box[i, 2 * j + 1] = min(max(math.ceil(params[i, 2 + j] + reach) + 1, 0), size)
+
+
+@compiled
+def _place(i: int, p: int) -> int:
+    """Where parameter p of spot i, FLUX to LN_SV in the order of `gaussian`, is among those of the fit."""
+    return SHARED + OWN * i + p - 1 if p <= OWN else p - OWN
+
+
+@compiled
+def _overlap(box: Ints, i: int, j: int) -> tuple[int, int, int, int]:
+    """Columns and rows where light of both spots comes, as in `profiles`."""
+    return (
+        max(box[i, 0], box[j, 0]),
+        min(box[i, 1], box[j, 1]),
+        max(box[i, 2], box[j, 2]),
+        min(box[i, 3], box[j, 3]),
+    )
+
+
+@compiled
+def sums_alone(
+    params: Floats,
+    along_u: Floats,
+    along_v: Floats,
+    box: Ints,
+    weight: Floats,
+    residual: Floats,
+    information: Floats,
+    gradient: Floats,
+) -> None:
+    """Fill the gradient (m,) and the background's row and column of the information (m, m); the rest is 0."""
+    weighted = weight * residual
+    information[:], gradient[:] = 0.0, 0.0
+    information[0, 0], gradient[0] = weight.sum(), weighted.sum()
+    told, pulled = np.empty((3, weight.shape[1])), np.empty((3, weight.shape[1]))
+    for i in range(len(params)):
+        first, end = box[i, 0], box[i, 1]
+        told[:], pulled[:] = 0.0, 0.0
+        for y in range(box[i, 2], box[i, 3]):
+            for a in range(3):
+                factor = along_v[i, a, y]
+                for x in range(first, end):
+                    told[a, x] += factor * weight[y, x]
+                    pulled[a, x] += factor * weighted[y, x]
+        for p in range(1, 6):
+            of_u, scale = along_u[i, ALONG_U[p]], 1.0 if p == 1 else params[i, 1]
+            one = other = 0.0
+            for x in range(first, end):
+                one += of_u[x] * told[ALONG_V[p], x]
+                other += of_u[x] * pulled[ALONG_V[p], x]
+            information[0, _place(i, p)] += scale * one
+            gradient[_place(i, p)] += scale * other
+    information[1:, 0] = information[0, 1:]
+
+
+@compiled
+def add_pairs(
+    params: Floats, along_u: Floats, along_v: Floats, box: Ints, weight: Floats, information: Floats
+) -> None:
+    """Add what every spot and every two that overlap tell to the information (m, m).
+
+    Sums are taken along v first, as in `sums.separable_sums`.
+    """
+    both = np.empty((3, 3, weight.shape[1]))
+    for i in range(len(params)):
+        for j in range(i + 1):
+            first, end, top, bottom = _overlap(box, i, j)
+            if first >= end or top >= bottom:
+                continue
+            both[:] = 0.0
+            for y in range(top, bottom):
+                for a in range(3):
+                    for b in range(3):
+                        factor, sums = along_v[i, a, y] * along_v[j, b, y], both[a, b]
+                        for x in range(first, end):
+                            sums[x] += factor * weight[y, x]
+            for p in range(1, 6):
+                for q in range(1, 6):
+                    of_i, of_j = along_u[i, ALONG_U[p]], along_u[j, ALONG_U[q]]
+                    sums = both[ALONG_V[p], ALONG_V[q]]
+                    told = 0.0
+                    for x in range(first, end):
+                        told += of_i[x] * of_j[x] * sums[x]
+                    told *= (1.0 if p == 1 else params[i, 1]) * (1.0 if q == 1 else params[j, 1])
+                    information[_place(i, p), _place(j, q)] += told
+                    if i != j:
+                        information[_place(j, q), _place(i, p)] += told
+
+
+@compiled
+def leverages(params: Floats, along_u: Floats, along_v: Floats, box: Ints, cov: Floats, out: Floats) -> None:
+    """Fill (height, width): variance of the fitted pixel values, DN^2."""
+    out[:] = cov[0, 0]
+    mixed = np.empty((3, 3))
+    for i in range(len(params)):
+        for y in range(box[i, 2], box[i, 3]):
+            for p in range(1, 6):
+                factor = 2.0 * cov[0, _place(i, p)] * (1.0 if p == 1 else params[i, 1])
+                factor *= along_v[i, ALONG_V[p], y]
+                for x in range(box[i, 0], box[i, 1]):
+                    out[y, x] += factor * along_u[i, ALONG_U[p], x]
+        for j in range(i + 1):
+            first, end, top, bottom = _overlap(box, i, j)
+            for y in range(top, bottom):
+                mixed[:] = 0.0
+                for p in range(1, 6):
+                    for q in range(1, 6):
+                        factor = (1.0 if p == 1 else params[i, 1]) * (1.0 if q == 1 else params[j, 1])
+                        factor *= along_v[i, ALONG_V[p], y] * along_v[j, ALONG_V[q], y]
+                        mixed[ALONG_U[p], ALONG_U[q]] += factor * cov[_place(i, p), _place(j, q)]
+                if i != j:
+                    mixed *= 2.0
+                for a in range(3):
+                    share, centre, width = mixed[a, 0], mixed[a, 1], mixed[a, 2]
+                    for x in range(first, end):
+                        of_j = share * along_u[j, 0, x] + centre * along_u[j, 1, x] + width * along_u[j, 2, x]
+                        out[y, x] += along_u[i, a, x] * of_j

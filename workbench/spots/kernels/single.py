@@ -1,0 +1,221 @@
+"""Fisher scoring over all windows as one compiled program. Derivation: docs/spots.md."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from workbench.spots.kernels.compiled import compiled
+from workbench.spots.kernels.photon_transfer import transfer_slope
+from workbench.spots.kernels.profiles import profile, sheared_rows, upright_rows
+from workbench.spots.kernels.single_sums import dense_sums, fill_leverage, invert, separable_sums
+from workbench.spots.types import Bools, Floats
+
+# Columns of `Fit.judged`.
+JUDGED: Final = 9
+_MAX_STEPS: Final = 20
+_MAX_STEP: Final = np.array([math.inf, math.inf, 1.0, 1.0, 0.4, 0.4, 0.4])
+# Of both logarithms of the width, and of the shear.
+_LOWEST: Final = np.array([math.log(0.15), math.log(0.15), -3.0])
+_HIGHEST: Final = np.array([math.log(12.0), math.log(12.0), 3.0])
+# Where the steps stop. Near the end a step squares the error: one of 1 sd that is small against the spot too,
+# or of 0.1 sd, leaves some hundredths of an sd once it is taken.
+_TOLERANCE_SD: Final = 0.1
+_SMALL: Final = 0.05
+# One window that never converges must not keep the noise of the others from being measured.
+_STEPS_TO_MEASURE: Final = 8
+# After so many steps it is settled which pixels clip: a set that changes with every step never converges.
+_STEPS_TO_SETTLE: Final = 6
+# A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would
+# choose.
+_CLIP_MARGIN_SD: Final = 2.0
+
+
+@compiled
+def _weigh(
+    usable: Bools, clip: Floats, signal: Floats, background: float, floor: float, slope: float, out: Floats
+) -> None:
+    """Inverse of the variance that the model predicts, 0 where a pixel is not to be used."""
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            variance = floor + slope * max(signal[y, x], 0.0)
+            out[y, x] = usable[y, x] / variance
+            if clip[y, x] < math.inf:
+                room = clip[y, x] - signal[y, x] - background
+                if not room > _CLIP_MARGIN_SD * math.sqrt(variance):
+                    out[y, x] = 0.0
+
+
+@compiled
+def _moved(params: Floats, delta: Floats) -> None:
+    """Step of one window, kept from jumping out of it; `params` is changed."""
+    flux = max(abs(params[1]), 1e-9)
+    for j in range(params.size):
+        step = delta[j] / flux if j > 1 else delta[j]
+        params[j] += min(max(step, -_MAX_STEP[j]), _MAX_STEP[j])
+        if j > 3:
+            params[j] = min(max(params[j], _LOWEST[j - 4]), _HIGHEST[j - 4])
+
+
+@compiled
+def _within(delta: Floats, cov: Floats, small: float) -> bool:
+    """Whether a step is within 0.1 sd; or within 1 sd if that is small, too, DN."""
+    for j in range(delta.size):
+        variance = cov[j, j]
+        limit = variance if small > 0.0 else 0.0
+        if j > 1:
+            limit = min(limit, small * small)
+        if not delta[j] * delta[j] <= max(limit, _TOLERANCE_SD**2 * variance):
+            return False
+    return True
+
+
+@compiled
+def _evaluate(
+    params: Floats,
+    data: Floats,
+    along_u: Floats,
+    along_v: Floats,
+    rows: Floats,
+    signal: Floats,
+    residual: Floats,
+) -> None:
+    """Fill profiles or derivatives of one window, its signal and residual, at `params`."""
+    if params.size == 7:
+        sheared_rows(params, rows)
+        signal[:] = params[1] * rows[1]
+    else:
+        profile(params[2], params[4], along_u)
+        profile(params[3], params[5], along_v)
+        for y in range(signal.shape[0]):
+            for x in range(signal.shape[1]):
+                signal[y, x] = params[1] * along_v[0, y] * along_u[0, x]
+    residual[:] = data - signal - params[0]
+
+
+@compiled
+def _solve(
+    along_u: Floats,
+    along_v: Floats,
+    rows: Floats,
+    weight: Floats,
+    residual: Floats,
+    cov: Floats,
+    delta: Floats,
+) -> None:
+    """Fill the covariance (k, k) and the step (k,) of one window."""
+    information, gradient = np.empty_like(cov), np.empty_like(delta)
+    if delta.size == 7:
+        dense_sums(rows, weight, residual, information, gradient)
+    else:
+        separable_sums(along_u, along_v, weight, residual, information, gradient)
+    invert(information, cov)
+    delta[:] = 0.0
+    for a in range(delta.size):
+        for b in range(delta.size):
+            delta[a] += cov[a, b] * gradient[b]
+    if not np.isfinite(delta.sum()):
+        delta[:] = 0.0
+
+
+@compiled
+def _leverages(params: Floats, cov: Floats, data: Floats) -> Floats:
+    """(n, height, width) leverage of every window's pixels."""
+    leverage = np.empty_like(data)
+    rows = np.empty((params.shape[1], data.shape[1], data.shape[2]))
+    for i in range(len(params)):
+        if params.shape[1] == 7:
+            sheared_rows(params[i], rows)
+        else:
+            upright_rows(params[i], rows)
+        fill_leverage(rows, cov[i], leverage[i])
+    return leverage
+
+
+@compiled
+def _tilt(along_u: Floats, along_v: Floats, weight: Floats, residual: Floats) -> float:
+    """Square of the score by the shear over its variance, of an upright window."""
+    score = told = 0.0
+    for y in range(weight.shape[0]):
+        for x in range(weight.shape[1]):
+            by_shear = along_v[1, y] * along_u[1, x]
+            score += by_shear * weight[y, x] * residual[y, x]
+            told += by_shear * by_shear * weight[y, x]
+    return score * score / max(told, 1e-300)
+
+
+@compiled
+def _judge(signal: Floats, residual: Floats, weight: Floats, cov: Floats, flux: float, out: Floats) -> None:
+    """Fill a window's `Fit.judged`, all but the score by a shear."""
+    height, width = signal.shape
+    worst = at_rim = told = 0.0
+    peak, in_rim = -math.inf, 0
+    for y in range(height):
+        for x in range(width):
+            excess = residual[y, x] * residual[y, x] * weight[y, x]
+            worst = max(worst, excess)
+            peak = max(peak, signal[y, x])
+            told += weight[y, x] * signal[y, x] * signal[y, x]
+            if y == 0 or y == height - 1 or x == 0 or x == width - 1:
+                at_rim += excess
+                in_rim += weight[y, x] > 0.0
+    out[0], out[1], out[2], out[3], out[8] = worst, at_rim / max(in_rim, 1), peak, told, in_rim
+    out[4] = math.sqrt(max(cov[1, 1], 0.0))
+    out[5] = math.sqrt(max(cov[2, 2], 0.0)) / max(flux, 1e-12)
+    out[6] = math.sqrt(max(cov[3, 3], 0.0)) / max(flux, 1e-12)
+
+
+@compiled
+def score(
+    data: Floats,
+    usable: Bools,
+    clip: Floats,
+    floor: Floats,
+    guess: Floats,
+    params: Floats,
+    cov: Floats,
+    signal: Floats,
+    residual: Floats,
+    weight: Floats,
+    last: Bools,
+    slope: Floats,
+    judged: Floats,
+) -> None:
+    """Fit one spot per window, starting at `params`; from there on the arguments are filled: see `Fit`.
+
+    Handing out an array that was made here would cost more than a step of one window.
+    """
+    n, k = params.shape
+    delta = np.empty((n, k))
+    slope[:] = guess
+    along_u, along_v = np.empty((n, 4, data.shape[2])), np.empty((n, 4, data.shape[1]))
+    rows = np.empty((n, k, data.shape[1], data.shape[2]))
+    measured = False
+    for step in range(_MAX_STEPS):
+        for i in range(n):
+            _evaluate(params[i], data[i], along_u[i], along_v[i], rows[i], signal[i], residual[i])
+        again = True
+        while again:
+            there = True
+            for i in range(n):
+                _weigh(usable[i], clip[i], signal[i], params[i, 0], floor[i], slope[i], weight[i])
+                _solve(along_u[i], along_v[i], rows[i], weight[i], residual[i], cov[i], delta[i])
+                there = there and _within(delta[i], cov[i], 0.0)
+            again = not measured and (there or step == _STEPS_TO_MEASURE)
+            if again:
+                leverage = _leverages(params, cov, data)
+                slope[:] = transfer_slope(signal, residual, weight, leverage, floor, guess)
+                measured = True
+        if step == _STEPS_TO_SETTLE:
+            usable = weight > 0.0
+            clip = np.full_like(clip, math.inf)
+        for i in range(n):
+            last[i] = _within(delta[i], cov[i], max(_SMALL * abs(params[i, 1]), 1e-300))
+            _moved(params[i], delta[i])
+        if measured and last.all():
+            break
+    for i in range(n):
+        _judge(signal[i], residual[i], weight[i], cov[i], params[i, 1], judged[i])
+        judged[i, 7] = 0.0 if k == 7 else _tilt(along_u[i], along_v[i], weight[i], residual[i])

@@ -1,0 +1,176 @@
+"""Compiled loops around a fit: windows cut out of the frames, first guesses, what a spot's place tells."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from workbench.spots.kernels.compiled import compiled
+from workbench.spots.types import Bools, Floats, Image, Ints
+
+_PER_HALF_HEIGHT: Final = 1.0 / (2.0 * math.pi * math.log(2.0))
+_EDGE_WIDTHS: Final = 2.5
+# Half-widths of windows; each holds spots whose width is up to (half - 0.5) / 3: what lies beyond 3 widths
+# tells next to nothing about the position.
+HALVES_PX: Final = (5, 8, 13, 19)
+_REACH_WIDTHS: Final = 3.0
+
+
+@compiled
+def half_for(width_px: float) -> int:
+    """Half-width of the window for a spot."""
+    for half in HALVES_PX:
+        if half >= _REACH_WIDTHS * width_px + 0.5:
+            return half
+    return HALVES_PX[-1]
+
+
+@compiled
+def _part(usable: Bools, rows: Floats, cols: Floats, group: Ints) -> None:
+    """Make the pixels unusable that lie nearer to another peak than to the window's own."""
+    half = usable.shape[1] // 2
+    for i in range(len(group)):
+        for k in range(len(rows)):
+            dv, du = rows[k] - rows[group[i]], cols[k] - cols[group[i]]
+            square = dv * dv + du * du
+            if square == 0 or square > (2 * half) ** 2:
+                continue
+            for y in range(usable.shape[1]):
+                for x in range(usable.shape[2]):
+                    if 2 * ((y - half) * dv + (x - half) * du) > square:
+                        usable[i, y, x] = False
+
+
+@compiled
+def cut(
+    on: Image,
+    off: Image,
+    share: float,
+    level: float,
+    clip_dn: float,
+    rows: Floats,
+    cols: Floats,
+    group: Ints,
+    data: Floats,
+    usable: Bools,
+    clip: Floats,
+) -> None:
+    """Fill data, usable pixels and clipping values (see `Windows`) around the peaks `group` (n,) of all."""
+    n, side = len(group), data.shape[1]
+    clip[:] = math.inf
+    clipped = False
+    for i in range(n):
+        row0, col0 = int(rows[group[i]]) - side // 2, int(cols[group[i]]) - side // 2
+        for y in range(side):
+            row = min(max(row0 + y, 0), on.shape[0] - 1)
+            for x in range(side):
+                col = min(max(col0 + x, 0), on.shape[1] - 1)
+                raw = float(on[row, col])
+                data[i, y, x] = raw - share * float(off[row, col]) - level
+                usable[i, y, x] = col0 + x == col and row0 + y == row and raw < clip_dn
+                clipped = clipped or raw >= clip_dn
+    if clipped:
+        for i in range(n):
+            row0, col0 = int(rows[group[i]]) - side // 2, int(cols[group[i]]) - side // 2
+            for y in range(side):
+                row = min(max(row0 + y, 0), on.shape[0] - 1)
+                for x in range(side):
+                    col = min(max(col0 + x, 0), on.shape[1] - 1)
+                    clip[i, y, x] = data[i, y, x] + (clip_dn - float(on[row, col]))
+    _part(usable, rows, cols, group)
+
+
+@compiled
+def guess(data: Floats, usable: Bools, rows: Floats, cols: Floats, start: Floats) -> None:
+    """Fill a start (n, 6) in pixels of the image, from windows around pixels (n,).
+
+    The width is that of a spot with as many pixels above half the peak (2 pi ln 2 widths squared).
+    """
+    half = data.shape[1] // 2
+    for i in range(len(data)):
+        height = -math.inf
+        for y in range(data.shape[1]):
+            for x in range(data.shape[2]):
+                height = max(height, data[i, y, x] if usable[i, y, x] else 0.0)
+        mass = of_u = of_v = 0.0
+        count = 0
+        for y in range(data.shape[1]):
+            for x in range(data.shape[2]):
+                above = (data[i, y, x] if usable[i, y, x] else 0.0) - 0.5 * height
+                if above > 0.0:
+                    count += 1
+                    mass, of_u, of_v = mass + above, of_u + above * x, of_v + above * y
+        square = count * _PER_HALF_HEIGHT
+        start[i, 0], start[i, 1] = 0.0, height * (2.0 * math.pi) * (square + 0.08)
+        start[i, 2] = of_u / max(mass, 1e-9) + cols[i] - half
+        start[i, 3] = of_v / max(mass, 1e-9) + rows[i] - half
+        start[i, 4] = start[i, 5] = 0.5 * math.log(max(square, 0.1))
+
+
+@compiled
+def is_near_edge(params: Floats, height: int, width: int) -> bool:
+    """Whether the border of the image cuts a spot (6 or more, in pixels of the image)."""
+    along_u, along_v = min(params[2], width - 1 - params[2]), min(params[3], height - 1 - params[3])
+    cut_off: bool = along_u < _EDGE_WIDTHS * math.exp(params[4]) or along_v < _EDGE_WIDTHS * math.exp(
+        params[5]
+    )
+    return cut_off
+
+
+@compiled
+def is_clipped(on: Image, clip_dn: float, params: Floats) -> bool:
+    """Whether a pixel within two widths of a spot (6 or more, in pixels of the image) is clipped."""
+    u, v, reach_u, reach_v = params[2], params[3], 2 * math.exp(params[4]), 2 * math.exp(params[5])
+    first_row, last_row = int(np.rint(v - reach_v)), int(np.rint(v + reach_v))
+    first_col, last_col = int(np.rint(u - reach_u)), int(np.rint(u + reach_u))
+    for y in range(max(first_row, 0), min(last_row + 1, on.shape[0])):
+        for x in range(max(first_col, 0), min(last_col + 1, on.shape[1])):
+            if float(on[y, x]) >= clip_dn:
+                return True
+    return False
+
+
+@compiled
+def flag_codes(on: Image, clip_dn: float, params: Floats, codes: Ints) -> None:
+    """Fill (n,) codes: 1 for a spot (n, 6 or more) that the border cuts, plus 2 for one that is clipped."""
+    for i in range(len(params)):
+        cut_off = is_near_edge(params[i], on.shape[0], on.shape[1])
+        codes[i] = int(cut_off) + 2 * int(is_clipped(on, clip_dn, params[i]))
+
+
+@compiled
+def halves_for(params: Floats, scale: float, halves: Ints) -> None:
+    """Fill (n,) half-widths of windows for spots (n, 6) whose widths are to be multiplied by `scale`."""
+    for i in range(len(params)):
+        halves[i] = half_for(scale * math.exp(params[i, 4]))
+
+
+@compiled
+def mark_light(row0: int, col0: int, lights: Floats, out: Bools) -> None:
+    """Mark pixels of a window (height, width) that lie within discs (n, 3): u, v and radius in the image.
+
+    `row0` and `col0` are the window's first pixel in the image.
+    """
+    for n in range(len(lights)):
+        u, v, radius = lights[n, 0] - col0, lights[n, 1] - row0, lights[n, 2]
+        for y in range(max(math.floor(v - radius), 0), min(math.ceil(v + radius) + 1, out.shape[0])):
+            for x in range(max(math.floor(u - radius), 0), min(math.ceil(u + radius) + 1, out.shape[1])):
+                if (x - u) ** 2 + (y - v) ** 2 < radius * radius:
+                    out[y, x] = True
+
+
+@compiled
+def mark_strip(
+    row0: int, col0: int, rows: tuple[int, int], cols: tuple[int, int], mask: Bools, out: Bools
+) -> None:
+    """Mark pixels of a window (height, width) that lie in a strip of the image.
+
+    The strip has rows and columns from the first to the one after its last; `mask` says which of its pixels
+    count, all if it is empty.
+    """
+    for y in range(max(rows[0] - row0, 0), min(rows[1] - row0, out.shape[0])):
+        for x in range(max(cols[0] - col0, 0), min(cols[1] - col0, out.shape[1])):
+            if mask.size == 0 or mask[y + row0 - rows[0], x + col0 - cols[0]]:
+                out[y, x] = True

@@ -1,0 +1,1 @@
+"""The thesis's simulation: its scenes, its own chain, the workbench's chain."""
