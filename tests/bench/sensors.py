@@ -22,6 +22,6 @@ def calibration_of(rig: Rig) -> Calibration:
     for laser_id, ray in truth["lasers"].items():
         world.values |= {f"{laser_id}.{name}": value for name, value in ray.items()}
     provenance = PROVENANCE.model_copy(update={"rig": rig.rig, "serial": rig.serial})
-    calibration, assessment = calibrate(fit(rig, world.sightings()), Acceptance(), provenance)
+    calibration, assessment = calibrate(fit(rig, world.observations()), Acceptance(), provenance)
     assert assessment.verdict == "accepted", assessment.reasons
     return calibration

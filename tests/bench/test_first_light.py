@@ -29,7 +29,7 @@ from workbench.model.event import (
     TrialFinished,
 )
 from workbench.model.rig import load_rig
-from workbench.sensor.calibrated import Sensor
+from workbench.sensor.calibrated import CalibratedSensor
 from workbench.session.journal import read_journal
 from workbench.viewer.recording import rebuild
 
@@ -250,5 +250,5 @@ def test_the_session_says_how_it_ended(demo: Demo) -> None:
 
 
 def test_the_calibration_reaches_the_whole_frame(demo: Demo) -> None:
-    sensor = Sensor(load_calibration(demo.folder / "calibration.yaml"))
+    sensor = CalibratedSensor(load_calibration(demo.folder / "calibration.yaml"))
     assert sensor.in_frame("L2", np.array([300.0, 4500.0])).all()

@@ -28,12 +28,12 @@ from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
 from workbench.procedure.capture.latency import WHOLE, count_latency
 from workbench.procedure.doctor import examine
-from workbench.procedure.engine.expected_prompts import foreseen_prompts
-from workbench.procedure.engine.operator import Scripted
+from workbench.procedure.engine.expected_prompts import expected_prompts
+from workbench.procedure.engine.operator import ScriptedOperator
 from workbench.procedure.engine.resume import resume
 from workbench.procedure.engine.run import NOBODY, Plan, run
 from workbench.session.journal import Journal, read_journal
-from workbench.session.state import effective, standing
+from workbench.session.state import effective, session_status
 
 HEAD = "format: 1\nprocedure: p\ntitle: P\nsteps:\n"
 GRID = """\
@@ -83,7 +83,7 @@ def session(folder: Path, steps: str, operator: Operator, emulator: str = "") ->
     rig, procedure = write_files(folder, HEAD + steps)
     rig.write_text(rig.read_text() + "  answers: false\n" + emulator)
     plan = Plan.load(rig, [procedure])
-    held = Foreseen(operator, foreseen_prompts(plan.procedures, plan.rig))
+    held = Foreseen(operator, expected_prompts(plan.procedures, plan.rig))
     run(plan, folder / "s", (), CALLER, lambda: None, held)
     return folder / "s"
 
@@ -138,7 +138,7 @@ def test_a_measured_standoff_counts_as_measured(tmp_path: Path) -> None:
 def test_abort_says_who_and_why(tmp_path: Path) -> None:
     with pytest.raises(StoppedError, match=r"aborted by the operator at p.1/600mm: fire drill"):
         session(tmp_path, GRID, Says(("p.1/600mm", Answer(action="abort", reason="fire drill"))))
-    assert standing(tmp_path / "s").state == "stopped"
+    assert session_status(tmp_path / "s").state == "stopped"
 
 
 def test_nobody_at_a_real_rig_and_then_somebody(tmp_path: Path) -> None:
@@ -146,16 +146,16 @@ def test_nobody_at_a_real_rig_and_then_somebody(tmp_path: Path) -> None:
     answers.write_text("safety: true\np.1/300mm: 300\n")
     foreseen = (Prompt("safety", "?"), Prompt("p.1/300mm", "?", quantity=Quantity("mm", 270, 330)))
     with pytest.raises(AnswerNeededError, match="prompt safety"):
-        session(tmp_path, GRID, Scripted.load(answers, {p.key: p for p in foreseen}, NOBODY))
+        session(tmp_path, GRID, ScriptedOperator.load(answers, {p.key: p for p in foreseen}, NOBODY))
     assert not list((tmp_path / "s/frames").iterdir()), "nothing was lit"
-    waiting = standing(tmp_path / "s")
+    waiting = session_status(tmp_path / "s")
     assert (waiting.state, waiting.unfinished) == ("waiting", True)
     assert waiting.why.startswith("for an answer to safety: Lasers of class ")
     assert "nobody" not in waiting.why
     operator = Says()
     resume(tmp_path / "s", (), RESUMER, lambda: None, operator)
     assert [p.key for p in operator.asked][:2] == ["safety", "p.1/300mm"]
-    assert standing(tmp_path / "s").state == "finished"
+    assert session_status(tmp_path / "s").state == "finished"
 
 
 def test_a_session_whose_folder_was_renamed(tmp_path: Path) -> None:
@@ -258,7 +258,7 @@ def test_a_marginal_value_is_told_and_gone_on_from(tmp_path: Path) -> None:
     done = session(tmp_path, limited("snr", "{in: [1, null], marginal: [1.0e9, null]}"), Says())
     verdicts = {e.verdict for e in events(done, ev.LimitChecked) if isinstance(e, ev.LimitChecked)}
     assert verdicts == {"marginal"}
-    assert standing(done).state == "finished"
+    assert session_status(done).state == "finished"
 
 
 FIT = GRID + "  - step: fit\n    limits: {max_relative_range_sd: 0.5}\n"
@@ -276,7 +276,7 @@ def test_a_fit_is_held_against_limits(tmp_path: Path, step: str, quantity: str) 
     operator = Says((f"p.3/{quantity}", Answer()))
     done = session(tmp_path / "asked", with_limit("{in: [0, 1.0e-9], on_fail: ask}"), operator)
     assert operator.answers == []
-    assert standing(done).state == "finished"
+    assert session_status(done).state == "finished"
 
 
 UNSEEN = """\
@@ -525,14 +525,14 @@ def test_a_stop_while_it_goes_over_what_is_there_takes_nothing_away(tmp_path: Pa
     later = Says()
     resume(stopped, (), RESUMER, lambda: None, later)
     assert [prompt.key for prompt in later.asked] == ["safety", "p.3/600mm", "p.3/1500mm"]
-    assert standing(stopped).state == "finished"
+    assert session_status(stopped).state == "finished"
 
 
 def test_a_comment_is_no_change(tmp_path: Path) -> None:
     stopped = stopped_session(tmp_path)
     change("serial: emulated-1", "serial: emulated-1  # by the window")(tmp_path / "rig.yaml")
     resume(stopped, (), RESUMER, lambda: None, Says())
-    assert standing(stopped).state == "finished"
+    assert session_status(stopped).state == "finished"
 
 
 @pytest.mark.parametrize(
@@ -555,7 +555,7 @@ def test_a_change_is_refused_unless_it_is_accepted(
     (resumed,) = [e for e in events(stopped, ev.SessionResumed) if isinstance(e, ev.SessionResumed)]
     assert resumed.accepted_because == "a typing error"
     assert file in resumed.changes[0]
-    assert standing(stopped).state == "finished"
+    assert session_status(stopped).state == "finished"
     assert (tmp_path / file).read_text() in _texts(stopped / "session.yaml")
     assert (tmp_path / file).read_text() not in _texts(stopped / "session-1.yaml")
 
@@ -591,7 +591,7 @@ def test_what_is_finished_or_running_is_not_resumed(tmp_path: Path) -> None:
         go_on(done)
     stopped = stopped_session(tmp_path / "stopped")
     with Journal.reopen(stopped)[0]:
-        assert standing(stopped).state == "running"
+        assert session_status(stopped).state == "running"
         with pytest.raises(BadInputError, match="another program"):
             go_on(stopped)
 

@@ -27,7 +27,7 @@ from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, 
 from workbench.procedure.engine.resume import resume
 from workbench.procedure.engine.run import Plan, run
 from workbench.session.journal import read_journal
-from workbench.session.state import effective, groups, standing
+from workbench.session.state import effective, groups, session_status
 
 SHOTS = 8
 
@@ -114,13 +114,13 @@ def goes_on(room: Room, error: WorkbenchError) -> None:
     last = records[-1].event
     assert isinstance(last, ev.SessionFinished)
     assert (last.exit_code, last.message) == (error.exit_code, str(error))
-    assert standing(session).state == "failed"
+    assert session_status(session).state == "failed"
     whole = [key for key, group in groups(records).items() if group.whole]
     assert whole == ["p.1/300mm"]
     operator = Says()
     resume(session, (), RESUMER, lambda: None, operator)
     assert [p.key for p in operator.asked] == ["safety", "p.1/600mm"], "what is whole is not asked for again"
-    assert standing(session).state == "finished"
+    assert session_status(session).state == "finished"
     told = [record.event for record in effective(read_journal(session))]
     taken = [e for e in told if isinstance(e, ev.CaptureTaken)]
     spots = [e for e in told if isinstance(e, ev.SpotsFound)]

@@ -42,7 +42,7 @@ class Bench:
         rig = rig or load_rig(RIG)
         self.rig = rig.model_copy(update={"lasers": tuple(s for s in rig.lasers if s.axis in axes)})
         self.world = World(self.rig, 3)
-        calibration, _ = calibrate(fit(self.rig, self.world.sightings()), Acceptance(), PROVENANCE)
+        calibration, _ = calibrate(fit(self.rig, self.world.observations()), Acceptance(), PROVENANCE)
         self.ranger = Ranger(calibration)
         ids = self.ranger.sensor.ids
         self.finders = {

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from workbench.model import event as ev
 from workbench.procedure.engine.resume import resume
-from workbench.procedure.engine.run import Caller, Plan, run
+from workbench.procedure.engine.run import Invocation, Plan, run
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
 
 ROOT = Path(__file__).parents[2]
-CALLER = Caller(operator="A. Technician", command="workbench run", created="2026-01-01T12:00:00+0000")
-RESUMER = Caller(operator="B. Other", command="workbench resume", created="2026-01-02T12:00:00+0000")
+CALLER = Invocation(operator="A. Technician", command="workbench run", created="2026-01-01T12:00:00+0000")
+RESUMER = Invocation(operator="B. Other", command="workbench resume", created="2026-01-02T12:00:00+0000")
 PROCEDURE = """\
 format: 1
 procedure: short

@@ -15,7 +15,7 @@ from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.procedure.engine.run import Plan, run
 from workbench.session.journal import read_journal
-from workbench.session.state import standing
+from workbench.session.state import session_status
 
 SCRIPT = Path(sys.executable).with_name("workbench")
 CAPTURES_ONLY = PROCEDURE[: PROCEDURE.index("  - step: fit")]
@@ -59,7 +59,7 @@ def test_a_journal_that_finds_no_room(
             begin(whole.parent, tmp_path / "s")
     assert len(list(read_journal(tmp_path / "s"))) == n
     assert (tmp_path / "s/journal.jsonl").read_bytes().count(b"\n") == n
-    assert standing(tmp_path / "s").unfinished
+    assert session_status(tmp_path / "s").unfinished
     assert_goes_on(tmp_path / "s", whole)
 
 
@@ -76,7 +76,7 @@ def test_frames_that_find_no_room(tmp_path: Path, whole: Path) -> None:
     assert "workbench resume" in done.stderr
     (session,) = [p for p in tmp_path.iterdir() if p.is_dir()]
     assert not list((session / "frames").rglob("*.png")), "half a frame is no frame"
-    assert standing(session).state == "stopped"
+    assert session_status(session).state == "stopped"
     go_on(session)
     assert results(session) == results(whole)
 

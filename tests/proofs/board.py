@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import yaml as pyyaml
 
-from workbench.calibration.data.spot_rows import sight_rows
-from workbench.calibration.estimation.fit import Fit, fit
+from workbench.calibration.data.spot_rows import observations_of_rows
+from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.verdict.assessment import determined_by
 from workbench.model.captures import load_captures
 from workbench.model.procedure import Procedure, load_procedure
 from workbench.model.rig import Rig, load_rig
-from workbench.procedure.engine.run import Caller, Plan, run
+from workbench.procedure.engine.run import Invocation, Plan, run
 
 ROOT = Path(__file__).parents[2]
 RIG = ROOT / "rigs/thesis-emulated.yaml"
@@ -39,10 +39,10 @@ class Study:
 
     seed: int
     truth: dict[str, float]
-    joint: Fit
-    flat: Fit
+    joint: CalibrationFit
+    flat: CalibrationFit
 
-    def f(self, result: Fit) -> tuple[float, float, float, str]:
+    def f(self, result: CalibrationFit) -> tuple[float, float, float, str]:
         """Error and sd relative to the truth, data share, and what it rests on."""
         true = self.truth["f_px"]
         error, sd = result.values[0] / true - 1, result.sd[0] / true
@@ -74,11 +74,13 @@ def study(rig: Rig, procedure: Procedure, seed: int, folder: Path) -> Study:
     rig = rig.model_copy(update={"emulator": {**(rig.emulator or {}), "seed": seed}})
     plan = Plan(rig, RIG, (procedure,), (PROCEDURE,))
     session = folder / f"seed-{seed}"
-    run(plan, session, (), Caller("proof", "tests.proofs.board", "2000-01-01T00:00:00+0000"), lambda: None)
-    sightings, rejected, boards = sight_rows(rig, load_captures(session / "captures.csv"))
+    run(
+        plan, session, (), Invocation("proof", "tests.proofs.board", "2000-01-01T00:00:00+0000"), lambda: None
+    )
+    observations, rejected, boards = observations_of_rows(rig, load_captures(session / "captures.csv"))
     on_boards = {view.placement.key for view in boards}
-    flats = [s for s in sightings if s.placement not in on_boards]
-    return Study(seed, _truth(session), fit(rig, sightings, rejected, boards), fit(rig, flats))
+    flats = [s for s in observations if s.placement not in on_boards]
+    return Study(seed, _truth(session), fit(rig, observations, rejected, boards), fit(rig, flats))
 
 
 def table(studies: list[Study]) -> list[str]:
@@ -136,7 +138,7 @@ def main() -> int:
     return 1 if misses(studies) else 0
 
 
-def _f(one: Study, result: Fit) -> str:
+def _f(one: Study, result: CalibrationFit) -> str:
     error, sd, share, by = one.f(result)
     return f"{100 * error:>+8.3f}{100 * sd:>7.3f}{share:>6.2f}{by:>6}"
 

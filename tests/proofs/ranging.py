@@ -12,7 +12,7 @@ from jax import Array
 from tests.proofs.simulate import COMMON, LENS, RAY, Floats
 from workbench.optics.lens import Lens
 from workbench.optics.rays import Ray
-from workbench.optics.triangulate import Sighted, estimate_depth
+from workbench.optics.triangulate import MeasuredSpot, estimate_depth
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def ranges(sensor: Floats, covariance: Floats, position_px: Floats, sd_px: Float
 @jax.jit
 def _depths(lens: Array, rays: Array, position_px: Array, sd_px: Array) -> tuple[Array, ...]:
     def one(lens: Array, ray: Array, position: Array, sd: Array) -> tuple[Array, ...]:
-        found = estimate_depth(Lens(*lens), Ray(*ray), Sighted(position[0], position[1], sd, sd))
+        found = estimate_depth(Lens(*lens), Ray(*ray), MeasuredSpot(position[0], position[1], sd, sd))
         return found.inverse_depth_per_mm, found.z_sd_of_spot_mm, found.dz_dlens, found.dz_dray
 
     by_laser = jax.vmap(one, in_axes=(None, 0, 0, None))

@@ -30,7 +30,7 @@ from workbench.model.calibration import load_calibration
 from workbench.model.errors import WorkbenchError
 from workbench.model.rig import Rig, load_rig
 from workbench.procedure.engine.run import Plan, run
-from workbench.sensor.calibrated import Sensor
+from workbench.sensor.calibrated import CalibratedSensor
 
 ROOT = Path(__file__).parents[2]
 RIG = ROOT / "rigs" / "thesis-emulated.yaml"
@@ -78,7 +78,7 @@ def session(seed: int, folder: Path) -> Outcome | str:
 
 def outcome(rig: Rig, calibration_file: Path, truth_file: Path) -> Outcome:
     """Hold a calibration against the truth of its bench."""
-    sensor = Sensor(load_calibration(calibration_file))
+    sensor = CalibratedSensor(load_calibration(calibration_file))
     stated = sensor.calibration.laser_ranger.parameters
     assert list(stated.names) == simulate.names(rig)
     truth = _truth(rig, truth_file)
@@ -172,7 +172,7 @@ def _misses(z: Floats, inside: int) -> Iterator[str]:
         yield f"mean z {mean:+.3f}, expected within {most:.3f} of 0"
 
 
-def _ranged(sensor: Sensor, seen: Floats) -> tuple[Floats, Floats]:
+def _ranged(sensor: CalibratedSensor, seen: Floats) -> tuple[Floats, Floats]:
     """Ranges (K, L) of spots (K, L, 2) and what the calibration adds to their deviations, mm."""
     found, sd = np.full(seen.shape[:2], np.nan), np.full(seen.shape[:2], np.nan)
     for n, laser in enumerate(sensor.ids):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.proofs.simulate import Calibrations, Floats
-from workbench.calibration.data.observations import PlacementInfo, Sighting
+from workbench.calibration.data.observations import Observation, PlacementInfo
 from workbench.calibration.estimation.batch import fit_batch
 from workbench.calibration.selection.model_terms import fit_chosen, without_idle
 from workbench.model.rig import Rig
@@ -41,7 +41,7 @@ def one_by_one(rig: Rig, placements: Sequence[PlacementInfo], data: Calibrations
     """As `workbench fit` from the means of the repeats on: spots that lie apart rejected, terms chosen."""
     sensors, covariances, scales, converged = [], [], [], []
     for position, sd in zip(data.position_px, data.sd_px, strict=True):
-        seen = _sightings(rig, placements, position, sd)
+        seen = _observations(rig, placements, position, sd)
         fitted = without_idle(fit_chosen(rig, seen))
         sensors.append(fitted.values[fitted.sensor])
         covariances.append(fitted.covariance[fitted.sensor, fitted.sensor])
@@ -50,11 +50,13 @@ def one_by_one(rig: Rig, placements: Sequence[PlacementInfo], data: Calibrations
     return Solved(np.array(sensors), np.array(covariances), np.array(scales), np.array(converged))
 
 
-def _sightings(rig: Rig, placements: Sequence[PlacementInfo], position: Floats, sd: Floats) -> list[Sighting]:
-    """One sighting a cell: the mean of its repeats, with the sd of that mean; speckle is the fit's to add."""
+def _observations(
+    rig: Rig, placements: Sequence[PlacementInfo], position: Floats, sd: Floats
+) -> list[Observation]:
+    """One observation a cell: the mean of its repeats and its sd; the fit adds speckle."""
     own = np.sqrt(np.maximum(sd**2 - rig.noise.speckle_sd_px**2, 0.0))
     return [
-        Sighting(f"{laser} {p.key}", laser, p.key, p.standoff_mm, 0, *position[j, i], *own[j, i])
+        Observation(f"{laser} {p.key}", laser, p.key, p.standoff_mm, 0, *position[j, i], *own[j, i])
         for j, p in enumerate(placements)
         for i, laser in enumerate(rig.laser_ids)
         if np.isfinite(position[j, i]).all()

@@ -10,7 +10,7 @@ from tests.proofs import bound, simulate
 from tests.proofs.ranging import ranges
 from tests.proofs.simulate import Floats
 from tests.proofs.solve import Solve, at_once
-from workbench.calibration.data.observations import PlacementInfo, Sighting, group
+from workbench.calibration.data.observations import Observation, PlacementInfo, group
 from workbench.model.rig import Rig
 
 RANGES_MM = np.array([120.0, 180.0, 270.0, 400.0, 600.0, 900.0, 1400.0, 2100.0, 3200.0, 5000.0])
@@ -75,7 +75,7 @@ def run(
 def placements(rig: Rig, standoffs_mm: Floats) -> tuple[PlacementInfo, ...]:
     """The target at standoffs (J,), square, with the rig's tolerances."""
     seen = [
-        Sighting(f"{s:g} mm", rig.laser_ids[0], f"{s:g} mm", s, 0, 0.0, 0.0) for s in standoffs_mm.tolist()
+        Observation(f"{s:g} mm", rig.laser_ids[0], f"{s:g} mm", s, 0, 0.0, 0.0) for s in standoffs_mm.tolist()
     ]
     return group(seen, rig.laser_ids, rig.noise)[0].placements
 

@@ -16,15 +16,15 @@ from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
 from workbench.model.rig import load_rig
-from workbench.sensor.calibrated import Sensor
+from workbench.sensor.calibrated import CalibratedSensor
 
 ROOT = Path(__file__).parents[2]
 
 
 def test_many_ranges_are_those_of_the_sensor() -> None:
     world = World(thesis_rig(), 1)
-    single = fit(world.rig, world.sightings())
-    sensor = Sensor(calibrate(single, Acceptance(), PROVENANCE)[0])
+    single = fit(world.rig, world.observations())
+    sensor = CalibratedSensor(calibrate(single, Acceptance(), PROVENANCE)[0])
     position, sd = as_grid(single.cells, 4)
     batch = fit_batch(world.rig, single.cells.placements, position[None], sd[None])
     at = np.array([150.0, 700.0, 4000.0])

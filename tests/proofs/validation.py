@@ -45,7 +45,7 @@ def _sound(fits: int) -> Iterator[str]:
     found: Counter[str] = Counter()
     chances: dict[str, list[float]] = {}
     for number in range(fits):
-        fit = fit_without_outliers(thesis_rig(), World(thesis_rig(), FIRST_SEED + number).sightings())
+        fit = fit_without_outliers(thesis_rig(), World(thesis_rig(), FIRST_SEED + number).observations())
         folds, tests = cross_validation.leave_each_out(fit), residuals.residual_tests(fit)
         found["cross-validation alarm"] += bool(cross_validation.alarms(folds))
         found["residual test alarm"] += bool(residuals.alarms(tests))
@@ -81,7 +81,7 @@ def _mistaken(fits: int) -> Iterator[str]:
     for standoff_mm in STANDOFFS_MM:
         alarmed = named = 0
         for number in range(fits):
-            seen = World(thesis_rig(), FIRST_SEED + number).sightings()
+            seen = World(thesis_rig(), FIRST_SEED + number).observations()
             off = standoff_mm + MISTAKE_MM
             told = [replace(s, standoff_mm=off) if s.standoff_mm == standoff_mm else s for s in seen]
             fit = fit_without_outliers(thesis_rig(), told)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tests.support.rigs import World
 from workbench.calibration.data.boards import BoardView
-from workbench.calibration.data.observations import PlacementInfo, Sighting
+from workbench.calibration.data.observations import Observation, PlacementInfo
 from workbench.corners.board import BoardCorners
 from workbench.model.board import sag_mm
 
@@ -54,14 +54,14 @@ class BoardWorld:
 
     def measure(
         self, placings: Sequence[tuple[float, float, float]] = PLACINGS, repeats: int = 4
-    ) -> tuple[list[Sighting], list[BoardView]]:
+    ) -> tuple[list[Observation], list[BoardView]]:
         """A capture of the board at every placing, with noise."""
         seen = [self._placing(f"B{n}", *placing, repeats) for n, placing in enumerate(placings)]
-        return [s for sightings, _ in seen for s in sightings], [view for _, view in seen]
+        return [s for observations, _ in seen for s in observations], [view for _, view in seen]
 
     def _placing(
         self, key: str, standoff: float, yaw: float, pitch: float, repeats: int
-    ) -> tuple[list[Sighting], BoardView]:
+    ) -> tuple[list[Observation], BoardView]:
         rig, values, rng = self.world.rig, self.world.values, self.rng
         sd = TILTED_SD_MM if yaw or pitch else rig.bench.placement_sd_mm
         told_sd = sd if yaw or pitch else float("nan")
@@ -70,17 +70,17 @@ class BoardWorld:
         stood = Stood(float(z0), *map(float, slopes))
         corners = self._corners(stood)
         view = BoardView(PlacementInfo(key, standoff, told_sd, 0.0, key), corners)
-        sightings = []
+        observations = []
         for laser in rig.lasers:
             spot = self.world.pixel(laser.id, stood.z0_mm, *np.arctan(slopes))
             spot = spot + rng.normal(0.0, rig.noise.speckle_sd_px, 2)
             for repeat in range(repeats):
                 u, v = spot + rng.normal(0.0, rig.noise.spot_sd_px, 2)
                 source = f"{key} {laser.id} {repeat}"
-                sightings.append(
-                    Sighting(source, laser.id, key, standoff, repeat, u, v, standoff_sd_mm=told_sd)
+                observations.append(
+                    Observation(source, laser.id, key, standoff, repeat, u, v, standoff_sd_mm=told_sd)
                 )
-        return sightings, view
+        return observations, view
 
     def _corners(self, stood: Stood) -> BoardCorners:
         """A board laid on the plane by hand, seen with noise; corners outside the picture are not."""

@@ -6,46 +6,46 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from tests.support.rigs import World
-from workbench.calibration.data.observations import Sighting
+from workbench.calibration.data.observations import Observation
 
 
-def exchanged(sightings: list[Sighting], a: str, b: str) -> list[Sighting]:
+def exchanged(observations: list[Observation], a: str, b: str) -> list[Observation]:
     """Two lasers wired the wrong way round."""
     other = {a: b, b: a}
-    return [replace(s, laser_id=other.get(s.laser_id, s.laser_id)) for s in sightings]
+    return [replace(s, laser_id=other.get(s.laser_id, s.laser_id)) for s in observations]
 
 
-def mirrored(world: World, sightings: list[Sighting]) -> list[Sighting]:
-    return [replace(s, u_px=world.rig.camera.width_px - 1 - s.u_px) for s in sightings]
+def mirrored(world: World, observations: list[Observation]) -> list[Observation]:
+    return [replace(s, u_px=world.rig.camera.width_px - 1 - s.u_px) for s in observations]
 
 
-def told_as(sightings: list[Sighting], standoff_mm: float, told_mm: float) -> list[Sighting]:
-    return [replace(s, standoff_mm=told_mm) if s.standoff_mm == standoff_mm else s for s in sightings]
+def told_as(observations: list[Observation], standoff_mm: float, told_mm: float) -> list[Observation]:
+    return [replace(s, standoff_mm=told_mm) if s.standoff_mm == standoff_mm else s for s in observations]
 
 
 def shifted(
-    sightings: list[Sighting],
+    observations: list[Observation],
     laser_id: str,
     standoff_mm: float,
     by_px: float,
     repeats: Collection[int] = range(99),
-) -> list[Sighting]:
+) -> list[Observation]:
     """Some repeats of one spot seen elsewhere, across and along alike."""
     return [
         replace(s, u_px=s.u_px + by_px, v_px=s.v_px + 0.1 * by_px)
         if (s.laser_id, s.standoff_mm) == (laser_id, standoff_mm) and s.repeat in repeats
         else s
-        for s in sightings
+        for s in observations
     ]
 
 
 def moved(
-    world: World, sightings: list[Sighting], standoff_mm: float, after: int, step_mm: float
-) -> list[Sighting]:
+    world: World, observations: list[Observation], standoff_mm: float, after: int, step_mm: float
+) -> list[Observation]:
     """A target that moves by `step_mm` after so many captures of its placement."""
     found, seen = [], 0
     z0 = standoff_mm + world.values["offset_mm"]
-    for s in sightings:
+    for s in observations:
         if s.standoff_mm == standoff_mm:
             seen += 1
             if seen > after:

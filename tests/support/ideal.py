@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.emulator.scene import Scene
+from workbench.emulator.scene import BenchScene
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.spot import Spot
 from workbench.emulator.truth import draw_truth
@@ -60,9 +60,9 @@ def ideal_rig(
     )
 
 
-def scene_of(rig: Rig, folder: Path) -> Scene:
+def scene_of(rig: Rig, folder: Path) -> BenchScene:
     spec = emulator_spec(rig)
-    return Scene(rig, spec, draw_truth(rig, spec), folder / "truth.yaml")
+    return BenchScene(rig, spec, draw_truth(rig, spec), folder / "truth.yaml")
 
 
 def painted(rig: Rig, folder: Path, standoff_mm: float, target: TargetShape | None = None) -> Spot:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.data.observations import Sighting
+from workbench.calibration.data.observations import Observation
 from workbench.model.calibration import Provenance
 from workbench.model.rig import BenchSpec, CameraSpec, LaserSpec, NoiseSpec, Prior, Rig
 
@@ -100,9 +100,9 @@ class World:
         pixel, _ = cv2.projectPoints(point, np.zeros(3), np.zeros(3), camera, lens)
         return np.asarray(pixel, np.float64).reshape(2)
 
-    def sightings(
+    def observations(
         self, standoffs_mm: tuple[float, ...] = STANDOFFS_MM, repeats: int = 5, session: int = 1
-    ) -> list[Sighting]:
+    ) -> list[Observation]:
         """A whole calibration: placement errors, tilts, speckle and noise drawn from the rig's tolerances."""
         rng = np.random.default_rng([self.seed, session])
         bench, noise = self.rig.bench, self.rig.noise
@@ -118,7 +118,9 @@ class World:
                     if 0 <= u <= 639 and 0 <= v <= 479:
                         source = f"{laser.id} {standoff:g} {repeat}"
                         found.append(
-                            Sighting(source, laser.id, f"{standoff:g}", standoff, repeat, float(u), float(v))
+                            Observation(
+                                source, laser.id, f"{standoff:g}", standoff, repeat, float(u), float(v)
+                            )
                         )
         return found
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from workbench.calibration.design.forecast import Forecast, forecast
+from workbench.calibration.design.forecast import CalibrationForecast, forecast
 from workbench.calibration.design.standoffs import best_standoffs
 from workbench.calibration.verdict.observability import direction_lines
 from workbench.model.errors import BadInputError
@@ -64,7 +64,7 @@ def _given(rig: Rig, text: str) -> tuple[float, ...]:
     return tuple(found)
 
 
-def _print(rig: Rig, result: Forecast, proposed: bool) -> None:
+def _print(rig: Rig, result: CalibrationForecast, proposed: bool) -> None:
     console = Console(stderr=True, markup=False)
     standoffs = ", ".join(f"{s:g}" for s in result.standoffs_mm)
     console.print(

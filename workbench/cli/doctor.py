@@ -11,12 +11,12 @@ from rich.console import Console
 from rich.text import Text
 
 from workbench.cli.stopping import StopAfterShot
-from workbench.cli.terminal_operator import whoever_is_there
+from workbench.cli.terminal_operator import choose_operator
 from workbench.devices.registry import open_bench
 from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import load_rig
 from workbench.procedure.doctor import examine
-from workbench.procedure.engine.operator import who_answers
+from workbench.procedure.engine.operator import operator_of_bench
 
 
 def examine_rig(rig_path: Path, no_input: bool) -> None:
@@ -31,8 +31,8 @@ def examine_rig(rig_path: Path, no_input: bool) -> None:
     stopping = StopAfterShot()
     bad = []
     with tempfile.TemporaryDirectory() as folder, open_bench(rig, Path(folder) / "doctor") as bench:
-        person = whoever_is_there(no_input, console, lambda: stopping.reason, nullcontext)
-        for finding in examine(rig, bench, who_answers(bench, person)):
+        person = choose_operator(no_input, console, lambda: stopping.reason, nullcontext)
+        for finding in examine(rig, bench, operator_of_bench(bench, person)):
             colour, word = ("green", "ok  ") if finding.ok else ("red", "FAIL")
             console.print(Text.assemble((word, colour), f" {finding.part}: {finding.found}"))
             if not finding.ok:

@@ -15,7 +15,7 @@ hung = False
 """Whether a thread hangs in a library that would be waited for at the end."""
 
 
-def leave(code: int, at_once: bool = False) -> NoReturn:
+def exit_program(code: int, at_once: bool = False) -> NoReturn:
     """End with an exit code; `at_once` without taking down, module by module, what was imported.
 
     That is a twentieth of a short command's time, and gains nothing where all that it leaves is on disk.

@@ -13,19 +13,19 @@ from typing import Any
 from rich.console import Console
 
 from workbench.calibration.data.boards import BoardView
-from workbench.calibration.data.observations import Rejected, Sighting
-from workbench.calibration.data.spot_rows import sight_rows
-from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.data.spot_rows import observations_of_rows
+from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.selection.model_terms import fit_chosen
 from workbench.calibration.verdict.assessment import Assessment, derive
-from workbench.calibration.verdict.export import calibrate, kept_because, write_calibration
+from workbench.calibration.verdict.export import accept_with_reason, calibrate, write_calibration
 from workbench.calibration.verdict.records import left_out_records, parameter_records, term_summaries
 from workbench.cli.invocation import command_line, now, operator
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
 from workbench.model.captures import CaptureRow, check_images, of_file, parse_captures, read_captures_file
 from workbench.model.errors import BadInputError, LimitFailedError
-from workbench.model.nested import hold
+from workbench.model.nested import fix_parameters
 from workbench.model.rig import Rig, load_rig
 from workbench.report.tables import derived_table, left_out_table, parameter_table, rejected_lines, term_table
 from workbench.session.capture_table import CALIBRATION_TABLE
@@ -64,17 +64,17 @@ def fit_captures(request: Request, as_json: bool) -> None:
     """
     check_output(request.output)
     _check_distinct(request)
-    rig = hold(_rig(request), request.fixed)
+    rig = fix_parameters(_rig(request), request.fixed)
     captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
     content = read_captures_file(captures)
     rows = parse_captures(captures, content)
     check_images(captures, rows)
-    data = _sightings(rig, rows, captures, request)
+    data = _observations(rig, rows, captures, request)
     fitted = fit_chosen(rig, *data, keep=request.kept)
     calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
     refused = assessment.verdict == "refused" and request.accept is None
     if assessment.verdict == "refused" and request.accept is not None:
-        calibration = kept_because(calibration, request.accept)
+        calibration = accept_with_reason(calibration, request.accept)
     if not refused:  # before anything is printed, which may fail: the output's reader may be gone
         write_calibration(request.output, calibration)
     if as_json:
@@ -115,23 +115,23 @@ def _rig(request: Request) -> Rig:
     return load_session_rig(source)
 
 
-def _sightings(
+def _observations(
     rig: Rig, rows: Sequence[CaptureRow], captures: Path, request: Request
-) -> tuple[list[Sighting], list[Rejected], list[BoardView]]:
+) -> tuple[list[Observation], list[Rejected], list[BoardView]]:
     known = {row.standoff_mm for row in rows}
     if unknown := [s for s in request.without_mm if s not in known]:
         raise BadInputError(f"--without-standoff: no row has the standoff {unknown[0]:g} mm")
     kept = [row for row in rows if row.standoff_mm not in request.without_mm]
     with of_file(captures):
-        sightings, rejected, boards = sight_rows(rig, kept)
+        observations, rejected, boards = observations_of_rows(rig, kept)
     left_out = [row for row in rows if row.standoff_mm in request.without_mm]
     rejected += [Rejected(f"row {row.row}", f"left out: standoff {row.standoff_mm:g} mm") for row in left_out]
-    if not sightings:
+    if not observations:
         lines = [f"not used: {line}" for line in rejected_lines(rejected)]
         more = [f"and {len(lines) - MOST_ROWS} more"] if len(lines) > MOST_ROWS else []
         told = [f"{request.source}: no spot is left to fit: do rig file and captures belong together?"]
         raise BadInputError("\n".join([*told, *lines[:MOST_ROWS], *more]))
-    return sightings, rejected, boards
+    return observations, rejected, boards
 
 
 def _provenance(rig: Rig, request: Request, captures: bytes) -> Provenance:
@@ -147,7 +147,7 @@ def _provenance(rig: Rig, request: Request, captures: bytes) -> Provenance:
     )
 
 
-def _as_json(fitted: Fit, assessment: Assessment) -> dict[str, Any]:
+def _as_json(fitted: CalibrationFit, assessment: Assessment) -> dict[str, Any]:
     parameters = [
         {key: getattr(p, key) for key in ("name", "unit", "value", "sd", "prior_sd", "data_share")}
         | {"determined_by": p.determined_by}
@@ -196,7 +196,7 @@ def _wrapped(label: str, text: str) -> list[str]:
     )
 
 
-def _print_tables(fitted: Fit, assessment: Assessment) -> None:
+def _print_tables(fitted: CalibrationFit, assessment: Assessment) -> None:
     console = Console(stderr=True, markup=False)
     console.print(parameter_table(parameter_records(fitted)))
     console.print(derived_table(derive(fitted)))

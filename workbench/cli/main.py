@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from workbench.cli.console import say
-from workbench.cli.exit import leave
+from workbench.cli.exit import exit_program
 from workbench.cli.option_types import millimetres, whole
 from workbench.cli.stdio import fill_closed_streams
 from workbench.cli.stopping import ignore_signals, stop_at_once
@@ -178,7 +178,7 @@ def fit(
         source, rig, output, accept, tuple(without_standoff or ()), tuple(fix or ()), tuple(keep or ())
     )
     fit_captures(request, json)
-    leave(0, at_once=True)
+    exit_program(0, at_once=True)
 
 
 @app.command()
@@ -291,7 +291,7 @@ def main() -> None:
         app()
     except (Exception, SystemExit) as error:
         ignore_signals()  # one more must not take the place of what is told now
-        leave(_tell(error))
+        exit_program(_tell(error))
 
 
 def _tell(error: BaseException) -> int:

@@ -11,7 +11,7 @@ from workbench.model.errors import BadInputError
 from workbench.procedure.capture.exposure import LIT_FRAMES, MOST_TRIALS
 from workbench.procedure.capture.latency import LEASE_S
 from workbench.procedure.engine.check import check_file
-from workbench.procedure.engine.durations import Pace, learn_pace
+from workbench.procedure.engine.durations import StepDurations, learn_durations
 from workbench.procedure.engine.plan import PlannedStep, outline
 from workbench.procedure.engine.run import Plan
 
@@ -46,7 +46,7 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
     plan = Plan.load(rig_path, procedures)
     if sessions.exists() and not sessions.is_dir():
         raise BadInputError(f"{sessions}: expected a folder of sessions, this is a file")
-    pace = learn_pace(sessions, plan.rig.rig)
+    pace = learn_durations(sessions, plan.rig.rig)
     steps = outline(plan.procedures, plan.rig)
     console = Console(stderr=True, markup=False)
     console.print(_table(steps, pace))
@@ -64,7 +64,7 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
     console.print(_told_by(pace, plan.rig.rig), highlight=False)
 
 
-def emission(shots: int, pace: Pace, lit_frames: int = 1) -> str:
+def emission(shots: int, pace: StepDurations, lit_frames: int = 1) -> str:
     """Seconds of emission, as measured before or as the lease bounds them."""
     if pace.lit_s is None:
         return f"at most {shots * LEASE_S:.0f} s of emission (leases of {LEASE_S:g} s)"
@@ -80,7 +80,7 @@ def duration(seconds: float) -> str:
     return f"{seconds / 3600:.1f} h"
 
 
-def _table(steps: list[PlannedStep], pace: Pace) -> Table:
+def _table(steps: list[PlannedStep], pace: StepDurations) -> Table:
     table = Table(title="Plan", title_justify="left")
     table.add_column("step", overflow="fold")
     table.add_column("", overflow="fold")
@@ -94,7 +94,7 @@ def _table(steps: list[PlannedStep], pace: Pace) -> Table:
     return table
 
 
-def _told_by(pace: Pace, rig: str) -> str:
+def _told_by(pace: StepDurations, rig: str) -> str:
     if pace.sessions == 0:
         return (
             f"Times are guesses: {pace.placing_s:g} s to place the target, {pace.exposing_s:g} s for the"

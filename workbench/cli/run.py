@@ -13,8 +13,8 @@ from workbench.cli.background import Background
 from workbench.cli.console import say
 from workbench.cli.invocation import command_line, now, operator
 from workbench.cli.stopping import StopAfterShot
-from workbench.cli.terminal import Guarded, Terminal
-from workbench.cli.terminal_operator import whoever_is_there
+from workbench.cli.terminal import FaultTolerantConsumer, Terminal
+from workbench.cli.terminal_operator import choose_operator
 from workbench.devices.protocols import Operator
 from workbench.model import event as ev
 from workbench.model.errors import (
@@ -23,13 +23,13 @@ from workbench.model.errors import (
     RigNotReadyError,
     StoppedError,
 )
-from workbench.procedure.engine.durations import learn_pace
-from workbench.procedure.engine.expected_prompts import foreseen_prompts
-from workbench.procedure.engine.operator import Scripted
+from workbench.procedure.engine.durations import learn_durations
+from workbench.procedure.engine.expected_prompts import expected_prompts
+from workbench.procedure.engine.operator import ScriptedOperator
 from workbench.procedure.engine.plan import outline
-from workbench.procedure.engine.progress import Forecast
+from workbench.procedure.engine.progress import TimeLeft
 from workbench.procedure.engine.resume import files_now, plan_of, resume
-from workbench.procedure.engine.run import NOBODY, Caller, Plan, run
+from workbench.procedure.engine.run import NOBODY, Invocation, Plan, run
 from workbench.report.thesis_figures import FigureWriter
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.spots import is_compiled
@@ -84,18 +84,18 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     asked = StopAfterShot()
     script = None
     if answers.file is not None:
-        script = Scripted.load(answers.file, foreseen_prompts(plan.procedures, plan.rig), NOBODY)
+        script = ScriptedOperator.load(answers.file, expected_prompts(plan.procedures, plan.rig), NOBODY)
     steps = outline(plan.procedures, plan.rig)
     if not is_compiled():
         say("note: the search for spots is compiled at the first capture: a minute or two, this once")
-    forecast = Forecast(steps, learn_pace(session_dir.parent, plan.rig.rig))
+    forecast = TimeLeft(steps, learn_durations(session_dir.parent, plan.rig.rig))
     recording = RecordingConsumer(session_dir, plan.rig)
     file = session_dir / RECORDING_FILE
     with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
-        person = whoever_is_there(answers.no_input, console, lambda: asked.reason, terminal.quiet)
+        person = choose_operator(answers.no_input, console, lambda: asked.reason, terminal.quiet)
         operator = person if script is None else replace(script, other=person)
-        figures = Guarded(FigureWriter(session_dir), "drawing figures", console)
-        consumers = (Guarded(terminal, "the progress", console), figures, beside)
+        figures = FaultTolerantConsumer(FigureWriter(session_dir), "drawing figures", console)
+        consumers = (FaultTolerantConsumer(terminal, "the progress", console), figures, beside)
         try:
             yield Screen(consumers, lambda: asked.reason, operator)
         except (RigNotReadyError, StoppedError, AnswerNeededError, LaserOffNotConfirmedError):
@@ -112,5 +112,5 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     console.print(f"replay:  workbench view {session_dir}", highlight=False, soft_wrap=True)
 
 
-def _caller() -> Caller:
-    return Caller(operator=operator(), command=command_line(), created=now())
+def _caller() -> Invocation:
+    return Invocation(operator=operator(), command=command_line(), created=now())

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from workbench.model.errors import BadInputError
 from workbench.session.manifest import MANIFEST
-from workbench.session.state import Standing, standings
+from workbench.session.state import SessionStatus, session_statuses
 
 SHOWN = 20
 WHY_LINES = 2
@@ -28,7 +28,7 @@ def list_sessions(sessions: Path, as_json: bool) -> None:
     Raises:
         BadInputError: there is no such folder.
     """
-    found = standings(sessions)
+    found = session_statuses(sessions)
     if as_json:
         for each in found:
             print(json.dumps(asdict(each) | {"session_dir": str(each.session_dir)}))
@@ -55,7 +55,7 @@ def find_session(name: Path | None, sessions: Path) -> Path:
         if known:  # `.` is the folder that somebody stands in, and its name is told by its path alone
             return known[0] if known[0].name not in {"", ".."} else known[0].resolve()
         raise BadInputError(f"{name}: expected a session folder, or the name of one in {sessions}")
-    found = standings(sessions)
+    found = session_statuses(sessions)
     unfinished = [each for each in found if each.unfinished]
     if not unfinished:
         if running := [each for each in found if each.state == "running"]:
@@ -64,7 +64,7 @@ def find_session(name: Path | None, sessions: Path) -> Path:
     return unfinished[-1].session_dir
 
 
-def _show(found: list[Standing], console: Console) -> None:
+def _show(found: list[SessionStatus], console: Console) -> None:
     """A line each, two where a name is too long; how it ended stands below, where it did not end well."""
     counted = [
         f"{each.state:{max(len(e.state) for e in found)}}  {each.captures:6} captures" for each in found

@@ -16,7 +16,7 @@ from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.model.simulation import SceneSimulated, SimulationFinished
 from workbench.procedure.capture.quality import Quality, quality_of
-from workbench.procedure.engine.progress import Forecast
+from workbench.procedure.engine.progress import TimeLeft
 from workbench.report.tables import (
     claim_table,
     left_out_table,
@@ -30,7 +30,7 @@ from workbench.report.tables import (
 class Terminal:
     """Shows the records of a session as they come."""
 
-    def __init__(self, console: Console, forecast: Forecast) -> None:
+    def __init__(self, console: Console, forecast: TimeLeft) -> None:
         self._console, self._forecast = console, forecast
         self._progress = Progress(
             TextColumn("{task.description}"),
@@ -144,7 +144,7 @@ class Terminal:
         self._console.print(Padding(Text(text, style=style), (0, 0, 0, indent)))
 
 
-class Guarded:
+class FaultTolerantConsumer:
     """A consumer that may fail without stopping the session: frames and journal are the record, not it."""
 
     def __init__(self, consumer: ev.Consumer, name: str, console: Console) -> None:

@@ -17,14 +17,14 @@ from rich.text import Text
 from workbench.devices.protocols import Operator
 from workbench.model.errors import AnswerNeededError, StoppedError
 from workbench.model.prompt import Answer, Prompt
-from workbench.procedure.engine.operator import Nobody
+from workbench.procedure.engine.operator import NoOperator
 
 LOOK_S = 0.1
 """A stop that is asked for while nobody types is seen after this."""
 ACTIONS = ("redo", "skip", "abort")
 
 
-def whoever_is_there(
+def choose_operator(
     no_input: bool,
     console: Console,
     stopping: Callable[[], str | None],
@@ -32,15 +32,15 @@ def whoever_is_there(
 ) -> Operator:
     """The person at the terminal; nobody where there is none, on CI, or with --no-input."""
     if no_input:
-        return Nobody("--no-input was given")
+        return NoOperator("--no-input was given")
     if os.environ.get("CI"):
-        return Nobody("CI is set")
+        return NoOperator("CI is set")
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        return Nobody("there is no terminal")
-    return Person(console, stopping, quiet)
+        return NoOperator("there is no terminal")
+    return TerminalOperator(console, stopping, quiet)
 
 
-class Person:
+class TerminalOperator:
     """One question at a time; what was typed before it is asked does not answer it."""
 
     def __init__(

@@ -31,7 +31,7 @@ DARK = {0, BadInputError.exit_code, RigNotReadyError.exit_code}
 """A guardian's exit codes that leave nothing to tell: all is off, or it never had the port."""
 
 
-class Guarded:
+class GuardianClient:
     """A guardian process, see `guardian.py`. It holds the port until this is closed, or its process ends."""
 
     def __init__(

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import cast
 
-from workbench.devices.guardian_client import Guarded
+from workbench.devices.guardian_client import GuardianClient
 from workbench.model.errors import BadInputError
 from workbench.model.rig import LaserDriver
 
@@ -54,7 +54,7 @@ class SerialLaserBank:
             LaserOffNotConfirmedError: the controller answers, but not that all are off.
         """
         self.ids = tuple(ids)
-        self._guardian = Guarded(driver, port, baud, len(ids), boot_s, hang_s, virtual)
+        self._guardian = GuardianClient(driver, port, baud, len(ids), boot_s, hang_s, virtual)
         self.identity = self._guardian.identity
         self._lit = False
 

@@ -11,8 +11,8 @@ from workbench.emulator.camera import EmulatedCamera
 from workbench.emulator.controller import Controller
 from workbench.emulator.operator import EmulatedOperator
 from workbench.emulator.pty import PtyServer
-from workbench.emulator.scene import Scene
-from workbench.emulator.sensor import Sensor
+from workbench.emulator.scene import BenchScene
+from workbench.emulator.sensor import ImageSensor
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.spot import ImageFormat
 from workbench.emulator.truth import draw_truth, truth_path
@@ -25,7 +25,7 @@ class EmulatedBench(Bench):
 
     camera: EmulatedCamera
     lasers: SerialLaserBank
-    target: Scene
+    target: BenchScene
     controller: Controller
     server: PtyServer
 
@@ -49,8 +49,8 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
     """
     spec = emulator_spec(rig)
     truth = draw_truth(rig, spec)
-    scene = Scene(rig, spec, truth, truth_path(session_dir))
-    sensor = Sensor(spec, ImageFormat(rig.camera.width_px, rig.camera.height_px), rig.camera.bits)
+    scene = BenchScene(rig, spec, truth, truth_path(session_dir))
+    sensor = ImageSensor(spec, ImageFormat(rig.camera.width_px, rig.camera.height_px), rig.camera.bits)
     controller = Controller(rig.laser_ids, spec.controller)
     camera = EmulatedCamera(spec, scene, sensor, controller.lit)
     server = PtyServer(controller.receive)

@@ -11,8 +11,8 @@ import numpy as np
 
 from workbench.devices.protocols import Frame, Image
 from workbench.emulator.keyed import generator
-from workbench.emulator.scene import Scene
-from workbench.emulator.sensor import Map, Sensor
+from workbench.emulator.scene import BenchScene
+from workbench.emulator.sensor import ImageSensor, Map
 from workbench.emulator.spec import EmulatorSpec
 from workbench.emulator.spot import Spot
 
@@ -23,7 +23,7 @@ class Exposure:
 
     spots: tuple[Spot, ...]
     picture: Map | None
-    """What room light shows, see `Scene.picture`."""
+    """What room light shows, see `BenchScene.picture`."""
     lit: bool
     key: str
     number: int
@@ -44,7 +44,11 @@ class EmulatedCamera:
     """
 
     def __init__(
-        self, spec: EmulatorSpec, scene: Scene, sensor: Sensor, lasers: Callable[[], tuple[str, ...]]
+        self,
+        spec: EmulatorSpec,
+        scene: BenchScene,
+        sensor: ImageSensor,
+        lasers: Callable[[], tuple[str, ...]],
     ) -> None:
         self._spec, self._scene, self._sensor, self._lasers = spec, scene, sensor, lasers
         self.exposure_s = spec.camera.exposure_s

@@ -35,7 +35,7 @@ F_STEP = 4e-6
 """Relative: spots are painted anew when the focal length has drifted by this (1e-3 px at the edge)."""
 
 
-class Scene:
+class BenchScene:
     """The target bench: puts targets where they are asked for, with the errors of the hidden truth."""
 
     def __init__(self, rig: Rig, spec: EmulatorSpec, truth: Truth, truth_file: Path) -> None:

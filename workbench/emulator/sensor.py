@@ -17,7 +17,7 @@ Map = NDArray[np.float32]
 CLUTTER_THINGS = 40
 
 
-class Sensor:
+class ImageSensor:
     """A grey sensor of a linear response; numbers are clipped to [0, 2^bits - 1]."""
 
     def __init__(self, spec: EmulatorSpec, image: ImageFormat, bits: int) -> None:

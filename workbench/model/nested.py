@@ -14,7 +14,7 @@ TILTS = "tilts"
 Part = TypeVar("Part", bound=FileModel)
 
 
-def hold(rig: Rig, names: Iterable[str]) -> Rig:
+def fix_parameters(rig: Rig, names: Iterable[str]) -> Rig:
     """The rig with parameters made constants, by their names in the calibration: `k2`, `L1.tx`; or `tilts`.
 
     Raises:

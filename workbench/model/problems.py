@@ -65,7 +65,7 @@ SELF_EVIDENT = AS_THEY_ARE | {"too_short", "too_long"}
 
 
 @dataclass(frozen=True)
-class Problem:
+class SchemaProblem:
     """One mistake."""
 
     location: Location
@@ -85,7 +85,7 @@ class Problem:
         return f"{self.key}: {self.text}"
 
 
-def problems(model: type[BaseModel], data: Any, errors: Sequence[ErrorDetails]) -> Iterator[Problem]:
+def problems(model: type[BaseModel], data: Any, errors: Sequence[ErrorDetails]) -> Iterator[SchemaProblem]:
     """Each mistake in `data`, which was to be `model`, once, though pydantic may tell it several times."""
     places = [_in_file(data, error) for error in errors]
     strangers = [
@@ -97,7 +97,7 @@ def problems(model: type[BaseModel], data: Any, errors: Sequence[ErrorDetails]) 
             continue
         told.add(place)
         alike = [e for e, other in zip(errors, places, strict=True) if other == place]
-        yield Problem(place, _say(model, error, alike))
+        yield SchemaProblem(place, _say(model, error, alike))
 
 
 def closest_first(word: str, known: Sequence[str]) -> list[str]:

@@ -14,7 +14,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from workbench.model.contents import not_text
 from workbench.model.errors import BadInputError
-from workbench.model.problems import Location, Problem, problems
+from workbench.model.problems import Location, SchemaProblem, problems
 
 KINDS = {"procedure": "a procedure", "rig": "a rig", "laser_ranger": "a calibration"}
 """The keys that tell what a file is."""
@@ -64,7 +64,7 @@ class Document:
     doubled: tuple[Mistake, ...] = ()
     """Keys that stand in one mapping twice; the first counts."""
 
-    def mistake(self, problem: Problem) -> Mistake:
+    def mistake(self, problem: SchemaProblem) -> Mistake:
         """A problem with its line."""
         return Mistake(line_of(self.data, problem.location), problem.told)
 
@@ -83,7 +83,8 @@ class Document:
             model.model_validate(node, context=context)
         except ValidationError as error:
             found = [
-                Problem((*part, *one.location), one.text) for one in problems(model, node, error.errors())
+                SchemaProblem((*part, *one.location), one.text)
+                for one in problems(model, node, error.errors())
             ]
             return [self.mistake(problem) for problem in found]
         return []

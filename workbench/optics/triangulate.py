@@ -20,7 +20,7 @@ ITERATIONS = 20
 be inverted; the rest is for lenses bent almost to folding, and costs nothing that shows."""
 
 
-class Sighted(NamedTuple):
+class MeasuredSpot(NamedTuple):
     """A measured spot, pixels, 1 sigma.
 
     A coordinate that was not measured has an infinite sd, and any finite value.
@@ -51,7 +51,7 @@ class DepthEstimate(NamedTuple):
     """(4,) derivatives of `across_sd`."""
 
 
-def estimate_depth(lens: Lens, ray: Ray, spot: Sighted) -> DepthEstimate:
+def estimate_depth(lens: Lens, ray: Ray, spot: MeasuredSpot) -> DepthEstimate:
     """Maximum-likelihood depth of the point of `ray` that is seen at `spot`; scalars in, batch with `vmap`.
 
     One unknown, the inverse depth w, by Gauss-Newton on the spot's distance in units of its standard

@@ -28,7 +28,7 @@ BRIGHT = 0.25
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """What came of one check."""
 
     part: str
@@ -47,14 +47,14 @@ class _TellsState(Protocol):
     def state(self) -> _Interlocked: ...
 
 
-def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[Finding]:
+def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[CheckResult]:
     """Try every part of an opened bench.
 
     Raises:
         AnswerNeededError, StoppedError: nobody puts the target there, or confirms that it is safe.
         LaserOffNotConfirmedError: a beam stays on.
     """
-    yield Finding("controller", True, f"answers, all lasers off{_identity(bench)}")
+    yield CheckResult("controller", True, f"answers, all lasers off{_identity(bench)}")
     yield _interlock(bench)
     yield _tried("camera", partial(_camera, rig, bench))
     for prompt in (safety_prompt(rig), _target_prompt()):
@@ -69,13 +69,13 @@ def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[Finding]:
         yield _tried(f"laser {laser.id}", partial(_laser, rig, bench, laser))
 
 
-def _tried(part: str, check: Callable[[], str]) -> Finding:
+def _tried(part: str, check: Callable[[], str]) -> CheckResult:
     try:
-        return Finding(part, True, check())
+        return CheckResult(part, True, check())
     except LaserOffNotConfirmedError:
         raise
     except RigNotReadyError as error:
-        return Finding(part, False, str(error))
+        return CheckResult(part, False, str(error))
 
 
 def _identity(bench: Bench) -> str:
@@ -83,11 +83,11 @@ def _identity(bench: Bench) -> str:
     return f", {told}" if told else ""
 
 
-def _interlock(bench: Bench) -> Finding:
+def _interlock(bench: Bench) -> CheckResult:
     closed = bench.lasers.state().interlock_closed if isinstance(bench.lasers, _TellsState) else None
     if closed is None:
-        return Finding("interlock", True, "not told by this driver; an open one refuses the lasers below")
-    return Finding("interlock", closed, "closed" if closed else "open: close the door or the key switch")
+        return CheckResult("interlock", True, "not told by this driver; an open one refuses the lasers below")
+    return CheckResult("interlock", closed, "closed" if closed else "open: close the door or the key switch")
 
 
 def _camera(rig: Rig, bench: Bench) -> str:
@@ -106,16 +106,16 @@ def _camera(rig: Rig, bench: Bench) -> str:
     return f"{expected[1]} x {expected[0]}, {image.dtype.itemsize * 8} bits, median {np.median(image):.0f}"
 
 
-def _exposure(rig: Rig, bench: Bench) -> Iterator[Finding]:
+def _exposure(rig: Rig, bench: Bench) -> Iterator[CheckResult]:
     """Set as for captures, where it can be set."""
     try:
         found = set_exposure(bench, rig, "doctor", bench.mark)
     except RigNotReadyError as error:
-        yield Finding("exposure", False, str(error))
+        yield CheckResult("exposure", False, str(error))
         return
     if found is not None:
         well = found.verdict != "unseen" and BRIGHT <= found.peak < CLIPPED
-        yield Finding("exposure", well, found.text.removeprefix("exposure "))
+        yield CheckResult("exposure", well, found.text.removeprefix("exposure "))
 
 
 def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:

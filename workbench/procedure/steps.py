@@ -16,7 +16,7 @@ from zlib import crc32
 import numpy as np
 
 from workbench.calibration.data.boards import BoardView, on_boards, see_board
-from workbench.calibration.data.observations import PlacementInfo, Rejected, Sighting
+from workbench.calibration.data.observations import Observation, PlacementInfo, Rejected
 from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.calibration.design.next_standoff import advise
 from workbench.calibration.selection.model_terms import fit_chosen
@@ -32,8 +32,8 @@ from workbench.model.simulation import SimulationFinished
 from workbench.model.target import BoardTarget, Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.limits import check_captures, check_fit
-from workbench.procedure.engine.observed import sight_capture, sighted
-from workbench.procedure.engine.placements import visit
+from workbench.procedure.engine.observed import observe_capture, observed_so_far
+from workbench.procedure.engine.placements import visit_placements
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE, write_capture_table
@@ -97,7 +97,9 @@ def _(step: pr.AskStep, context: Context, name: str) -> str:
 @run_step.register
 def _(step: pr.PlaceTargetStep, context: Context, name: str) -> str:
     # What needs it lit, counting the latency, sees to its own exposure: one set now may rest on old frames.
-    placed = visit(context, [placement_at(name, step.standoff_mm)], lambda placement: placement, lights=False)
+    placed = visit_placements(
+        context, [placement_at(name, step.standoff_mm)], lambda placement: placement, lights=False
+    )
     return f"at {placed[0].standoff_mm:g} mm" if placed else "left out"
 
 
@@ -144,7 +146,7 @@ def _(step: pr.CaptureGridStep, context: Context, name: str) -> str:
         _advise(context)
         return pairs
 
-    return f"{sum(visit(context, placements, work))} pairs"
+    return f"{sum(visit_placements(context, placements, work))} pairs"
 
 
 @run_step.register
@@ -169,7 +171,7 @@ def _(step: pr.CaptureBoardStep, context: Context, name: str) -> str:
         context.boards[placement.key] = see_board(frames, context.rig.board, told)
         _capture_lasers(context, placement, step.repeats)
 
-    visit(context, placements, work)
+    visit_placements(context, placements, work)
     mine = [seen for key, seen in context.boards.items() if key.startswith(f"{name}/")]
     corners = sum(len(seen.corners.ids) for seen in mine if isinstance(seen, BoardView))
     missed = [seen.reason for seen in mine if isinstance(seen, Rejected)]
@@ -182,12 +184,12 @@ def _(step: pr.FitStep, context: Context, name: str) -> str:
     if not captures:
         raise BadInputError(f"step {name}: nothing to fit; expected a capture_grid step before it")
     sha256 = write_capture_table(context.session_dir / CALIBRATION_TABLE, captures)
-    spots = [sight_capture(context, capture) for capture in captures if capture.laser_id != BOARD]
+    spots = [observe_capture(context, capture) for capture in captures if capture.laser_id != BOARD]
     found = on_boards(context.rig.board, context.boards, spots)
-    sightings = [f for f in found if isinstance(f, Sighting)]
+    observations = [f for f in found if isinstance(f, Observation)]
     rejected = [f for f in (*found, *context.boards.values()) if isinstance(f, Rejected)]
     boards = [b for b in context.boards.values() if isinstance(b, BoardView)]
-    fitted = fit_chosen(context.rig, sightings, rejected, boards)
+    fitted = fit_chosen(context.rig, observations, rejected, boards)
     provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
     calibration, assessment = calibrate(fitted, step.limits, provenance)
     context.emit(fit_finished(fitted, assessment))
@@ -196,8 +198,8 @@ def _(step: pr.FitStep, context: Context, name: str) -> str:
     context.accepted, context.left_out = calibration, assessment.left_out
     worst = calibration.laser_ranger.validity.max_relative_range_sd
     return (
-        f"accepted: rms {fitted.rms_px:.3f} px over {len(sightings)} spots, {len(fitted.rejected)} not used;"
-        f" ranges to {100 * worst:.2g} % (1 sigma) or better"
+        f"accepted: rms {fitted.rms_px:.3f} px over {len(observations)} spots, {len(fitted.rejected)} not"
+        f" used; ranges to {100 * worst:.2g} % (1 sigma) or better"
     )
 
 
@@ -242,7 +244,9 @@ def _(step: pr.AccuracyTrialStep, context: Context, name: str) -> str:
             )
         return accuracy_row(placement.standoff_mm, readings, context.rig.bench)
 
-    rows = visit(context, [placement_at(name, standoff_mm) for standoff_mm in step.standoffs_mm], work)
+    rows = visit_placements(
+        context, [placement_at(name, standoff_mm) for standoff_mm in step.standoffs_mm], work
+    )
     trial = [c for c in context.captures if c.purpose == "trial"]
     write_capture_table(context.session_dir / TRIAL_TABLE, trial)
     table = f"{name}.csv"
@@ -316,7 +320,7 @@ def _advise(context: Context) -> None:
     """Tell how far the captures have come; not where the board was seen: its corners would not count."""
     if context.ahead is None or context.boards:
         return
-    if (advice := advise(context.rig, sighted(context), context.ahead.planned_mm)) is not None:
+    if (advice := advise(context.rig, observed_so_far(context), context.ahead.planned_mm)) is not None:
         context.emit(ev.StandoffAdvised(limit=context.ahead.limit, **asdict(advice)))
 
 

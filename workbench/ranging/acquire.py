@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from workbench.ranging.ranger import Dealt, Ranger, Reading, spot_arrays
+from workbench.ranging.ranger import Assignment, Ranger, Reading, spot_arrays
 from workbench.ranging.records import flag_notes
 from workbench.spots import Finding, Spot
 
@@ -33,16 +33,16 @@ class Seen(Enum):
     """What a state's captures showed."""
 
     NOTHING = "no spot"
-    TOLD = "every spot is some laser's"
-    UNTOLD = "spots that may be one laser's or another's"
+    ASSIGNED = "every spot is some laser's"
+    AMBIGUOUS = "spots that may be one laser's or another's"
 
 
 NEXT: Final = {
     (State.NORMAL, Seen.NOTHING): State.ANSWER,
-    (State.NORMAL, Seen.TOLD): State.ANSWER,
-    (State.NORMAL, Seen.UNTOLD): State.ALTERNATIVE,
+    (State.NORMAL, Seen.ASSIGNED): State.ANSWER,
+    (State.NORMAL, Seen.AMBIGUOUS): State.ALTERNATIVE,
     (State.ALTERNATIVE, Seen.NOTHING): State.ANSWER,
-    (State.ALTERNATIVE, Seen.TOLD): State.ANSWER,
+    (State.ALTERNATIVE, Seen.ASSIGNED): State.ANSWER,
 }
 
 
@@ -66,7 +66,7 @@ class _Control:
     def __init__(self, ranger: Ranger, scene: str, shoot: Shoot) -> None:
         self._ranger, self._scene, self._shoot = ranger, scene, shoot
         self._known: list[tuple[str, Spot]] = []
-        self._untold: tuple[str, ...] = ()
+        self._ambiguous: tuple[str, ...] = ()
         self._notes: list[str] = []
         self.reading: Reading | None = None
 
@@ -76,16 +76,16 @@ class _Control:
 
     def _normal(self) -> Seen:
         spots = self._shoot(self._ranger.sensor.ids).spots
-        dealt = self._ranger.deal(spots)
-        self._known, self._untold = self._of(spots, dealt), dealt.untold
-        self._notes = list(dealt.notes)
-        self.reading = self._ranger.read_dealt(self._scene, spots, dealt)
+        assignment = self._ranger.assign_spots(spots)
+        self._known, self._ambiguous = self._of(spots, assignment), assignment.ambiguous
+        self._notes = list(assignment.notes)
+        self.reading = self._ranger.read_assigned(self._scene, spots, assignment)
         if not spots:
             return Seen.NOTHING
-        return Seen.UNTOLD if dealt.untold else Seen.TOLD
+        return Seen.AMBIGUOUS if assignment.ambiguous else Seen.ASSIGNED
 
     def _alternative(self) -> Seen:
-        for laser_id in self._untold:
+        for laser_id in self._ambiguous:
             spots = self._ranger.alone(laser_id, self._shoot((laser_id,)).spots)
             if len(spots) == 1:
                 self._known.append((laser_id, spots[0]))
@@ -95,12 +95,14 @@ class _Control:
         position, sd = spot_arrays(spots)
         self._notes += flag_notes(ids, spots)
         fired = len(self._ranger.sensor.ids)
-        unseen = [i for i in self._ranger.sensor.ids if i not in ids and i not in self._untold]
+        unseen = [i for i in self._ranger.sensor.ids if i not in ids and i not in self._ambiguous]
         reading = self._ranger.read_known(self._scene, fired, ids, position, sd, self._notes, unseen)
         # The normal capture showed spots, or this one would not have been asked for.
         self.reading = replace(reading, status="not_enough_points") if not reading.lasers else reading
-        return Seen.TOLD if ids else Seen.NOTHING
+        return Seen.ASSIGNED if ids else Seen.NOTHING
 
-    def _of(self, spots: tuple[Spot, ...], dealt: Dealt) -> list[tuple[str, Spot]]:
+    def _of(self, spots: tuple[Spot, ...], assignment: Assignment) -> list[tuple[str, Spot]]:
         ids = self._ranger.sensor.ids
-        return [(ids[i], spots[n]) for i, n in np.stack((dealt.lasers, dealt.spots), axis=1).tolist()]
+        return [
+            (ids[i], spots[n]) for i, n in np.stack((assignment.lasers, assignment.spots), axis=1).tolist()
+        ]

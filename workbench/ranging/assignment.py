@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from workbench.sensor.calibrated import Ranges, Sensor
+from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
 FloatArray = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -31,19 +31,19 @@ MOST_LASERS = 6
 class Pairs:
     """What each of L lasers would make of each of S spots."""
 
-    ranges: Ranges
+    ranges: RangeEstimates
     """Of the L x S pairs, row by row: laser 0 with every spot, laser 1, ..."""
     inverse_depth: FloatArray
     """(L, S) not positive where the laser cannot have made the spot."""
     misfit_sd: FloatArray
     """(L, S)"""
 
-    def chosen(self, lasers: Ints, spots: Ints) -> Ranges:
+    def chosen(self, lasers: Ints, spots: Ints) -> RangeEstimates:
         """Ranges of some pairs."""
         return self.ranges.only(lasers * self.misfit_sd.shape[1] + spots)
 
 
-def pair_up(sensor: Sensor, position_px: FloatArray, sd_px: FloatArray) -> Pairs:
+def pair_up(sensor: CalibratedSensor, position_px: FloatArray, sd_px: FloatArray) -> Pairs:
     """Range every spot as if every laser had made it.
 
     Args:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.ranging.points import Points
 from workbench.ranging.shape import Shape, fit_shape
-from workbench.sensor.calibrated import Ranges, Sensor
+from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
 FloatArray = NDArray[np.float64]
 Axis = Literal["u", "v"]
@@ -34,7 +34,9 @@ class Line:
     """(n,) 1 sigma of the closest range by each spot's own noise."""
 
 
-def line_of(sensor: Sensor, axis: Axis, ids: Sequence[str], ranges: Ranges, indices: Sequence[int]) -> Line:
+def line_of(
+    sensor: CalibratedSensor, axis: Axis, ids: Sequence[str], ranges: RangeEstimates, indices: Sequence[int]
+) -> Line:
     """Fit the shape before one line.
 
     A spot lies where its beam meets the surface, not where the beam starts; the error of that place comes

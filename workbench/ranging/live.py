@@ -14,7 +14,7 @@ from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.rig import Rig
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
-from workbench.spots import Finding, Image, Spot, SpotFinder, is_same, lasting
+from workbench.spots import Finding, Image, Spot, SpotFinder, is_same_spot, persistent_spots
 
 LEASE_S = 2.0
 """Longest time that a laser stays lit for one frame."""
@@ -64,7 +64,7 @@ class LiveRanger:
         Returns:
             What to warn of: lights that burn already.
         """
-        self._lamps = tuple(lasting(self._look_again(), self._look_again))
+        self._lamps = tuple(persistent_spots(self._look_again(), self._look_again))
         return tuple(_burned(lamp) for lamp in self._lamps)
 
     def warm_up(self) -> None:
@@ -114,8 +114,8 @@ class LiveRanger:
         if self._dark is None:
             return reading
         lights = self._find(self.ranger.sensor.ids, self._dark, None).spots
-        known = [light for light in lights if any(is_same(light, lamp) for lamp in self._lamps)]
-        if new := lasting([light for light in lights if light not in known], self._look_again):
+        known = [light for light in lights if any(is_same_spot(light, lamp) for lamp in self._lamps)]
+        if new := persistent_spots([light for light in lights if light not in known], self._look_again):
             raise LaserOffNotConfirmedError(
                 f"reading {reading.scene}: the frame with all lasers off shows a spot at {_at(new[0])}. A"
                 " beam may be on although the controller says that it is off: cut the lasers' supply and keep"

@@ -17,7 +17,7 @@ from workbench.ranging.lines import NAMES, Axis, Line, Weights, line_of, mean_of
 from workbench.ranging.records import flag_notes, flat_range, laser_ranges
 from workbench.ranging.search_band import band
 from workbench.ranging.validity_checks import objections, outside_validity
-from workbench.sensor.calibrated import Ranges, Sensor
+from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 from workbench.spots import Scanline, Spot
 
 FloatArray = NDArray[np.float64]
@@ -57,16 +57,16 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Dealt:
+class Assignment:
     """The spots of a frame in which every laser is lit, as far as they tell their lasers."""
 
     lasers: Ints
     """(n,) indices of lasers with a spot."""
     spots: Ints
     """(n,) indices of their spots."""
-    ranges: Ranges
+    ranges: RangeEstimates
     """(n)"""
-    untold: tuple[str, ...]
+    ambiguous: tuple[str, ...]
     """Lasers whose spots, if they have any, cannot be told apart: fire each alone."""
     notes: tuple[str, ...] = ()
 
@@ -80,9 +80,9 @@ class Ranger:
     """How the ranges of two lines are averaged."""
 
     @cached_property
-    def sensor(self) -> Sensor:
+    def sensor(self) -> CalibratedSensor:
         """The calibration as arrays."""
-        return Sensor(self.calibration)
+        return CalibratedSensor(self.calibration)
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -154,9 +154,9 @@ class Ranger:
 
         Lines of lasers whose spots cannot be told apart have no range: fire these lasers alone instead.
         """
-        return self.read_dealt(scene, spots, self.deal(spots))
+        return self.read_assigned(scene, spots, self.assign_spots(spots))
 
-    def read_dealt(self, scene: str, spots: Sequence[Spot], dealt: Dealt) -> Reading:
+    def read_assigned(self, scene: str, spots: Sequence[Spot], dealt: Assignment) -> Reading:
         """Range spots that have been dealt to their lasers."""
         if not spots:
             return Reading(scene, "no_points", notes=(NOTHING_SEEN,))
@@ -164,13 +164,13 @@ class Ranger:
         mine = [spots[i] for i in dealt.spots.tolist()]
         position, _ = spot_arrays(mine)
         notes = (*dealt.notes, *flag_notes(ids, mine))
-        unseen = [i for i in self.sensor.ids if i not in ids and i not in dealt.untold]
+        unseen = [i for i in self.sensor.ids if i not in ids and i not in dealt.ambiguous]
         reading = self._answer(scene, len(self.sensor.ids), ids, position, dealt.ranges, notes, unseen)
-        if dealt.untold and reading.status == "no_points":
+        if dealt.ambiguous and reading.status == "no_points":
             return Reading(scene, "not_enough_points", notes=reading.notes)
         return reading
 
-    def deal(self, spots: Sequence[Spot]) -> Dealt:
+    def assign_spots(self, spots: Sequence[Spot]) -> Assignment:
         """Deal the spots of a frame in which every laser is lit to the lasers, each line apart.
 
         A spot that two lines claim leaves both untold. A laser without a spot whose spot would lie where
@@ -185,17 +185,17 @@ class Ranger:
         dealt = np.concatenate([np.empty(0, np.intp), *(f[1] for f in told.values())])
         hidden = [pair for axis in told for pair in self._hidden(spots, pairs, *told[axis], self._axes[axis])]
         clear = ~np.isin(dealt, [spot for _, spot in hidden])
-        untold = {int(i) for axis, all_ in self._axes.items() if axis not in told for i in all_}
-        untold |= {laser for laser, _ in hidden} | set(lasers[~clear].tolist())
+        ambiguous = {int(i) for axis, all_ in self._axes.items() if axis not in told for i in all_}
+        ambiguous |= {laser for laser, _ in hidden} | set(lasers[~clear].tolist())
         notes = self._what_is_left(pairs, len(spots), tuple(axis for axis in self._axes if axis not in told))
         notes += tuple(
             f"{self.sensor.ids[laser]}: its spot may be one with that at u = {spots[spot].u_px:.0f},"
             f" v = {spots[spot].v_px:.0f} px: fire each laser alone"
             for laser, spot in hidden
         )
-        ids = tuple(i for n, i in enumerate(self.sensor.ids) if n in untold)
+        ids = tuple(i for n, i in enumerate(self.sensor.ids) if n in ambiguous)
         lasers, dealt = lasers[clear], dealt[clear]
-        return Dealt(lasers, dealt, pairs.chosen(lasers, dealt), ids, notes)
+        return Assignment(lasers, dealt, pairs.chosen(lasers, dealt), ids, notes)
 
     def _hidden(
         self, spots: Sequence[Spot], pairs: Pairs, told: Ints, dealt: Ints, lasers: Ints
@@ -221,11 +221,11 @@ class Ranger:
         on_line = np.flatnonzero((ranges.misfit_sd < MOST_MISFIT_SD) & (ranges.range_mm > 0))
         return [spots[n] for n in on_line.tolist()]
 
-    def _what_is_left(self, pairs: Pairs, spots: int, untold: tuple[Axis, ...]) -> tuple[str, ...]:
+    def _what_is_left(self, pairs: Pairs, spots: int, ambiguous: tuple[Axis, ...]) -> tuple[str, ...]:
         astray = int((pairs.misfit_sd >= MOST_MISFIT_SD).all(axis=0).sum())
         notes = [f"{astray} of {spots} spots on no laser's line: other light"] if astray else []
-        if untold:
-            lines = " and ".join(f"{len(self._axes[axis])} {NAMES[axis]}" for axis in untold)
+        if ambiguous:
+            lines = " and ".join(f"{len(self._axes[axis])} {NAMES[axis]}" for axis in ambiguous)
             seen = f"{spots} spot{'s' * (spots != 1)}"
             notes.append(f"{seen} of {lines} lasers cannot be told apart: fire each laser alone")
         if spots - astray > len(self.sensor.ids):
@@ -238,7 +238,7 @@ class Ranger:
         fired: int,
         laser_ids: Sequence[str],
         position_px: FloatArray,
-        ranges: Ranges,
+        ranges: RangeEstimates,
         notes: Sequence[str],
         unseen: Sequence[str],
     ) -> Reading:
@@ -279,7 +279,7 @@ class Ranger:
             return f"{laser_id}: no spot was seen"
         return f"{laser_id}: at {range_mm:.0f} mm its spot lies outside the picture"
 
-    def _lines(self, ids: Sequence[str], ranges: Ranges) -> tuple[Line, ...]:
+    def _lines(self, ids: Sequence[str], ranges: RangeEstimates) -> tuple[Line, ...]:
         lines = []
         for axis, lasers in self._axes.items():
             names = {self.sensor.ids[i] for i in lasers}

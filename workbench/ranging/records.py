@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.model.event import LaserRange
 from workbench.ranging.points import interval_mm
-from workbench.sensor.calibrated import Ranges
+from workbench.sensor.calibrated import RangeEstimates
 from workbench.spots import Failure, Spot
 
 FloatArray = NDArray[np.float64]
@@ -34,7 +34,7 @@ def flag_notes(laser_ids: Sequence[str], spots: Sequence[Spot]) -> list[str]:
 
 
 def laser_ranges(
-    laser_ids: Sequence[str], position_px: FloatArray, ranges: Ranges, offset_mm: float
+    laser_ids: Sequence[str], position_px: FloatArray, ranges: RangeEstimates, offset_mm: float
 ) -> tuple[LaserRange, ...]:
     """A record for each of n ranges; positions (n, 2), NaN where a coordinate was not measured."""
     records = []
@@ -57,7 +57,7 @@ def laser_ranges(
     return tuple(records)
 
 
-def flat_range(ranges: Ranges) -> tuple[float, float]:
+def flat_range(ranges: RangeEstimates) -> tuple[float, float]:
     """Mean weighted by the spots' variances; its sigma from the full covariance.
 
     The calibration's part is common to the lasers: weights by the full covariance would lean on differences

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from workbench.model.calibration import Validity
 from workbench.model.event import LaserRange
 from workbench.ranging.assignment import MOST_MISFIT_SD
-from workbench.sensor.calibrated import Ranges
+from workbench.sensor.calibrated import RangeEstimates
 
 FloatArray = NDArray[np.float64]
 MOST_RELATIVE_SIGMA = 0.5
@@ -19,7 +19,7 @@ LEAST_BEYOND_PX = 0.5
 """Beyond the calibrated field by less than this is not worth telling."""
 
 
-def objections(position_px: FloatArray, ranges: Ranges, size_px: tuple[int, int]) -> list[str | None]:
+def objections(position_px: FloatArray, ranges: RangeEstimates, size_px: tuple[int, int]) -> list[str | None]:
     """For each of n spots why it cannot give a range; None where it can.
 
     Args:

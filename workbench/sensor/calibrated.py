@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Ranges:
+class RangeEstimates:
     """Ranges from the reference plane of n spots, mm; not finite where a spot admits none."""
 
     range_mm: FloatArray
@@ -38,9 +38,9 @@ class Ranges:
         """(n,) 1 sigma of each range."""
         return np.sqrt(np.diag(self.covariance_mm2))
 
-    def only(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Ranges:
+    def only(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> RangeEstimates:
         """Some of them."""
-        return Ranges(
+        return RangeEstimates(
             self.range_mm[index],
             self.spot_sd_mm[index],
             self.by_parameter[index],
@@ -50,7 +50,7 @@ class Ranges:
 
 
 @dataclass(frozen=True)
-class Sensor:
+class CalibratedSensor:
     """A calibration as arrays."""
 
     calibration: Calibration
@@ -122,7 +122,7 @@ class Sensor:
         gradient[:, :, self._columns["offset_mm"]] = -by[:, :, -1] * w[:, None] ** 2
         return gradient
 
-    def ranges(self, laser_ids: Sequence[str], position_px: FloatArray, sd_px: FloatArray) -> Ranges:
+    def ranges(self, laser_ids: Sequence[str], position_px: FloatArray, sd_px: FloatArray) -> RangeEstimates:
         """Ranges of n spots with known lasers.
 
         Args:
@@ -133,7 +133,9 @@ class Sensor:
         """
         return self.ranges_of(np.array([self.ids.index(i) for i in laser_ids], np.intp), position_px, sd_px)
 
-    def ranges_of(self, laser: NDArray[np.intp], position_px: FloatArray, sd_px: FloatArray) -> Ranges:
+    def ranges_of(
+        self, laser: NDArray[np.intp], position_px: FloatArray, sd_px: FloatArray
+    ) -> RangeEstimates:
         """As `ranges`, of lasers by their indices (n,) in the order of `ids`."""
         noise = self.calibration.laser_ranger.noise
         measured = np.isfinite(position_px)
@@ -150,10 +152,10 @@ class Sensor:
         line = self._by_parameter(laser, found.dacross)
         line_variance = ((line @ self.covariance) * line).sum(axis=1)
         misfit_sd = np.abs(found.across_sd) / np.sqrt(1 + line_variance)
-        return Ranges(range_mm, found.z_sd_of_spot_mm, gradient, covariance, misfit_sd)
+        return RangeEstimates(range_mm, found.z_sd_of_spot_mm, gradient, covariance, misfit_sd)
 
     def places(
-        self, laser_ids: Sequence[str], axis: Literal["u", "v"], ranges: Ranges
+        self, laser_ids: Sequence[str], axis: Literal["u", "v"], ranges: RangeEstimates
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where n spots lie along x (axis u) or y (axis v), origin + tangent x depth.
 
@@ -178,7 +180,7 @@ class Sensor:
         """(n,) 1 sigma of a single range over the range, for spots of the calibration's typical noise."""
         return np.asarray(self.typical_ranges(laser_id, range_mm).sigma_mm / range_mm)
 
-    def typical_ranges(self, laser_id: str, range_mm: FloatArray) -> Ranges:
+    def typical_ranges(self, laser_id: str, range_mm: FloatArray) -> RangeEstimates:
         """What spots of the calibration's typical noise at (n,) ranges would give."""
         typical = np.full((len(range_mm), 2), np.nan)
         return self.ranges([laser_id] * len(range_mm), self.spot_px(laser_id, range_mm), typical)

@@ -79,7 +79,7 @@ STATES: dict[int, Literal["finished", "stopped", "waiting"]] = {
 
 
 @dataclass(frozen=True)
-class Standing:
+class SessionStatus:
     """Where a session stands."""
 
     session_dir: Path
@@ -97,7 +97,7 @@ class Standing:
         return self.state in {"stopped", "waiting", "failed", "interrupted"}
 
 
-def standings(sessions: Path) -> list[Standing]:
+def session_statuses(sessions: Path) -> list[SessionStatus]:
     """Every session of a folder, by name, which is by time.
 
     Raises:
@@ -106,24 +106,24 @@ def standings(sessions: Path) -> list[Standing]:
     if not sessions.is_dir():
         came = "this is a file" if sessions.exists() else "there is none"
         raise BadInputError(f"{sessions}: expected a folder of sessions, {came}")
-    return [standing(path.parent) for path in sorted(sessions.glob(f"*/{MANIFEST}"))]
+    return [session_status(path.parent) for path in sorted(sessions.glob(f"*/{MANIFEST}"))]
 
 
-def standing(session_dir: Path) -> Standing:
+def session_status(session_dir: Path) -> SessionStatus:
     """Where one session stands."""
     try:
         exists = (session_dir / JOURNAL).exists()
         events = [r.event for r in effective(read_journal(session_dir))] if exists else []
     except BadInputError as error:
-        return Standing(session_dir, "damaged", (), 0, str(error))
+        return SessionStatus(session_dir, "damaged", (), 0, str(error))
     first, last = (events[0], events[-1]) if events else (None, None)
     procedures = first.procedures if isinstance(first, ev.SessionStarted) else ()
     captures = sum(isinstance(event, ev.CaptureTaken) for event in events)
     if is_running(session_dir):
-        return Standing(session_dir, "running", procedures, captures, "under way in another program")
+        return SessionStatus(session_dir, "running", procedures, captures, "under way in another program")
     if not isinstance(last, ev.SessionFinished):
-        return Standing(session_dir, "interrupted", procedures, captures, "killed, or the power went")
+        return SessionStatus(session_dir, "interrupted", procedures, captures, "killed, or the power went")
     why = (last.message.splitlines() or [""])[0]
     if last.exit_code == AnswerNeededError.exit_code:
         why = f"for an answer to {why.removeprefix('prompt ').partition(' -- ')[0]}"
-    return Standing(session_dir, STATES.get(last.exit_code, "failed"), procedures, captures, why)
+    return SessionStatus(session_dir, STATES.get(last.exit_code, "failed"), procedures, captures, why)

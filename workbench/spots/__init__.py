@@ -2,7 +2,7 @@
 
 from workbench.spots.explain import explain
 from workbench.spots.finder import SpotFinder, find_spots, is_compiled
-from workbench.spots.persistence import is_same, lasting
+from workbench.spots.persistence import is_same_spot, persistent_spots
 from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
 
 __all__ = [
@@ -15,6 +15,6 @@ __all__ = [
     "explain",
     "find_spots",
     "is_compiled",
-    "is_same",
-    "lasting",
+    "is_same_spot",
+    "persistent_spots",
 ]

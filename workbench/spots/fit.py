@@ -29,7 +29,7 @@ class Windows(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class SpotFit:
     """Result for n windows. `cov` is that of background, flux, and flux times each further parameter."""
 
     params: Floats
@@ -53,7 +53,7 @@ class Fit:
     number of the rim's used pixels."""
 
 
-def fit_spots(win: Windows, start: Floats, noise: Noise) -> Fit:
+def fit_spots(win: Windows, start: Floats, noise: Noise) -> SpotFit:
     """Fit one spot per window; the photon-transfer slope is measured from the residuals on the way.
 
     Args:
@@ -63,7 +63,7 @@ def fit_spots(win: Windows, start: Floats, noise: Noise) -> Fit:
     """
     n, k = start.shape
     shape = win.data.shape
-    fit = Fit(
+    fit = SpotFit(
         start.copy(),
         np.empty((n, k, k)),
         np.empty(shape),

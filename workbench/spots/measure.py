@@ -11,7 +11,7 @@ from workbench.spots.detect import FINE_PX, Peaks
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.acceptance import COLUMNS, NEXT_HALF, U_SD, fit_group
 from workbench.spots.kernels.windows import HALVES_PX, flag_codes, guess, halves_for
-from workbench.spots.pair import Scene
+from workbench.spots.pair import PairSignal
 from workbench.spots.psf import FLUX, LN_SU, U, V
 from workbench.spots.types import NO_FLAGS, Failure, Floats, Spot
 
@@ -30,7 +30,7 @@ _FLAGS: Final = (
 )
 
 
-class Trace(NamedTuple):
+class FittedSpot(NamedTuple):
     """A measured spot with what telling neighbours apart needs."""
 
     spot: Spot
@@ -41,18 +41,18 @@ class Trace(NamedTuple):
     """The larger of both widths."""
     clarity: float
     """Flux over its standard deviation."""
-    scene: Scene
+    scene: PairSignal
     """The strip that it was found in."""
 
 
-def spot_flags(scene: Scene, params: Floats) -> list[frozenset[Failure]]:
+def spot_flags(scene: PairSignal, params: Floats) -> list[frozenset[Failure]]:
     """What the places of n spots (n, 6 or more) in the image tell: cut by its border, clipped."""
     codes = np.empty(len(params), np.intp)
     flag_codes(scene.pair.on, scene.pair.clip_dn, params, codes)
     return [_FLAGS[code] for code in codes.tolist()]
 
 
-def measure(scene: Scene, peaks: Peaks) -> list[Trace]:
+def measure(scene: PairSignal, peaks: Peaks) -> list[FittedSpot]:
     """Fit every peak and keep those that are spots."""
     n = peaks.rows.size
     if n == 0:
@@ -96,7 +96,7 @@ def first_guess(win: Windows, peaks: Peaks) -> tuple[Floats, float]:
     return start, 1.0
 
 
-def _traces(scene: Scene, found: Floats) -> list[Trace]:
+def _traces(scene: PairSignal, found: Floats) -> list[FittedSpot]:
     """What the table of fits says is a spot."""
     flags = spot_flags(scene, found)
     traces = []
@@ -105,5 +105,5 @@ def _traces(scene: Scene, found: Floats) -> list[Trace]:
         if is_spot:
             spot = Spot(u, v, u_sd, v_sd, flux, math.exp(0.5 * (ln_su + ln_sv)), peak, its_flags)
             reach = math.exp(max(ln_su, ln_sv))
-            traces.append(Trace(spot, params[:U_SD], slope, reach, flux / flux_sd, scene))
+            traces.append(FittedSpot(spot, params[:U_SD], slope, reach, flux / flux_sd, scene))
     return traces

@@ -54,7 +54,7 @@ class Pair(NamedTuple):
         return win
 
 
-class Scene(NamedTuple):
+class PairSignal(NamedTuple):
     """A strip of a pair, with its level taken off and its noise measured."""
 
     pair: Pair
@@ -66,7 +66,7 @@ class Scene(NamedTuple):
     ambient_changed: bool
 
 
-def look(pair: Pair, strip: Strip) -> Scene:
+def measure_signal(pair: Pair, strip: Strip) -> PairSignal:
     """Measure level and noise of a strip.
 
     When the ambient light changed, the off-frame is scaled to the on-frame by a straight line through the
@@ -76,13 +76,13 @@ def look(pair: Pair, strip: Strip) -> Scene:
     level, variance = level_and_variance(signal)
     limit = max(_LEVEL_CHANGE_DN, _LEVEL_CHANGE_SD * variance**0.5)
     if pair.off is not None and abs(level) <= limit:
-        return Scene(pair, strip, signal, variance, ambient_changed=False)
+        return PairSignal(pair, strip, signal, variance, ambient_changed=False)
     if pair.off is not None:
         share = _share_of_off(pair.on[strip.at].astype(np.float64), pair.off[strip.at].astype(np.float64))
         pair = pair._replace(off_share=share)
         level, variance = level_and_variance(pair.signal(strip))
     pair = pair._replace(level_dn=level)
-    return Scene(pair, strip, pair.signal(strip), variance, ambient_changed=pair.off is not None)
+    return PairSignal(pair, strip, pair.signal(strip), variance, ambient_changed=pair.off is not None)
 
 
 def _share_of_off(on: Floats, off: Floats) -> float:

@@ -15,7 +15,7 @@ SAME_LIGHT_SD = 4.0
 """Lights of two frames that lie so near to each other are the same."""
 
 
-def is_same(light: Spot, other: Spot) -> bool:
+def is_same_spot(light: Spot, other: Spot) -> bool:
     """Whether the lights of two frames are one."""
     sd = hypot(light.u_sd_px, light.v_sd_px, other.u_sd_px, other.v_sd_px)
     away = hypot(light.u_px - other.u_px, light.v_px - other.v_px)
@@ -27,7 +27,7 @@ def clearness(light: Spot) -> float:
     return light.width_px / min(light.u_sd_px, light.v_sd_px)
 
 
-def lasting(lights: Sequence[Spot], look_again: Callable[[], Sequence[Spot]]) -> list[Spot]:
+def persistent_spots(lights: Sequence[Spot], look_again: Callable[[], Sequence[Spot]]) -> list[Spot]:
     """The lights that are no noise: clear, or there in another frame as well.
 
     Args:
@@ -38,4 +38,6 @@ def lasting(lights: Sequence[Spot], look_again: Callable[[], Sequence[Spot]]) ->
     if not faint:
         return list(lights)
     again = look_again()
-    return [light for light in lights if light not in faint or any(is_same(light, other) for other in again)]
+    return [
+        light for light in lights if light not in faint or any(is_same_spot(light, other) for other in again)
+    ]

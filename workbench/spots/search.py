@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from workbench.spots.deblending.blend import fitted_together, grown, split
+from workbench.spots.deblending.blend import fit_blends, grown, split
 from workbench.spots.deblending.clusters import CLEAR_SD, are_apart, clearest, clusters, without_duplicates
 from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
-from workbench.spots.measure import Trace, measure
-from workbench.spots.pair import Pair, Scene, look
+from workbench.spots.measure import FittedSpot, measure
+from workbench.spots.pair import Pair, PairSignal, measure_signal
 from workbench.spots.strip import Strip, is_on, strip_of
 from workbench.spots.types import NO_FLAGS, Failure, Finding, Image, Scanline, Spot
 
@@ -37,13 +37,13 @@ class Search:
     def find(self, on: Image, off: Image | None, clip_dn: float) -> Finding:
         """Spots of a pair of frames that were checked."""
         pair = Pair(on, off, clip_dn)
-        scenes = [look(pair, strip) for strip in self._strips]
+        scenes = [measure_signal(pair, strip) for strip in self._strips]
         traces = self._search(scenes)
         spots = self._in_order([t.spot for t in traces if self._on_a_line(t.spot)])
         return Finding(tuple(spots), self._failures(pair, scenes, traces, spots))
 
-    def _search(self, scenes: list[Scene]) -> list[Trace]:
-        traces: list[Trace] = []
+    def _search(self, scenes: list[PairSignal]) -> list[FittedSpot]:
+        traces: list[FittedSpot] = []
         for scale in (FINE_PX, COARSE_PX):
             for scene in scenes:
                 peaks = find_peaks(scene.signal, scene.strip, scene.variance, scale)
@@ -59,21 +59,21 @@ class Search:
         more = self._wants_more(traces)
         if more:
             traces = [s for t in traces for s in split(scenes, t, _without(traces, [t]))]
-        groups = [fitted_together(scenes, g, _without(traces, g), more) for g in clusters(traces)]
+        groups = [fit_blends(scenes, g, _without(traces, g), more) for g in clusters(traces)]
         traces = without_duplicates([trace for group in groups for trace in group])
         if self._wants_more(traces):
             found = [t for g in clusters(traces) for t in grown(scenes, g, _without(traces, g))]
             traces = without_duplicates(found)
         return self._as_many_as_lasers(traces, scenes)
 
-    def _wants_more(self, traces: list[Trace]) -> bool:
+    def _wants_more(self, traces: list[FittedSpot]) -> bool:
         return self._expected is None or len(traces) < self._expected
 
-    def _is_complete(self, traces: list[Trace]) -> bool:
+    def _is_complete(self, traces: list[FittedSpot]) -> bool:
         """Whether every laser has a spot that is no spike of noise."""
         return len(traces) == self._expected and all(t.clarity >= CLEAR_SD for t in traces)
 
-    def _as_many_as_lasers(self, traces: list[Trace], scenes: list[Scene]) -> list[Trace]:
+    def _as_many_as_lasers(self, traces: list[FittedSpot], scenes: list[PairSignal]) -> list[FittedSpot]:
         """The traces without the dim ones that are more than there are lasers."""
         if self._expected is None or len(traces) <= self._expected:
             return traces
@@ -92,7 +92,7 @@ class Search:
         return sorted(spots, key=lambda s: (s.u_px * du + s.v_px * dv, s.v_px))
 
     def _failures(
-        self, pair: Pair, scenes: list[Scene], traces: list[Trace], spots: list[Spot]
+        self, pair: Pair, scenes: list[PairSignal], traces: list[FittedSpot], spots: list[Spot]
     ) -> tuple[Failure, ...]:
         failures = [Failure.AMBIENT_CHANGED] if any(s.ambient_changed for s in scenes) else []
         if len(spots) < len(traces):
@@ -106,7 +106,7 @@ class Search:
             failures += [f for f in Failure if f in flags]
         return tuple(dict.fromkeys(failures))
 
-    def _reasons(self, pair: Pair, scenes: list[Scene], spots: list[Spot]) -> list[Failure]:
+    def _reasons(self, pair: Pair, scenes: list[PairSignal], spots: list[Spot]) -> list[Failure]:
         """Why spots are missing: too dim, or outside the band (then the whole frame is read)."""
         reasons = []
         for scene in scenes:
@@ -121,20 +121,20 @@ class Search:
             if dim.rows.size and not near.reshape(dim.rows.size, -1).any(axis=1).all():
                 reasons.append(Failure.TOO_DIM)
         if self._lines:
-            scene = look(pair, self._everywhere)
+            scene = measure_signal(pair, self._everywhere)
             elsewhere = measure(scene, find_peaks(scene.signal, scene.strip, scene.variance))
             if any(not self._on_a_line(t.spot) for t in elsewhere):
                 reasons.append(Failure.OFF_SCANLINE)
         return reasons
 
 
-def _without(traces: list[Trace], group: list[Trace]) -> list[Trace]:
+def _without(traces: list[FittedSpot], group: list[FittedSpot]) -> list[FittedSpot]:
     """The traces that are not in a group."""
     mine = {id(t) for t in group}
     return [t for t in traces if id(t) not in mine]
 
 
-def _new_ones(peaks: Peaks, traces: list[Trace]) -> Peaks:
+def _new_ones(peaks: Peaks, traces: list[FittedSpot]) -> Peaks:
     """Peaks that no measured spot explains."""
     if not traces or peaks.rows.size == 0:
         return peaks

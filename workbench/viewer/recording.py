@@ -22,7 +22,7 @@ from workbench.viewer import entities as at
 from workbench.viewer.blueprint import blueprint
 from workbench.viewer.geometry import Geometry
 from workbench.viewer.stream import Moment, Stream
-from workbench.viewer.trial import Trial
+from workbench.viewer.trial import TrialView
 
 RECORDING_FILE = "recording.rrd"
 
@@ -94,7 +94,7 @@ class _OpenRecording:
         self._rig = rig
         self._colors = at.laser_colors(rig.laser_ids)
         self._geometry = Geometry.of_rig(rig)
-        self._trial = Trial(stream, self._colors)
+        self._trial = TrialView(stream, self._colors)
         self._placement: Placement | None = None
         self._captures: dict[str, tuple[int, ev.CaptureTaken, Placement | None]] = {}
         self._exposure = Moment(0, 0, 0)

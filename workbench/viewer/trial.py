@@ -18,7 +18,7 @@ PERCENT = 100.0
 
 
 @dataclass
-class Trial:
+class TrialView:
     """Readings of one trial as they come."""
 
     stream: Stream

@@ -15,7 +15,7 @@ from workbench.cli import sessions
 from workbench.cli.sessions import find_session, list_sessions
 from workbench.ranging.ranger import Reading
 from workbench.report.readings import reading_list
-from workbench.session.state import Standing
+from workbench.session.state import SessionStatus
 
 LONG_WHY = "laser controller at /dev/ttyACM0: asked '!', expected 'OK OFF', got a dead line; check the cable"
 
@@ -25,8 +25,8 @@ def test_sessions_are_listed_with_whole_names(
 ) -> None:
     names = ["20261122-214141-calibrate-flat", "20261122-214142-calibrate-flat-of-the-long-rig-2"]
     found = [
-        Standing(Path("sessions") / names[0], "finished", ("p",), 440, "done"),
-        Standing(Path("sessions") / names[1], "failed", ("p",), 12, LONG_WHY),
+        SessionStatus(Path("sessions") / names[0], "finished", ("p",), 440, "done"),
+        SessionStatus(Path("sessions") / names[1], "failed", ("p",), 12, LONG_WHY),
     ]
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sessions, "standings", lambda folder: found)
@@ -43,7 +43,7 @@ def test_a_session_with_a_name_as_long_as_the_line_has_two(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     names = ["20261122-214141-calibrate-flat", "20261122-214142-" + "calibrate-" * 6 + "x"]
-    found = [Standing(Path("sessions") / name, "finished", ("p",), 440, "done") for name in names]
+    found = [SessionStatus(Path("sessions") / name, "finished", ("p",), 440, "done") for name in names]
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sessions, "standings", lambda folder: found)
     list_sessions(Path("sessions"), as_json=False)
@@ -71,7 +71,7 @@ def test_how_a_session_ended_takes_two_lines_at_most(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     why = "the calibration is refused: " + "; ".join(f"laser L{n} was seen at 2 standoffs" for n in range(9))
-    found = [Standing(Path("sessions/a"), "failed", ("p",), 12, why)]
+    found = [SessionStatus(Path("sessions/a"), "failed", ("p",), 12, why)]
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sessions, "standings", lambda folder: found)
     list_sessions(Path("sessions"), as_json=False)

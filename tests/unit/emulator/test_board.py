@@ -11,7 +11,7 @@ import yaml as pyyaml
 
 from tests.support.ideal import ideal_rig, laser, scene_of
 from workbench.emulator.board import BoardSurface
-from workbench.emulator.scene import Scene
+from workbench.emulator.scene import BenchScene
 from workbench.emulator.spec import SurfaceSpec
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
@@ -20,17 +20,17 @@ from workbench.model.target import BoardTarget, FlatTarget, Placement, TargetSha
 NARROW: dict[str, Any] = {"beam": {"exit_diameter_mm": 0.5, "divergence_mrad": 0.0, "speckle_contrast": 0.0}}
 
 
-def placed(rig: Rig, folder: Path, target: TargetShape, key: str = "P") -> Scene:
+def placed(rig: Rig, folder: Path, target: TargetShape, key: str = "P") -> BenchScene:
     scene = scene_of(rig, folder)
     scene.place(Placement(key=key, standoff_mm=300.0, target=target))
     return scene
 
 
-def power(scene: Scene, laser_id: str) -> float:
+def power(scene: BenchScene, laser_id: str) -> float:
     return sum(float(spot.rate.sum(dtype=np.float64)) for spot in scene.spots(laser_id))
 
 
-def board_of(scene: Scene) -> BoardSurface:
+def board_of(scene: BenchScene) -> BoardSurface:
     board = scene._surfaces[0][0]
     assert isinstance(board, BoardSurface)
     return board

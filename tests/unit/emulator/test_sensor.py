@@ -11,7 +11,7 @@ from scipy.special import j1
 
 from tests.support.ideal import F, ideal_rig, laser, moments, painted, scene_of
 from workbench.emulator.keyed import generator
-from workbench.emulator.sensor import Sensor
+from workbench.emulator.sensor import ImageSensor
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.speckle import speckle_field
 from workbench.emulator.spot import ImageFormat, Spot
@@ -21,8 +21,8 @@ from workbench.model.target import CylinderTarget, FlatTarget, Placement
 SMALL = ImageFormat(200, 150)
 
 
-def sensor_of(rig: Rig, image: ImageFormat = SMALL) -> Sensor:
-    return Sensor(emulator_spec(rig), image, rig.camera.bits)
+def sensor_of(rig: Rig, image: ImageFormat = SMALL) -> ImageSensor:
+    return ImageSensor(emulator_spec(rig), image, rig.camera.bits)
 
 
 def test_pixels_collect_what_the_pupil_lets_in(tmp_path: Path) -> None:

@@ -4,12 +4,12 @@ import pytest
 
 from tests.support.rigs import thesis_rig
 from workbench.model.errors import BadInputError
-from workbench.model.nested import hold
+from workbench.model.nested import fix_parameters
 
 
 def test_parameters_become_constants_and_nothing_else_changes() -> None:
     rig = thesis_rig()
-    held = hold(rig, ["k2", "offset_mm", "L2.tx"])
+    held = fix_parameters(rig, ["k2", "offset_mm", "L2.tx"])
     assert (held.camera.k2.sd, held.bench.offset_mm.sd, held.lasers[1].tx.sd) == (0.0, 0.0, 0.0)
     assert (held.camera.k1, held.bench.ruler_scale) == (rig.camera.k1, rig.bench.ruler_scale)
     assert (held.lasers[0], held.lasers[2:]) == (rig.lasers[0], rig.lasers[2:])
@@ -19,4 +19,4 @@ def test_parameters_become_constants_and_nothing_else_changes() -> None:
 @pytest.mark.parametrize("name", ["k9", "L9.tx", "L1.colour", "placement_sd_mm", ""])
 def test_a_parameter_that_is_none(name: str) -> None:
     with pytest.raises(BadInputError, match=r"expected one of f_px, .*offset_mm, .*L4\.ty"):
-        hold(thesis_rig(), [name])
+        fix_parameters(thesis_rig(), [name])

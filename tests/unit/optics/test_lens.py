@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from workbench.optics.lens import Lens, distort, project, radial_slope
 from workbench.optics.rays import Plane, Ray, depth_on_plane, spot_at_inverse_depth, spot_on_plane
-from workbench.optics.triangulate import Sighted, estimate_depth
+from workbench.optics.triangulate import MeasuredSpot, estimate_depth
 
 LENS = Lens(541.3, 358.7, 235.0, 0.11, -0.07, 0.002, -0.003, 0.01)
 RAY = Ray(-60.1, 0.3, 0.004, -0.002)
@@ -76,7 +76,7 @@ def test_the_spot_at_infinity_is_where_far_spots_go() -> None:
 def test_a_spot_gives_back_its_depth(z_mm: float, x_mm: float, sign: float, k1: float, v_known: bool) -> None:
     lens, ray = LENS._replace(k1=k1, k2=0.0, k3=0.0), RAY._replace(x_mm=sign * x_mm)
     u, v = (float(c) for c in spot_at_inverse_depth(lens, ray, 1 / z_mm))
-    spot = Sighted(u, v, 0.1, 0.1) if v_known else Sighted(u, 0.0, 0.1, np.inf)
+    spot = MeasuredSpot(u, v, 0.1, 0.1) if v_known else MeasuredSpot(u, 0.0, 0.1, np.inf)
     found = estimate_depth(lens, ray, spot)
     assert 1 / float(found.inverse_depth_per_mm) == pytest.approx(z_mm, rel=1e-9)
     assert abs(float(found.across_sd)) < 1e-6
@@ -84,7 +84,7 @@ def test_a_spot_gives_back_its_depth(z_mm: float, x_mm: float, sign: float, k1: 
 
 def test_derivatives_of_the_depth_are_those_of_the_estimate() -> None:
     u, v = (float(c) for c in spot_at_inverse_depth(LENS, RAY, 1 / 750.0))
-    spot = Sighted(u + 0.2, v, 0.1, 0.1)
+    spot = MeasuredSpot(u + 0.2, v, 0.1, 0.1)
 
     def depth(lens: np.ndarray, ray: np.ndarray) -> jax.Array:
         return 1 / estimate_depth(Lens(*lens), Ray(*ray), spot).inverse_depth_per_mm
@@ -109,7 +109,7 @@ def test_the_range_s_deviation_is_r_squared_over_f_b(z_mm: float) -> None:
     """The closed form of a pinhole and a beam beside it, as the thesis's (4.3) differentiated."""
     lens, ray = Lens(541.0, 320.0, 240.0), Ray(60.0, 0.0, 0.0, 0.0)
     u, v = spot_at_inverse_depth(lens, ray, 1 / z_mm)
-    found = estimate_depth(lens, ray, Sighted(float(u), float(v), 0.05, 0.05))
+    found = estimate_depth(lens, ray, MeasuredSpot(float(u), float(v), 0.05, 0.05))
     assert float(found.z_sd_of_spot_mm) == pytest.approx(0.05 * z_mm**2 / (541.0 * 60.0), rel=1e-12)
 
 
@@ -119,9 +119,9 @@ def test_the_stated_deviation_is_that_of_many_spots() -> None:
     noise = rng.normal(0.0, 0.05, (4000, 2))
 
     def depth(du: jax.Array, dv: jax.Array) -> jax.Array:
-        return 1 / estimate_depth(LENS, RAY, Sighted(u + du, v + dv, 0.05, 0.05)).inverse_depth_per_mm
+        return 1 / estimate_depth(LENS, RAY, MeasuredSpot(u + du, v + dv, 0.05, 0.05)).inverse_depth_per_mm
 
     depths = np.asarray(jax.vmap(depth)(*noise.T))
-    stated = float(estimate_depth(LENS, RAY, Sighted(u, v, 0.05, 0.05)).z_sd_of_spot_mm)
+    stated = float(estimate_depth(LENS, RAY, MeasuredSpot(u, v, 0.05, 0.05)).z_sd_of_spot_mm)
     # The sd of 4000 draws is known to 1 / sqrt(2 x 4000) = 1.1 %: four of these.
     assert depths.std() == pytest.approx(stated, rel=0.045)

@@ -27,7 +27,7 @@ HEADER = "laser_id,standoff_mm,repeat,on,off\n"
 def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bad") / "calibration.yaml"
     rig = thesis_rig()
-    write_calibration(path, calibrate(fit(rig, World(rig, 1).sightings()), Acceptance(), PROVENANCE)[0])
+    write_calibration(path, calibrate(fit(rig, World(rig, 1).observations()), Acceptance(), PROVENANCE)[0])
     return path
 
 

@@ -22,7 +22,7 @@ from workbench.ranging.lines import Axis
 from workbench.ranging.ranger import Ranger
 from workbench.ranging.search_band import band
 from workbench.ranging.validity_checks import objections
-from workbench.sensor.calibrated import Sensor
+from workbench.sensor.calibrated import CalibratedSensor
 from workbench.spots import Failure, Finding, Scanline, Spot
 
 IDS = ("L1", "L2", "L3", "L4")
@@ -31,7 +31,7 @@ IDS = ("L1", "L2", "L3", "L4")
 @pytest.fixture(scope="module")
 def ranger() -> Ranger:
     rig = thesis_rig()
-    return Ranger(calibrate(fit(rig, World(rig, 1).sightings()), Acceptance(), PROVENANCE)[0])
+    return Ranger(calibrate(fit(rig, World(rig, 1).observations()), Acceptance(), PROVENANCE)[0])
 
 
 def positions(ranger: Ranger, ranges_mm: dict[str, float]) -> np.ndarray:
@@ -78,7 +78,7 @@ def test_spots_that_fit_two_ways_are_not_dealt(ranger: Ranger) -> None:
 def test_steps_in_depth_are_dealt_rightly_or_not_at_all(seed: int) -> None:
     """A post before a wall, and one laser of a flat on another surface: where a swap could deceive."""
     world = World(thesis_rig(), seed)
-    ranger = Ranger(calibrate(fit(world.rig, world.sightings()), Acceptance(), PROVENANCE)[0])
+    ranger = Ranger(calibrate(fit(world.rig, world.observations()), Acceptance(), PROVENANCE)[0])
     rng = np.random.default_rng(seed)
     right = wrong = 0
     for _ in range(150):
@@ -98,7 +98,7 @@ def test_steps_in_depth_are_dealt_rightly_or_not_at_all(seed: int) -> None:
 def test_missing_spots_leave_the_others_told(seed: int, missing: int) -> None:
     """Lasers aligned by eye do not share a line: that tells their spots apart, steps in depth included."""
     world = World(thesis_rig(), seed)
-    ranger = Ranger(calibrate(fit(world.rig, world.sightings()), Acceptance(), PROVENANCE)[0])
+    ranger = Ranger(calibrate(fit(world.rig, world.observations()), Acceptance(), PROVENANCE)[0])
     rng = np.random.default_rng([seed, missing])
     right = wrong = 0
     for _ in range(100):
@@ -120,7 +120,7 @@ def coplanar() -> Ranger:
     rig = thesis_rig()
     level = {"y_mm": prior(0.0, 1e-3), "ty": prior(0.0, 1e-6)}
     rig = rig.model_copy(update={"lasers": tuple(laser.model_copy(update=level) for laser in rig.lasers)})
-    return Ranger(calibrate(fit(rig, World(rig, 1).sightings()), Acceptance(), PROVENANCE)[0])
+    return Ranger(calibrate(fit(rig, World(rig, 1).observations()), Acceptance(), PROVENANCE)[0])
 
 
 def test_on_one_line_three_spots_of_a_flat_are_told_and_two_are_not(coplanar: Ranger) -> None:
@@ -260,7 +260,7 @@ def test_a_spot_that_cannot_be_the_laser_s_has_no_range(
 
 
 def test_a_spot_where_the_lens_model_folds_over_has_no_range(ranger: Ranger) -> None:
-    folding = Sensor(ranger.calibration, {"k1": -0.45, "k2": 0.0, "k3": 0.0})
+    folding = CalibratedSensor(ranger.calibration, {"k1": -0.45, "k2": 0.0, "k3": 0.0})
     (far,) = folding.spot_px("L4", np.array([np.inf]))
     beyond = np.array([[20.0, far[1]]])
     ranges = folding.ranges(["L1"], beyond, np.full((1, 2), 0.05))
@@ -525,7 +525,7 @@ def test_angle_and_closest_range_lie_where_stated_whatever_the_calibration() -> 
     angle, closest = [], []
     for seed in range(300, 350):
         world = World(thesis_rig(), seed)
-        ranger = Ranger(calibrate(fit(world.rig, world.sightings()), Acceptance(), PROVENANCE)[0])
+        ranger = Ranger(calibrate(fit(world.rig, world.observations()), Acceptance(), PROVENANCE)[0])
         yaw, z0 = np.radians(30.0), 600.0 + world.values["offset_mm"]
         noise = np.random.default_rng([seed, 5]).normal(0.0, 0.05, (4, 2))  # 0.03 px and the speckle's 0.04
         pixels = np.array([world.pixel(i, z0, yaw) for i in IDS]) + noise

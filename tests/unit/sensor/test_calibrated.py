@@ -9,37 +9,37 @@ from tests.support.rigs import PROVENANCE, World, thesis_rig
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
-from workbench.sensor.calibrated import Sensor
+from workbench.sensor.calibrated import CalibratedSensor
 
 STANDOFFS_MM = np.array([120.0, 200.0, 350.0, 700.0, 1300.0, 2500.0, 5000.0])
 
 
-def sensor_of(seed: int) -> tuple[Sensor, World]:
+def sensor_of(seed: int) -> tuple[CalibratedSensor, World]:
     world = World(thesis_rig(), seed)
-    fitted = fit(world.rig, world.sightings())
-    return Sensor(calibrate(fitted, Acceptance(), PROVENANCE)[0]), world
+    fitted = fit(world.rig, world.observations())
+    return CalibratedSensor(calibrate(fitted, Acceptance(), PROVENANCE)[0]), world
 
 
 @pytest.fixture(scope="module")
-def sensor() -> Sensor:
+def sensor() -> CalibratedSensor:
     return sensor_of(1)[0]
 
 
 @pytest.mark.parametrize("laser_id", ["L1", "L3"])
-def test_spots_and_ranges_are_inverse(sensor: Sensor, laser_id: str) -> None:
+def test_spots_and_ranges_are_inverse(sensor: CalibratedSensor, laser_id: str) -> None:
     spots = sensor.spot_px(laser_id, STANDOFFS_MM)
     found = sensor.ranges([laser_id] * len(spots), spots, np.full_like(spots, 0.05))
     np.testing.assert_allclose(found.range_mm, STANDOFFS_MM, rtol=1e-9)
     np.testing.assert_allclose(found.misfit_sd, 0.0, atol=1e-6)
 
 
-def test_a_spot_beyond_infinity_has_no_range(sensor: Sensor) -> None:
+def test_a_spot_beyond_infinity_has_no_range(sensor: CalibratedSensor) -> None:
     far = sensor.spot_px("L4", np.array([np.inf]))
     found = sensor.ranges(["L4"], far - [5.0, 0.0], np.full((1, 2), 0.05))
     assert not np.isfinite(found.range_mm[0])
 
 
-def test_the_covariance_is_the_scatter_of_drawn_calibrations(sensor: Sensor) -> None:
+def test_the_covariance_is_the_scatter_of_drawn_calibrations(sensor: CalibratedSensor) -> None:
     """Parameters drawn from their covariance, spots ranged anew with each."""
     parameters = sensor.calibration.laser_ranger.parameters
     ids, at = ["L1", "L4", "L4"], np.array([300.0, 300.0, 1500.0])
@@ -71,7 +71,7 @@ def test_the_covariance_is_the_scatter_of_drawn_calibrations(sensor: Sensor) -> 
     np.testing.assert_allclose(correlation, expected, atol=0.2)
 
 
-def test_speckle_stays_in_every_range(sensor: Sensor) -> None:
+def test_speckle_stays_in_every_range(sensor: CalibratedSensor) -> None:
     spot = sensor.spot_px("L4", np.array([1000.0]))
     sharp = sensor.ranges(["L4"], spot, np.full((1, 2), 1e-9)).spot_sd_mm[0]
     f_b = sensor.calibration.geometry()["f_px"] * sensor.calibration.geometry()["L4.x_mm"]
@@ -95,6 +95,6 @@ def test_ranges_of_unseen_standoffs_lie_where_stated() -> None:
     assert distance2 / 480 == pytest.approx(1.0, abs=3.5 * 0.065)
 
 
-def test_out_of_the_frame(sensor: Sensor) -> None:
+def test_out_of_the_frame(sensor: CalibratedSensor) -> None:
     inside = sensor.in_frame("L4", np.array([40.0, 500.0]))
     assert inside.tolist() == [False, True]

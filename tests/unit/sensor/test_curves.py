@@ -9,7 +9,7 @@ import pytest
 
 from workbench.optics.lens import Lens
 from workbench.optics.rays import Ray, spot_at_inverse_depth
-from workbench.optics.triangulate import DepthEstimate, Sighted, estimate_depth
+from workbench.optics.triangulate import DepthEstimate, MeasuredSpot, estimate_depth
 from workbench.sensor import curves
 from workbench.sensor.curves import SpotCurves
 
@@ -23,7 +23,7 @@ RAYS = np.array([[-60.0, 0.3, 0.004, -0.006], [30.0, -0.2, -0.003, 0.001], [0.2,
 
 def model(lens: np.ndarray, laser: np.ndarray, position: np.ndarray, sd: np.ndarray) -> DepthEstimate:
     def one(ray: jax.Array, at: jax.Array, sd: jax.Array) -> DepthEstimate:
-        return estimate_depth(Lens(*lens), Ray(*ray), Sighted(at[0], at[1], sd[0], sd[1]))
+        return estimate_depth(Lens(*lens), Ray(*ray), MeasuredSpot(at[0], at[1], sd[0], sd[1]))
 
     return jax.vmap(one)(jnp.asarray(RAYS[laser]), jnp.asarray(position), jnp.asarray(sd))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.draw import Drawn, Sensor, draw
-from workbench.spots import Scanline, Spot, find_spots, is_same, lasting
+from workbench.spots import Scanline, Spot, find_spots, is_same_spot, persistent_spots
 from workbench.spots.persistence import CLEAR, clearness
 
 SENSOR = Sensor(electrons_per_dn=156.0, read_sd=225.0, bits=8)
@@ -25,7 +25,7 @@ def test_noise_is_taken_for_a_spot_now_and_then_and_never_for_a_light() -> None:
         found = find_spots(dark(rng, []), scanlines=EVERYWHERE).spots
         spots += bool(found)
         assert all(clearness(spot) < CLEAR for spot in found)
-        lights += bool(lasting(found, lambda: find_spots(dark(rng, []), scanlines=EVERYWHERE).spots))
+        lights += bool(persistent_spots(found, lambda: find_spots(dark(rng, []), scanlines=EVERYWHERE).spots))
     print(f"spots in {spots} of {FRAMES} dark frames")
     assert spots > 0, "otherwise there is nothing to tell apart"
     assert lights == 0
@@ -43,7 +43,7 @@ def test_a_beam_is_a_light_be_it_faint(electrons: float, looks: int) -> None:
         return find_spots(dark(rng, [beam]), scanlines=EVERYWHERE).spots
 
     for _ in range(50):
-        lights = lasting(find_spots(dark(rng, [beam]), scanlines=EVERYWHERE).spots, look_again)
+        lights = persistent_spots(find_spots(dark(rng, [beam]), scanlines=EVERYWHERE).spots, look_again)
         seen += any(abs(light.u_px - beam.u) < 2 and abs(light.v_px - beam.v) < 2 for light in lights)
     assert seen >= 49
     assert looked / 50 == pytest.approx(looks, abs=0.1)
@@ -52,9 +52,11 @@ def test_a_beam_is_a_light_be_it_faint(electrons: float, looks: int) -> None:
 def test_the_clear_ones_need_no_second_look() -> None:
     rng = np.random.default_rng(3)
     frame = dark(rng, [Drawn(100.0, 100.0, 1e5), Drawn(400.0, 300.0, 1e5)])
-    lights = lasting(find_spots(frame, scanlines=EVERYWHERE).spots, lambda: pytest.fail("not asked for"))
+    lights = persistent_spots(
+        find_spots(frame, scanlines=EVERYWHERE).spots, lambda: pytest.fail("not asked for")
+    )
     assert len(lights) == 2
-    assert not is_same(*lights)
+    assert not is_same_spot(*lights)
 
 
 def test_a_faint_one_beside_a_clear_one_is_a_light_as_well() -> None:
@@ -64,5 +66,5 @@ def test_a_faint_one_beside_a_clear_one_is_a_light_as_well() -> None:
     found, again = (find_spots(dark(rng, lamps), scanlines=EVERYWHERE).spots for _ in range(2))
     clear, faint = sorted(found, key=clearness, reverse=True)
     assert clearness(faint) < CLEAR < clearness(clear)
-    assert lasting(found, lambda: again) == list(found)
-    assert lasting(found, list) == [clear]
+    assert persistent_spots(found, lambda: again) == list(found)
+    assert persistent_spots(found, list) == [clear]

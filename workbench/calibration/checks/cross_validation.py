@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc, ndtr, stdtr
 
-from workbench.calibration.estimation.fit import Fit
-from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.estimation.fit import CalibrationFit
+from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import (
     Refit,
     measured,
@@ -91,7 +91,7 @@ class LeftOut:
         return float(fdtrc(self.coordinates, self.freedom, self.chi2 / self.coordinates))
 
 
-def leave_each_out(fit: Fit) -> tuple[LeftOut, ...]:
+def leave_each_out(fit: CalibrationFit) -> tuple[LeftOut, ...]:
     """Refit without each placement and hold its spots against the prediction.
 
     Returns:
@@ -111,7 +111,9 @@ def alarms(folds: tuple[LeftOut, ...]) -> tuple[LeftOut, ...]:
     return tuple(fold for fold in folds if min(fold.range_p, fold.spots_p) < limit)
 
 
-def _leave_out(fit: Fit, problem: Problem, start: FloatArray, index: int) -> LeftOut | None:
+def _leave_out(
+    fit: CalibrationFit, problem: LeastSquaresProblem, start: FloatArray, index: int
+) -> LeftOut | None:
     cells = fit.cells.placement == index
     spots = rows_of(cells, problem) & measured(problem)
     info = fit.cells.placements[index]
@@ -141,13 +143,13 @@ def _leave_out(fit: Fit, problem: Problem, start: FloatArray, index: int) -> Lef
     )
 
 
-def rows_at(problem: Problem, index: int) -> NDArray[np.bool_]:
+def rows_at(problem: LeastSquaresProblem, index: int) -> NDArray[np.bool_]:
     """(R,) rows of everything seen at a placement, corners of the board too."""
     placement = np.concatenate([problem.data.spots.placement, problem.data.corners.placement])
     return np.repeat(placement == index, 2)
 
 
-def _without(start: FloatArray, fit: Fit, key: str) -> FloatArray:
+def _without(start: FloatArray, fit: CalibrationFit, key: str) -> FloatArray:
     """The optimum with the placement's own parameters where they are without its data: at their priors."""
     own = [p.name.rpartition(".")[0] == key and p.kind == "placement" for p in fit.table.parameters]
     return np.where(own, 0.0, start)

@@ -12,10 +12,10 @@ from scipy.special import chdtrc
 
 from workbench.calibration.checks.cross_validation import LeftOut
 from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit
-from workbench.calibration.checks.target_motion import Movement, find_movements
+from workbench.calibration.checks.target_motion import TargetMotion, find_target_motion
 from workbench.calibration.data.averaging import scatter_chi2, weighted_mean
-from workbench.calibration.data.observations import Sighting, positions, stated_sd
-from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.data.observations import Observation, positions, stated_sd
+from workbench.calibration.estimation.fit import CalibrationFit
 
 FaultName = Literal[
     "lasers_swapped",
@@ -51,7 +51,7 @@ class Fault:
         return self.name in REFUSING
 
 
-def find_faults(fit: Fit, left_out: Sequence[LeftOut]) -> tuple[Fault, ...]:
+def find_faults(fit: CalibrationFit, left_out: Sequence[LeftOut]) -> tuple[Fault, ...]:
     """Everything that can be named, in the order in which to look at it."""
     found = [*_never_lit(fit), *_by_hypothesis(fit, left_out)]
     if not any(fault.name == "moved" for fault in found):  # its captures agree with one another as well
@@ -59,12 +59,12 @@ def find_faults(fit: Fit, left_out: Sequence[LeftOut]) -> tuple[Fault, ...]:
     return (*found, *_saturated(fit), *_all_far(fit))
 
 
-def _by_hypothesis(fit: Fit, left_out: Sequence[LeftOut]) -> Iterator[Fault]:
+def _by_hypothesis(fit: CalibrationFit, left_out: Sequence[LeftOut]) -> Iterator[Fault]:
     hypotheses = explain_misfit(fit)
     wiring = [h for h in hypotheses if h.kind not in {"standoff", "spot"}]
     for h in wiring:
         yield _name_wiring(fit, h)
-    movements = () if wiring else find_movements(fit, _suspects(fit, left_out))
+    movements = () if wiring else find_target_motion(fit, _suspects(fit, left_out))
     for movement in movements:
         yield _name_movement(fit, movement)
     for h in hypotheses:
@@ -72,7 +72,7 @@ def _by_hypothesis(fit: Fit, left_out: Sequence[LeftOut]) -> Iterator[Fault]:
             yield _name_standoff(fit, h)
 
 
-def _suspects(fit: Fit, left_out: Sequence[LeftOut]) -> list[int]:
+def _suspects(fit: CalibrationFit, left_out: Sequence[LeftOut]) -> list[int]:
     """Placements whose captures disagree with one another or with what the others say of them."""
     cells, noise = fit.cells, fit.rig.noise
     odd = {one.placement for one in left_out if one.spots_p < SUSPECT}
@@ -88,7 +88,7 @@ def _suspects(fit: Fit, left_out: Sequence[LeftOut]) -> list[int]:
     return [index for index, info in enumerate(cells.placements) if info.key in odd]
 
 
-def _name_wiring(fit: Fit, h: Hypothesis) -> Fault:
+def _name_wiring(fit: CalibrationFit, h: Hypothesis) -> Fault:
     if h.kind == "lasers_swapped":
         a, b = (fit.rig.laser_ids[i] for i in h.subject)
         text = (
@@ -111,7 +111,7 @@ def _name_wiring(fit: Fit, h: Hypothesis) -> Fault:
     )
 
 
-def _name_standoff(fit: Fit, h: Hypothesis) -> Fault:
+def _name_standoff(fit: CalibrationFit, h: Hypothesis) -> Fault:
     info = fit.cells.placements[h.subject[0]]
     fitted = float(np.asarray(h.state.problem.data.standoff_mm)[h.subject[0]])
     slip = _slip(info.standoff_mm, fitted)
@@ -131,7 +131,7 @@ def _slip(told_mm: float, fitted_mm: float) -> str:
     return ""
 
 
-def _name_movement(fit: Fit, movement: Movement) -> Fault:
+def _name_movement(fit: CalibrationFit, movement: TargetMotion) -> Fault:
     info = fit.cells.placements[movement.placement]
     return Fault(
         "moved",
@@ -142,7 +142,7 @@ def _name_movement(fit: Fit, movement: Movement) -> Fault:
     )
 
 
-def _reflections(fit: Fit) -> Iterator[Fault]:
+def _reflections(fit: CalibrationFit) -> Iterator[Fault]:
     """Spots that were rejected and agree with one another: something shines there."""
     away = defaultdict(list)
     for r in fit.rejected:
@@ -159,7 +159,7 @@ def _reflections(fit: Fit) -> Iterator[Fault]:
             )
 
 
-def _is_another_spot(fit: Fit, strays: Sequence[Sighting], used: Sequence[Sighting]) -> bool:
+def _is_another_spot(fit: CalibrationFit, strays: Sequence[Observation], used: Sequence[Observation]) -> bool:
     """Whether strays agree, in each coordinate that they have, and not with the repeats that are used."""
     position = positions(strays)
     count = np.isfinite(position).sum(axis=0)
@@ -177,7 +177,7 @@ def _is_another_spot(fit: Fit, strays: Sequence[Sighting], used: Sequence[Sighti
     return bool((np.abs(middle - rest[seen]) > wide.max(axis=0)).any())
 
 
-def _never_lit(fit: Fit) -> Iterator[Fault]:
+def _never_lit(fit: CalibrationFit) -> Iterator[Fault]:
     seen = {s.laser_id for s in fit.cells.captures}
     dark = Counter(r.missing.laser_id for r in fit.rejected if r.missing is not None)
     for laser in fit.rig.laser_ids:
@@ -192,7 +192,7 @@ def _never_lit(fit: Fit) -> Iterator[Fault]:
             )
 
 
-def _saturated(fit: Fit) -> Iterator[Fault]:
+def _saturated(fit: CalibrationFit) -> Iterator[Fault]:
     clipped = Counter(s.standoff_mm for s in fit.used if s.saturated)
     if clipped.total() > SATURATED_SHARE * len(fit.used):
         where = ", ".join(f"{mm:g}" for mm in sorted(clipped))
@@ -204,7 +204,7 @@ def _saturated(fit: Fit) -> Iterator[Fault]:
         )
 
 
-def _all_far(fit: Fit) -> Iterator[Fault]:
+def _all_far(fit: CalibrationFit) -> Iterator[Fault]:
     reaches = [_reach(fit, laser) for laser in range(len(fit.rig.lasers))]
     known = [reach for reach in reaches if reach is not None]
     if known and max(known) < LEAST_TRAVEL:
@@ -217,7 +217,7 @@ def _all_far(fit: Fit) -> Iterator[Fault]:
         )
 
 
-def _reach(fit: Fit, laser: int) -> float | None:
+def _reach(fit: CalibrationFit, laser: int) -> float | None:
     """Share of the picture from a laser's nearest spot to where it ends at infinity; None if hardly seen."""
     cells, camera = fit.cells, fit.rig.camera
     axis = "uv".index(fit.rig.lasers[laser].axis)

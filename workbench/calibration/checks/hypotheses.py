@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
 
 from workbench.calibration.checks.cross_validation import by_standoff, predictive, range_error, rows_at
-from workbench.calibration.estimation.fit import Fit
-from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.estimation.fit import CalibrationFit
+from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit, rows_of
 
 FloatArray = NDArray[np.float64]
@@ -71,7 +71,7 @@ class Hypothesis:
     significant: bool
 
 
-def explain_misfit(fit: Fit) -> tuple[Hypothesis, ...]:
+def explain_misfit(fit: CalibrationFit) -> tuple[Hypothesis, ...]:
     """The hypotheses, best first, that together explain what the fit does not; none where it is sound.
 
     Spots that lie apart are found whether or not everything else is explained; anything else counts only
@@ -94,7 +94,7 @@ def explain_misfit(fit: Fit) -> tuple[Hypothesis, ...]:
     return tuple(found) if len(spots) <= most else tuple(h for h in found if h.kind != "spot")
 
 
-def _needed(fit: Fit, state: Refit, found: list[Hypothesis]) -> list[Hypothesis]:
+def _needed(fit: CalibrationFit, state: Refit, found: list[Hypothesis]) -> list[Hypothesis]:
     """Those without which the rest explains decisively less: what came first may be a mistake."""
     latest = list({(h.kind, h.subject): h for h in found}.values())
     if len(latest) == 1:
@@ -102,7 +102,7 @@ def _needed(fit: Fit, state: Refit, found: list[Hypothesis]) -> list[Hypothesis]
     return [replace(h, state=state) for h in latest if _is_needed(fit, state, h)]
 
 
-def _is_needed(fit: Fit, state: Refit, h: Hypothesis) -> bool:
+def _is_needed(fit: CalibrationFit, state: Refit, h: Hypothesis) -> bool:
     problem, used = state.problem, state.used
     if h.kind == "standoff":
         problem = _problem_at(problem, h.subject[0], fit.cells.placements[h.subject[0]].standoff_mm)
@@ -136,7 +136,7 @@ def _any(candidates: list[Hypothesis], top: float) -> bool:
     return any(c.significant for c in candidates if c.score >= top - TIE)
 
 
-def _candidates(fit: Fit, state: Refit, first: bool) -> Iterator[Hypothesis]:
+def _candidates(fit: CalibrationFit, state: Refit, first: bool) -> Iterator[Hypothesis]:
     improbable = is_improbable(state)
     if improbable and first:
         yield from _pictures(fit, state)
@@ -152,7 +152,7 @@ def _scored(kind: Kind, subject: tuple[int, ...], before: Refit, after: Refit, c
     return Hypothesis(kind, subject, after, score, score > DECISIVE)
 
 
-def _pictures(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
+def _pictures(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
     """The picture left for right, top for bottom, both."""
     data = state.problem.data
     edge = np.array([fit.rig.camera.width_px - 1.0, fit.rig.camera.height_px - 1.0])
@@ -163,28 +163,28 @@ def _pictures(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
     )
     for kind, axes in turns:
         position = np.where(axes, edge - data.position_px, data.position_px)
-        problem = Problem(state.problem.layout, data._replace(position_px=position))
+        problem = LeastSquaresProblem(state.problem.layout, data._replace(position_px=position))
         yield _scored(kind, (), state, _from_priors(problem, state.used), 2 * log(3))
 
 
-def _swaps(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
+def _swaps(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
     data = state.problem.data
     pairs = list(combinations(range(len(fit.rig.lasers)), 2))
     laser = np.asarray(data.spots.laser)
     for a, b in pairs:
         swapped = np.where(laser == a, b, np.where(laser == b, a, laser))
         spots = data.spots._replace(laser=swapped)
-        problem = Problem(state.problem.layout, data._replace(spots=spots))
+        problem = LeastSquaresProblem(state.problem.layout, data._replace(spots=spots))
         after = _from_priors(problem, state.used)
         yield _scored("lasers_swapped", (a, b), state, after, 2 * log(len(pairs)))
 
 
-def _from_priors(problem: Problem, used: BoolArray) -> Refit:
+def _from_priors(problem: LeastSquaresProblem, used: BoolArray) -> Refit:
     """An optimum that wrong data may have led far astray is no place to start from."""
     return refit(problem, used, np.zeros(len(np.asarray(problem.data.mean))))
 
 
-def _standoffs(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
+def _standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
     """Placements' standoffs free, the most strained first, until one explains everything.
 
     The rest must be better off without the placement by what a free standoff takes.
@@ -213,7 +213,7 @@ def _standoffs(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
                 return
 
 
-def _strain(fit: Fit, state: Refit, index: int) -> float:
+def _strain(fit: CalibrationFit, state: Refit, index: int) -> float:
     """By how much the cost falls if a placement's error needs no prior, to first order."""
     error = _error_index(fit, index)
     told = 1.0 - state.covariance[error, error]
@@ -227,7 +227,7 @@ def _gain_without(state: Refit, rows: BoolArray) -> float:
     return float(state.residual[rows] @ np.linalg.solve(free, state.residual[rows]))
 
 
-def _freed(fit: Fit, state: Refit, left: Refit, index: int, at_mm: float) -> Refit:
+def _freed(fit: CalibrationFit, state: Refit, left: Refit, index: int, at_mm: float) -> Refit:
     """The state with the placement where its spots say that it stood."""
     problem = _problem_at(left.problem, index, at_mm)
     found = refit(problem, state.used, left.y)
@@ -236,7 +236,9 @@ def _freed(fit: Fit, state: Refit, left: Refit, index: int, at_mm: float) -> Ref
     return refit(_problem_at(problem, index, at_mm + float(error)), state.used, found.y)
 
 
-def _where_it_stood(fit: Fit, left: Refit, rows: BoolArray, index: int, scan_mm: FloatArray) -> float:
+def _where_it_stood(
+    fit: CalibrationFit, left: Refit, rows: BoolArray, index: int, scan_mm: FloatArray
+) -> float:
     """The standoff that the rest finds likeliest for what was seen of a placement."""
     scanned = np.nan_to_num([_surprise(_stands(left, index, mm), rows) for mm in scan_mm], nan=np.inf)
     low = [n for n in range(1, len(scanned) - 1) if scanned[n] <= min(scanned[n - 1], scanned[n + 1])]
@@ -261,10 +263,10 @@ def _stands(left: Refit, index: int, standoff_mm: float) -> Refit:
     return left.with_unused(_problem_at(left.problem, index, standoff_mm))
 
 
-def _problem_at(problem: Problem, index: int, standoff_mm: float) -> Problem:
+def _problem_at(problem: LeastSquaresProblem, index: int, standoff_mm: float) -> LeastSquaresProblem:
     standoff = np.array(problem.data.standoff_mm, float)
     standoff[index] = standoff_mm
-    return Problem(problem.layout, problem.data._replace(standoff_mm=standoff))
+    return LeastSquaresProblem(problem.layout, problem.data._replace(standoff_mm=standoff))
 
 
 def _surprise(left: Refit, rows: BoolArray) -> float:
@@ -273,11 +275,11 @@ def _surprise(left: Refit, rows: BoolArray) -> float:
     return float(distance @ np.linalg.solve(variance, distance) + np.linalg.slogdet(variance)[1])
 
 
-def _error_index(fit: Fit, index: int) -> int:
+def _error_index(fit: CalibrationFit, index: int) -> int:
     return [p.name for p in fit.table.parameters].index(f"{fit.cells.placements[index].key}.error_mm")
 
 
-def _spots(fit: Fit, state: Refit) -> Iterator[Hypothesis]:
+def _spots(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
     """The spots that lie farthest from where all others put them, each left out."""
     count = len(fit.cells.laser)
     if count < FEWEST_SPOTS:
@@ -309,7 +311,7 @@ def _reweighted(state: Refit, count: int) -> Refit:
     weight = np.full(len(inverse_sd), START_WEIGHT)
     for _ in range(REWEIGHTINGS):
         data = problem.data._replace(inverse_sd=inverse_sd * np.sqrt(weight)[:, None])
-        y = refit(Problem(problem.layout, data), state.used, y).y
+        y = refit(LeastSquaresProblem(problem.layout, data), state.used, y).y
         residual, jacobian = problem.linearise(y)
         square = (np.where(state.used, residual, 0.0).reshape(-1, 2) ** 2).sum(axis=1)
         weight[:count] = 1.0 / (1.0 + square[:count] / STUDENT_SQUARE)

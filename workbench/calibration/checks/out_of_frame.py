@@ -22,25 +22,25 @@ def name_out_of_frame(
     Args:
         rig: size of the picture, and the lasers.
         values: (P,) fitted parameters, the sensor's first.
-        rejected: captures left out; those without a `missing` sighting stay as they are.
+        rejected: captures left out; those without a `missing` observation stay as they are.
     """
     return tuple(_renamed(rig, values, r) for r in rejected)
 
 
 def _renamed(rig: Rig, values: NDArray[np.float64], rejected: Rejected) -> Rejected:
-    sighting = rejected.missing
-    if sighting is None:
+    observation = rejected.missing
+    if observation is None:
         return rejected
     common = len(LENS) + len(REFERENCE)
-    start = common + len(RAY) * rig.laser_ids.index(sighting.laser_id)
+    start = common + len(RAY) * rig.laser_ids.index(observation.laser_id)
     square = (0.0, 0.0, 0.0)  # no error of placement, no tilt
     inputs = (*values[:common], *values[start : start + len(RAY)], *square)
-    u, v = (float(c) for c in predict_cell(inputs, sighting.standoff_mm))
+    u, v = (float(c) for c in predict_cell(inputs, observation.standoff_mm))
     width, height = rig.camera.width_px, rig.camera.height_px
     if -0.5 <= u < width - 0.5 and -0.5 <= v < height - 0.5:
         return rejected
     return replace(
         rejected,
-        reason=f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm: its spot lies outside the picture,"
-        f" at u = {u:.0f}, v = {v:.0f} px of {width} x {height}: too near for this laser",
+        reason=f"laser {observation.laser_id} at {observation.standoff_mm:g} mm: its spot lies outside the"
+        f" picture, at u = {u:.0f}, v = {v:.0f} px of {width} x {height}: too near for this laser",
     )

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, gammainc, gammaincc, ndtr
 
 from workbench.calibration.data.observations import positions, stated_sd
-from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit
 
 FloatArray = NDArray[np.float64]
@@ -60,7 +60,7 @@ class ResidualTest:
     """Chance of a value as far out if nothing is wrong."""
 
 
-def residual_tests(fit: Fit) -> tuple[ResidualTest, ...]:
+def residual_tests(fit: CalibrationFit) -> tuple[ResidualTest, ...]:
     """Every test that the fit has data for."""
     spots = _Spots.of(fit)
     tests = (*_trends(spots, len(fit.rig.lasers)), *_of_spots(fit, spots), *_of_repeats(fit))
@@ -126,7 +126,7 @@ class _Spots:
     """(n, 2) where the fit has the spot, -1 to 1 over the picture (where it was seen, its noise is too)."""
 
     @classmethod
-    def of(cls, fit: Fit) -> _Spots:
+    def of(cls, fit: CalibrationFit) -> _Spots:
         cells, problem = fit.cells, problem_of(fit)
         size = np.array([fit.rig.camera.width_px, fit.rig.camera.height_px])
         whole: Refit = refit(problem, measured(problem), optimum_of(fit), fit.noise_scale)
@@ -190,7 +190,7 @@ def _trends(spots: _Spots, lasers: int) -> Iterator[ResidualTest]:
         yield ResidualTest(name, spots.trend_p(pixels))
 
 
-def _of_spots(fit: Fit, spots: _Spots) -> Iterator[ResidualTest]:
+def _of_spots(fit: CalibrationFit, spots: _Spots) -> Iterator[ResidualTest]:
     order = np.zeros(spots.covariance.shape)
     for axis in (0, 1):
         mine = np.flatnonzero(spots.axis == axis)
@@ -201,7 +201,7 @@ def _of_spots(fit: Fit, spots: _Spots) -> Iterator[ResidualTest]:
 
 
 def _contrasts(
-    fit: Fit, laser: NDArray[np.intp], axis: NDArray[np.intp], distance: FloatArray
+    fit: CalibrationFit, laser: NDArray[np.intp], axis: NDArray[np.intp], distance: FloatArray
 ) -> Iterator[tuple[str, FloatArray]]:
     """What a variance may differ by, as weights whose mean is 0."""
     candidates = [("over standoff", distance), ("of u and v", np.where(axis == 0, 1.0, -1.0))]
@@ -215,7 +215,7 @@ def _contrasts(
             yield name, centred
 
 
-def _of_repeats(fit: Fit) -> Iterator[ResidualTest]:
+def _of_repeats(fit: CalibrationFit) -> Iterator[ResidualTest]:
     """Deviations of the repeats from their means."""
     groups = [
         _Repeats.of(fit, cell, axis)
@@ -244,7 +244,7 @@ def _of_repeats(fit: Fit) -> Iterator[ResidualTest]:
         yield ResidualTest(f"repeats: {words[kind]}" + (f": {which}" if which else ""), p)
 
 
-def _share_equal(fit: Fit, axis: int) -> float:
+def _share_equal(fit: CalibrationFit, axis: int) -> float:
     """Of all pairs of repeats of a spot, those whose coordinates are the same number; 0 where none are."""
     equal = pairs = 0
     for members in fit.cells.members:
@@ -267,7 +267,7 @@ class _Repeats:
     """(m,) unit vector that the mean has taken out."""
 
     @classmethod
-    def of(cls, fit: Fit, cell: int, axis: int) -> _Repeats:
+    def of(cls, fit: CalibrationFit, cell: int, axis: int) -> _Repeats:
         members = fit.cells.members[cell]
         value = positions(members)[:, axis]
         seen = np.isfinite(value)

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from workbench.calibration.checks.cross_validation import by_standoff
 from workbench.calibration.checks.hypotheses import DECISIVE, SPOT_COST
 from workbench.calibration.data.averaging import scatter_chi2
-from workbench.calibration.data.observations import Sighting, positions, stated_sd
-from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.data.observations import Observation, positions, stated_sd
+from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.refit import Refit, measured, problem_of, refit_with_scale, rows_of
 
 FloatArray = NDArray[np.float64]
@@ -33,7 +33,7 @@ FEWEST_BESIDE = 2
 
 
 @dataclass(frozen=True)
-class Movement:
+class TargetMotion:
     """A step of the target between two captures of one placement."""
 
     placement: int
@@ -47,7 +47,7 @@ class Movement:
     captures: int
 
 
-def find_movements(fit: Fit, suspects: Sequence[int]) -> tuple[Movement, ...]:
+def find_target_motion(fit: CalibrationFit, suspects: Sequence[int]) -> tuple[TargetMotion, ...]:
     """Placements that moved, among those (by index) that something is wrong with."""
     problem = problem_of(fit)
     found = []
@@ -55,7 +55,7 @@ def find_movements(fit: Fit, suspects: Sequence[int]) -> tuple[Movement, ...]:
         mine = rows_of(fit.cells.placement == index, problem)
         others = measured(problem) & ~mine
         captures = _Captures.of(fit, index)
-        if len(captures.sightings) >= 2 * FEWEST_BESIDE and others.any():
+        if len(captures.observations) >= 2 * FEWEST_BESIDE and others.any():
             start = np.zeros(len(fit.table.parameters))
             left = refit_with_scale(problem, others, start)
             found.append(_movement(fit, captures, left, index))
@@ -66,7 +66,7 @@ def find_movements(fit: Fit, suspects: Sequence[int]) -> tuple[Movement, ...]:
 class _Captures:
     """One placement's captures in their order, n measured coordinates in all."""
 
-    sightings: tuple[Sighting, ...]
+    observations: tuple[Observation, ...]
     capture: NDArray[np.intp]
     """(n,) which capture a coordinate is of."""
     axis: NDArray[np.intp]
@@ -78,7 +78,7 @@ class _Captures:
     stray: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, fit: Fit, index: int) -> _Captures:
+    def of(cls, fit: CalibrationFit, index: int) -> _Captures:
         cells = {
             fit.rig.laser_ids[fit.cells.laser[n]]: n for n in np.flatnonzero(fit.cells.placement == index)
         }
@@ -90,7 +90,7 @@ class _Captures:
         cell = np.array([cells[s.laser_id] for s in mine], np.intp)[capture]
         scale = {int(n): _repeat_scale(fit, int(n)) for n in cells.values()}
         return cls(
-            sightings=mine,
+            observations=mine,
             capture=capture,
             axis=axis,
             cell=cell,
@@ -100,7 +100,7 @@ class _Captures:
         )
 
 
-def _repeat_scale(fit: Fit, cell: int) -> float:
+def _repeat_scale(fit: CalibrationFit, cell: int) -> float:
     """Factor on the stated deviations of a spot's repeats.
 
     Repeats that scatter more than all others (torn) are as noisy as they are to both sides of the split that
@@ -120,17 +120,17 @@ def _repeat_scale(fit: Fit, cell: int) -> float:
     return max(usual, (chi2 / free) ** 0.5) if free else usual
 
 
-def _movement(fit: Fit, captures: _Captures, left: Refit, index: int) -> Movement | None:
+def _movement(fit: CalibrationFit, captures: _Captures, left: Refit, index: int) -> TargetMotion | None:
     mean, slope, variance = _prediction(fit, captures, left, index)
     distance = captures.position_px - mean
     try:
         whitened = np.linalg.inv(np.linalg.cholesky(variance))
     except np.linalg.LinAlgError:  # the others tell so little of it that rounding is larger than the noise
         return None
-    lasers = captures.cell[np.searchsorted(captures.capture, np.arange(len(captures.sightings)))]
+    lasers = captures.cell[np.searchsorted(captures.capture, np.arange(len(captures.observations)))]
     steps = [
         m
-        for m in range(FEWEST_BESIDE, len(captures.sightings) - FEWEST_BESIDE + 1)
+        for m in range(FEWEST_BESIDE, len(captures.observations) - FEWEST_BESIDE + 1)
         if not _is_one_spot(lasers, m)
     ]
     if not steps:
@@ -144,19 +144,19 @@ def _movement(fit: Fit, captures: _Captures, left: Refit, index: int) -> Movemen
     if score < DECISIVE or score < _rival(captures, whitened, white) + DECISIVE:
         return None
     before = steps[best]
-    return Movement(
+    return TargetMotion(
         placement=index,
         step_mm=float(columns[:, best] @ white / information[best]),
         sd_mm=float(information[best] ** -0.5),
-        last_before=captures.sightings[before - 1].source,
-        first_after=captures.sightings[before].source,
+        last_before=captures.observations[before - 1].source,
+        first_after=captures.observations[before].source,
         before=before,
-        captures=len(captures.sightings),
+        captures=len(captures.observations),
     )
 
 
 def _prediction(
-    fit: Fit, captures: _Captures, left: Refit, index: int
+    fit: CalibrationFit, captures: _Captures, left: Refit, index: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Where each coordinate is expected, its change by the standoff (a mm), and (n, n) covariance."""
     rows = 2 * captures.cell + captures.axis

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.data.observations import Cells, PlacementInfo, Rejected, Sighting
+from workbench.calibration.data.observations import MeanObservations, Observation, PlacementInfo, Rejected
 from workbench.model.board import Board
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
@@ -54,52 +54,54 @@ def see_board(frames: Sequence[Image], board: Board, placement: PlacementInfo) -
         return Rejected(placement.source, f"board at {placement.standoff_mm:g} mm: {error}")
 
 
-def on_band(view: BoardView, board: Board, sighting: Sighting) -> Sighting | Rejected:
-    """The sighting of a spot, or its rejection where it lies on the print or beside the board.
+def on_band(view: BoardView, board: Board, observation: Observation) -> Observation | Rejected:
+    """The observation of a spot, or its rejection where it lies on the print or beside the board.
 
     The spot's place on the board comes from the corners around it; lens distortion over their distance
     shifts it by less than a millimetre.
     """
-    if not np.isfinite([sighting.u_px, sighting.v_px]).all():
-        return sighting
+    if not np.isfinite([observation.u_px, observation.v_px]).all():
+        return observation
     import cv2
 
     printed = board.corners_mm[view.corners.ids]
     to_board, _ = cv2.findHomography(view.corners.position_px, printed)
-    x, y, w = to_board @ [sighting.u_px, sighting.v_px, 1.0]
+    x, y, w = to_board @ [observation.u_px, observation.v_px, 1.0]
     half_height, half_width = board.band_mm / 2 - BAND_EDGE_MM, board.page_mm[0] / 2
     if abs(y / w) <= half_height and abs(x / w) <= half_width:
-        return sighting
+        return observation
     return Rejected(
-        sighting.source,
-        f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm: the spot lies {y / w:.0f} mm from the"
-        f" middle of the board's blank band, expected at most {half_height:g} mm: shift the board",
+        observation.source,
+        f"laser {observation.laser_id} at {observation.standoff_mm:g} mm: the spot lies {y / w:.0f} mm from"
+        f" the middle of the board's blank band, expected at most {half_height:g} mm: shift the board",
     )
 
 
 def on_boards(
-    board: Board, seen: Mapping[str, BoardView | Rejected], found: Sequence[Sighting | Rejected]
-) -> list[Sighting | Rejected]:
+    board: Board, seen: Mapping[str, BoardView | Rejected], found: Sequence[Observation | Rejected]
+) -> list[Observation | Rejected]:
     """What was found of spots, without those that a board as their target spoils.
 
     Args:
         board: the board.
         seen: by placement, what was seen of the board where it was the target.
-        found: sightings of any placement, and what was rejected already.
+        found: observations of any placement, and what was rejected already.
     """
-    return [_on_board(board, seen.get(f.placement), f) if isinstance(f, Sighting) else f for f in found]
+    return [_on_board(board, seen.get(f.placement), f) if isinstance(f, Observation) else f for f in found]
 
 
-def _on_board(board: Board, seen: BoardView | Rejected | None, sighting: Sighting) -> Sighting | Rejected:
+def _on_board(
+    board: Board, seen: BoardView | Rejected | None, observation: Observation
+) -> Observation | Rejected:
     if seen is None:
-        return sighting
+        return observation
     if isinstance(seen, BoardView):
-        return on_band(seen, board, sighting)
-    where = f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm"
-    return Rejected(sighting.source, f"{where}: the board that it fell on was not found")
+        return on_band(seen, board, observation)
+    where = f"laser {observation.laser_id} at {observation.standoff_mm:g} mm"
+    return Rejected(observation.source, f"{where}: the board that it fell on was not found")
 
 
-def with_placements(cells: Cells, boards: Sequence[BoardView]) -> Cells:
+def with_placements(cells: MeanObservations, boards: Sequence[BoardView]) -> MeanObservations:
     """The cells with the boards' placements among theirs.
 
     Raises:

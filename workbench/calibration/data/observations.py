@@ -1,4 +1,4 @@
-"""From single sightings of a spot to what the fit needs: one mean position for each laser and placement."""
+"""Single observations of spots, and their means for each laser and placement, which the fit uses."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Sighting:
+class Observation:
     """One laser's spot in one capture, of a target at a known standoff. NaN: not measured or not stated."""
 
     source: str
     """Where it comes from, for people: `row 3`, or a capture's key."""
     laser_id: str
     placement: str
-    """Sightings with the same placement share the error of its standoff."""
+    """Observations with the same placement share the error of its standoff."""
     standoff_mm: float
     repeat: int
     u_px: float
@@ -49,13 +49,13 @@ class Sighting:
 
 @dataclass(frozen=True)
 class Rejected:
-    """A sighting or row that the fit did not use."""
+    """A observation or row that the fit did not use."""
 
     source: str
     reason: str
-    missing: Sighting | None = None
+    missing: Observation | None = None
     """Where a spot was expected and none was seen: its laser and standoff."""
-    stray: Sighting | None = None
+    stray: Observation | None = None
     """What was seen, where it was left out for lying apart from the other repeats."""
 
 
@@ -72,13 +72,13 @@ class PlacementInfo:
     """Who said so first."""
 
     @classmethod
-    def of(cls, s: Sighting) -> PlacementInfo:
-        """What a sighting says of its placement."""
+    def of(cls, s: Observation) -> PlacementInfo:
+        """What a observation says of its placement."""
         return cls(s.placement, s.standoff_mm, s.standoff_sd_mm, s.yaw_deg, s.source)
 
     @property
     def told(self) -> tuple[float, float | None, float]:
-        """What must be the same for all sightings of a placement."""
+        """What must be the same for all observations of a placement."""
         return self.standoff_mm, None if isnan(self.standoff_sd_mm) else self.standoff_sd_mm, self.yaw_deg
 
     @property
@@ -89,7 +89,7 @@ class PlacementInfo:
 
 
 @dataclass(frozen=True)
-class Cells:
+class MeanObservations:
     """Mean positions, one for each laser and placement that was seen; arrays of length N.
 
     The mean of the repeats and its standard deviation are sufficient for the fit: nothing that the fit can
@@ -103,35 +103,35 @@ class Cells:
     """(N, 2) u, v; NaN where a coordinate was not measured."""
     sd_px: FloatArray
     """(N, 2) 1 sigma of the mean, shared error of the repeats included."""
-    members: tuple[tuple[Sighting, ...], ...]
-    """The sightings behind each mean."""
+    members: tuple[tuple[Observation, ...], ...]
+    """The observations behind each mean."""
     repeat_scale: float = 1.0
     """Factor on the stated deviations that the scatter of the repeats called for."""
-    captures: tuple[Sighting, ...] = ()
-    """Every sighting in the order of the captures, those rejected as strays among them."""
+    captures: tuple[Observation, ...] = ()
+    """Every observation in the order of the captures, those rejected as strays among them."""
     torn: tuple[int, ...] = ()
     """Cells whose repeats scatter far more than all others: they have the deviation that they show."""
 
 
 def group(
-    sightings: Iterable[Sighting], laser_ids: Sequence[str], noise: NoiseSpec
-) -> tuple[Cells, list[Rejected]]:
+    observations: Iterable[Observation], laser_ids: Sequence[str], noise: NoiseSpec
+) -> tuple[MeanObservations, list[Rejected]]:
     """Average the repeats of each laser at each placement; repeats far from their fellows are rejected.
 
     Where the repeats scatter significantly more than their stated deviations, all of these are enlarged to
-    match (`Cells.repeat_scale`). A spot whose repeats alone do (`Cells.torn`) has its own deviation enlarged
-    and leaves the others' alone: so it weighs as little as it should.
+    match (`MeanObservations.repeat_scale`). A spot whose repeats alone do (`MeanObservations.torn`) has its own
+    deviation enlarged and leaves the others' alone: so it weighs as little as it should.
 
     Raises:
-        BadInputError: sightings of one placement disagree about where the target stood.
+        BadInputError: observations of one placement disagree about where the target stood.
     """
-    buckets: dict[tuple[str, str], list[Sighting]] = defaultdict(list)
+    buckets: dict[tuple[str, str], list[Observation]] = defaultdict(list)
     placements: dict[str, PlacementInfo] = {}
-    seen = list(sightings)
+    seen = list(observations)
     for s in seen:
         buckets[s.placement, s.laser_id].append(s)
         _check_placement(placements.setdefault(s.placement, PlacementInfo.of(s)), s)
-    kept: dict[tuple[str, str], list[Sighting]] = {}
+    kept: dict[tuple[str, str], list[Observation]] = {}
     rejected: list[Rejected] = []
     scatter = [_scatter(members, noise) for members in buckets.values()]
     usual = usual_scale(scatter)
@@ -150,7 +150,7 @@ def group(
     ]
     order = list(placements)
     return (
-        Cells(
+        MeanObservations(
             placements=tuple(placements.values()),
             laser=np.array([laser_ids.index(laser) for _, laser in kept], dtype=np.intp),
             placement=np.array([order.index(placement) for placement, _ in kept], dtype=np.intp),
@@ -165,29 +165,29 @@ def group(
     )
 
 
-def positions(sightings: Sequence[Sighting]) -> FloatArray:
+def positions(observations: Sequence[Observation]) -> FloatArray:
     """(n, 2) measured u, v."""
-    return np.array([(s.u_px, s.v_px) for s in sightings]).reshape(-1, 2)
+    return np.array([(s.u_px, s.v_px) for s in observations]).reshape(-1, 2)
 
 
-def stated_sd(sightings: Sequence[Sighting], noise: NoiseSpec) -> FloatArray:
+def stated_sd(observations: Sequence[Observation], noise: NoiseSpec) -> FloatArray:
     """(n, 2) standard deviation of each position, the rig's where none is stated."""
-    sd = np.array([(s.u_sd_px, s.v_sd_px) for s in sightings]).reshape(-1, 2)
+    sd = np.array([(s.u_sd_px, s.v_sd_px) for s in observations]).reshape(-1, 2)
     return np.where(np.isfinite(sd), sd, noise.spot_sd_px)
 
 
-def _check_placement(first: PlacementInfo, sighting: Sighting) -> None:
-    other = PlacementInfo.of(sighting)
+def _check_placement(first: PlacementInfo, observation: Observation) -> None:
+    other = PlacementInfo.of(observation)
     if other.told != first.told:
         raise BadInputError(
-            f"{sighting.source}: standoff_mm: expected what {first.source} says of the same placement"
+            f"{observation.source}: standoff_mm: expected what {first.source} says of the same placement"
             f" {first.key} ({first.describe}), got {other.describe}; give other placements other names"
         )
 
 
 def _without_strays(
-    members: Sequence[Sighting], noise: NoiseSpec, usual: float
-) -> tuple[list[Sighting], list[Rejected]]:
+    members: Sequence[Observation], noise: NoiseSpec, usual: float
+) -> tuple[list[Observation], list[Rejected]]:
     position, sd = positions(members), stated_sd(members, noise)
     stray = strays(position, sd) | strays_of_few(position, usual * sd)
     kept = [s for s, out in zip(members, stray.tolist(), strict=True) if not out]
@@ -205,5 +205,5 @@ def _without_strays(
     return kept, dropped
 
 
-def _scatter(members: Sequence[Sighting], noise: NoiseSpec) -> tuple[float, int]:
+def _scatter(members: Sequence[Observation], noise: NoiseSpec) -> tuple[float, int]:
     return scatter_chi2(positions(members), stated_sd(members, noise))

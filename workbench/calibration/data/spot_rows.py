@@ -1,4 +1,4 @@
-"""From captures to sightings: which spot of which laser, at which standoff, and what was left out.
+"""From captures to observations: which spot of which laser, at which standoff, and what was left out.
 
 What finds spots in images is imported where there are images: positions need none of it.
 """
@@ -12,7 +12,7 @@ from math import isnan
 from typing import TYPE_CHECKING
 
 from workbench.calibration.data.boards import BoardView, on_boards, see_board
-from workbench.calibration.data.observations import PlacementInfo, Rejected, Sighting
+from workbench.calibration.data.observations import Observation, PlacementInfo, Rejected
 from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
 from workbench.model.rig import LaserSpec, Rig
 
@@ -24,10 +24,10 @@ PRIOR_REACH_SD = 4.0
 BEAM_HALF_WIDTH_PX = 8.0
 
 
-def sight_rows(
+def observations_of_rows(
     rig: Rig, rows: Sequence[CaptureRow]
-) -> tuple[list[Sighting], list[Rejected], list[BoardView]]:
-    """The sightings in a captures file, the rows that show none, with their reasons, and the board's views.
+) -> tuple[list[Observation], list[Rejected], list[BoardView]]:
+    """Observations in a captures file, rejected rows with their reasons, and views of the board.
 
     Raises:
         BadInputError: an image cannot be used.
@@ -35,27 +35,27 @@ def sight_rows(
     boards = _see_boards(rig, [row for row in rows if row.laser_id == BOARD])
     spots = [_sight_row(rig, row) for row in rows if row.laser_id != BOARD]
     found = on_boards(rig.board, boards, spots)
-    sightings = [f for f in found if isinstance(f, Sighting)]
+    observations = [f for f in found if isinstance(f, Observation)]
     rejected = [f for f in (*found, *boards.values()) if isinstance(f, Rejected)]
-    return sightings, rejected, [b for b in boards.values() if isinstance(b, BoardView)]
+    return observations, rejected, [b for b in boards.values() if isinstance(b, BoardView)]
 
 
-def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | Rejected:
-    """The one spot of a capture that fired one laser, put into `sighting`, or why there is none."""
+def observe(finding: Finding, laser: LaserSpec, observation: Observation) -> Observation | Rejected:
+    """The one spot of a capture that fired one laser, put into `observation`, or why there is none."""
     from workbench.spots import Failure, explain
 
-    source = sighting.source
-    where = f"laser {laser.id} at {sighting.standoff_mm:g} mm"
+    source = observation.source
+    where = f"laser {laser.id} at {observation.standoff_mm:g} mm"
     if len(finding.spots) != 1:
         cause = explain(finding.failures[0]) if finding.failures else ""
         reason = f"{where}: expected one spot, got {len(finding.spots)}. {cause}"
-        return Rejected(source, reason, None if finding.spots else sighting)
+        return Rejected(source, reason, None if finding.spots else observation)
     spot = finding.spots[0]
     # Cut by the border or grown together with another, its centre is not the laser's.
     if bad := [flag for flag in (Failure.AT_EDGE, Failure.MERGED) if flag in spot.flags]:
         return Rejected(source, f"{where}: {bad[0]}: {explain(bad[0])}")
     return replace(
-        sighting,
+        observation,
         u_px=spot.u_px,
         v_px=spot.v_px,
         u_sd_px=spot.u_sd_px,
@@ -64,15 +64,17 @@ def sight(finding: Finding, laser: LaserSpec, sighting: Sighting) -> Sighting | 
     )
 
 
-def _in_picture(rig: Rig, sighting: Sighting) -> Sighting | Rejected:
+def _in_picture(rig: Rig, observation: Observation) -> Observation | Rejected:
     for name, value, size in (
-        ("u_px", sighting.u_px, rig.camera.width_px),
-        ("v_px", sighting.v_px, rig.camera.height_px),
+        ("u_px", observation.u_px, rig.camera.width_px),
+        ("v_px", observation.v_px, rig.camera.height_px),
     ):
         if value < -0.5 or value >= size - 0.5:
-            where = f"laser {sighting.laser_id} at {sighting.standoff_mm:g} mm"
-            return Rejected(sighting.source, f"{where}: {name}: expected -0.5 to {size - 0.5}, got {value:g}")
-    return sighting
+            where = f"laser {observation.laser_id} at {observation.standoff_mm:g} mm"
+            return Rejected(
+                observation.source, f"{where}: {name}: expected -0.5 to {size - 0.5}, got {value:g}"
+            )
+    return observation
 
 
 def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
@@ -120,7 +122,7 @@ def _placement(row: CaptureRow) -> str:
     return row.scene or f"{row.standoff_mm:g} mm"
 
 
-def _sight_row(rig: Rig, row: CaptureRow) -> Sighting | Rejected:
+def _sight_row(rig: Rig, row: CaptureRow) -> Observation | Rejected:
     source = f"row {row.row}"
     if row.laser_id == ALL_LASERS:
         return Rejected(source, "a calibration needs captures of one laser at a time, got all")
@@ -129,7 +131,7 @@ def _sight_row(rig: Rig, row: CaptureRow) -> Sighting | Rejected:
     if row.laser_id not in rig.laser_ids:
         known = ", ".join(rig.laser_ids)
         return Rejected(source, f"laser_id: expected one of {known} (rig {rig.rig}), got {row.laser_id}")
-    sighting = Sighting(
+    observation = Observation(
         source=source,
         laser_id=row.laser_id,
         placement=_placement(row),
@@ -143,9 +145,9 @@ def _sight_row(rig: Rig, row: CaptureRow) -> Sighting | Rejected:
         yaw_deg=0.0 if isnan(row.tilt_deg) else row.tilt_deg,
     )
     if row.on is None:
-        return _in_picture(rig, sighting)
+        return _in_picture(rig, observation)
     from workbench.session.capture_spots import find_row_spots
 
     laser = rig.lasers[rig.laser_ids.index(row.laser_id)]
     size = rig.camera.width_px, rig.camera.height_px
-    return sight(find_row_spots(row, size, [prior_scanline(rig, laser)], 1), laser, sighting)
+    return observe(find_row_spots(row, size, [prior_scanline(rig, laser)], 1), laser, observation)

@@ -14,7 +14,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from workbench.calibration.estimation.jit_cache import kept
+from workbench.calibration.estimation.jit_cache import jit_cached
 from workbench.calibration.model.parameters import (
     LENS,
     PLACEMENT,
@@ -146,7 +146,7 @@ def _in_blocks(inputs: FloatArray, standoff_mm: FloatArray) -> tuple[FloatArray,
     return spot[:count], slopes[:count], unfolded[:count]
 
 
-@kept()
+@jit_cached()
 def _slopes(inputs: Array, standoff_mm: Array) -> tuple[Array, Array, Array]:
     """(n, 2) spots, (n, 2, 17) their derivatives by the inputs, (n,) whether the lens is unfolded there."""
 

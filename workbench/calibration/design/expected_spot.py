@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.data.observations import Sighting, group
+from workbench.calibration.data.observations import Observation, group
 from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.model.parameters import ParameterTable, sensor_parameters
 from workbench.model.rig import Rig
@@ -22,7 +22,7 @@ SURE_SD = 2.0
 
 
 @dataclass(frozen=True)
-class Whereabouts:
+class ExpectedSpot:
     """Of one laser's spot. Pixels; sd is 1 sigma."""
 
     u_px: float
@@ -33,18 +33,20 @@ class Whereabouts:
     """With respect to the picture."""
 
 
-def whereabouts(rig: Rig, sightings: Sequence[Sighting], laser_id: str, standoff_mm: float) -> Whereabouts:
+def expected_spot(
+    rig: Rig, observations: Sequence[Observation], laser_id: str, standoff_mm: float
+) -> ExpectedSpot:
     """Expect a laser's spot on a square flat target.
 
     A fit of the sensor alone: placements are exact in it but for noise, which suffices for some pixels.
 
     Args:
         rig: priors, size of the picture.
-        sightings: what was seen so far, of flat targets; may be none.
+        observations: what was seen so far, of flat targets; may be none.
         laser_id: whose spot.
         standoff_mm: by the ruler.
     """
-    cells, _ = group(sightings, rig.laser_ids, rig.noise)
+    cells, _ = group(observations, rig.laser_ids, rig.noise)
     standoffs = np.array([*(p.standoff_mm for p in cells.placements), standoff_mm])
     table = ParameterTable(sensor_parameters(rig))
     y = np.zeros(len(table.prior_sd))
@@ -63,11 +65,11 @@ def whereabouts(rig: Rig, sightings: Sequence[Sighting], laser_id: str, standoff
     return _placed(rig, spot[asked], spread)
 
 
-def _placed(rig: Rig, spot: FloatArray, sd: FloatArray) -> Whereabouts:
+def _placed(rig: Rig, spot: FloatArray, sd: FloatArray) -> ExpectedSpot:
     size = np.array([rig.camera.width_px, rig.camera.height_px])
     inwards = np.minimum(spot + 0.5, size - 0.5 - spot) / sd
     least = float(inwards.min())
     place: Literal["inside", "outside", "at the edge"] = (
         "outside" if least < -SURE_SD else "inside" if least > SURE_SD else "at the edge"
     )
-    return Whereabouts(float(spot[0]), float(spot[1]), float(sd[0]), float(sd[1]), place)
+    return ExpectedSpot(float(spot[0]), float(spot[1]), float(sd[0]), float(sd[1]), place)

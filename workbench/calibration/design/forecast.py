@@ -13,7 +13,12 @@ from workbench.calibration.design.standoffs import Aim, drawn_sensors, mean_sd_p
 from workbench.calibration.estimation.fit import share_of
 from workbench.calibration.model.parameters import ParameterTable, sensor_parameters
 from workbench.calibration.verdict.assessment import basis
-from workbench.calibration.verdict.observability import NullDirection, Ranges, information_of, null_directions
+from workbench.calibration.verdict.observability import (
+    NullDirection,
+    RangeGradients,
+    information_of,
+    null_directions,
+)
 from workbench.model.calibration import DeterminedBy
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
@@ -49,7 +54,7 @@ class RangeForecast:
 
 
 @dataclass(frozen=True)
-class Forecast:
+class CalibrationForecast:
     """What to expect of a calibration."""
 
     standoffs_mm: tuple[float, ...]
@@ -64,7 +69,7 @@ class Forecast:
     notes: tuple[str, ...]
 
 
-def forecast(rig: Rig, standoffs_mm: Sequence[float], repeats: int) -> Forecast:
+def forecast(rig: Rig, standoffs_mm: Sequence[float], repeats: int) -> CalibrationForecast:
     """Predict a calibration at these standoffs, `repeats` readings of each laser at each.
 
     Raises:
@@ -77,7 +82,7 @@ def forecast(rig: Rig, standoffs_mm: Sequence[float], repeats: int) -> Forecast:
     rows = sensors.spot_rows(standoffs, mean_sd_px(rig.noise, repeats))
     covariance = posterior(rows[..., sensors.table.free])
     variance = aim.variance(covariance)
-    return Forecast(
+    return CalibrationForecast(
         standoffs_mm=tuple(standoffs_mm),
         repeats=repeats,
         parameters=_parameters(sensors, covariance),
@@ -130,7 +135,9 @@ def _directions(rig: Rig, standoffs: FloatArray, repeats: int) -> tuple[NullDire
     by_parameter = np.zeros((int(seen.sum()), len(table.prior_sd)))
     by_parameter[:, table.free] = aim.by_parameter[0, seen] / sd
     total = np.sqrt(aim.variance(posterior(rows)) + aim.spot_sd**2)[0, seen]
-    return null_directions(rig, table.parameters, table.prior_mean, covariance, Ranges(by_parameter, total))
+    return null_directions(
+        rig, table.parameters, table.prior_mean, covariance, RangeGradients(by_parameter, total)
+    )
 
 
 def _out_of_picture(sensors: Expectation, standoffs: FloatArray) -> tuple[str, ...]:

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.data.observations import Cells, Sighting, group, positions, stated_sd
+from workbench.calibration.data.observations import MeanObservations, Observation, group, positions, stated_sd
 from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.design.standoffs import Aim, Choice, candidates
 from workbench.calibration.estimation.batch import as_grid
 from workbench.calibration.estimation.fit import table_of
 from workbench.calibration.estimation.noise_scale import scale_called_for
-from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import measured, refit
 from workbench.model.rig import NoiseSpec, Rig
 
@@ -48,23 +48,23 @@ class Advice:
     worst_standoff_mm: float
 
 
-def advise(rig: Rig, sightings: Sequence[Sighting], planned_mm: Sequence[float]) -> Advice | None:
+def advise(rig: Rig, observations: Sequence[Observation], planned_mm: Sequence[float]) -> Advice | None:
     """Fit what was seen so far, and look for the standoff that makes the worst range best.
 
     Args:
         rig: priors, noise and reach.
-        sightings: of a flat target.
+        observations: of a flat target.
         planned_mm: standoffs of the whole procedure: ranges should be good from the nearest to the farthest.
 
     Returns:
         None: there is too little yet, or it cannot be fitted.
     """
-    cells, _ = group(sightings, rig.laser_ids, rig.noise)
+    cells, _ = group(observations, rig.laser_ids, rig.noise)
     if len(cells.placements) < FEWEST:
         return None
     if (fitted := _fit(rig, cells, len(planned_mm))) is None:
         return None
-    noise = _noise(rig, sightings, cells.repeat_scale, fitted.noise_scale)
+    noise = _noise(rig, observations, cells.repeat_scale, fitted.noise_scale)
     now = Expectation(rig.model_copy(update={"noise": noise}), fitted.sensor)
     aim = Aim.of(now, np.geomspace(min(planned_mm), max(planned_mm), RANGES), noise)
     repeats = max(1, round(float(np.mean([len(members) for members in cells.members]))))
@@ -93,14 +93,14 @@ class _Fitted:
     """(M, 2) of each cell in deviations of the noise so scaled, 0 where nothing was measured."""
     residual_px: FloatArray
     """(M, 2)"""
-    cells: Cells
+    cells: MeanObservations
 
 
-def _fit(rig: Rig, cells: Cells, planned: int) -> _Fitted | None:
+def _fit(rig: Rig, cells: MeanObservations, planned: int) -> _Fitted | None:
     """As `fit`, the noise scaled to the residuals where they are too large; None: no finite result."""
     whole = _with_room(cells, len(rig.lasers), planned)
     table = table_of(rig, whole.placements)
-    problem = Problem.of(len(rig.lasers), table, whole, (), rig.board)
+    problem = LeastSquaresProblem.of(len(rig.lasers), table, whole, (), rig.board)
     with np.errstate(over="ignore", invalid="ignore"):
         found = refit(problem, measured(problem), np.zeros(len(table.prior_mean)))
         for _ in range(SCALE_ROUNDS):
@@ -136,7 +136,7 @@ def _worst_residual(rig: Rig, fitted: _Fitted) -> dict[str, Any]:
     }
 
 
-def _with_room(cells: Cells, lasers: int, planned: int) -> Cells:
+def _with_room(cells: MeanObservations, lasers: int, planned: int) -> MeanObservations:
     """The cells with a place for every spot of the procedure, those not seen without a measurement.
 
     So the fit after each placement is the same program, that of the fit at the end.
@@ -146,7 +146,9 @@ def _with_room(cells: Cells, lasers: int, planned: int) -> Cells:
     placements = (*cells.placements, *(replace(first, key=f"ahead {n}") for n in room))
     position, sd = as_grid(replace(cells, placements=placements), lasers)
     placement, laser = np.indices(position.shape[:2]).reshape(2, -1)
-    return Cells(placements, laser, placement, position.reshape(-1, 2), sd.reshape(-1, 2), members=())
+    return MeanObservations(
+        placements, laser, placement, position.reshape(-1, 2), sd.reshape(-1, 2), members=()
+    )
 
 
 def _worst(aim: Aim, covariance: FloatArray) -> float:
@@ -154,8 +156,8 @@ def _worst(aim: Aim, covariance: FloatArray) -> float:
     return float(f"{np.sqrt((aim.variance(covariance) + aim.spot_sd**2).max()):.4g}")
 
 
-def _noise(rig: Rig, sightings: Sequence[Sighting], repeat_scale: float, scale: float) -> NoiseSpec:
+def _noise(rig: Rig, observations: Sequence[Observation], repeat_scale: float, scale: float) -> NoiseSpec:
     """As a calibration would state it."""
-    seen = np.isfinite(positions(sightings))
-    own = float(np.sqrt((stated_sd(sightings, rig.noise)[seen] ** 2).mean()))
+    seen = np.isfinite(positions(observations))
+    own = float(np.sqrt((stated_sd(observations, rig.noise)[seen] ** 2).mean()))
     return NoiseSpec(spot_sd_px=own * repeat_scale * scale, speckle_sd_px=rig.noise.speckle_sd_px * scale)

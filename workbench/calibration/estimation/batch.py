@@ -19,7 +19,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from workbench.calibration.data.observations import Cells, PlacementInfo
+from workbench.calibration.data.observations import MeanObservations, PlacementInfo
 from workbench.calibration.estimation.fit import table_of
 from workbench.calibration.estimation.noise_scale import scale_called_for
 from workbench.calibration.model.parameters import LENS, PLACEMENT, RAY, REFERENCE, ParameterTable
@@ -122,7 +122,7 @@ def fit_batch(
     )
 
 
-def as_grid(cells: Cells, lasers: int) -> tuple[FloatArray, FloatArray]:
+def as_grid(cells: MeanObservations, lasers: int) -> tuple[FloatArray, FloatArray]:
     """(J, L, 2) mean positions of one calibration and their standard deviations, NaN where not seen."""
     shape = (len(cells.placements), lasers, 2)
     position, sd = np.full(shape, np.nan), np.full(shape, np.nan)

@@ -12,8 +12,15 @@ from numpy.typing import NDArray
 
 from workbench.calibration.checks.out_of_frame import name_out_of_frame
 from workbench.calibration.data.boards import BoardView, PoseGuess, guess_pose, with_placements
-from workbench.calibration.data.observations import Cells, PlacementInfo, Rejected, Sighting, group, positions
-from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.data.observations import (
+    MeanObservations,
+    Observation,
+    PlacementInfo,
+    Rejected,
+    group,
+    positions,
+)
+from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.model.parameters import (
     LENS,
     POSE,
@@ -41,12 +48,12 @@ FLAT_PRIOR_SD = 1e3
 
 
 @dataclass(frozen=True)
-class Fit:
+class CalibrationFit:
     """A fitted calibration. P parameters (sensor first), N cells, K corners of boards, 1 sigma throughout."""
 
     rig: Rig
     table: ParameterTable
-    cells: Cells
+    cells: MeanObservations
     rejected: tuple[Rejected, ...]
     values: FloatArray
     """(P,) maximum a posteriori."""
@@ -93,8 +100,8 @@ class Fit:
         return float(np.sqrt(np.mean(corners**2))) if corners.size else float("nan")
 
     @property
-    def used(self) -> tuple[Sighting, ...]:
-        """Every sighting that the fit rests on."""
+    def used(self) -> tuple[Observation, ...]:
+        """Every observation that the fit rests on."""
         return tuple(s for members in self.cells.members for s in members)
 
     @property
@@ -105,11 +112,11 @@ class Fit:
 
 def fit(
     rig: Rig,
-    sightings: Sequence[Sighting],
+    observations: Sequence[Observation],
     rejected: Sequence[Rejected] = (),
     boards: Sequence[BoardView] = (),
-) -> Fit:
-    """Fit the rig's parameters to sightings of a flat target, and to the printed board where it was one.
+) -> CalibrationFit:
+    """Fit the rig's parameters to observations of a flat target, and to the printed board where it was one.
 
     The estimate maximises the posterior of Gaussian noise and the rig's Gaussian priors. Placement errors and
     tilts are parameters with priors, so that repeats at one placement count as what they are: one placement.
@@ -118,30 +125,30 @@ def fit(
 
     Args:
         rig: priors and noise.
-        sightings: spots at known standoffs.
+        observations: spots at known standoffs.
         rejected: what was already rejected before, to be listed with the fit's own.
         boards: what was seen of the board, one view for each placement that had it as its target.
 
     Raises:
-        BadInputError: no sightings, one of a laser that the rig does not have, placements that contradict
+        BadInputError: no observations, one of a laser that the rig does not have, placements that contradict
             themselves, or a target that the rig file puts behind the pinhole.
         LimitFailedError: the fit does not come to a finite result.
     """
-    _check(rig, sightings)
-    cells, strays = group(sightings, rig.laser_ids, rig.noise)
+    _check(rig, observations)
+    cells, strays = group(observations, rig.laser_ids, rig.noise)
     return fit_cells(rig, with_placements(cells, boards), (*rejected, *strays), boards)
 
 
 def fit_cells(
-    rig: Rig, cells: Cells, rejected: Sequence[Rejected] = (), boards: Sequence[BoardView] = ()
-) -> Fit:
+    rig: Rig, cells: MeanObservations, rejected: Sequence[Rejected] = (), boards: Sequence[BoardView] = ()
+) -> CalibrationFit:
     """As `fit`, of what is averaged already, with the boards' placements among the cells'.
 
     Raises:
         LimitFailedError: the fit does not come to a finite result.
     """
     table = table_of(rig, cells.placements, boards)
-    problem = Problem.of(len(rig.lasers), table, cells, boards, rig.board)
+    problem = LeastSquaresProblem.of(len(rig.lasers), table, cells, boards, rig.board)
     scale = 1.0
     with np.errstate(over="ignore", invalid="ignore"):  # a result that is not finite is refused by name
         for _ in range(10):
@@ -156,7 +163,7 @@ def fit_cells(
         )
     values = table.prior_mean + table.prior_sd * solution.y
     residual, corner_residual = np.split(solution.residual_px, [len(cells.laser)])
-    return Fit(
+    return CalibrationFit(
         rig=rig,
         table=table,
         cells=cells,
@@ -250,17 +257,17 @@ def _as_told(parameter: Parameter, told: dict[str, PlacementInfo]) -> Parameter:
     return parameter
 
 
-def _rms(cells: Cells, residual_px: FloatArray) -> float:
+def _rms(cells: MeanObservations, residual_px: FloatArray) -> float:
     """Root mean square of measured - predicted over every single coordinate."""
     predicted = cells.position_px - residual_px
     single = [positions(m) - p for m, p in zip(cells.members, predicted, strict=True)]
     return float(np.sqrt(np.nanmean(np.concatenate(single) ** 2)))
 
 
-def _check(rig: Rig, sightings: Sequence[Sighting]) -> None:
-    if not sightings:
+def _check(rig: Rig, observations: Sequence[Observation]) -> None:
+    if not observations:
         raise BadInputError("no spot is left to fit: expected captures with a known standoff and a spot each")
-    for s in sightings:
+    for s in observations:
         if s.laser_id not in rig.laser_ids:
             raise BadInputError(
                 f"{s.source}: laser_id: expected one of {', '.join(rig.laser_ids)} (rig {rig.rig}),"

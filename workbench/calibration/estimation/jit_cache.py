@@ -1,8 +1,8 @@
 """Traced programs kept on disk, so that a second process need not trace them again.
 
 JAX keeps what it has compiled. It does not keep the tracing and lowering before that, which take longer than
-all else that a cold `workbench fit` does, and for which optimistix has to be imported. `kept` is `jax.jit`
-with the lowered program (StableHLO) kept in the cache folder, beside JAX's own.
+all else that a cold `workbench fit` does, and for which optimistix has to be imported. `jit_cached` is
+`jax.jit` with the lowered program (StableHLO) kept in the cache folder, beside JAX's own.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LAPACK = ("lapack_dormqr_ffi",)
 SUM_BYTES = hashlib.sha256().digest_size
 
 
-def kept(static: int = 0) -> Callable[[Program[T]], Program[T]]:
+def jit_cached(static: int = 0) -> Callable[[Program[T]], Program[T]]:
     """Compile a function of arrays as `jax.jit` does, and keep the lowered program on disk.
 
     The function takes its arguments by position, and returns an array or a tuple of arrays.

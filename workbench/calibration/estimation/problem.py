@@ -14,8 +14,8 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from workbench.calibration.data.boards import BoardView
-from workbench.calibration.data.observations import Cells
-from workbench.calibration.estimation.jit_cache import kept
+from workbench.calibration.data.observations import MeanObservations
+from workbench.calibration.estimation.jit_cache import jit_cached
 from workbench.calibration.estimation.noise_scale import scale_called_for
 from workbench.calibration.model.parameters import ParameterTable
 from workbench.calibration.model.prediction import (
@@ -64,7 +64,7 @@ class _Data(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Problem:
+class LeastSquaresProblem:
     """One fit, ready to be solved at any noise."""
 
     layout: Layout
@@ -72,8 +72,13 @@ class Problem:
 
     @classmethod
     def of(
-        cls, lasers: int, table: ParameterTable, cells: Cells, boards: Sequence[BoardView], board: Board
-    ) -> Problem:
+        cls,
+        lasers: int,
+        table: ParameterTable,
+        cells: MeanObservations,
+        boards: Sequence[BoardView],
+        board: Board,
+    ) -> LeastSquaresProblem:
         """Spots on the cells' placements; every board's placement is one of them."""
         position = np.concatenate([cells.position_px, *(b.corners.position_px for b in boards)])
         sd = np.concatenate([cells.sd_px, *(b.corners.sd_px for b in boards)])
@@ -124,7 +129,7 @@ class Problem:
         )
 
 
-def _corner_data(cells: Cells, boards: Sequence[BoardView], board: Board) -> CornerData:
+def _corner_data(cells: MeanObservations, boards: Sequence[BoardView], board: Board) -> CornerData:
     order = [p.key for p in cells.placements]
     counts = [len(b.corners.ids) for b in boards]
     ids = np.concatenate([np.array([], np.intp), *(b.corners.ids for b in boards)])
@@ -135,7 +140,7 @@ def _corner_data(cells: Cells, boards: Sequence[BoardView], board: Board) -> Cor
     )
 
 
-@kept(static=1)
+@jit_cached(static=1)
 def _solve(data: _Data, layout: Layout) -> tuple[Array, Array]:
     """(P,) optimum in units of the prior, and whether the solver converged."""
     import optimistix as optx
@@ -151,7 +156,7 @@ def _solve(data: _Data, layout: Layout) -> tuple[Array, Array]:
     return solution.value, jnp.asarray(solution.result == optx.RESULTS.successful)
 
 
-@kept(static=1)
+@jit_cached(static=1)
 def _linearise(y: Array, data: _Data, layout: Layout) -> tuple[Array, Array, Array]:
     """Residuals of the data (2 M,) in standard deviations, and their derivatives by y and standoff.
 

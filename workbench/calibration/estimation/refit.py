@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.estimation.fit import Fit
-from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.estimation.fit import CalibrationFit
+from workbench.calibration.estimation.problem import LeastSquaresProblem
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -27,7 +27,7 @@ SCALE_ROUNDS = 5
 class Refit:
     """An optimum over the data of `used`. P parameters in units of their priors, R = 2 M rows of data."""
 
-    problem: Problem
+    problem: LeastSquaresProblem
     used: BoolArray
     """(R,) rows that were fitted."""
     y: FloatArray
@@ -50,7 +50,7 @@ class Refit:
         """(M, 2) positions, measured or not."""
         data = self.problem.data
         plain = data._replace(inverse_sd=np.ones_like(np.asarray(data.inverse_sd)))
-        residual, _ = Problem(self.problem.layout, plain).linearise(self.y)
+        residual, _ = LeastSquaresProblem(self.problem.layout, plain).linearise(self.y)
         return np.asarray(data.position_px + residual.reshape(-1, 2))
 
     @property
@@ -69,7 +69,7 @@ class Refit:
         rows = self.jacobian[self.used]
         return float(self.used.sum() - np.einsum("ij,jk,ik->", rows, self.covariance, rows))
 
-    def with_unused(self, problem: Problem) -> Refit:
+    def with_unused(self, problem: LeastSquaresProblem) -> Refit:
         """The same refit, where only rows that it has not used have other numbers."""
         residual, jacobian = problem.linearise(self.y, self.scale)
         other = Refit(problem, self.used, self.y, self.scale, residual, jacobian)
@@ -81,29 +81,29 @@ class Refit:
         return refit(self.problem, self.used, self.y, scale)
 
 
-def rows_of(cells: BoolArray, problem: Problem) -> BoolArray:
+def rows_of(cells: BoolArray, problem: LeastSquaresProblem) -> BoolArray:
     """(R,) rows of data of the spots' cells (N,), measured or not; corners have none."""
     corners = np.zeros(len(np.asarray(problem.data.inverse_sd)) - len(cells), bool)
     return np.repeat(np.concatenate([cells, corners]), 2)
 
 
-def measured(problem: Problem) -> BoolArray:
+def measured(problem: LeastSquaresProblem) -> BoolArray:
     """(R,) rows that carry a measurement."""
     return np.asarray(problem.data.inverse_sd).ravel() > 0
 
 
-def problem_of(fit: Fit) -> Problem:
+def problem_of(fit: CalibrationFit) -> LeastSquaresProblem:
     """The problem that a fit has solved."""
-    return Problem.of(len(fit.rig.lasers), fit.table, fit.cells, fit.boards, fit.rig.board)
+    return LeastSquaresProblem.of(len(fit.rig.lasers), fit.table, fit.cells, fit.boards, fit.rig.board)
 
 
-def optimum_of(fit: Fit) -> FloatArray:
+def optimum_of(fit: CalibrationFit) -> FloatArray:
     """(P,) of a fit, in units of the priors counted from their means."""
     sd = fit.table.prior_sd
     return np.where(sd > 0, (fit.values - fit.table.prior_mean) / np.where(sd > 0, sd, 1.0), 0.0)
 
 
-def refit(problem: Problem, used: BoolArray, start: FloatArray, scale: float = 1.0) -> Refit:
+def refit(problem: LeastSquaresProblem, used: BoolArray, start: FloatArray, scale: float = 1.0) -> Refit:
     """Levenberg-Marquardt on the rows used, at a given noise."""
     y, damping = np.array(start), 0.0
     residual, jacobian = problem.linearise(y, scale)
@@ -127,7 +127,7 @@ def refit(problem: Problem, used: BoolArray, start: FloatArray, scale: float = 1
     return Refit(problem, used, y, scale, residual, jacobian)
 
 
-def refit_with_scale(problem: Problem, used: BoolArray, start: FloatArray) -> Refit:
+def refit_with_scale(problem: LeastSquaresProblem, used: BoolArray, start: FloatArray) -> Refit:
     """As `refit`, at the noise that the residuals of the rows used show, if that is more than stated."""
     found = refit(problem, used, start)
     for _ in range(SCALE_ROUNDS):

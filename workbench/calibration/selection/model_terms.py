@@ -20,15 +20,15 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from workbench.calibration.data.boards import BoardView
-from workbench.calibration.data.observations import Rejected, Sighting
-from workbench.calibration.estimation.fit import Fit, fit, fit_cells, table_of
-from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.estimation.fit import CalibrationFit, fit, fit_cells, table_of
+from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.model.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.model.term import Term
 from workbench.calibration.selection.outliers import fit_without_outliers, without_outliers
 from workbench.model.calibration import TermVerdict
 from workbench.model.errors import BadInputError
-from workbench.model.nested import TILTS, hold
+from workbench.model.nested import TILTS, fix_parameters
 from workbench.model.rig import Prior, Rig
 
 FloatArray = NDArray[np.float64]
@@ -62,11 +62,11 @@ class _Comparison(NamedTuple):
 
 def fit_chosen(
     rig: Rig,
-    sightings: Sequence[Sighting],
+    observations: Sequence[Observation],
     rejected: Sequence[Rejected] = (),
     boards: Sequence[BoardView] = (),
     keep: Sequence[str] = (),
-) -> Fit:
+) -> CalibrationFit:
     """As `fit`, without spots that lie apart, and with the terms of the model that the data need.
 
     `terms` of the result has the evidence on each. An idle one is still in the fit: `without_idle` is what is
@@ -74,7 +74,7 @@ def fit_chosen(
 
     Args:
         rig: the largest model. What it holds constant stays so, but is tried (`verdict` "called for").
-        sightings: as for `fit`.
+        observations: as for `fit`.
         rejected: as for `fit`.
         boards: as for `fit`.
         keep: names of terms that stay whatever the data say.
@@ -84,16 +84,16 @@ def fit_chosen(
         LimitFailedError: as `fit`.
     """
     # Asked before anything is rejected: the spots that the model lacks a term for look like wrong ones.
-    whole = fit(rig, sightings, rejected, boards)
+    whole = fit(rig, observations, rejected, boards)
     missing = _called_for(whole)
     freed = _freed(rig, [t.name for t in missing])
     sound = (
-        fit_without_outliers(freed, sightings, rejected, boards)
+        fit_without_outliers(freed, observations, rejected, boards)
         if missing
         else without_outliers(whole, rejected)
     )
 
-    def refit(model: Rig) -> Fit:
+    def refit(model: Rig) -> CalibrationFit:
         return fit_cells(model, sound.cells, sound.rejected, boards)
 
     fitted = refit(rig) if missing else sound
@@ -108,13 +108,13 @@ def fit_chosen(
             term = replace(term, verdict="asked for")
         terms.append(term)
         if term.verdict == "absent":
-            fitted = refit(hold(fitted.rig, name.split()))
+            fitted = refit(fix_parameters(fitted.rig, name.split()))
         if term.verdict == "idle":
             idle.append(name)
     return replace(fitted, terms=(*terms, *missing))
 
 
-def without_idle(fitted: Fit) -> Fit:
+def without_idle(fitted: CalibrationFit) -> CalibrationFit:
     """The estimate with its idle terms at their priors' means, as it is exported.
 
     Values and covariance alone differ, to first order: no range is to tell the difference. The covariance is
@@ -130,7 +130,7 @@ def without_idle(fitted: Fit) -> Fit:
     return replace(fitted, values=values, covariance=_carried(fitted, index, comparison.follow))
 
 
-def _weigh(fitted: Fit, name: str, idle: Sequence[str], higher_stays: bool) -> Term:
+def _weigh(fitted: CalibrationFit, name: str, idle: Sequence[str], higher_stays: bool) -> Term:
     """A term against its absence; idle only if it is so together with those that are already."""
     one = _compare(fitted, _indices(fitted, [name]))
     shift, _ = _effect_on_ranges(fitted, _indices(fitted, [name]))
@@ -147,7 +147,7 @@ def _weigh(fitted: Fit, name: str, idle: Sequence[str], higher_stays: bool) -> T
     return Term(name, one.p_value, one.log10_bayes_factor, shift, verdict)
 
 
-def _check_names(fitted: Fit, keep: Sequence[str]) -> None:
+def _check_names(fitted: CalibrationFit, keep: Sequence[str]) -> None:
     known = _candidates(fitted)
     if unknown := [name for name in keep if name not in {*known, *" ".join(known).split()}]:
         raise BadInputError(
@@ -162,7 +162,7 @@ def _freed(rig: Rig, names: Sequence[str]) -> Rig:
     return rig.model_copy(update={"camera": rig.camera.model_copy(update=priors)})
 
 
-def _candidates(fitted: Fit) -> list[str]:
+def _candidates(fitted: CalibrationFit) -> list[str]:
     """Names of the terms of a fit, the first to go first."""
     names = {p.name for p in fitted.table.parameters if p.prior.sd > 0}
     tangential = " ".join(n for n in ("p1", "p2") if n in names)
@@ -170,7 +170,7 @@ def _candidates(fitted: Fit) -> list[str]:
     return [*found, TILTS] if len(_indices(fitted, [TILTS])) else found
 
 
-def _indices(fitted: Fit, names: Sequence[str]) -> NDArray[np.intp]:
+def _indices(fitted: CalibrationFit, names: Sequence[str]) -> NDArray[np.intp]:
     """(T,) where the parameters of terms stand among all."""
     wanted = set(" ".join(names).split())
     if TILTS in wanted:
@@ -180,7 +180,7 @@ def _indices(fitted: Fit, names: Sequence[str]) -> NDArray[np.intp]:
     return np.flatnonzero([p.name in wanted and p.prior.sd > 0 for p in fitted.table.parameters])
 
 
-def _compare(fitted: Fit, index: NDArray[np.intp]) -> _Comparison:
+def _compare(fitted: CalibrationFit, index: NDArray[np.intp]) -> _Comparison:
     prior_sd = fitted.table.prior_sd[index]
     offset = fitted.values[index] - fitted.table.prior_mean[index]
     posterior = fitted.covariance[np.ix_(index, index)]
@@ -204,7 +204,7 @@ def _p_value(score: FloatArray, information: FloatArray) -> float:
     return float(chdtrc(known.sum(), chi2)) if known.any() else 1.0
 
 
-def _effect_on_ranges(fitted: Fit, index: NDArray[np.intp]) -> tuple[float, float]:
+def _effect_on_ranges(fitted: CalibrationFit, index: NDArray[np.intp]) -> tuple[float, float]:
     """Without a term: the largest shift of a range in its deviations, and the largest change of these.
 
     The deviation without it is of ranges whose covariance still carries the term's prior.
@@ -218,7 +218,7 @@ def _effect_on_ranges(fitted: Fit, index: NDArray[np.intp]) -> tuple[float, floa
     return float(shift.max(initial=0.0)), float(np.abs(without_sd / with_sd - 1).max(initial=0.0))
 
 
-def _carried(fitted: Fit, index: NDArray[np.intp], follow: FloatArray) -> FloatArray:
+def _carried(fitted: CalibrationFit, index: NDArray[np.intp], follow: FloatArray) -> FloatArray:
     """(P, P) of an estimate that holds a term at its prior's mean while the truth is as its prior says.
 
     S. F. Schmidt's consider covariance (Advances in Control Systems 3 (1966) 293).
@@ -228,7 +228,7 @@ def _carried(fitted: Fit, index: NDArray[np.intp], follow: FloatArray) -> FloatA
     return np.asarray(conditional + weighted @ weighted.T)
 
 
-def _range_gradients(fitted: Fit) -> tuple[FloatArray, FloatArray]:
+def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
     """(n, P) of ln(range) by all parameters, and (n,) what a spot's noise adds, over lasers and standoffs."""
     standoffs = [s.standoff_mm for s in fitted.used]
     grid = np.geomspace(min(standoffs), max(standoffs), GRID)
@@ -252,12 +252,12 @@ def _range_gradients(fitted: Fit) -> tuple[FloatArray, FloatArray]:
     return gradient[seen] / range_mm[seen, None], found.z_sd_of_spot_mm[seen] / range_mm[seen]
 
 
-def _called_for(fitted: Fit) -> list[Term]:
+def _called_for(fitted: CalibrationFit) -> list[Term]:
     """Terms of the lens that the rig file holds constant and the data call for (a score test)."""
     rig = fitted.rig
     tried = [name for name in TRIAL_SD if getattr(rig.camera, name).sd == 0]
     table = table_of(_freed(rig, tried), fitted.cells.placements, fitted.boards)
-    problem = Problem.of(len(rig.lasers), table, fitted.cells, fitted.boards, rig.board)
+    problem = LeastSquaresProblem.of(len(rig.lasers), table, fitted.cells, fitted.boards, rig.board)
     sd = table.prior_sd
     y = np.divide(fitted.values - table.prior_mean, sd, out=np.zeros_like(sd), where=sd > 0)
     residual, jacobian = problem.linearise(y, fitted.noise_scale)

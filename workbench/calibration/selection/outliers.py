@@ -7,24 +7,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from workbench.calibration.checks.hypotheses import explain_misfit
-from workbench.calibration.checks.target_motion import find_movements
+from workbench.calibration.checks.target_motion import find_target_motion
 from workbench.calibration.data.boards import BoardView
-from workbench.calibration.data.observations import Rejected, Sighting
-from workbench.calibration.estimation.fit import Fit, fit
+from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.model.rig import Rig
 
 
 def fit_without_outliers(
     rig: Rig,
-    sightings: Sequence[Sighting],
+    observations: Sequence[Observation],
     rejected: Sequence[Rejected] = (),
     boards: Sequence[BoardView] = (),
-) -> Fit:
+) -> CalibrationFit:
     """As `fit`, and then `without_outliers`."""
-    return without_outliers(fit(rig, sightings, rejected, boards), rejected)
+    return without_outliers(fit(rig, observations, rejected, boards), rejected)
 
 
-def without_outliers(found: Fit, rejected: Sequence[Rejected]) -> Fit:
+def without_outliers(found: CalibrationFit, rejected: Sequence[Rejected]) -> CalibrationFit:
     """The fit, repeated without the spots that lie apart from where all the others put them if there are any.
 
     A spot is the mean of its repeats: they share what is wrong with it. It is rejected where its distance is
@@ -41,7 +41,7 @@ def without_outliers(found: Fit, rejected: Sequence[Rejected]) -> Fit:
     """
     outliers = [h.subject[0] for h in explain_misfit(found) if h.kind == "spot"]
     suspects = sorted({int(found.cells.placement[cell]) for cell in outliers})
-    moved = [movement.placement for movement in find_movements(found, suspects)]
+    moved = [movement.placement for movement in find_target_motion(found, suspects)]
     outliers = [
         cell
         for cell in outliers
@@ -50,19 +50,19 @@ def without_outliers(found: Fit, rejected: Sequence[Rejected]) -> Fit:
     if not outliers:
         return found
     apart = {s.source: _reason(found, cell) for cell in outliers for s in found.cells.members[cell]}
-    sightings = found.cells.captures
-    strays = [Rejected(s.source, apart[s.source], stray=s) for s in sightings if s.source in apart]
-    kept = [s for s in sightings if s.source not in apart]
+    observations = found.cells.captures
+    strays = [Rejected(s.source, apart[s.source], stray=s) for s in observations if s.source in apart]
+    kept = [s for s in observations if s.source not in apart]
     return fit(found.rig, kept, [*rejected, *strays], found.boards)
 
 
-def _is_most(found: Fit, placement: int, outliers: Sequence[int]) -> bool:
+def _is_most(found: CalibrationFit, placement: int, outliers: Sequence[int]) -> bool:
     """Whether half the spots of a placement lie apart: then it is the placement that is wrong."""
     of_it = found.cells.placement == placement
     return 2 * int(of_it[list(outliers)].sum()) >= int(of_it.sum()) > 1
 
 
-def _reason(found: Fit, cell: int) -> str:
+def _reason(found: CalibrationFit, cell: int) -> str:
     laser = found.rig.laser_ids[found.cells.laser[cell]]
     standoff = found.cells.placements[found.cells.placement[cell]].standoff_mm
     off = np.nan_to_num(found.residual_px[cell])

@@ -14,7 +14,7 @@ from workbench.calibration.checks.cross_validation import LeftOut, alarms, leave
 from workbench.calibration.checks.faults import Fault, find_faults
 from workbench.calibration.checks.residuals import ResidualTest, explain, residual_tests
 from workbench.calibration.checks.residuals import alarms as residual_alarms
-from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.model.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.verdict.observability import NullDirection, direction_lines
 from workbench.model.acceptance import Acceptance
@@ -56,7 +56,7 @@ class Assessment:
     """What the data leave open."""
 
 
-def determined_by(fit: Fit) -> tuple[DeterminedBy, ...]:
+def determined_by(fit: CalibrationFit) -> tuple[DeterminedBy, ...]:
     """For each parameter, what it rests on."""
     columns = zip(fit.data_share.tolist(), fit.sd.tolist(), fit.table.prior_sd.tolist(), strict=True)
     return tuple(basis(share, sd, prior_sd) for share, sd, prior_sd in columns)
@@ -73,13 +73,16 @@ def basis(data_share: float, sd: float, prior_sd: float) -> DeterminedBy:
     return "prior" if prior_sd == 0 or sd > PRIOR_UNMOVED * prior_sd else "joint"
 
 
-def derive(fit: Fit) -> tuple[Derived, ...]:
+def derive(fit: CalibrationFit) -> tuple[Derived, ...]:
     """`Derived` of every laser, with the full covariance."""
     return tuple(_derive_one(fit, index) for index in range(len(fit.rig.lasers)))
 
 
 def judge(
-    fit: Fit, limits: Acceptance, max_relative_range_sd: float, directions: Sequence[NullDirection] = ()
+    fit: CalibrationFit,
+    limits: Acceptance,
+    max_relative_range_sd: float,
+    directions: Sequence[NullDirection] = (),
 ) -> Assessment:
     """Hold a fit against the limits.
 
@@ -119,7 +122,7 @@ def judge(
     )
 
 
-def _beyond(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> list[str]:
+def _beyond(fit: CalibrationFit, limits: Acceptance, max_relative_range_sd: float) -> list[str]:
     """The limits' own figures that are not met."""
     reasons = []
     if not fit.rms_px <= limits.max_rms_px:
@@ -136,7 +139,7 @@ def _beyond(fit: Fit, limits: Acceptance, max_relative_range_sd: float) -> list[
     return reasons
 
 
-def _derive_one(fit: Fit, index: int) -> Derived:
+def _derive_one(fit: CalibrationFit, index: int) -> Derived:
     laser = fit.rig.lasers[index]
     start = len(LENS) + len(REFERENCE) + len(RAY) * index
     origin = slice(start, start + 2)
@@ -160,11 +163,11 @@ def _derive_one(fit: Fit, index: int) -> Derived:
     )
 
 
-def _sd(fit: Fit, gradient: NDArray[np.float64]) -> float:
+def _sd(fit: CalibrationFit, gradient: NDArray[np.float64]) -> float:
     return float(np.sqrt(gradient @ fit.covariance @ gradient))
 
 
-def _too_few_standoffs(fit: Fit, limits: Acceptance) -> list[str]:
+def _too_few_standoffs(fit: CalibrationFit, limits: Acceptance) -> list[str]:
     seen: dict[str, set[float]] = defaultdict(set)
     captured = {s.laser_id for s in fit.cells.captures}
     for s in fit.used:
@@ -177,7 +180,7 @@ def _too_few_standoffs(fit: Fit, limits: Acceptance) -> list[str]:
     ]
 
 
-def _contradictions(fit: Fit) -> list[str]:
+def _contradictions(fit: CalibrationFit) -> list[str]:
     """Priors that the data contradict: a rig file that is wrong, or a standoff that was mistyped."""
     return [
         f"the data pull {p.name} {abs(pull):.1f} sd away from what the rig file says ({p.prior.value:g} +-"
@@ -198,7 +201,7 @@ def _alarm(one: LeftOut) -> str:
     )
 
 
-def _largest_residual(fit: Fit) -> str:
+def _largest_residual(fit: CalibrationFit) -> str:
     size = np.abs(fit.residual_px / fit.cells.sd_px)
     cell, axis = np.unravel_index(np.nanargmax(size), size.shape)
     laser = fit.rig.laser_ids[fit.cells.laser[cell]]
@@ -206,7 +209,7 @@ def _largest_residual(fit: Fit) -> str:
     return f"{fit.residual_px[cell, axis]:+.2f} px in {'uv'[axis]} of laser {laser} at {standoff:g} mm"
 
 
-def _warnings(fit: Fit) -> list[str]:
+def _warnings(fit: CalibrationFit) -> list[str]:
     sensor = [(p, by) for p, by in zip(fit.table.parameters, determined_by(fit), strict=True) if p.prior.sd]
     prior = [p.name for p, by in sensor if by == "prior" and p.kind == "sensor"]
     warnings: list[str] = []

@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 
 from workbench.model.calibration import Calibration
 from workbench.model.errors import BadInputError
-from workbench.sensor.calibrated import Sensor
+from workbench.sensor.calibrated import CalibratedSensor
 
 FloatArray = NDArray[np.float64]
 Pairs = list[tuple[str, FloatArray]]
@@ -65,7 +65,7 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
     Raises:
         BadInputError: the lasers, the picture's size or the standoffs have nothing in common.
     """
-    sensor_a, sensor_b = Sensor(a), Sensor(b)
+    sensor_a, sensor_b = CalibratedSensor(a), CalibratedSensor(b)
     pairs = _visible(sensor_a, sensor_b, _common_ranges(a, b))
     shift_px = _spots(sensor_b, pairs) - _spots(sensor_a, pairs)
     whiten = _whitener(_spot_covariance(sensor_a, pairs) + _spot_covariance(sensor_b, pairs))
@@ -90,27 +90,27 @@ def _numbers(calibration: Calibration) -> tuple[object, ...]:
     return calibration.geometry(), ours.lasers, ours.noise, ours.parameters, ours.validity
 
 
-def _spots(sensor: Sensor, pairs: Pairs) -> FloatArray:
+def _spots(sensor: CalibratedSensor, pairs: Pairs) -> FloatArray:
     """(n,) where the sensor expects the spots along each laser's axis, px."""
     return np.concatenate([sensor.spot_px(i, r)[:, _axis(sensor, i)] for i, r in pairs])
 
 
-def _spot_gradient(sensor: Sensor, pairs: Pairs) -> FloatArray:
+def _spot_gradient(sensor: CalibratedSensor, pairs: Pairs) -> FloatArray:
     """(n, P) derivatives of `_spots` by the parameters."""
     return np.concatenate([sensor.spot_gradient(i, r)[:, _axis(sensor, i)] for i, r in pairs])
 
 
-def _spot_covariance(sensor: Sensor, pairs: Pairs) -> FloatArray:
+def _spot_covariance(sensor: CalibratedSensor, pairs: Pairs) -> FloatArray:
     """(n, n) of `_spots`, by the calibration's covariance."""
     gradient = _spot_gradient(sensor, pairs)
     return gradient @ sensor.calibration.laser_ranger.parameters.covariance_array @ gradient.T
 
 
-def _axis(sensor: Sensor, laser_id: str) -> int:
+def _axis(sensor: CalibratedSensor, laser_id: str) -> int:
     return "uv".index(sensor.calibration.laser_ranger.lasers[sensor.ids.index(laser_id)].axis)
 
 
-def _differences(a: Sensor, b: Sensor, pairs: Pairs) -> tuple[Difference, ...]:
+def _differences(a: CalibratedSensor, b: CalibratedSensor, pairs: Pairs) -> tuple[Difference, ...]:
     found = []
     for laser_id, at in pairs:
         spots = a.spot_px(laser_id, at)
@@ -140,7 +140,7 @@ def _laser_ids(calibration: Calibration) -> tuple[str, ...]:
     return tuple(laser.id for laser in calibration.laser_ranger.lasers)
 
 
-def _visible(a: Sensor, b: Sensor, grid: FloatArray) -> Pairs:
+def _visible(a: CalibratedSensor, b: CalibratedSensor, grid: FloatArray) -> Pairs:
     """Each laser with the ranges at which both calibrations expect its spot in the picture."""
     return [(i, grid[a.in_frame(i, grid) & b.in_frame(i, grid)]) for i in a.ids]
 
@@ -152,7 +152,7 @@ def _whitener(covariance: FloatArray) -> FloatArray:
     return np.asarray((direction[:, kept] / np.sqrt(variance[kept])).T)
 
 
-def _explanations(a: Sensor, b: Calibration, pairs: Pairs, whiten: FloatArray) -> tuple[str, ...]:
+def _explanations(a: CalibratedSensor, b: Calibration, pairs: Pairs, whiten: FloatArray) -> tuple[str, ...]:
     """Parameters of B of which one alone, put back, brings the difference down to chance."""
     expected = _spots(a, pairs)
     parameters = b.laser_ranger.parameters
@@ -174,7 +174,7 @@ def _put_back(
     name = b.laser_ranger.parameters.names[column]
     chi2 = float("inf")
     for _ in range(GAUSS_NEWTON_STEPS):
-        sensor = Sensor(b, {name: value})
+        sensor = CalibratedSensor(b, {name: value})
         white = whiten @ (_spots(sensor, pairs) - expected)
         chi2 = float(white @ white)
         slope = whiten @ _spot_gradient(sensor, pairs)[:, column]

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from workbench.calibration.data.observations import positions, stated_sd
-from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.selection.model_terms import without_idle
 from workbench.calibration.verdict.assessment import Assessment, determined_by, judge
-from workbench.calibration.verdict.observability import Ranges, null_directions
+from workbench.calibration.verdict.observability import RangeGradients, null_directions
 from workbench.calibration.verdict.records import term_summaries
 from workbench.calibration.verdict.yaml_text import yaml_text
 from workbench.model.acceptance import Acceptance
@@ -27,11 +27,13 @@ from workbench.model.calibration import (
     Validity,
 )
 from workbench.model.errors import LimitFailedError
-from workbench.sensor.calibrated import Sensor
+from workbench.sensor.calibrated import CalibratedSensor
 from workbench.session.files import write_output
 
 
-def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Calibration, Assessment]:
+def calibrate(
+    fit: CalibrationFit, limits: Acceptance, provenance: Provenance
+) -> tuple[Calibration, Assessment]:
     """The calibration that a fit amounts to, and the verdict on it.
 
     Raises:
@@ -40,7 +42,7 @@ def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Cal
     exported = without_idle(fit)
     values = dict(zip((p.name for p in fit.table.parameters), exported.values.tolist(), strict=True))
     provisional = _calibration(exported, values, provenance, Assessment("accepted", (), ()), 0.0)
-    ranges = _ranges(Sensor(provisional))
+    ranges = _ranges(CalibratedSensor(provisional))
     worst = float(ranges.sd.max()) if len(ranges.sd) else float("nan")
     if not np.isfinite(worst):
         raise LimitFailedError(
@@ -59,7 +61,7 @@ def calibrate(fit: Fit, limits: Acceptance, provenance: Provenance) -> tuple[Cal
     return _calibration(exported, values, provenance, assessment, worst), assessment
 
 
-def kept_because(calibration: Calibration, reason: str) -> Calibration:
+def accept_with_reason(calibration: Calibration, reason: str) -> Calibration:
     """A refused calibration with somebody's reason for using it all the same."""
     ranger = calibration.laser_ranger
     summary = ranger.fit.model_copy(update={"accepted_because": reason})
@@ -81,7 +83,11 @@ def render(calibration: Calibration) -> str:
 
 
 def _calibration(
-    fit: Fit, values: dict[str, float], provenance: Provenance, assessment: Assessment, worst: float
+    fit: CalibrationFit,
+    values: dict[str, float],
+    provenance: Provenance,
+    assessment: Assessment,
+    worst: float,
 ) -> Calibration:
     f, cx, cy = values["f_px"], values["cx_px"], values["cy_px"]
     camera = fit.rig.camera
@@ -130,7 +136,7 @@ def _calibration(
     )
 
 
-def _parameters(fit: Fit) -> Parameters:
+def _parameters(fit: CalibrationFit) -> Parameters:
     sensor = fit.sensor
     table = fit.table.parameters[sensor]
     covariance = fit.covariance[sensor, sensor]
@@ -147,13 +153,13 @@ def _parameters(fit: Fit) -> Parameters:
     )
 
 
-def _typical_spot_sd(fit: Fit) -> float:
+def _typical_spot_sd(fit: CalibrationFit) -> float:
     """Root mean square deviation of a single spot, as stated and enlarged to match what was seen."""
     sd, seen = stated_sd(fit.used, fit.rig.noise), np.isfinite(positions(fit.used))
     return float(np.sqrt((sd[seen] ** 2).mean()) * fit.cells.repeat_scale * fit.noise_scale)
 
 
-def _ranges(sensor: Sensor) -> Ranges:
+def _ranges(sensor: CalibratedSensor) -> RangeGradients:
     """Of every laser, wherever its spot is in frame between the nearest and the farthest standoff."""
     nearest, farthest = sensor.calibration.laser_ranger.validity.standoff_mm
     grid = np.geomspace(nearest, farthest, 30)
@@ -164,4 +170,4 @@ def _ranges(sensor: Sensor) -> Ranges:
             found, seen = sensor.typical_ranges(laser_id, grid), sensor.in_frame(laser_id, grid)
             rows.append((found.by_parameter / grid[:, None])[seen])
             sd.append((found.sigma_mm / grid)[seen])
-    return Ranges(np.concatenate(rows), np.concatenate(sd))
+    return RangeGradients(np.concatenate(rows), np.concatenate(sd))

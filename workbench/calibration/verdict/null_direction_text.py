@@ -44,7 +44,7 @@ UNSEEN = "nothing, as long as no spot depends on it"
 
 
 @dataclass(frozen=True)
-class Moved:
+class ParameterChange:
     """One parameter of a combination."""
 
     name: str
@@ -63,7 +63,7 @@ class Moved:
 class Group:
     """Parameters of one kind that move together."""
 
-    members: tuple[Moved, ...]
+    members: tuple[ParameterChange, ...]
 
     @property
     def kind(self) -> str:
@@ -89,7 +89,7 @@ class Group:
         return (f"{mean:+.2g} {unit}" if one_way else f"+-{mean:.2g} {unit}").rstrip()
 
 
-def moved(rig: Rig, name: str, value: float, change: float, effect: float) -> Moved:
+def parameter_change(rig: Rig, name: str, value: float, change: float, effect: float) -> ParameterChange:
     """A parameter that moves by `change` from `value`, both in its own unit."""
     laser, _, own = name.rpartition(".")
     if not laser:
@@ -100,12 +100,12 @@ def moved(rig: Rig, name: str, value: float, change: float, effect: float) -> Mo
         along = "x_mm" if rig.lasers[rig.laser_ids.index(laser)].axis == "u" else "y_mm"
         kind = BASELINE if own == along else ACROSS
     shown, unit = _shown(kind, value, change)
-    return Moved(name, kind, laser, shown, unit, effect)
+    return ParameterChange(name, kind, laser, shown, unit, effect)
 
 
-def grouped(parts: Iterable[Moved]) -> tuple[Group, ...]:
+def group_by_kind(parts: Iterable[ParameterChange]) -> tuple[Group, ...]:
     """What moves together, by kind: the first part's group and the strongest others, lasers' last."""
-    buckets: dict[str, list[Moved]] = {}
+    buckets: dict[str, list[ParameterChange]] = {}
     for part in parts:
         buckets.setdefault(part.kind, []).append(part)
     first, *others = [Group(_strong(members)) for members in buckets.values()]
@@ -148,7 +148,7 @@ def own_laser(rig: Rig, groups: Sequence[Group]) -> str:
     return lasers.pop() if len(lasers) == 1 and len(rig.lasers) > 1 else ""
 
 
-def _strong(members: Sequence[Moved]) -> tuple[Moved, ...]:
+def _strong(members: Sequence[ParameterChange]) -> tuple[ParameterChange, ...]:
     least = LEAST_PART * max(m.effect for m in members)
     return tuple(m for m in members if m.effect >= least)
 

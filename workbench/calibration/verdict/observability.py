@@ -20,9 +20,9 @@ from workbench.calibration.model.parameters import LENS, PRINT, Parameter
 from workbench.calibration.verdict.null_direction_text import (
     Group,
     describe,
-    grouped,
-    moved,
+    group_by_kind,
     own_laser,
+    parameter_change,
     remedy,
 )
 from workbench.model.rig import Rig
@@ -60,7 +60,7 @@ class NullDirection:
         return f"{self.words}. Ranges do not suffer. Only to know each by itself: {self.remedy}"
 
 
-class Ranges(NamedTuple):
+class RangeGradients(NamedTuple):
     """K ranges of spots that are in frame."""
 
     by_parameter: FloatArray
@@ -80,7 +80,7 @@ class _Posterior:
     covariance: FloatArray
     information: FloatArray
     """Of the data alone."""
-    ranges: Ranges
+    ranges: RangeGradients
 
     @property
     def names(self) -> list[str]:
@@ -97,7 +97,7 @@ def null_directions(
     parameters: Sequence[Parameter],
     values: FloatArray,
     covariance: FloatArray,
-    ranges: Ranges,
+    ranges: RangeGradients,
 ) -> tuple[NullDirection, ...]:
     """Directions of which priors tell more than the data, those that move ranges most first.
 
@@ -133,7 +133,11 @@ def direction_lines(directions: Sequence[NullDirection]) -> list[str]:
 
 
 def _posterior(
-    rig: Rig, parameters: Sequence[Parameter], values: FloatArray, covariance: FloatArray, ranges: Ranges
+    rig: Rig,
+    parameters: Sequence[Parameter],
+    values: FloatArray,
+    covariance: FloatArray,
+    ranges: RangeGradients,
 ) -> _Posterior:
     prior_sd = np.array([p.prior.sd for p in parameters])
     free = np.flatnonzero(prior_sd > 0)
@@ -144,7 +148,7 @@ def _posterior(
         value=values[free],
         covariance=scaled,
         information=information_of(scaled),
-        ranges=Ranges(ranges.by_parameter[:, free] * prior_sd[free], ranges.sd),
+        ranges=RangeGradients(ranges.by_parameter[:, free] * prior_sd[free], ranges.sd),
     )
 
 
@@ -167,8 +171,8 @@ def _directions(posterior: _Posterior) -> Iterator[tuple[int, FloatArray]]:
 def _groups(posterior: _Posterior, pivot: int, direction: FloatArray) -> tuple[Group, ...]:
     effect = np.abs(direction) * np.sqrt(np.maximum(np.diag(posterior.information), 0.0))
     order = [pivot, *(i for i in range(len(direction)) if i != pivot)]
-    return grouped(
-        moved(
+    return group_by_kind(
+        parameter_change(
             posterior.rig,
             posterior.names[i],
             float(posterior.value[i]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from workbench.calibration.checks.cross_validation import alarms
-from workbench.calibration.estimation.fit import Fit
+from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.selection.model_terms import without_idle
 from workbench.calibration.verdict.assessment import Assessment, determined_by
 from workbench.model.calibration import TermSummary
@@ -21,7 +21,7 @@ from workbench.model.fit_event import (
 )
 
 
-def parameter_records(fit: Fit) -> tuple[ParameterRecord, ...]:
+def parameter_records(fit: CalibrationFit) -> tuple[ParameterRecord, ...]:
     """The sensor's parameters; constants (prior sd 0) are among them."""
     sensor, exported = fit.sensor, without_idle(fit)
     columns = zip(
@@ -47,12 +47,12 @@ def parameter_records(fit: Fit) -> tuple[ParameterRecord, ...]:
     )
 
 
-def term_summaries(fit: Fit) -> tuple[TermSummary, ...]:
+def term_summaries(fit: CalibrationFit) -> tuple[TermSummary, ...]:
     """The evidence on the terms of the model."""
     return tuple(TermSummary.model_validate(asdict(term)) for term in fit.terms)
 
 
-def fit_finished(fit: Fit, assessment: Assessment) -> FitFinished:
+def fit_finished(fit: CalibrationFit, assessment: Assessment) -> FitFinished:
     """The event of a finished fit."""
     return FitFinished(
         parameters=parameter_records(fit),
@@ -88,7 +88,7 @@ def left_out_records(assessment: Assessment) -> tuple[LeftOutRecord, ...]:
     )
 
 
-def _residuals(fit: Fit) -> tuple[ResidualRecord, ...]:
+def _residuals(fit: CalibrationFit) -> tuple[ResidualRecord, ...]:
     cells = fit.cells
     columns = zip(
         cells.laser.tolist(),

@@ -23,7 +23,7 @@ OUTLYING_SD = 4.0
 
 
 @dataclass(frozen=True)
-class Peak:
+class Brightness:
     """Shares of full scale."""
 
     peak: float
@@ -45,9 +45,9 @@ def searched_pixels(rig: Rig) -> NDArray[np.bool_]:
     return on_a_line if on_a_line.any() else np.ones_like(on_a_line)
 
 
-def look_at_peak(
+def measure_brightness(
     on: Sequence[Image], off: Sequence[Image], searched: NDArray[np.bool_], full_scale: int
-) -> Peak:
+) -> Brightness:
     """What the lasers light most.
 
     A lamp that flickers is as bright in a dark frame as in a lit one, or differs between frames alike. So a
@@ -67,9 +67,9 @@ def look_at_peak(
     sure = lit.min(axis=0) - dark.max(axis=0) - unsteady
     where = int(sure.argmax())
     if sure[where] <= SURE_SD * noise:
-        return Peak(float(np.median(dark)) / full_scale)
+        return Brightness(float(np.median(dark)) / full_scale)
     gained = float(lit[:, where].mean() - dark[:, where].mean())
-    return Peak(int(lit[:, where].max()) / full_scale, gained / full_scale, noise / full_scale)
+    return Brightness(int(lit[:, where].max()) / full_scale, gained / full_scale, noise / full_scale)
 
 
 def _typical_sd(differences: NDArray[np.int32]) -> float:

@@ -22,7 +22,7 @@ from workbench.model.errors import RigNotReadyError
 from workbench.model.event import ExposureSet
 from workbench.model.exposure import AIM, CLIPPED, GOOD, verdict_of
 from workbench.model.rig import Rig
-from workbench.procedure.capture.brightness import Peak, look_at_peak, searched_pixels
+from workbench.procedure.capture.brightness import Brightness, measure_brightness, searched_pixels
 from workbench.procedure.capture.latency import LEASE_S
 
 BOLDEST = 8.0
@@ -51,11 +51,11 @@ FLAT = 0.03
 
 
 @dataclass(frozen=True)
-class Trial:
+class ExposureTrial:
     """An exposure as the camera took it, and what the lasers lit with it."""
 
     exposure: float
-    seen: Peak
+    seen: Brightness
 
 
 def set_exposure(
@@ -84,14 +84,14 @@ def set_exposure(
     camera, limits = found
     searched = searched_pixels(rig)
 
-    def look(exposure: float, number: int) -> Trial:
+    def look(exposure: float, number: int) -> ExposureTrial:
         begin(f"{placement_key}/exposure/{number:02d}")
         taken = camera.set_exposure(exposure)
         before = camera.grab().image
         with bench.lasers.lit(rig.laser_ids, for_s=LEASE_S):
             on = [camera.grab().image, _next_frame(camera)]
         off = [before, camera.grab().image]
-        return Trial(taken, look_at_peak(on, off, searched, 2**rig.camera.bits - 1))
+        return ExposureTrial(taken, measure_brightness(on, off, searched, 2**rig.camera.bits - 1))
 
     tried = search_exposure(limits, look)
     best = best_of(tried)
@@ -127,7 +127,9 @@ def _set_again(camera: ExposableCamera, exposure: float) -> None:
         )
 
 
-def search_exposure(limits: tuple[float, float], look: Callable[[float, int], Trial]) -> list[Trial]:
+def search_exposure(
+    limits: tuple[float, float], look: Callable[[float, int], ExposureTrial]
+) -> list[ExposureTrial]:
     """Try exposures until one is good, or the next would be one that was tried.
 
     Args:
@@ -138,7 +140,7 @@ def search_exposure(limits: tuple[float, float], look: Callable[[float, int], Tr
         Every trial.
     """
     asked: list[float] = []
-    tried: list[Trial] = []
+    tried: list[ExposureTrial] = []
     following: float | None = math.sqrt(limits[0] * limits[1])
     while following is not None and (following := _within(limits, following)) not in asked:
         asked.append(following)
@@ -150,7 +152,7 @@ def search_exposure(limits: tuple[float, float], look: Callable[[float, int], Tr
     return tried
 
 
-def _after(tried: Sequence[Trial]) -> float | None:
+def _after(tried: Sequence[ExposureTrial]) -> float | None:
     """The exposure to try next; None: a good one is among them."""
     best = _longest(tried)
     if GOOD[0] <= _level(best, tried) <= GOOD[1]:
@@ -171,7 +173,7 @@ def _within(limits: tuple[float, float], exposure: float) -> float:
     return min(max(float(f"{exposure:.3g}"), limits[0]), limits[1])
 
 
-def best_of(tried: Sequence[Trial]) -> Trial:
+def best_of(tried: Sequence[ExposureTrial]) -> ExposureTrial:
     """The longest exposure that was not too bright; where all were, the shortest; well below a jump."""
     longest = _longest(tried)
     if not _below_jump(longest, tried):
@@ -184,7 +186,7 @@ def best_of(tried: Sequence[Trial]) -> Trial:
     )
 
 
-def _longest(tried: Sequence[Trial]) -> Trial:
+def _longest(tried: Sequence[ExposureTrial]) -> ExposureTrial:
     """Not too bright, with the lasers seen if any trial sees them."""
     seen = [trial for trial in tried if trial.seen.lit > 0 and share_of(trial, tried) < CLIPPED]
     among = seen or tried
@@ -192,48 +194,48 @@ def _longest(tried: Sequence[Trial]) -> Trial:
     return max(sound, key=_exposure) if sound else min(among, key=_exposure)
 
 
-def _below_jump(trial: Trial, tried: Sequence[Trial]) -> bool:
+def _below_jump(trial: ExposureTrial, tried: Sequence[ExposureTrial]) -> bool:
     """Whether a dim spot was clipped at an exposure at which light in proportion would not have been."""
     share = share_of(trial, tried)
     growth = _shortest_clipped(tried) / trial.exposure
     return trial.seen.lit > 0 and share < GOOD[0] and share * growth < CLIPPED
 
 
-def _shortest_clipped(tried: Sequence[Trial]) -> float:
+def _shortest_clipped(tried: Sequence[ExposureTrial]) -> float:
     return min((t.exposure for t in tried if _level(t, tried) >= CLIPPED), default=math.inf)
 
 
-def _level(trial: Trial, tried: Sequence[Trial]) -> float:
+def _level(trial: ExposureTrial, tried: Sequence[ExposureTrial]) -> float:
     """How bright it is for the search: where no laser is seen dark, or clipped if it is as bright as that."""
     if trial.seen.lit > 0:
         return share_of(trial, tried)
     return 0.0 if trial.seen.peak <= GOOD[1] else CLIPPED
 
 
-def share_of(trial: Trial, tried: Sequence[Trial]) -> float:
+def share_of(trial: ExposureTrial, tried: Sequence[ExposureTrial]) -> float:
     """The brightest pixel as a share of the number at which it is clipped, which all trials tell."""
     ceiling = _ceiling(tried)
     share = trial.seen.peak / ceiling
     return CLIPPED if ceiling < CLIPPED and share >= 1 - FLAT else share
 
 
-def _ceiling(tried: Sequence[Trial]) -> float:
+def _ceiling(tried: Sequence[ExposureTrial]) -> float:
     """Where peaks do not grow any more; full scale where they do."""
     flat = any(_tells(a, b) and not _grows(a, b) for a in tried for b in tried)
     return max(trial.seen.peak for trial in tried) if flat else CLIPPED
 
 
-def _tells(shorter: Trial, longer: Trial) -> bool:
+def _tells(shorter: ExposureTrial, longer: ExposureTrial) -> bool:
     """Whether two trials can tell if the peak grows: both see the lasers, at exposures that differ."""
     return longer.exposure >= TELLING * shorter.exposure and min(shorter.seen.lit, longer.seen.lit) > 0
 
 
-def _grows(shorter: Trial, longer: Trial) -> bool:
+def _grows(shorter: ExposureTrial, longer: ExposureTrial) -> bool:
     a, b = shorter.seen, longer.seen
     growth = (longer.exposure / shorter.exposure) ** LEAST_GROWTH
     sd = math.hypot(growth * a.noise, b.noise)
     return b.peak >= CLIPPED or b.lit > growth * a.lit - GROWTH_SD * sd
 
 
-def _exposure(trial: Trial) -> float:
+def _exposure(trial: ExposureTrial) -> float:
     return trial.exposure

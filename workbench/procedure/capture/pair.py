@@ -19,11 +19,11 @@ from workbench.procedure.capture.exposure import set_exposure
 from workbench.procedure.capture.latency import LEASE_S
 from workbench.session.frames import FrameStore, read_image
 from workbench.session.state import Group
-from workbench.spots import Finding, Image, Scanline, Spot, find_spots, lasting
+from workbench.spots import Finding, Image, Scanline, Spot, find_spots, persistent_spots
 
 
 @dataclass
-class Shooting:
+class PairSource:
     """The captures at one placement after the other."""
 
     session_dir: Path
@@ -183,7 +183,7 @@ class Shooting:
         def look_again() -> Sequence[Spot]:
             return find_spots(self.bench.camera.grab().image, scanlines=scanlines).spots
 
-        if stuck := lasting(find_spots(off, scanlines=scanlines).spots, look_again):
+        if stuck := persistent_spots(find_spots(off, scanlines=scanlines).spots, look_again):
             at = f"u = {stuck[0].u_px:.0f}, v = {stuck[0].v_px:.0f} px"
             raise LaserOffNotConfirmedError(
                 f"capture {key}: the frame with all lasers off shows a spot at {at}. A beam may be on"

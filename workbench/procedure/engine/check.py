@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from workbench.devices.registry import blocks_of, not_installed
 from workbench.model.errors import BadInputError
-from workbench.model.problems import Problem
+from workbench.model.problems import SchemaProblem
 from workbench.model.procedure import Procedure, Step
 from workbench.model.rig import Rig
 from workbench.model.yamlfile import Document, FileModel, Mistake, kind_of, line_of, read_document, refuse
@@ -83,7 +83,7 @@ def _in_rig(document: Document) -> Iterator[Mistake]:
     if not isinstance(driver, str):
         return
     if (wrong := not_installed(driver)) is not None:
-        yield document.mistake(Problem(("driver",), wrong))
+        yield document.mistake(SchemaProblem(("driver",), wrong))
         return
     rig = None if of_rig else Rig.model_validate(document.data)
     for block, model in blocks_of(driver).items():

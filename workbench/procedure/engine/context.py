@@ -17,14 +17,14 @@ from workbench.model.prompt import Answer, Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.capture.latency import count_latency
-from workbench.procedure.capture.pair import Shooting, spots_found
+from workbench.procedure.capture.pair import PairSource, spots_found
 from workbench.procedure.engine.prompts import safety_prompt
-from workbench.procedure.engine.replay import SAFETY, Recorder
+from workbench.procedure.engine.replay import SAFETY, ReplayingJournal
 from workbench.spots import Finding, Image, Scanline, find_spots
 
 
 @dataclass(frozen=True)
-class Ahead:
+class UpcomingFit:
     """The fit to come in this procedure."""
 
     planned_mm: tuple[float, ...]
@@ -41,7 +41,7 @@ class Context:
     rig: Rig
     bench: Bench
     operator: Operator
-    recorder: Recorder
+    recorder: ReplayingJournal
     provenance: Provenance
     stopping: Callable[[], str | None]
     """Asked between shots; a text ends the session with it."""
@@ -50,7 +50,7 @@ class Context:
     """By the capture's key."""
     boards: dict[str, BoardView | Rejected] = field(default_factory=dict)
     """By the placement's key."""
-    ahead: Ahead | None = None
+    ahead: UpcomingFit | None = None
     """What the captures of the present step are for; None where no fit follows in its procedure."""
     accepted: Calibration | None = None
     """What the last fit amounts to."""
@@ -58,10 +58,10 @@ class Context:
     """And what it says of each placement when it has not seen it."""
     calibration: Calibration | None = None
     """The exported one: what a trial ranges with."""
-    shooting: Shooting = field(init=False)
+    pairs: PairSource = field(init=False)
 
     def __post_init__(self) -> None:
-        self.shooting = Shooting(self.session_dir, self.rig, self.bench)
+        self.pairs = PairSource(self.session_dir, self.rig, self.bench)
 
     def emit(self, event: ev.Event) -> ev.Record:
         """Journal an event, then show it to every consumer."""
@@ -81,11 +81,11 @@ class Context:
 
     def confirm_safety(self) -> None:
         """Before the first emission: eyewear and beam path, whoever resumes a session asks again."""
-        if not self.shooting.may_fire:
+        if not self.pairs.may_fire:
             prompt = safety_prompt(self.rig)
             answer = self.ask_now(prompt)
             self.emit(ev.Answered(key=SAFETY, question=prompt.do, answer=answer))
-            self.shooting.may_fire = True
+            self.pairs.may_fire = True
 
     def capture(
         self,
@@ -105,11 +105,11 @@ class Context:
             LaserOffNotConfirmedError: a beam stays on.
         """
         self.begin(key)
-        on, off, taken = self.shooting.pair(key, laser_ids, placement, repeat, scene)
+        on, off, taken = self.pairs.pair(key, laser_ids, placement, repeat, scene)
         self.emit(taken)
         finding = find_spots(on, off, scanlines=scanlines, expected=len(laser_ids))
         self.emit(spots_found(key, finding, laser_ids))
-        self.shooting.look_at_dark(key, off, finding, scanlines)
+        self.pairs.look_at_dark(key, off, finding, scanlines)
         self.captures.append(taken)
         self.findings[key] = finding
         return finding
@@ -121,7 +121,7 @@ class Context:
             StoppedError: a stop was asked for.
         """
         self.begin(key)
-        image, taken = self.shooting.room_light(key, placement, repeat)
+        image, taken = self.pairs.room_light(key, placement, repeat)
         self.emit(taken)
         self.captures.append(taken)
         return image

@@ -17,18 +17,18 @@ from workbench.procedure.engine.replay import SAFETY
 from workbench.session.journal import read_journal
 from workbench.session.manifest import MANIFEST
 
-LEARNED_FROM = 5
+SESSIONS_USED = 5
 """So many of the latest sessions of a rig tell its pace."""
-WORTH = 2
+PRIOR_WEIGHT = 2
 """What other sessions told of a duration counts as so many measurements of this one's; a guess as none."""
-LUNCH = 3
+LONG_PAUSE_FACTOR = 3
 LOADED = frozenset({"exposing_s", "shot_s", "finishing_s"})
 """The first of these in a program's life takes longer: what computes it is loaded, or even compiled, then."""
 
 
 @dataclass(frozen=True)
-class Pace:
-    """Means; of what a person does without what took `LUNCH` times as long as usual."""
+class StepDurations:
+    """Means; of what a person does without what took `LONG_PAUSE_FACTOR` times as long as usual."""
 
     placing_s: float = 60.0
     """From the end of one placement to the target's standing at the next."""
@@ -54,12 +54,12 @@ class Pace:
         return self.without_shots_s.get(step.title, guess_s)
 
 
-def learn_pace(sessions: Path, rig: str) -> Pace:
+def learn_durations(sessions: Path, rig: str) -> StepDurations:
     """The pace of the latest sessions of `rig`; guesses where there are none."""
-    meter = PaceMeter()
+    meter = DurationMeter()
     used = 0
     for manifest in sorted(sessions.glob(f"*/{MANIFEST}"), reverse=True):
-        if used == LEARNED_FROM:
+        if used == SESSIONS_USED:
             break
         try:
             records = list(read_journal(manifest.parent))
@@ -69,10 +69,10 @@ def learn_pace(sessions: Path, rig: str) -> Pace:
             used += 1
             for record in records:
                 meter.take(record)
-    return replace(meter.pace(Pace()), sessions=used)
+    return replace(meter.pace(StepDurations()), sessions=used)
 
 
-class PaceMeter:
+class DurationMeter:
     """Measures durations between records that follow one another."""
 
     def __init__(self) -> None:
@@ -87,9 +87,9 @@ class PaceMeter:
         """Of such a step, while nothing but time has gone by in it."""
         self._since: ev.Record | None = None
 
-    def pace(self, otherwise: Pace) -> Pace:
+    def pace(self, otherwise: StepDurations) -> StepDurations:
         """What was measured, together with `otherwise` where that was learned; the rest is as `otherwise`."""
-        worth = WORTH if otherwise.sessions else 0
+        worth = PRIOR_WEIGHT if otherwise.sessions else 0
         told: dict[str, Any] = dict(self._loading)
         for name, values in self._told.items():
             usual = _usual(values) if name == "placing_s" else fmean(values)
@@ -151,7 +151,7 @@ class PaceMeter:
 
 def _usual(values: Sequence[float]) -> float:
     """The mean, as sums of them are to be right; but somebody may go to lunch."""
-    most = LUNCH * median(values)
+    most = LONG_PAUSE_FACTOR * median(values)
     return fmean(value for value in values if value <= most)
 
 

@@ -15,7 +15,7 @@ from workbench.procedure.engine.prompts import captures_prompt, placement_prompt
 from workbench.procedure.steps import board_placement, confirmation, placement_at, question
 
 
-def foreseen_prompts(procedures: Sequence[Procedure], rig: Rig) -> dict[str, Prompt]:
+def expected_prompts(procedures: Sequence[Procedure], rig: Rig) -> dict[str, Prompt]:
     """Every prompt that may come, by its key, in order. Of limits only what answers are possible is told."""
     found = [safety_prompt(rig)]
     for procedure in procedures:

@@ -13,7 +13,7 @@ from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
 from workbench.procedure.capture.quality import quality_of
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.missing_spot import where_it_should_be, why_not_measured
+from workbench.procedure.engine.missing_spot import expected_position_text, why_not_measured
 from workbench.procedure.engine.placements import RetakeError, settle
 from workbench.procedure.engine.prompts import captures_prompt
 
@@ -47,7 +47,7 @@ def check_captures(context: Context, step: str, placement: Placement, limits: Gr
                 continue  # a spot that is not there is asked about once
             if limit.on_fail == "retry" and context.recorder.retries(placement.key) < RETRIES:
                 raise RetakeError(failed, by_limit=True)
-            where = where_it_should_be(context, laser_id, placement) if unseen else ""
+            where = expected_position_text(context, laser_id, placement) if unseen else ""
             if limit.on_fail != "ask":
                 raise LimitFailedError(f"{failed}. {where}" if unseen else failed)
             shown = f"{why} at {placement.standoff_mm:g} mm ({name}: expected {limit.describe()})"

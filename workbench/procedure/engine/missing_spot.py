@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.calibration.design.expected_spot import Whereabouts, whereabouts
+from workbench.calibration.design.expected_spot import ExpectedSpot, expected_spot
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.observed import sighted
+from workbench.procedure.engine.observed import observed_so_far
 
 
 def why_not_measured(quantity: str, laser_id: str, spots: Sequence[int]) -> str:
@@ -21,13 +21,13 @@ def why_not_measured(quantity: str, laser_id: str, spots: Sequence[int]) -> str:
     return f"no spot of {laser_id} was found in {captures}"
 
 
-def where_it_should_be(context: Context, laser_id: str, placement: Placement) -> str:
+def expected_position_text(context: Context, laser_id: str, placement: Placement) -> str:
     """By the rig file and by what was seen so far, of a square flat target; what that means."""
-    where = whereabouts(context.rig, sighted(context), laser_id, placement.standoff_mm)
+    where = expected_spot(context.rig, observed_so_far(context), laser_id, placement.standoff_mm)
     return in_words(context.rig, laser_id, where)
 
 
-def in_words(rig: Rig, laser_id: str, where: Whereabouts) -> str:
+def in_words(rig: Rig, laser_id: str, where: ExpectedSpot) -> str:
     """For the person at the bench."""
     picture = f"the picture of {rig.camera.width_px} x {rig.camera.height_px}"
     told = {

@@ -35,7 +35,7 @@ class _Answers(RootModel[dict[str, Annotated[Answer, BeforeValidator(_in_full)]]
 
 
 @dataclass(frozen=True)
-class Nobody:
+class NoOperator:
     """No terminal, or nobody at it: every question stays open."""
 
     why: str
@@ -53,7 +53,7 @@ class Nobody:
 
 
 @dataclass(frozen=True)
-class Scripted:
+class ScriptedOperator:
     """Answers out of a file; what the file does not answer goes to `other`."""
 
     path: Path
@@ -63,7 +63,7 @@ class Scripted:
     """Whether nobody can be hurt: on a virtual bench the file may say where the target stands."""
 
     @classmethod
-    def load(cls, path: Path, foreseen: Mapping[str, Prompt], other: Operator) -> Scripted:
+    def load(cls, path: Path, foreseen: Mapping[str, Prompt], other: Operator) -> ScriptedOperator:
         """Read the file, and hold it against the prompts that may come.
 
         Raises:
@@ -148,10 +148,12 @@ def _refuse(prompt: Prompt, answer: Answer) -> str | None:
     return prompt.refuse(answer)
 
 
-def who_answers(bench: Bench, given: Operator) -> Operator:
+def operator_of_bench(bench: Bench, given: Operator) -> Operator:
     """The bench's own operator where it has one, but an answers file comes first."""
     if bench.operator is None:
         return given
     return (
-        replace(given, other=bench.operator, at_bench=True) if isinstance(given, Scripted) else bench.operator
+        replace(given, other=bench.operator, at_bench=True)
+        if isinstance(given, ScriptedOperator)
+        else bench.operator
     )

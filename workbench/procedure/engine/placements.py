@@ -36,7 +36,7 @@ class _LeftOutError(Exception):
         self.answer = answer
 
 
-def visit(
+def visit_placements(
     context: Context, placements: Sequence[Placement], work: Callable[[Placement], T], *, lights: bool = True
 ) -> list[T]:
     """Have the target placed at one placement after the other, and do the `work` at each.
@@ -63,7 +63,7 @@ def visit(
     while index < len(placements):
         asked = placements[index]
         before = placements[index - 1] if index and placements[index - 1].key in began else None
-        context.shooting.served = context.recorder.group(asked.key)
+        context.pairs.served = context.recorder.group(asked.key)
         answer = _place_answer(context, asked, before)
         if answer.action == "redo" and before is not None:
             _set_aside(context, before.key, began.pop(before.key), answer.reason or "")
@@ -85,9 +85,9 @@ def visit(
             del began[asked.key]
             _tell_skipped(context, asked, left_out.answer)
         else:
-            context.shooting.look_for_stuck_beam(asked.key)
+            context.pairs.look_for_stuck_beam(asked.key)
             context.emit(ev.PlacementFinished(key=asked.key))
-        context.shooting.served = None
+        context.pairs.served = None
     return list(results.values())
 
 
@@ -100,7 +100,7 @@ def _work(
             return work(placed)
         except RetakeError as again:
             _set_aside(context, placed.key, from_n, str(again), retry=again.by_limit)
-            if context.shooting.served is not None:
+            if context.pairs.served is not None:
                 raise _ServedAgainError from again
             FrameStore(context.session_dir).set_aside(placed.key)
             from_n = context.emit(ev.TargetPlaced(placement=placed, by=answer.by)).n
@@ -113,7 +113,7 @@ def _exposed(context: Context, work: Callable[[Placement], T]) -> Callable[[Plac
     """The work with the camera's exposure set before it."""
 
     def do(placed: Placement) -> T:
-        if (found := context.shooting.set_exposure(placed.key, context.begin)) is not None:
+        if (found := context.pairs.set_exposure(placed.key, context.begin)) is not None:
             context.emit(found)
         return work(placed)
 
@@ -125,7 +125,7 @@ def _tell_skipped(context: Context, asked: Placement, answer: Answer) -> None:
 
 
 def _place_answer(context: Context, asked: Placement, before: Placement | None) -> Answer:
-    if context.shooting.served is not None:
+    if context.pairs.served is not None:
         return Answer()
     known = context.recorder.answer(asked.key)
     if known is not None and known.action == "skip":
@@ -136,8 +136,8 @@ def _place_answer(context: Context, asked: Placement, before: Placement | None) 
 
 def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Record, Placement]:
     """The target stands; what stood in frames of an earlier try is moved aside."""
-    if context.shooting.served is not None:
-        return context.emit(context.shooting.served.placed), context.shooting.served.placed.placement
+    if context.pairs.served is not None:
+        return context.emit(context.pairs.served.placed), context.pairs.served.placed.placement
     FrameStore(context.session_dir).set_aside(asked.key)
     measured = answer.value if isinstance(answer.value, float) else asked.standoff_mm
     placed = context.bench.target.place(asked.model_copy(update={"standoff_mm": measured}))

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from workbench.model import event as ev
-from workbench.procedure.engine.durations import Pace, PaceMeter
+from workbench.procedure.engine.durations import DurationMeter, StepDurations
 from workbench.procedure.engine.plan import PlannedStep
 
 
-class Forecast:
+class TimeLeft:
     """By the pace of this session as far as it goes, by that of others for the rest."""
 
-    def __init__(self, steps: Sequence[PlannedStep], otherwise: Pace) -> None:
+    def __init__(self, steps: Sequence[PlannedStep], otherwise: StepDurations) -> None:
         self._steps, self._otherwise = list(steps), otherwise
-        self._meter = PaceMeter()
+        self._meter = DurationMeter()
         self._step = -1
         self._visited: dict[str, int] = {}
         """Placements of this step, those left out too, with the shots that each took so far."""

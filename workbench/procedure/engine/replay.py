@@ -21,7 +21,7 @@ SAFETY = "safety"
 """Key of the confirmation before the first emission; asked for anew whenever a session goes on."""
 
 
-class Recorder:
+class ReplayingJournal:
     """Writes events and shows their records to the consumers."""
 
     def __init__(

@@ -14,8 +14,8 @@ from workbench.model.errors import BadInputError
 from workbench.model.procedure import Procedure
 from workbench.model.rig import Rig
 from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model
-from workbench.procedure.engine.replay import Recorder
-from workbench.procedure.engine.run import NOBODY, Caller, Plan, go_through, open_context
+from workbench.procedure.engine.replay import ReplayingJournal
+from workbench.procedure.engine.run import NOBODY, Invocation, Plan, go_through, open_context
 from workbench.session.journal import JOURNAL, Journal, read_journal
 from workbench.session.manifest import (
     MANIFEST,
@@ -30,7 +30,7 @@ from workbench.session.manifest import (
 def resume(
     session_dir: Path,
     consumers: Sequence[ev.Consumer],
-    caller: Caller,
+    caller: Invocation,
     stopping: Callable[[], str | None],
     operator: Operator = NOBODY,
     accepted_because: str | None = None,
@@ -75,8 +75,8 @@ def resume(
             changes=changes,
             accepted_because=accepted_because if changes else None,
         )
-        recorder = Recorder(journal, consumers, before, resumed)
-        began = Caller(began_with.operator, began_with.command, began_with.created)
+        recorder = ReplayingJournal(journal, consumers, before, resumed)
+        began = Invocation(began_with.operator, began_with.command, began_with.created)
         go_through(plan, open_context(plan, session_dir, bench, operator, recorder, began, stopping))
 
 

@@ -15,18 +15,18 @@ from workbench.model.calibration import Provenance
 from workbench.model.errors import BadInputError, StoppedError, WorkbenchError
 from workbench.model.procedure import CaptureGridStep, FitStep, Procedure, Step, load_procedure
 from workbench.model.rig import Rig, load_rig
-from workbench.procedure.engine.context import Ahead, Context
-from workbench.procedure.engine.operator import Nobody, who_answers
-from workbench.procedure.engine.replay import Recorder
+from workbench.procedure.engine.context import Context, UpcomingFit
+from workbench.procedure.engine.operator import NoOperator, operator_of_bench
+from workbench.procedure.engine.replay import ReplayingJournal
 from workbench.procedure.steps import run_step, shots
 from workbench.session.journal import Journal
 from workbench.session.manifest import create_session, workbench_version
 
-NOBODY = Nobody("the caller has given nobody to ask")
+NOBODY = NoOperator("the caller has given nobody to ask")
 
 
 @dataclass(frozen=True)
-class Caller:
+class Invocation:
     """Who runs a session, with what command, and when (ISO 8601 with zone)."""
 
     operator: str
@@ -98,7 +98,7 @@ def run(
     plan: Plan,
     session_dir: Path,
     consumers: Sequence[ev.Consumer],
-    caller: Caller,
+    caller: Invocation,
     stopping: Callable[[], str | None],
     operator: Operator = NOBODY,
 ) -> None:
@@ -137,7 +137,7 @@ def run(
             command=caller.command,
         )
         journal = stack.enter_context(Journal(session_dir))
-        recorder = Recorder(journal, consumers)
+        recorder = ReplayingJournal(journal, consumers)
         go_through(plan, open_context(plan, session_dir, bench, operator, recorder, caller, stopping))
 
 
@@ -158,8 +158,8 @@ def open_context(
     session_dir: Path,
     bench: Bench,
     operator: Operator,
-    recorder: Recorder,
-    caller: Caller,
+    recorder: ReplayingJournal,
+    caller: Invocation,
     stopping: Callable[[], str | None],
 ) -> Context:
     """The context that a session's steps run in; what they write names `caller`."""
@@ -173,16 +173,18 @@ def open_context(
         operator=caller.operator,
         created=caller.created,
     )
-    return Context(session_dir, plan.rig, bench, who_answers(bench, operator), recorder, provenance, stopping)
+    return Context(
+        session_dir, plan.rig, bench, operator_of_bench(bench, operator), recorder, provenance, stopping
+    )
 
 
-def _ahead(steps: Sequence[Step], index: int) -> Ahead | None:
+def _ahead(steps: Sequence[Step], index: int) -> UpcomingFit | None:
     """The next fit from a step on, and what is planned before it."""
     for number, fit in enumerate(steps[index:], start=index):
         if isinstance(fit, FitStep):
             before = [step for step in steps[:number] if isinstance(step, CaptureGridStep)]
             planned = tuple(standoff for step in before for standoff in step.standoffs_mm)
-            return Ahead(planned, fit.limits.max_relative_range_sd)
+            return UpcomingFit(planned, fit.limits.max_relative_range_sd)
     return None
 
 

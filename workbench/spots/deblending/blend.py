@@ -16,9 +16,9 @@ from workbench.spots.deblending.joint_fit import Joint, evidence, fit_joint, hal
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.acceptance import without_outliers
 from workbench.spots.kernels.windows import half_for, mark_light, mark_strip
-from workbench.spots.measure import Trace, spot_flags
+from workbench.spots.measure import FittedSpot, spot_flags
 from workbench.spots.noise import Noise
-from workbench.spots.pair import Scene
+from workbench.spots.pair import PairSignal
 from workbench.spots.psf import FLUX, LN_SU, SHEAR, U, principal_axes
 from workbench.spots.types import Bools, Failure, Floats, Spot
 
@@ -37,7 +37,7 @@ _TURNS = 2
 _NO_MASK = np.zeros((0, 0), bool)
 
 
-class Crowd:
+class Blend:
     """Spots that are fitted in one window, and what lies around them.
 
     Args:
@@ -49,9 +49,9 @@ class Crowd:
 
     def __init__(
         self,
-        scenes: Sequence[Scene],
-        group: Sequence[Trace],
-        others: Sequence[Trace],
+        scenes: Sequence[PairSignal],
+        group: Sequence[FittedSpot],
+        others: Sequence[FittedSpot],
         reach_px: float | None = None,
     ) -> None:
         self.scene = group[0].scene
@@ -75,11 +75,11 @@ class Crowd:
         self.win = win._replace(usable=(near & elsewhere)[None] & win.usable)
         """A window around all of them."""
 
-    def start_of(self, traces: Sequence[Trace]) -> Floats:
+    def start_of(self, traces: Sequence[FittedSpot]) -> Floats:
         """(n, 6) their parameters, in pixels of the window."""
         return np.array([t.params[:SHEAR] for t in traces]) - (0, 0, self.col0, self.row0, 0, 0)
 
-    def as_traces(self, joint: Joint) -> list[Trace]:
+    def as_traces(self, joint: Joint) -> list[FittedSpot]:
         """The spots of a fit, in pixels of the image."""
         absolute = joint.params + np.array([0, 0, self.col0, self.row0, 0, 0])
         traces = []
@@ -95,10 +95,10 @@ class Crowd:
             peak = flux / (2.0 * math.pi * (width**2 + 1.0 / 12.0))
             spot = Spot(u, v, float(sd[1]), float(sd[2]), flux, width, peak, flags)
             slope = float(joint.noise.slope_dn[0])
-            traces.append(Trace(spot, params, slope, reach, flux / float(sd[0]), self.scene))
+            traces.append(FittedSpot(spot, params, slope, reach, flux / float(sd[0]), self.scene))
         return traces
 
-    def _light_of(self, traces: Sequence[Trace], shape: tuple[int, int]) -> Bools:
+    def _light_of(self, traces: Sequence[FittedSpot], shape: tuple[int, int]) -> Bools:
         """(height, width) where light of these spots comes."""
         found = np.zeros(shape, bool)
         if traces:
@@ -106,7 +106,7 @@ class Crowd:
             mark_light(self.row0, self.col0, lights, found)
         return found
 
-    def _in_a_strip(self, scenes: Sequence[Scene], shape: tuple[int, int]) -> Bools:
+    def _in_a_strip(self, scenes: Sequence[PairSignal], shape: tuple[int, int]) -> Bools:
         """(height, width) where a scanline lets a spot be."""
         found = np.zeros(shape, bool)
         for strip in (scene.strip for scene in scenes):
@@ -149,16 +149,16 @@ def _is_sound(joint: Joint, win: Windows) -> bool:
     return joint.converged and bool((points >= 0).all() and (points < np.array(win.shape[::-1])).all())
 
 
-def fitted_together(
-    scenes: Sequence[Scene], group: list[Trace], others: Sequence[Trace], wants_more: bool
-) -> list[Trace]:
+def fit_blends(
+    scenes: Sequence[PairSignal], group: list[FittedSpot], others: Sequence[FittedSpot], wants_more: bool
+) -> list[FittedSpot]:
     """A cluster fitted jointly, the strongest first; members that the data do not ask for are dropped.
 
     Where more spots are wanted, longish members are tried as two.
     """
     if len(group) == 1:
         return group
-    crowd = Crowd(scenes, group, others)
+    crowd = Blend(scenes, group, others)
     if not crowd.fits:
         return group
     start = crowd.start_of(group)
@@ -171,7 +171,7 @@ def fitted_together(
     return [group[i] for i in kept] if best is None else crowd.as_traces(best)
 
 
-def _needed(crowd: Crowd, start: Floats, alone: Bools) -> tuple[Joint | None, list[int]]:
+def _needed(crowd: Blend, start: Floats, alone: Bools) -> tuple[Joint | None, list[int]]:
     """The fit of the spots that the data ask for, and their indices; no fit where there is no sound one.
 
     All at first, then without the least certain one: to a model that lacks a spot its light is noise, and in
@@ -217,9 +217,11 @@ def _halved(start: Floats, alone: Bools) -> tuple[Floats, Bools]:
     return halved, np.append(alone[~long], np.zeros(2 * len(pairs), bool))
 
 
-def grown(scenes: Sequence[Scene], group: list[Trace], others: Sequence[Trace]) -> list[Trace]:
+def grown(
+    scenes: Sequence[PairSignal], group: list[FittedSpot], others: Sequence[FittedSpot]
+) -> list[FittedSpot]:
     """A cluster with the neighbours that hide in its residuals, as long as the data ask for them."""
-    crowd = Crowd(scenes, group, others)
+    crowd = Blend(scenes, group, others)
     if not crowd.fits:
         return group
     best = fit_joint(crowd.win, crowd.start_of(group), crowd.noise)
@@ -235,14 +237,14 @@ def grown(scenes: Sequence[Scene], group: list[Trace], others: Sequence[Trace]) 
     return group if len(best.params) == len(group) else crowd.as_traces(best)
 
 
-def split(scenes: Sequence[Scene], trace: Trace, others: list[Trace]) -> list[Trace]:
+def split(scenes: Sequence[PairSignal], trace: FittedSpot, others: list[FittedSpot]) -> list[FittedSpot]:
     """A spot as two if it is elongated and two explain it far better.
 
     Spots whose light mixes with that of others are left to the fit of all of them together.
     """
     if any(mixes(trace, o) for o in others):
         return [trace]
-    crowd = Crowd(scenes, [trace], others, 1.3 * trace.reach_px)
+    crowd = Blend(scenes, [trace], others, 1.3 * trace.reach_px)
     win = crowd.win
     start = trace.params[None].copy()
     start[0, U:LN_SU] -= crowd.col0, crowd.row0

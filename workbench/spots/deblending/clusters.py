@@ -6,7 +6,7 @@ import math
 from itertools import combinations, product, starmap
 
 from workbench.spots.kernels.windows import half_for
-from workbench.spots.measure import Trace
+from workbench.spots.measure import FittedSpot
 
 TAIL_WIDTHS = 2.5
 """The light of a spot beyond so many widths moves no other."""
@@ -16,12 +16,12 @@ CLEAR_SD = 7.0
 _RIVAL_WIDTHS = 2.0
 
 
-def apart_px(one: Trace, other: Trace) -> float:
+def apart_px(one: FittedSpot, other: FittedSpot) -> float:
     """Distance of two spots."""
     return math.hypot(one.spot.u_px - other.spot.u_px, one.spot.v_px - other.spot.v_px)
 
 
-def are_apart(traces: list[Trace]) -> bool:
+def are_apart(traces: list[FittedSpot]) -> bool:
     """Whether no spot is a duplicate of another or disturbs it: the common case, told at once."""
     reach = max((t.reach_px for t in traces), default=0.0)
     limit = half_for(reach) + TAIL_WIDTHS * reach
@@ -29,16 +29,16 @@ def are_apart(traces: list[Trace]) -> bool:
     return min(starmap(math.dist, combinations(places, 2)), default=limit) >= limit
 
 
-def without_duplicates(traces: list[Trace]) -> list[Trace]:
+def without_duplicates(traces: list[FittedSpot]) -> list[FittedSpot]:
     """Peaks whose fits ended on the same spot count once."""
-    kept: list[Trace] = []
+    kept: list[FittedSpot] = []
     for trace in sorted(traces, key=lambda t: -t.spot.flux_dn):
         if all(apart_px(trace, k) > max(_SAME_WIDTHS * min(trace.reach_px, k.reach_px), 0.5) for k in kept):
             kept.append(trace)
     return kept
 
 
-def clearest(old: list[Trace], new: list[Trace]) -> list[Trace]:
+def clearest(old: list[FittedSpot], new: list[FittedSpot]) -> list[FittedSpot]:
     """Old and new traces; of a faint old one and a new one at the same place only the clearer.
 
     A narrow fit may have settled on a spike of noise upon a wide faint spot, which is another maximum of the
@@ -55,15 +55,15 @@ def clearest(old: list[Trace], new: list[Trace]) -> list[Trace]:
     return [t for t in (*old, *new) if id(t) not in worse]
 
 
-def _disturbs(one: Trace, other: Trace) -> bool:
+def _disturbs(one: FittedSpot, other: FittedSpot) -> bool:
     """Whether light of one spot falls into the window of the other."""
     reach = max(one.reach_px, other.reach_px)
     return apart_px(one, other) < half_for(reach) + TAIL_WIDTHS * reach
 
 
-def clusters(traces: list[Trace]) -> list[list[Trace]]:
+def clusters(traces: list[FittedSpot]) -> list[list[FittedSpot]]:
     """Groups of spots that disturb each other, the strongest first in each."""
-    groups: list[list[Trace]] = []
+    groups: list[list[FittedSpot]] = []
     for trace in traces:
         near = [g for g in groups if any(_disturbs(trace, t) for t in g)]
         groups = [g for g in groups if all(g is not n for n in near)]
@@ -71,11 +71,11 @@ def clusters(traces: list[Trace]) -> list[list[Trace]]:
     return [sorted(g, key=lambda t: -t.spot.flux_dn) for g in groups]
 
 
-def mixes(one: Trace, other: Trace) -> bool:
+def mixes(one: FittedSpot, other: FittedSpot) -> bool:
     """Whether light of one spot falls where light of the other does."""
     return apart_px(one, other) < TAIL_WIDTHS * (one.reach_px + other.reach_px)
 
 
-def stands_alone(trace: Trace, others: list[Trace]) -> bool:
+def stands_alone(trace: FittedSpot, others: list[FittedSpot]) -> bool:
     """Whether a spot is clear, and no light of the others comes where its own is."""
     return trace.clarity >= CLEAR_SD and not any(mixes(trace, o) for o in others)

@@ -11,9 +11,9 @@ import pytest
 from tests.support.corrupted_data import told_as
 from tests.support.rigs import STANDOFFS_MM, World, thesis_rig
 from workbench.calibration.checks.cross_validation import LeftOut, alarms, leave_each_out
-from workbench.calibration.data.spot_rows import sight_rows
+from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.estimation.fit import fit
-from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit, rows_of
 from workbench.calibration.verdict.assessment import judge
 from workbench.model.acceptance import Acceptance
@@ -29,14 +29,14 @@ FITS = 40
 @pytest.fixture(scope="module")
 def sound() -> list[tuple[LeftOut, ...]]:
     """The folds of simulated calibrations in which nothing is wrong."""
-    return [leave_each_out(fit(RIG, World(RIG, seed).sightings())) for seed in range(500, 500 + FITS)]
+    return [leave_each_out(fit(RIG, World(RIG, seed).observations())) for seed in range(500, 500 + FITS)]
 
 
 @pytest.mark.parametrize("standoff_mm", [125.0, 600.0, 4500.0])
 def test_a_fold_is_the_fit_without_the_placement(standoff_mm: float) -> None:
-    sightings = World(RIG, 1).sightings()
-    whole = fit(RIG, sightings)
-    without = fit(RIG, [s for s in sightings if s.standoff_mm != standoff_mm])
+    observations = World(RIG, 1).observations()
+    whole = fit(RIG, observations)
+    without = fit(RIG, [s for s in observations if s.standoff_mm != standoff_mm])
     problem = problem_of(whole)
     cells = np.array([whole.cells.placements[i].standoff_mm == standoff_mm for i in whole.cells.placement])
     left = refit(problem, measured(problem) & ~rows_of(cells, problem), optimum_of(whole))
@@ -51,12 +51,12 @@ def test_a_fold_is_the_fit_without_the_placement(standoff_mm: float) -> None:
 
 def test_what_a_standoff_moves_is_its_difference() -> None:
     problem, y = (
-        problem_of(fit(RIG, World(RIG, 1).sightings())),
-        optimum_of(fit(RIG, World(RIG, 1).sightings())),
+        problem_of(fit(RIG, World(RIG, 1).observations())),
+        optimum_of(fit(RIG, World(RIG, 1).observations())),
     )
     step_mm = 1e-3
     ahead, behind = (
-        Problem(
+        LeastSquaresProblem(
             problem.layout,
             problem.data._replace(standoff_mm=np.asarray(problem.data.standoff_mm) + sign * step_mm),
         ).linearise(y, 2.0)[0]
@@ -70,10 +70,10 @@ def test_what_a_standoff_moves_is_its_difference() -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_range_errors_are_those_of_a_fit_whose_standoff_is_free(seed: int) -> None:
     """A placement whose ruler may be a metre off: what its error is fitted to, is what its spots range."""
-    sightings = World(RIG, seed).sightings()
-    folds = {fold.standoff_mm: fold for fold in leave_each_out(fit(RIG, sightings))}
+    observations = World(RIG, seed).observations()
+    folds = {fold.standoff_mm: fold for fold in leave_each_out(fit(RIG, observations))}
     for standoff in (160.0, 600.0, 3200.0):
-        told = [replace(s, standoff_sd_mm=1e3) if s.standoff_mm == standoff else s for s in sightings]
+        told = [replace(s, standoff_sd_mm=1e3) if s.standoff_mm == standoff else s for s in observations]
         freed = fit(RIG, told)
         index = [p.name for p in freed.table.parameters].index(f"{standoff:g}.error_mm")
         sd = np.hypot(freed.sd[index], RIG.bench.placement_sd_mm)
@@ -107,7 +107,7 @@ def test_sound_calibrations_raise_no_alarm(sound: list[tuple[LeftOut, ...]]) -> 
 @pytest.mark.parametrize("standoff_mm", STANDOFFS_MM[:7])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_ten_millimetres_are_found_up_to_900(seed: int, standoff_mm: float) -> None:
-    result = fit(RIG, told_as(World(RIG, seed).sightings(), standoff_mm, standoff_mm + 10))
+    result = fit(RIG, told_as(World(RIG, seed).observations(), standoff_mm, standoff_mm + 10))
     found = alarms(leave_each_out(result))
     worst = min(found, key=lambda fold: min(fold.range_p, fold.spots_p))
     assert worst.standoff_mm == standoff_mm + 10
@@ -117,7 +117,7 @@ def test_ten_millimetres_are_found_up_to_900(seed: int, standoff_mm: float) -> N
 
 def test_an_alarm_refuses_and_says_what_to_do() -> None:
     """12 mm at 1400: seen, though not so clearly that it could have no other name."""
-    assessment = judge(fit(RIG, told_as(World(RIG, 5).sightings(), 1400.0, 1412.0)), Acceptance(), 0.01)
+    assessment = judge(fit(RIG, told_as(World(RIG, 5).observations(), 1400.0, 1412.0)), Acceptance(), 0.01)
     assert (assessment.verdict, assessment.faults) == ("refused", ())
     (told,) = assessment.reasons
     assert "the captures at 1412 mm contradict the others" in told
@@ -126,12 +126,14 @@ def test_an_alarm_refuses_and_says_what_to_do() -> None:
 
 
 def test_two_placements_leave_nothing_to_predict_with() -> None:
-    assert leave_each_out(fit(RIG, World(RIG, 1).sightings((200.0, 800.0)))) == ()
+    assert leave_each_out(fit(RIG, World(RIG, 1).observations((200.0, 800.0)))) == ()
 
 
 def test_noise_that_nobody_stated_rightly_is_no_alarm() -> None:
     """Real readings, scattering 2.4 times as much as their rounding: the noise is then the others'."""
     rig = load_rig(ROOT / "rigs/webcam-laser.yaml")
-    folds = leave_each_out(fit(rig, *sight_rows(rig, load_captures(ROOT / "data/webcam-laser-rows.csv"))))
+    folds = leave_each_out(
+        fit(rig, *observations_of_rows(rig, load_captures(ROOT / "data/webcam-laser-rows.csv")))
+    )
     assert all(np.isfinite(fold.freedom) for fold in folds)
     assert not alarms(folds)

@@ -15,7 +15,7 @@ from workbench.calibration.checks import hypotheses
 from workbench.calibration.checks.cross_validation import leave_each_out, rows_at
 from workbench.calibration.checks.faults import Fault, find_faults
 from workbench.calibration.checks.hypotheses import explain_misfit
-from workbench.calibration.data.observations import Rejected, Sighting
+from workbench.calibration.data.observations import Observation, Rejected
 from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit
 from workbench.calibration.selection.outliers import fit_without_outliers
 from workbench.calibration.verdict.assessment import Assessment, judge
@@ -27,13 +27,15 @@ SEEDS = (1, 2)
 SOUND = 20
 
 
-def named(sightings: list[Sighting], rejected: list[Rejected] | None = None, rig: Rig = RIG) -> list[Fault]:
-    fit = fit_without_outliers(rig, sightings, rejected or [])
+def named(
+    observations: list[Observation], rejected: list[Rejected] | None = None, rig: Rig = RIG
+) -> list[Fault]:
+    fit = fit_without_outliers(rig, observations, rejected or [])
     return list(find_faults(fit, leave_each_out(fit)))
 
 
-def judged(sightings: list[Sighting]) -> Assessment:
-    return judge(fit_without_outliers(RIG, sightings), Acceptance(), 0.01)
+def judged(observations: list[Observation]) -> Assessment:
+    return judge(fit_without_outliers(RIG, observations), Acceptance(), 0.01)
 
 
 def the(faults: list[Fault], name: str) -> str:
@@ -45,19 +47,19 @@ def the(faults: list[Fault], name: str) -> str:
 class TestFaults:
     @pytest.mark.parametrize(("a", "b"), [("L1", "L2"), ("L1", "L4")])
     def test_two_lasers_exchanged(self, seed: int, a: str, b: str) -> None:
-        message = the(named(exchanged(World(RIG, seed).sightings(), a, b)), "lasers_swapped")
+        message = the(named(exchanged(World(RIG, seed).observations(), a, b)), "lasers_swapped")
         assert f"lasers {a} and {b} are exchanged" in message
 
     def test_a_mirrored_picture(self, seed: int) -> None:
         world = World(RIG, seed)
-        assert "left to right" in the(named(mirrored(world, world.sightings())), "mirrored")
+        assert "left to right" in the(named(mirrored(world, world.observations())), "mirrored")
 
     @pytest.mark.parametrize(
         ("standoff_mm", "told_mm", "slip"),
         [(600.0, 6000.0, "a digit too many"), (160.0, 1600.0, "too many"), (400.0, 40.0, "a digit too few")],
     )
     def test_a_standoff_mistyped(self, seed: int, standoff_mm: float, told_mm: float, slip: str) -> None:
-        message = the(named(told_as(World(RIG, seed).sightings(), standoff_mm, told_mm)), "standoff")
+        message = the(named(told_as(World(RIG, seed).observations(), standoff_mm, told_mm)), "standoff")
         assert f"the captures at {told_mm:g} mm fit a standoff of" in message
         assert slip in message
         fitted = float(message.split("standoff of ")[1].split(" mm")[0])
@@ -65,7 +67,9 @@ class TestFaults:
 
     @pytest.mark.parametrize("standoff_mm", [125.0, 400.0, 900.0])
     def test_a_standoff_ten_millimetres_off(self, seed: int, standoff_mm: float) -> None:
-        message = the(named(told_as(World(RIG, seed).sightings(), standoff_mm, standoff_mm + 10)), "standoff")
+        message = the(
+            named(told_as(World(RIG, seed).observations(), standoff_mm, standoff_mm + 10)), "standoff"
+        )
         assert f"at {standoff_mm + 10:g} mm" in message
 
     @pytest.mark.parametrize(
@@ -74,53 +78,53 @@ class TestFaults:
     )
     def test_a_target_that_moved(self, seed: int, standoff_mm: float, after: int, step_mm: float) -> None:
         world = World(RIG, seed)
-        sightings = moved(world, world.sightings(), standoff_mm, after, step_mm)
-        message = the(named(sightings), "moved")
+        observations = moved(world, world.observations(), standoff_mm, after, step_mm)
+        message = the(named(observations), "moved")
         assert f"the target at {standoff_mm:g} mm moved by {step_mm:+.2g}"[:30] in message
-        of_it = [s.source for s in sightings if s.standoff_mm == standoff_mm]
+        of_it = [s.source for s in observations if s.standoff_mm == standoff_mm]
         assert f"after {after} of its {len(of_it)} captures" in message
         assert f"between {of_it[after - 1]} and {of_it[after]}" in message
 
     @pytest.mark.parametrize("by_px", [2.0, -100.0])
     @pytest.mark.parametrize("repeats", [range(5), (1, 3), (1, 3, 4)])
     def test_a_reflection(self, seed: int, by_px: float, repeats: range | tuple[int, ...]) -> None:
-        sightings = shifted(World(RIG, seed).sightings(), "L2", 600.0, by_px, repeats)
-        fit = fit_without_outliers(RIG, sightings)
+        observations = shifted(World(RIG, seed).observations(), "L2", 600.0, by_px, repeats)
+        fit = fit_without_outliers(RIG, observations)
         message = the(list(find_faults(fit, leave_each_out(fit))), "reflection")
         assert f"laser L2 at 600 mm: {len(repeats)} of its captures" in message
         assert {r.source for r in fit.rejected} == {f"L2 600 {k}" for k in repeats}
         assert fit.noise_scale == 1.0
 
     def test_a_laser_that_never_lit(self, seed: int) -> None:
-        sightings = World(RIG, seed).sightings()
-        dark = [s for s in sightings if s.laser_id == "L3"]
+        observations = World(RIG, seed).observations()
+        dark = [s for s in observations if s.laser_id == "L3"]
         missing = [Rejected(s.source, "no spot", s) for s in dark]
-        message = the(named([s for s in sightings if s not in dark], missing), "never_lit")
+        message = the(named([s for s in observations if s not in dark], missing), "never_lit")
         assert f"laser L3 never lit: none of its {len(dark)} captures" in message
 
     def test_spots_saturated(self, seed: int) -> None:
-        sightings = [replace(s, saturated=s.standoff_mm < 300) for s in World(RIG, seed).sightings()]
-        assert "at 125, 160, 210, 280 mm" in the(named(sightings), "saturated")
+        observations = [replace(s, saturated=s.standoff_mm < 300) for s in World(RIG, seed).observations()]
+        assert "at 125, 160, 210, 280 mm" in the(named(observations), "saturated")
 
     def test_all_standoffs_far(self, seed: int) -> None:
-        message = the(named(World(RIG, seed).sightings((1400.0, 2200.0, 3200.0, 4500.0))), "all_far")
+        message = the(named(World(RIG, seed).observations((1400.0, 2200.0, 3200.0, 4500.0))), "all_far")
         assert "from 1400 mm on" in message
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("standoffs_mm", [(200.0,), (200.0, 200.0), (200.0, 230.0)])
 def test_few_standoffs_that_are_near_are_not_called_far(seed: int, standoffs_mm: tuple[float, ...]) -> None:
-    fit = fit_without_outliers(RIG, World(RIG, seed).sightings(standoffs_mm))
+    fit = fit_without_outliers(RIG, World(RIG, seed).observations(standoffs_mm))
     assert find_faults(fit, ()) == ()
 
 
 def test_lasers_read_across_their_line_alone_are_not_called_far() -> None:
-    sightings = [replace(s, u_px=float("nan")) for s in World(RIG, 1).sightings()]
-    assert find_faults(fit_without_outliers(RIG, sightings), ()) == ()
+    observations = [replace(s, u_px=float("nan")) for s in World(RIG, 1).observations()]
+    assert find_faults(fit_without_outliers(RIG, observations), ()) == ()
 
 
 def test_what_leaving_a_placement_out_gains_is_known_to_first_order() -> None:
-    fit = fit_without_outliers(RIG, World(RIG, 3).sightings())
+    fit = fit_without_outliers(RIG, World(RIG, 3).observations())
     problem = problem_of(fit)
     state = refit(problem, measured(problem), optimum_of(fit))
     for index in range(len(fit.cells.placements)):
@@ -133,8 +137,8 @@ def test_what_leaving_a_placement_out_gains_is_known_to_first_order() -> None:
 def test_nothing_is_missed_where_no_refit_is_made(
     standoff_mm: float, off_mm: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sightings = told_as(World(RIG, 20_001).sightings(), standoff_mm, standoff_mm + off_mm)
-    fit = fit_without_outliers(RIG, sightings)
+    observations = told_as(World(RIG, 20_001).observations(), standoff_mm, standoff_mm + off_mm)
+    fit = fit_without_outliers(RIG, observations)
     quick = explain_misfit(fit)
     monkeypatch.setattr(hypotheses, "CLEARLY_LESS", 0.0)
     assert [(h.kind, h.subject) for h in quick] == [(h.kind, h.subject) for h in explain_misfit(fit)]
@@ -142,8 +146,8 @@ def test_nothing_is_missed_where_no_refit_is_made(
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_two_standoffs_mistyped(seed: int) -> None:
-    sightings = told_as(told_as(World(RIG, seed).sightings(), 600.0, 6000.0), 160.0, 170.0)
-    faults = named(sightings)
+    observations = told_as(told_as(World(RIG, seed).observations(), 600.0, 6000.0), 160.0, 170.0)
+    faults = named(observations)
     assert {fault.name for fault in faults} == {"standoff"}
     assert {fault.message.split(" mm")[0] for fault in faults} == {
         "the captures at 6000",
@@ -159,8 +163,8 @@ def test_a_camera_on_its_head_where_lasers_stand_above_and_below() -> None:
         for laser in RIG.lasers
     )
     rig = RIG.model_copy(update={"lasers": upright})
-    sightings = [replace(s, v_px=479 - s.v_px) for s in World(rig, 1).sightings()]
-    assert "top to bottom" in the(named(sightings, rig=rig), "upside_down")
+    observations = [replace(s, v_px=479 - s.v_px) for s in World(rig, 1).observations()]
+    assert "top to bottom" in the(named(observations, rig=rig), "upside_down")
 
 
 @pytest.mark.parametrize(
@@ -173,17 +177,17 @@ def test_a_camera_on_its_head_where_lasers_stand_above_and_below() -> None:
     ],
 )
 def test_a_fault_that_spoils_everything_refuses(
-    spoil: Callable[[World, list[Sighting]], list[Sighting]],
+    spoil: Callable[[World, list[Observation]], list[Observation]],
 ) -> None:
     world = World(RIG, 4)
-    assessment = judged(spoil(world, world.sightings()))
+    assessment = judged(spoil(world, world.observations()))
     assert assessment.verdict == "refused"
     assert assessment.reasons[0] == assessment.faults[0].message
     assert not any("contradict the others" in reason for reason in assessment.reasons)
 
 
 def test_a_reflection_left_out_does_not_refuse() -> None:
-    assessment = judged(shifted(World(RIG, 4).sightings(), "L2", 600.0, 12.0))
+    assessment = judged(shifted(World(RIG, 4).observations(), "L2", 600.0, 12.0))
     assert (assessment.verdict, [f.name for f in assessment.faults]) == ("accepted", ["reflection"])
     assert assessment.faults[0].message in assessment.warnings
 
@@ -191,7 +195,7 @@ def test_a_reflection_left_out_does_not_refuse() -> None:
 def test_sound_calibrations_name_no_fault_and_lose_no_spot() -> None:
     """2000 are tried by `python -m tests.proofs.validation`."""
     for seed in range(700, 700 + SOUND):
-        fit = fit_without_outliers(RIG, World(RIG, seed).sightings())
+        fit = fit_without_outliers(RIG, World(RIG, seed).observations())
         assert fit.rejected == ()
         assert find_faults(fit, ()) == ()
 
@@ -199,8 +203,8 @@ def test_sound_calibrations_name_no_fault_and_lose_no_spot() -> None:
 def test_noise_that_nobody_stated_rightly_is_no_fault() -> None:
     """Noise and speckle three times the stated: the fit scales its deviations, and nothing is named."""
     for seed in range(2):
-        sightings = World(thesis_rig(0.09, 0.12), seed).sightings()
-        fit = fit_without_outliers(RIG, sightings)
+        observations = World(thesis_rig(0.09, 0.12), seed).observations()
+        fit = fit_without_outliers(RIG, observations)
         assert fit.noise_scale > 1.5
         assert fit.rejected == ()
         assert find_faults(fit, leave_each_out(fit)) == ()
@@ -211,8 +215,8 @@ def test_noise_that_nobody_stated_rightly_is_no_fault() -> None:
 @pytest.mark.parametrize(("factor", "seed"), [(2, 4), (3, 2), (3, 6), (4, 1), (4, 3)])
 def test_repeats_noisier_than_stated_are_no_fault(factor: int, seed: int) -> None:
     """Speckle is as stated: the fit's own scale stays 1, and the repeats' must serve every test."""
-    sightings = World(thesis_rig(0.03 * factor), seed).sightings(repeats=10)
-    fit = fit_without_outliers(RIG, sightings)
+    observations = World(thesis_rig(0.03 * factor), seed).observations(repeats=10)
+    fit = fit_without_outliers(RIG, observations)
     assert fit.cells.repeat_scale == pytest.approx(factor, rel=0.1)
     assert fit.noise_scale == 1.0
     assert find_faults(fit, leave_each_out(fit)) == ()
@@ -222,13 +226,13 @@ def test_repeats_noisier_than_stated_are_no_fault(factor: int, seed: int) -> Non
 def test_one_spot_that_flickers_is_no_movement(seed: int) -> None:
     """Three times the noise of all others in the repeats of one spot: its own deviation is the measure."""
     rng = np.random.default_rng(seed)
-    sightings = [
+    observations = [
         replace(s, u_px=s.u_px + rng.normal(0, 0.1), v_px=s.v_px + rng.normal(0, 0.1))
         if (s.laser_id, s.standoff_mm) == ("L2", 600.0)
         else s
-        for s in World(RIG, seed).sightings(repeats=8)
+        for s in World(RIG, seed).observations(repeats=8)
     ]
-    fit = fit_without_outliers(RIG, sightings)
+    fit = fit_without_outliers(RIG, observations)
     assert len(fit.cells.torn) == 1
     assert find_faults(fit, leave_each_out(fit)) == ()
 
@@ -248,26 +252,26 @@ def test_one_spot_that_flickers_is_no_movement(seed: int) -> None:
 def test_strays_agree_only_where_they_were_measured(
     seed: int, u_px: tuple[float, ...], v_px: tuple[float, ...], agree: bool
 ) -> None:
-    sightings = World(RIG, seed).sightings(repeats=2)
-    template = next(s for s in sightings if (s.laser_id, s.standoff_mm) == ("L2", 600.0))
+    observations = World(RIG, seed).observations(repeats=2)
+    template = next(s for s in observations if (s.laser_id, s.standoff_mm) == ("L2", 600.0))
     strays = [replace(template, u_px=u, v_px=v) for u, v in zip(u_px, v_px, strict=True)]
-    fit = fit_without_outliers(RIG, sightings, [Rejected(s.source, "away", stray=s) for s in strays])
+    fit = fit_without_outliers(RIG, observations, [Rejected(s.source, "away", stray=s) for s in strays])
     assert [fault.name for fault in find_faults(fit, ())] == ["reflection"] * agree
 
 
-def without_v(world: World) -> list[Sighting]:
-    return [replace(s, v_px=float("nan")) for s in world.sightings()]
+def without_v(world: World) -> list[Observation]:
+    return [replace(s, v_px=float("nan")) for s in world.observations()]
 
 
 ONE_LASER = RIG.model_copy(update={"lasers": RIG.lasers[:1]})
-SHAPES: list[tuple[str, Rig, Rig, Callable[[World], list[Sighting]]]] = [
-    ("repeats noisier", RIG, thesis_rig(0.09), World.sightings),
-    ("speckle larger", RIG, thesis_rig(0.03, 0.12), World.sightings),
-    ("one laser", ONE_LASER, ONE_LASER, World.sightings),
+SHAPES: list[tuple[str, Rig, Rig, Callable[[World], list[Observation]]]] = [
+    ("repeats noisier", RIG, thesis_rig(0.09), World.observations),
+    ("speckle larger", RIG, thesis_rig(0.03, 0.12), World.observations),
+    ("one laser", ONE_LASER, ONE_LASER, World.observations),
     ("u alone", RIG, RIG, without_v),
-    ("one placement", RIG, RIG, lambda world: world.sightings((400.0,))),
-    ("two placements", RIG, RIG, lambda world: world.sightings((200.0, 800.0))),
-    ("one row", ONE_LASER, ONE_LASER, lambda world: world.sightings((400.0,), repeats=1)),
+    ("one placement", RIG, RIG, lambda world: world.observations((400.0,))),
+    ("two placements", RIG, RIG, lambda world: world.observations((200.0, 800.0))),
+    ("one row", ONE_LASER, ONE_LASER, lambda world: world.observations((400.0,), repeats=1)),
 ]
 
 
@@ -276,12 +280,12 @@ SHAPES: list[tuple[str, Rig, Rig, Callable[[World], list[Sighting]]]] = [
     ("told", "true", "seen"), [shape[1:] for shape in SHAPES], ids=[n for n, *_ in SHAPES]
 )
 def test_sound_data_of_any_shape_are_judged_without_a_fault(
-    seed: int, told: Rig, true: Rig, seen: Callable[[World], list[Sighting]]
+    seed: int, told: Rig, true: Rig, seen: Callable[[World], list[Observation]]
 ) -> None:
-    sightings = seen(World(true, seed))
-    assessment = judge(fit_without_outliers(told, sightings), Acceptance(), 0.001)
+    observations = seen(World(true, seed))
+    assessment = judge(fit_without_outliers(told, observations), Acceptance(), 0.001)
     assert assessment.faults == ()
-    few = len({s.standoff_mm for s in sightings}) < Acceptance().min_standoffs
+    few = len({s.standoff_mm for s in observations}) < Acceptance().min_standoffs
     assert (assessment.verdict == "refused") == few
     assert all("standoffs, expected at least" in reason for reason in assessment.reasons)
 
@@ -291,10 +295,10 @@ def test_sound_data_of_any_shape_are_judged_without_a_fault(
 def test_a_boards_standoff_mistyped(seed: int, off_mm: float) -> None:
     """Its corners and its spots agree with one another and contradict the ruler."""
     world = World(board_rig(), seed)
-    sightings, views = BoardWorld(world).measure(PLACINGS[:5])
+    observations, views = BoardWorld(world).measure(PLACINGS[:5])
     told = [
-        replace(s, standoff_mm=s.standoff_mm + off_mm) if s.placement == "B1" else s for s in sightings
-    ] + world.sightings((600.0, 1400.0))
+        replace(s, standoff_mm=s.standoff_mm + off_mm) if s.placement == "B1" else s for s in observations
+    ] + world.observations((600.0, 1400.0))
     boards = [
         replace(view, placement=replace(view.placement, standoff_mm=view.placement.standoff_mm + off_mm))
         if view.placement.key == "B1"

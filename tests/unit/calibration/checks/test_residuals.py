@@ -12,27 +12,27 @@ from scipy.stats import chi2
 from tests.support.rigs import STANDOFFS_MM, World, prior, thesis_rig
 from workbench.calibration.checks import residuals
 from workbench.calibration.checks.residuals import alarms, explain, residual_tests
-from workbench.calibration.data.observations import Sighting
+from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import fit
 
 RIG = thesis_rig()
 FITS = 40
-Spoil = Callable[[list[Sighting], np.random.Generator], list[Sighting]]
+Spoil = Callable[[list[Observation], np.random.Generator], list[Observation]]
 
 
 def noisier(
-    sightings: list[Sighting], rng: np.random.Generator, which: Callable[[Sighting], bool]
-) -> list[Sighting]:
+    observations: list[Observation], rng: np.random.Generator, which: Callable[[Observation], bool]
+) -> list[Observation]:
     """Some readings with four times the noise stated."""
     return [
         replace(s, u_px=s.u_px + rng.normal(0, 0.12), v_px=s.v_px + rng.normal(0, 0.12)) if which(s) else s
-        for s in sightings
+        for s in observations
     ]
 
 
-def lagging(sightings: list[Sighting], rng: np.random.Generator) -> list[Sighting]:
+def lagging(observations: list[Observation], rng: np.random.Generator) -> list[Observation]:
     """Every reading still has some of the one before."""
-    found = list(sightings)
+    found = list(observations)
     for n in range(1, len(found)):
         if found[n].repeat:
             before, now = found[n - 1], found[n]
@@ -56,8 +56,8 @@ SPOILT: list[tuple[str, Spoil]] = [
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("name", "spoil"), SPOILT, ids=[name for name, _ in SPOILT])
 def test_what_is_wrong_with_repeats_is_found(name: str, spoil: Spoil, seed: int) -> None:
-    sightings = spoil(World(RIG, seed).sightings(repeats=8), np.random.default_rng(seed))
-    found = alarms(residual_tests(fit(RIG, sightings)))
+    observations = spoil(World(RIG, seed).observations(repeats=8), np.random.default_rng(seed))
+    found = alarms(residual_tests(fit(RIG, observations)))
     assert name in {test.name for test in found}
     assert all("by chance in 1 of" in explain(test) for test in found)
 
@@ -65,8 +65,10 @@ def test_what_is_wrong_with_repeats_is_found(name: str, spoil: Spoil, seed: int)
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_picture_bent_as_no_lens_of_the_model_does_shows(seed: int) -> None:
     """An S across the picture of 1 px at its edges. (p1 and p2 look like another principal point.)"""
-    sightings = [replace(s, v_px=s.v_px + ((s.u_px - 320) / 320) ** 3) for s in World(RIG, seed).sightings()]
-    assert {"u", "laser"} & {test.name for test in alarms(residual_tests(fit(RIG, sightings)))}
+    observations = [
+        replace(s, v_px=s.v_px + ((s.u_px - 320) / 320) ** 3) for s in World(RIG, seed).observations()
+    ]
+    assert {"u", "laser"} & {test.name for test in alarms(residual_tests(fit(RIG, observations)))}
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -74,20 +76,20 @@ def test_lasers_with_speckle_of_their_own_show(seed: int) -> None:
     """L3's spots scatter by 0.3 px between placements, not between repeats."""
     rng = np.random.default_rng(seed)
     shift = {s: rng.normal(0, 0.3, 2) for s in STANDOFFS_MM}
-    sightings = [
+    observations = [
         replace(s, u_px=s.u_px + float(shift[s.standoff_mm][0]), v_px=s.v_px + float(shift[s.standoff_mm][1]))
         if s.laser_id == "L3"
         else s
-        for s in World(RIG, seed).sightings()
+        for s in World(RIG, seed).observations()
     ]
-    assert "variance of laser: L3" in {test.name for test in alarms(residual_tests(fit(RIG, sightings)))}
+    assert "variance of laser: L3" in {test.name for test in alarms(residual_tests(fit(RIG, observations)))}
 
 
 def test_chances_of_sound_calibrations_are_chances() -> None:
     """A tenth below 0.1, of every kind; 2000 are tried by `python -m tests.proofs.validation`."""
     chances: dict[str, list[float]] = {}
     for seed in range(800, 800 + FITS):
-        for test in residual_tests(fit(RIG, World(RIG, seed).sightings())):
+        for test in residual_tests(fit(RIG, World(RIG, seed).observations())):
             chances.setdefault(test.name.partition(": L")[0], []).append(test.p)
     assert set(chances) >= {"standoff", "laser", "u", "order", "variance of u and v", "repeats: order"}
     assert "v" not in chances  # four lasers in one line: their v tells nothing
@@ -105,13 +107,13 @@ def test_lasers_above_the_camera_are_tested_against_v() -> None:
         for laser in RIG.lasers
     )
     rig = RIG.model_copy(update={"lasers": upright})
-    names = {test.name for test in residual_tests(fit(rig, World(rig, 1).sightings()))}
+    names = {test.name for test in residual_tests(fit(rig, World(rig, 1).observations()))}
     assert "v" in names
     assert "u" not in names
 
 
 def test_few_readings_leave_nothing_to_test_repeats_with() -> None:
-    names = [test.name for test in residual_tests(fit(RIG, World(RIG, 1).sightings(repeats=1)))]
+    names = [test.name for test in residual_tests(fit(RIG, World(RIG, 1).observations(repeats=1)))]
     assert not [name for name in names if name.startswith("repeats")]
 
 
@@ -127,7 +129,7 @@ def test_the_gamma_approximation_is_exact_for_a_chi_square(value: float) -> None
 def test_noise_smaller_than_stated_is_no_lag_and_no_difference(repeats: int) -> None:
     told = thesis_rig(noise_px=0.12)
     for seed in range(5):
-        assert alarms(residual_tests(fit(told, World(RIG, seed).sightings(repeats=repeats)))) == ()
+        assert alarms(residual_tests(fit(told, World(RIG, seed).observations(repeats=repeats)))) == ()
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -136,12 +138,12 @@ def test_repeats_that_do_not_scatter_as_noise_are_not_tested(seed: int, rounded:
     """Every row three times the same, or positions rounded to ten times their noise."""
     world = World(thesis_rig(noise_px=0.01), seed)
     if rounded:
-        sightings = [
-            replace(s, u_px=round(s.u_px, 1), v_px=round(s.v_px, 1)) for s in world.sightings(repeats=8)
+        observations = [
+            replace(s, u_px=round(s.u_px, 1), v_px=round(s.v_px, 1)) for s in world.observations(repeats=8)
         ]
     else:
-        sightings = [replace(s, repeat=n) for s in world.sightings(repeats=1) for n in range(3)]
-    tests = residual_tests(fit(world.rig, sightings))
+        observations = [replace(s, repeat=n) for s in world.observations(repeats=1) for n in range(3)]
+    tests = residual_tests(fit(world.rig, observations))
     assert not [test.name for test in tests if test.name.startswith("repeats")]
     assert alarms(tests) == ()
 
@@ -149,8 +151,10 @@ def test_repeats_that_do_not_scatter_as_noise_are_not_tested(seed: int, rounded:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_repeats_rounded_to_their_noise_are_tested(seed: int) -> None:
     world = World(thesis_rig(noise_px=0.1), seed)
-    sightings = [replace(s, u_px=round(s.u_px, 1), v_px=round(s.v_px, 1)) for s in world.sightings(repeats=8)]
-    tests = residual_tests(fit(world.rig, sightings))
+    observations = [
+        replace(s, u_px=round(s.u_px, 1), v_px=round(s.v_px, 1)) for s in world.observations(repeats=8)
+    ]
+    tests = residual_tests(fit(world.rig, observations))
     assert "repeats: order" in {test.name for test in tests}
     assert alarms(tests) == ()
 
@@ -162,7 +166,7 @@ def test_hardly_any_data_are_tested_for_nothing(
 ) -> None:
     rig = RIG.model_copy(update={"lasers": RIG.lasers[:lasers]})
     for repeats in (1, 2):
-        tests = residual_tests(fit(rig, World(rig, seed).sightings(standoffs_mm, repeats)))
+        tests = residual_tests(fit(rig, World(rig, seed).observations(standoffs_mm, repeats)))
         assert all(0 <= test.p <= 1 for test in tests)
         assert alarms(tests) == ()
 
@@ -172,11 +176,11 @@ def test_an_unmeasured_coordinate_has_the_place_where_the_fit_puts_it(seed: int)
     """One laser read in v alone: its u is off the middle of the picture all the same."""
     camera = RIG.camera.model_copy(update={"cx_px": prior(200.0, 1.0)})
     rig = RIG.model_copy(update={"camera": camera})
-    sightings = World(rig, seed).sightings()
-    blind = fit(rig, [replace(s, u_px=float("nan")) if s.laser_id == "L2" else s for s in sightings])
+    observations = World(rig, seed).observations()
+    blind = fit(rig, [replace(s, u_px=float("nan")) if s.laser_id == "L2" else s for s in observations])
     of_l2 = blind.cells.laser == rig.laser_ids.index("L2")
     spots = residuals._Spots.of(blind)
-    seen = np.array([s.u_px for s in sightings if s.laser_id == "L2" and s.repeat == 0])
+    seen = np.array([s.u_px for s in observations if s.laser_id == "L2" and s.repeat == 0])
     mine = spots.laser == rig.laser_ids.index("L2")
     assert mine.sum() == of_l2.sum() == len(seen)
     # The other lasers say where the lens is; the prior of the pointing where L2 goes: within some 15 px.

@@ -12,8 +12,8 @@ from tests.support.board_world import CORNER_SD_PX, BoardWorld
 from tests.support.rigs import PROVENANCE, World, board_rig, prior
 from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.data.boards import BoardView, on_boards
-from workbench.calibration.data.observations import Rejected, Sighting
-from workbench.calibration.estimation.fit import Fit, fit
+from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.selection.model_terms import fit_chosen
 from workbench.calibration.verdict.assessment import determined_by
 from workbench.calibration.verdict.export import calibrate, render
@@ -26,13 +26,13 @@ SEEDS = (1, 2, 3)
 FAR_MM = (600.0, 1400.0, 3200.0)
 
 
-def joint(rig: Rig, seed: int) -> tuple[Fit, dict[str, float]]:
+def joint(rig: Rig, seed: int) -> tuple[CalibrationFit, dict[str, float]]:
     world = World(rig, seed)
-    sightings, views = BoardWorld(world).measure()
-    return fit(rig, [*sightings, *world.sightings(FAR_MM)], (), views), world.values
+    observations, views = BoardWorld(world).measure()
+    return fit(rig, [*observations, *world.observations(FAR_MM)], (), views), world.values
 
 
-def of(result: Fit, name: str) -> tuple[float, float, float, str]:
+def of(result: CalibrationFit, name: str) -> tuple[float, float, float, str]:
     """Value, sd, data share, determined by."""
     i = [p.name for p in result.table.parameters].index(name)
     by = determined_by(result)[i]
@@ -51,7 +51,7 @@ def test_the_board_gives_the_focal_length_where_the_flat_does_not(seed: int) -> 
     directions = calibrate(result, Acceptance(), PROVENANCE)[1].directions
     assert not any("f_px" in one.words for one in directions)
 
-    flat = fit(rig, World(rig, seed).sightings())
+    flat = fit(rig, World(rig, seed).observations())
     assert of(flat, "f_px")[2] < 0.1
     assert of(flat, "f_px")[3] == "joint"
     assert of(flat, "f_px")[1] > 10 * sd
@@ -83,10 +83,10 @@ def test_the_print_s_scale_moves_lengths_and_not_the_lens() -> None:
     loose = rig.bench.model_copy(update={"ruler_scale": prior(0.0, 1.0), "offset_mm": prior(0.0, 100.0)})
     lasers = tuple(laser.model_copy(update={"x_mm": prior(laser.x_mm.value, 20.0)}) for laser in rig.lasers)
     rig = rig.model_copy(update={"bench": loose, "lasers": lasers})
-    sightings, views = BoardWorld(World(board_rig(), 4)).measure()
+    observations, views = BoardWorld(World(board_rig(), 4)).measure()
     assumed = rig.bench.model_copy(update={"print_scale": prior(0.01, 0.0)})
-    one = fit(rig, sightings, (), views)
-    other = fit(rig.model_copy(update={"bench": assumed}), sightings, (), views)
+    one = fit(rig, observations, (), views)
+    other = fit(rig.model_copy(update={"bench": assumed}), observations, (), views)
     assert of(other, "f_px")[0] == pytest.approx(of(one, "f_px")[0], rel=1e-4)
     for name in ("L1.x_mm", "L4.x_mm"):
         assert of(other, name)[0] == pytest.approx(1.01 * of(one, name)[0], rel=1e-3)
@@ -108,21 +108,21 @@ def test_baselines_are_known_as_well_as_print_ruler_and_calliper_tell() -> None:
 def test_a_start_far_from_the_truth_ends_in_the_same_place() -> None:
     rig = board_rig()
     world = World(rig, 6)
-    sightings, views = BoardWorld(world).measure()
+    observations, views = BoardWorld(world).measure()
     shifted = rig.camera.model_copy(update={"f_px": prior(490.0, 1e3), "cx_px": prior(280.0, 1e3)})
-    one = fit(rig, sightings, (), views)
-    other = fit(rig.model_copy(update={"camera": shifted}), sightings, (), views)
+    one = fit(rig, observations, (), views)
+    other = fit(rig.model_copy(update={"camera": shifted}), observations, (), views)
     assert of(other, "f_px")[0] == pytest.approx(of(one, "f_px")[0], abs=0.1 * of(one, "f_px")[1])
 
 
 def test_an_unsquare_board_upside_down() -> None:
     """Nothing is assumed of how the board is turned: half a turn of it is another roll."""
     rig = board_rig()
-    sightings, views = BoardWorld(World(rig, 7)).measure()
+    observations, views = BoardWorld(World(rig, 7)).measure()
     count = len(rig.board.corners_mm)
     # Seen by the board's corners renamed: the board is its own image under half a turn but for the names.
     turned = [replace(v, corners=replace(v.corners, ids=count - 1 - v.corners.ids)) for v in views]
-    one, other = fit(rig, sightings, (), views), fit(rig, sightings, (), turned)
+    one, other = fit(rig, observations, (), views), fit(rig, observations, (), turned)
     assert of(other, "f_px")[0] == pytest.approx(of(one, "f_px")[0], rel=1e-6)
     roll = of(other, "B1.board_roll_rad")[0] - of(one, "B1.board_roll_rad")[0]
     assert np.cos(roll) == pytest.approx(-1.0, abs=1e-6)
@@ -142,39 +142,39 @@ def test_what_the_yaml_says_of_it(tmp_path: Path) -> None:
 
 def test_spots_beside_the_band_or_on_a_board_not_found() -> None:
     rig = board_rig()
-    sightings, views = BoardWorld(World(rig, 9)).measure(repeats=1)
+    observations, views = BoardWorld(World(rig, 9)).measure(repeats=1)
     seen = {view.placement.key: view for view in views}
-    kept = on_boards(rig.board, seen, sightings)
-    assert kept == sightings
+    kept = on_boards(rig.board, seen, observations)
+    assert kept == observations
     # 12 mm from the band's middle at 300 mm: 533 / 300 x 12 = 21 px.
-    beside = [replace(s, v_px=s.v_px + 40.0) for s in sightings if s.placement == "B1"]
+    beside = [replace(s, v_px=s.v_px + 40.0) for s in observations if s.placement == "B1"]
     for rejected in on_boards(rig.board, seen, beside):
         assert isinstance(rejected, Rejected)
         assert "blank band" in rejected.reason
     lost: dict[str, BoardView | Rejected] = {**seen, "B1": Rejected("B1", "dark")}
-    of_b1 = [s for s in on_boards(rig.board, lost, sightings) if isinstance(s, Rejected)]
+    of_b1 = [s for s in on_boards(rig.board, lost, observations) if isinstance(s, Rejected)]
     assert [r.reason.split(": ")[1] for r in of_b1] == ["the board that it fell on was not found"] * 4
 
 
 def test_two_boards_at_one_placement_and_a_board_told_otherwise() -> None:
     rig = board_rig()
-    sightings, views = BoardWorld(World(rig, 1)).measure(repeats=1)
+    observations, views = BoardWorld(World(rig, 1)).measure(repeats=1)
     with pytest.raises(BadInputError, match="one board"):
-        fit(rig, sightings, (), [*views, views[0]])
+        fit(rig, observations, (), [*views, views[0]])
     moved = replace(views[0], placement=replace(views[0].placement, standoff_mm=250.0))
     with pytest.raises(BadInputError, match=r"250 mm.*other placements other names"):
-        fit(rig, sightings, (), [moved])
+        fit(rig, observations, (), [moved])
 
 
 def test_a_mirrored_picture_fits_no_pose() -> None:
     rig = board_rig()
-    sightings: list[Sighting]
-    sightings, views = BoardWorld(World(rig, 1)).measure(repeats=1)
+    observations: list[Observation]
+    observations, views = BoardWorld(World(rig, 1)).measure(repeats=1)
     corners = views[1].corners
     position_px = np.array([639.0, 0.0]) + np.array([-1.0, 1.0]) * corners.position_px
     mirrored = replace(corners, position_px=position_px)
     with pytest.raises(BadInputError, match="mirrored"):
-        fit(rig, sightings, (), [replace(views[1], corners=mirrored)])
+        fit(rig, observations, (), [replace(views[1], corners=mirrored)])
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -182,8 +182,8 @@ def test_terms_are_weighed_with_the_board_as_well(seed: int) -> None:
     """With a board k1 and k2 are known to a thousandth: what is there is shown."""
     rig = board_rig()
     world = World(rig, seed)
-    sightings, views = BoardWorld(world).measure()
-    fitted = fit_chosen(rig, [*sightings, *world.sightings(FAR_MM)], (), views)
+    observations, views = BoardWorld(world).measure()
+    fitted = fit_chosen(rig, [*observations, *world.observations(FAR_MM)], (), views)
     told = {term.name: term for term in fitted.terms}
     assert told["k1"].verdict == "shown"
     assert set(told) == {"k2", "k1", "ruler_scale", "tilts"}

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from workbench.calibration.data.averaging import strays
-from workbench.calibration.data.observations import Sighting, group
+from workbench.calibration.data.observations import Observation, group
 from workbench.model.errors import BadInputError
 from workbench.model.rig import NoiseSpec
 
 NOISE = NoiseSpec(spot_sd_px=0.1, speckle_sd_px=0.04)
 
 
-def sightings(us: list[float], sds: list[float]) -> list[Sighting]:
+def observations(us: list[float], sds: list[float]) -> list[Observation]:
     return [
-        Sighting(f"row {i}", "1", "p", 500.0, i, u, 10.0, sd, sd)
+        Observation(f"row {i}", "1", "p", 500.0, i, u, 10.0, sd, sd)
         for i, (u, sd) in enumerate(zip(us, sds, strict=True))
     ]
 
 
 def test_the_mean_is_weighted_and_keeps_the_shared_error() -> None:
-    cells, rejected = group(sightings([100.0, 101.0], [0.5, 1.0]), ["1"], NOISE)
+    cells, rejected = group(observations([100.0, 101.0], [0.5, 1.0]), ["1"], NOISE)
     # Weights 4 and 1: mean (400 + 101) / 5, variance 1 / 5; the speckle does not average out.
     np.testing.assert_allclose(cells.position_px, [[100.2, 10.0]])
     np.testing.assert_allclose(cells.sd_px**2, [[0.2 + 0.04**2] * 2])
@@ -29,13 +29,13 @@ def test_the_mean_is_weighted_and_keeps_the_shared_error() -> None:
 
 
 def test_a_deviation_not_stated_is_the_rig_s() -> None:
-    cells, _ = group([replace(sightings([7.0], [1.0])[0], u_sd_px=np.nan)], ["1"], NOISE)
+    cells, _ = group([replace(observations([7.0], [1.0])[0], u_sd_px=np.nan)], ["1"], NOISE)
     np.testing.assert_allclose(cells.sd_px[0], [np.hypot(0.1, 0.04), np.hypot(1.0, 0.04)])
 
 
 def test_cells_by_laser_and_placement() -> None:
     rows = [
-        Sighting(f"row {i}", laser, place, float(place), 0, 1.0, 2.0)
+        Observation(f"row {i}", laser, place, float(place), 0, 1.0, 2.0)
         for i, (laser, place) in enumerate([("a", "500"), ("b", "500"), ("b", "700")])
     ]
     cells, _ = group(rows, ["b", "a"], NOISE)
@@ -46,7 +46,7 @@ def test_cells_by_laser_and_placement() -> None:
 
 def test_a_repeat_far_from_its_fellows_is_rejected_by_name() -> None:
     us = [100.0, 100.1, 99.9, 100.05, 99.95, 100.02, 100.04, 99.97, 100.01, 103.0]
-    cells, rejected = group(sightings(us, [0.1] * 10), ["1"], NOISE)
+    cells, rejected = group(observations(us, [0.1] * 10), ["1"], NOISE)
     assert [r.source for r in rejected] == ["row 9"]
     assert "2.98 px" in rejected[0].reason
     assert len(cells.members[0]) == 9
@@ -54,13 +54,13 @@ def test_a_repeat_far_from_its_fellows_is_rejected_by_name() -> None:
 
 @pytest.mark.parametrize("us", [[100.0, 100.1, 103.0], [100.0, 100.1, 99.9, 100.5] * 3])
 def test_repeats_that_may_be_noise_stay(us: list[float]) -> None:
-    cells, rejected = group(sightings(us, [0.1] * len(us)), ["1"], NOISE)
+    cells, rejected = group(observations(us, [0.1] * len(us)), ["1"], NOISE)
     assert rejected == []
     assert len(cells.members[0]) == len(us)
 
 
 def test_a_coordinate_that_some_repeats_lack_is_the_mean_of_the_others() -> None:
-    rows = sightings([100.0, 101.0, 102.0], [0.1] * 3)
+    rows = observations([100.0, 101.0, 102.0], [0.1] * 3)
     cells, _ = group([replace(rows[0], u_px=np.nan), *rows[1:]], ["1"], NOISE)
     np.testing.assert_allclose(cells.position_px, [[101.5, 10.0]])
     scaled = cells.repeat_scale**2 * np.array([0.01 / 2, 0.01 / 3])
@@ -68,7 +68,7 @@ def test_a_coordinate_that_some_repeats_lack_is_the_mean_of_the_others() -> None
 
 
 def test_rows_that_say_two_things_of_one_placement() -> None:
-    rows = sightings([100.0, 101.0], [0.1] * 2)
+    rows = observations([100.0, 101.0], [0.1] * 2)
     with pytest.raises(BadInputError, match=r"row 1: .*row 0 says of the same placement p .*got 600 mm"):
         group([rows[0], replace(rows[1], standoff_mm=600.0)], ["1"], NOISE)
 
@@ -84,18 +84,18 @@ def test_honest_repeats_are_hardly_ever_rejected() -> None:
 
 
 def test_a_coordinate_never_measured_stays_unknown() -> None:
-    rows = [replace(s, u_px=np.nan) for s in sightings([1.0] * 5, [0.1] * 5)]
+    rows = [replace(s, u_px=np.nan) for s in observations([1.0] * 5, [0.1] * 5)]
     cells, rejected = group(rows, ["1"], NOISE)
     assert np.isnan(cells.position_px[0, 0])
     assert cells.position_px[0, 1] == pytest.approx(10.0)
     assert rejected == []
 
 
-def many(rng: np.random.Generator, cells: int, repeats: int, sd: float) -> list[Sighting]:
+def many(rng: np.random.Generator, cells: int, repeats: int, sd: float) -> list[Observation]:
     """Honest repeats of one laser at several placements."""
     spots = rng.normal(0.0, sd, (cells, repeats, 2)) + 10.0 * np.arange(cells)[:, None, None]
     return [
-        Sighting(f"{c} {k}", "1", f"{c}", 500.0 + c, k, u, v)
+        Observation(f"{c} {k}", "1", f"{c}", 500.0 + c, k, u, v)
         for c, repeats_of_one in enumerate(spots.tolist())
         for k, (u, v) in enumerate(repeats_of_one)
     ]

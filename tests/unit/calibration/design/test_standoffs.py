@@ -27,14 +27,14 @@ from workbench.calibration.design.standoffs import (
     worst_of,
 )
 from workbench.calibration.estimation.batch import fit_batch
-from workbench.calibration.estimation.fit import Fit, fit
+from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
 from workbench.model.errors import BadInputError
-from workbench.model.nested import hold
+from workbench.model.nested import fix_parameters
 from workbench.model.procedure import load_procedure
 from workbench.model.rig import BenchSpec, Rig, load_rig
-from workbench.sensor.calibrated import Sensor
+from workbench.sensor.calibrated import CalibratedSensor
 
 ROOT = Path(__file__).parents[4]
 RIG = load_rig(ROOT / "rigs/thesis-emulated.yaml")
@@ -68,8 +68,8 @@ def test_spots_tell_what_differences_of_the_simulator_say() -> None:
 
 def test_ranges_depend_on_parameters_as_the_sensor_says() -> None:
     world = World(thesis_rig(), 2)
-    calibration = calibrate(fit(world.rig, world.sightings()), Acceptance(), PROVENANCE)[0]
-    sensor = Sensor(calibration)
+    calibration = calibrate(fit(world.rig, world.observations()), Acceptance(), PROVENANCE)[0]
+    sensor = CalibratedSensor(calibration)
     parameters = calibration.laser_ranger.parameters
     expectation = Expectation(world.rig, np.array([parameters.values]))
     at = np.array([200.0, 900.0, 4000.0])
@@ -254,7 +254,7 @@ def test_a_range_that_no_spot_shows_has_no_forecast() -> None:
 def test_a_rig_of_constants_has_nothing_to_determine() -> None:
     rig = thesis_rig()
     names = [p.name for p in Expectation(rig, np.empty((0, 0))).table.parameters]
-    fixed = hold(rig, names)
+    fixed = fix_parameters(rig, names)
     found = forecast(fixed, (200.0, 1000.0), 10)
     assert found.parameters == ()
     assert found.directions == ()
@@ -271,21 +271,21 @@ class TestAdvice:
 
     def test_it_ends_at_what_the_fit_states(self) -> None:
         world = World(RIG, 3)
-        sightings = world.sightings(SHIPPED, 10)
-        advice = advise(RIG, sightings, SHIPPED)
+        observations = world.observations(SHIPPED, 10)
+        advice = advise(RIG, observations, SHIPPED)
         assert advice is not None
-        calibration, _ = calibrate(fit(RIG, sightings), Acceptance(), PROVENANCE)
+        calibration, _ = calibrate(fit(RIG, observations), Acceptance(), PROVENANCE)
         stated = calibration.laser_ranger.validity.max_relative_range_sd
         assert advice.relative_range_sd == pytest.approx(stated, rel=0.01)
         assert advice.placements == len(SHIPPED)
 
     def test_a_placement_where_it_says_gains_what_it_says(self) -> None:
         world = World(RIG, 3)
-        before = advise(RIG, world.sightings(SHIPPED[:3], 10), SHIPPED)
+        before = advise(RIG, world.observations(SHIPPED[:3], 10), SHIPPED)
         assert before is not None
         assert before.then_relative_range_sd < 0.3 * before.relative_range_sd
         further = (*SHIPPED[:3], before.next_standoff_mm)
-        after = advise(RIG, world.sightings(further, 10), SHIPPED)
+        after = advise(RIG, world.observations(further, 10), SHIPPED)
         assert after is not None
         assert after.relative_range_sd == pytest.approx(before.then_relative_range_sd, rel=0.15)
 
@@ -296,25 +296,25 @@ class TestAdvice:
         louder = stated.model_copy(
             update={name: noise * getattr(stated, name) for name in ("spot_sd_px", "speckle_sd_px")}
         )
-        sightings = World(RIG.model_copy(update={"noise": louder}), seed).sightings(SHIPPED[::2], 10)
-        advice = advise(RIG, sightings, SHIPPED)
+        observations = World(RIG.model_copy(update={"noise": louder}), seed).observations(SHIPPED[::2], 10)
+        advice = advise(RIG, observations, SHIPPED)
         assert advice is not None
-        fitted = fit(RIG, sightings)
+        fitted = fit(RIG, observations)
         assert (fitted.noise_scale > 2) == (noise == 3.0)
         assert advice.relative_range_sd == pytest.approx(self.worst_of_fit(fitted), rel=1e-3)
 
     @pytest.mark.parametrize("told", [{"standoff_sd_mm": 5.0}, {"yaw_deg": 20.0}])
     def test_what_captures_tell_of_their_placement_counts(self, told: dict[str, Any]) -> None:
-        plain = World(RIG, 3).sightings(SHIPPED[::2], 10)
-        sightings = [replace(s, **told) for s in plain]
-        advice, without = advise(RIG, sightings, SHIPPED), advise(RIG, plain, SHIPPED)
+        plain = World(RIG, 3).observations(SHIPPED[::2], 10)
+        observations = [replace(s, **told) for s in plain]
+        advice, without = advise(RIG, observations, SHIPPED), advise(RIG, plain, SHIPPED)
         assert advice is not None
         assert without is not None
-        assert advice.relative_range_sd == pytest.approx(self.worst_of_fit(fit(RIG, sightings)), rel=1e-3)
+        assert advice.relative_range_sd == pytest.approx(self.worst_of_fit(fit(RIG, observations)), rel=1e-3)
         assert advice.relative_range_sd != pytest.approx(without.relative_range_sd, rel=0.01)
 
     @staticmethod
-    def worst_of_fit(fitted: Fit) -> float:
+    def worst_of_fit(fitted: CalibrationFit) -> float:
         """The worst range over the shipped procedure's span, the noise of its spot included."""
         sensors = Expectation(RIG, fitted.values[None, fitted.sensor])
         free = sensors.table.free
@@ -332,12 +332,12 @@ class TestAdvice:
     @pytest.mark.parametrize("seed", [1, 2])
     def test_the_worst_residual_is_named(self, seed: int) -> None:
         """A spot that lies 3 px off is seen while the target still stands, by the final fit's residuals."""
-        plain = World(RIG, seed).sightings(SHIPPED[:6], 10)
+        plain = World(RIG, seed).observations(SHIPPED[:6], 10)
         bad = ("L3", SHIPPED[4])
-        sightings = [
+        observations = [
             replace(s, u_px=s.u_px + 3.0) if (s.laser_id, s.standoff_mm) == bad else s for s in plain
         ]
-        advice, without = advise(RIG, sightings, SHIPPED), advise(RIG, plain, SHIPPED)
+        advice, without = advise(RIG, observations, SHIPPED), advise(RIG, plain, SHIPPED)
         assert advice is not None
         assert without is not None
         assert (advice.worst_laser_id, advice.worst_standoff_mm) == bad
@@ -353,7 +353,7 @@ class TestAdvice:
     def test_too_little_is_no_advice(self) -> None:
         world = World(RIG, 3)
         assert advise(RIG, [], SHIPPED) is None
-        assert advise(RIG, world.sightings(SHIPPED[:1], 10), SHIPPED) is None
+        assert advise(RIG, world.observations(SHIPPED[:1], 10), SHIPPED) is None
 
     def test_the_shipped_procedure_is_the_one_meant_here(self) -> None:
         steps = load_procedure(ROOT / "procedures/calibrate-flat.yaml").steps

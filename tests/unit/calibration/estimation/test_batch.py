@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from tests.support.rigs import World, thesis_rig
-from workbench.calibration.data.observations import Sighting, group
+from workbench.calibration.data.observations import Observation, group
 from workbench.calibration.estimation.batch import CHUNK, BatchFit, as_grid, fit_batch
-from workbench.calibration.estimation.fit import Fit, fit
+from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.model.rig import Rig
 
 STANDOFFS_MM = (125.0, 200.0, 330.0, 600.0, 1200.0, 2500.0, 4500.0)
@@ -20,9 +20,9 @@ SOLVED_SD = 1e-6
 """What two solvers of one problem may differ by, in posterior standard deviations."""
 
 
-def sightings(rig: Rig, seed: int) -> list[Sighting]:
+def observations(rig: Rig, seed: int) -> list[Observation]:
     """Of even seeds, spots are missing at random, in one coordinate or in both."""
-    seen = World(rig, seed).sightings(STANDOFFS_MM, repeats=3)
+    seen = World(rig, seed).observations(STANDOFFS_MM, repeats=3)
     if seed % 2:
         return seen
     rng = np.random.default_rng([seed, 2])
@@ -34,11 +34,11 @@ def sightings(rig: Rig, seed: int) -> list[Sighting]:
 class Both:
     """The same calibrations by either solver."""
 
-    single: list[Fit]
+    single: list[CalibrationFit]
     batch: BatchFit
 
 
-def both(rig: Rig, per_seed: list[list[Sighting]]) -> Both:
+def both(rig: Rig, per_seed: list[list[Observation]]) -> Both:
     single = [fit(rig, seen) for seen in per_seed]
     grids = [as_grid(s.cells, len(rig.lasers)) for s in single]
     position, sd = (np.stack(part) for part in zip(*grids, strict=True))
@@ -48,7 +48,7 @@ def both(rig: Rig, per_seed: list[list[Sighting]]) -> Both:
 @pytest.fixture(scope="module")
 def solved() -> Both:
     rig = thesis_rig()
-    return both(rig, [sightings(rig, seed) for seed in SEEDS])
+    return both(rig, [observations(rig, seed) for seed in SEEDS])
 
 
 @pytest.mark.parametrize("index", range(len(SEEDS)), ids=[f"seed {s}" for s in SEEDS])
@@ -117,7 +117,7 @@ def test_noise_larger_than_stated() -> None:
     """Spots three times as noisy as the rig says: both solvers enlarge the noise to the same."""
     told = thesis_rig()
     noisy = thesis_rig(noise_px=0.15, speckle_px=0.12)
-    pair = both(told, [World(noisy, seed).sightings(STANDOFFS_MM, repeats=1) for seed in (11, 13)])
+    pair = both(told, [World(noisy, seed).observations(STANDOFFS_MM, repeats=1) for seed in (11, 13)])
     for index, single in enumerate(pair.single):
         assert pair.batch.noise_scale[index] > 1.5
         assert pair.batch.noise_scale[index] == pytest.approx(single.noise_scale, rel=1e-6)
@@ -127,7 +127,7 @@ def test_noise_larger_than_stated() -> None:
 def test_a_fit_does_not_depend_on_its_company() -> None:
     """More than a chunk, which is not full at its end: every fit comes back in its place."""
     rig = thesis_rig()
-    cells, _ = group(World(rig, 1).sightings(STANDOFFS_MM, repeats=2), rig.laser_ids, rig.noise)
+    cells, _ = group(World(rig, 1).observations(STANDOFFS_MM, repeats=2), rig.laser_ids, rig.noise)
     position, sd = as_grid(cells, len(rig.lasers))
     shifts = np.random.default_rng(4).normal(0.0, 0.03, (CHUNK + 3, *position.shape))
     together = fit_batch(rig, cells.placements, position + shifts, sd)
@@ -142,7 +142,7 @@ def test_a_fit_does_not_depend_on_its_company() -> None:
 
 def test_a_cell_that_no_calibration_saw_leaves_the_priors() -> None:
     rig = thesis_rig()
-    cells, _ = group(World(rig, 1).sightings(STANDOFFS_MM, repeats=1), rig.laser_ids, rig.noise)
+    cells, _ = group(World(rig, 1).observations(STANDOFFS_MM, repeats=1), rig.laser_ids, rig.noise)
     blind = fit_batch(rig, cells.placements, np.full((1, len(STANDOFFS_MM), 4, 2), np.nan), np.array(0.05))
     np.testing.assert_allclose(blind.values[0], blind.table.prior_mean, atol=1e-12)
     np.testing.assert_allclose(blind.sd[0], blind.table.prior_sd, rtol=1e-12)

@@ -10,9 +10,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from tests.support.rigs import STANDOFFS_MM, World, prior, thesis_rig
-from workbench.calibration.data.observations import Rejected, Sighting
-from workbench.calibration.data.spot_rows import sight_rows
-from workbench.calibration.estimation.fit import Fit, data_share, fit
+from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.data.spot_rows import observations_of_rows
+from workbench.calibration.estimation.fit import CalibrationFit, data_share, fit
 from workbench.calibration.model.parameters import Parameter, ParameterTable
 from workbench.calibration.verdict.assessment import derive, determined_by
 from workbench.model.captures import load_captures
@@ -23,11 +23,11 @@ ROOT = Path(__file__).parents[4]
 SEEDS = (1, 2, 3)
 
 
-def value(result: Fit, name: str) -> float:
+def value(result: CalibrationFit, name: str) -> float:
     return float(result.values[[p.name for p in result.table.parameters].index(name)])
 
 
-def deviation(result: Fit, name: str) -> float:
+def deviation(result: CalibrationFit, name: str) -> float:
     return float(result.sd[[p.name for p in result.table.parameters].index(name)])
 
 
@@ -39,8 +39,8 @@ class TestWebcam:
         return load_rig(ROOT / "rigs/webcam-laser.yaml")
 
     @staticmethod
-    def fitted(rig: Rig) -> Fit:
-        return fit(rig, *sight_rows(rig, load_captures(ROOT / "data/webcam-laser-rows.csv")))
+    def fitted(rig: Rig) -> CalibrationFit:
+        return fit(rig, *observations_of_rows(rig, load_captures(ROOT / "data/webcam-laser-rows.csv")))
 
     def test_product_and_infinity_are_those_of_ordinary_least_squares(self, rig: Rig) -> None:
         result = self.fitted(rig)
@@ -91,8 +91,8 @@ class TestWebcam:
 def test_the_optimum_is_scipy_s(seed: int) -> None:
     """The same posterior written again with OpenCV's lens and solved by scipy from the same start."""
     rig = thesis_rig()
-    sightings = World(rig, seed).sightings(repeats=1)
-    result = fit(rig, sightings)
+    observations = World(rig, seed).observations(repeats=1)
+    result = fit(rig, observations)
     table, cells = result.table, result.cells
     names = [p.name for p in table.parameters]
     model = World(rig, seed)
@@ -130,7 +130,7 @@ def test_the_truth_lies_where_the_covariance_says() -> None:
     distance2, count = 0.0, 0
     for seed in range(100, 140):
         world = World(rig, seed)
-        result = fit(rig, world.sightings())
+        result = fit(rig, world.observations())
         free = result.table.free[result.table.free < result.sensor.stop]
         names = [result.table.parameters[i].name for i in free]
         error = result.values[free] - np.array([world.values[name] for name in names])
@@ -143,7 +143,7 @@ def test_the_truth_lies_where_the_covariance_says() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_flat_does_not_give_the_focal_length(seed: int) -> None:
-    result = fit(thesis_rig(), World(thesis_rig(), seed).sightings())
+    result = fit(thesis_rig(), World(thesis_rig(), seed).observations())
     names = [p.name for p in result.table.parameters]
     # Sharp by the calliper on four baselines, not by the data.
     assert deviation(result, "f_px") < 0.1 * 26.7
@@ -180,16 +180,16 @@ def test_a_placement_s_error_counts_as_noise_of_the_data() -> None:
 
 def test_more_repeats_at_one_placement_do_not_wash_out_its_error() -> None:
     rig = thesis_rig(speckle_px=0.0)
-    one = fit(rig, World(rig, 5).sightings((200.0, 400.0, 800.0), repeats=2))
-    many = fit(rig, World(rig, 5).sightings((200.0, 400.0, 800.0), repeats=200))
+    one = fit(rig, World(rig, 5).observations((200.0, 400.0, 800.0), repeats=2))
+    many = fit(rig, World(rig, 5).observations((200.0, 400.0, 800.0), repeats=200))
     # 100 times the pictures; were they independent the offset's sd would fall tenfold.
     assert deviation(many, "offset_mm") > 0.5 * deviation(one, "offset_mm")
 
 
 def test_what_captures_state_of_a_placement_replaces_the_rig_s_prior() -> None:
     rig = thesis_rig()
-    sightings = World(rig, 1).sightings(repeats=1)
-    told = [replace(s, standoff_sd_mm=0.01, yaw_deg=2.0) for s in sightings]
+    observations = World(rig, 1).observations(repeats=1)
+    told = [replace(s, standoff_sd_mm=0.01, yaw_deg=2.0) for s in observations]
     result = fit(rig, told)
     by_name = {p.name: p.prior for p in result.table.parameters}
     assert by_name["125.error_mm"].sd == 0.01
@@ -200,9 +200,9 @@ def test_what_captures_state_of_a_placement_replaces_the_rig_s_prior() -> None:
 
 def test_a_laser_unknown_to_the_rig() -> None:
     rig = thesis_rig()
-    sighting = replace(World(rig, 1).sightings()[0], laser_id="L9", source="row 7")
+    observation = replace(World(rig, 1).observations()[0], laser_id="L9", source="row 7")
     with pytest.raises(BadInputError, match=r"row 7: laser_id: expected one of L1.*got L9"):
-        fit(rig, [sighting])
+        fit(rig, [observation])
 
 
 @pytest.mark.parametrize(("standoff_mm", "cause"), [(40.0, "outside the picture, at u = "), (700.0, "dark")])
@@ -210,9 +210,9 @@ def test_a_spot_that_cannot_be_in_the_picture_is_not_blamed_on_the_light(
     standoff_mm: float, cause: str
 ) -> None:
     rig = thesis_rig()
-    sightings = World(rig, 1).sightings(repeats=1)
-    missing = Sighting("row 9", "L4", "near", standoff_mm, 0, np.nan, np.nan)
-    result = fit(rig, sightings, [Rejected("row 9", "too dark", missing)])
+    observations = World(rig, 1).observations(repeats=1)
+    missing = Observation("row 9", "L4", "near", standoff_mm, 0, np.nan, np.nan)
+    result = fit(rig, observations, [Rejected("row 9", "too dark", missing)])
     assert cause in result.rejected[0].reason
 
 
@@ -223,7 +223,7 @@ def test_nothing_to_fit() -> None:
 
 def test_standoffs_are_named_in_the_residuals() -> None:
     rig = thesis_rig()
-    result = fit(rig, World(rig, 1).sightings())
+    result = fit(rig, World(rig, 1).observations())
     assert {p.standoff_mm for p in result.cells.placements} == set(STANDOFFS_MM)
     assert result.residual_px.shape == (len(result.cells.laser), 2)
     assert result.rms_px < 0.1
@@ -233,12 +233,12 @@ def test_a_target_behind_the_pinhole() -> None:
     rig = thesis_rig()
     bench = rig.bench.model_copy(update={"offset_mm": prior(-300.0, 5.0)})
     with pytest.raises(BadInputError, match=r"125 mm, which rig thesis puts at a depth of -175 mm"):
-        fit(rig.model_copy(update={"bench": bench}), World(rig, 1).sightings(repeats=1))
+        fit(rig.model_copy(update={"bench": bench}), World(rig, 1).observations(repeats=1))
 
 
 def test_positions_that_contradict_everything_are_said_to() -> None:
     rig = thesis_rig()
-    wild = [replace(s, v_px=1e200) for s in World(rig, 1).sightings(repeats=1)]
+    wild = [replace(s, v_px=1e200) for s in World(rig, 1).observations(repeats=1)]
     with pytest.raises(LimitFailedError, match="finite result"):
         fit(rig, wild)
 
@@ -247,7 +247,7 @@ def test_repeats_that_scatter_more_than_stated_are_believed() -> None:
     """Noise ten times the stated: the means' deviations and the exported spot's must follow."""
     rig = thesis_rig(noise_px=0.3)
     told = thesis_rig(noise_px=0.03)
-    result = fit(told, World(rig, 1).sightings(repeats=20))
+    result = fit(told, World(rig, 1).observations(repeats=20))
     # 44 cells of 20 repeats and 2 coordinates: the ratio is known to 1 / sqrt(2 x 1672) = 1.7 %.
     assert result.cells.repeat_scale == pytest.approx(10.0, rel=0.06)
     np.testing.assert_allclose(result.cells.sd_px, np.hypot(0.3 / np.sqrt(20), 0.04), rtol=0.06)

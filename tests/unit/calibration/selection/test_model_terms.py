@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.stats import kstest
 
 from tests.support.rigs import PROVENANCE, World, prior, thesis_rig
-from workbench.calibration.estimation.fit import Fit, fit
-from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.model.term import Term
 from workbench.calibration.selection import model_terms
 from workbench.calibration.selection.model_terms import fit_chosen, without_idle
@@ -20,7 +20,7 @@ from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
-from workbench.sensor.calibrated import Sensor
+from workbench.sensor.calibrated import CalibratedSensor
 
 FloatArray = NDArray[np.float64]
 SEEDS = (3, 4, 8)
@@ -32,17 +32,17 @@ def lens(rig: Rig, **priors: float) -> Rig:
     return rig.model_copy(update={"camera": camera})
 
 
-def chosen(rig: Rig, world: World, keep: tuple[str, ...] = ()) -> Fit:
-    return fit_chosen(rig, world.sightings(), keep=keep)
+def chosen(rig: Rig, world: World, keep: tuple[str, ...] = ()) -> CalibrationFit:
+    return fit_chosen(rig, world.observations(), keep=keep)
 
 
-def told(fitted: Fit) -> dict[str, Term]:
+def told(fitted: CalibrationFit) -> dict[str, Term]:
     return {term.name: term for term in fitted.terms}
 
 
-def linear(fitted: Fit) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+def linear(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """At the priors' means: residuals (n,), derivatives (n, P) in priors' sd; which are free (P,)."""
-    problem = Problem.of(len(fitted.rig.lasers), fitted.table, fitted.cells, (), fitted.rig.board)
+    problem = LeastSquaresProblem.of(len(fitted.rig.lasers), fitted.table, fitted.cells, (), fitted.rig.board)
     sd = fitted.table.prior_sd
     y = np.divide(fitted.values - fitted.table.prior_mean, sd, out=np.zeros_like(sd), where=sd > 0)
     residual, jacobian = problem.linearise(y, fitted.noise_scale)
@@ -58,7 +58,7 @@ def log_likelihood(residual: FloatArray, jacobian: FloatArray) -> float:
 @pytest.mark.parametrize("name", ["k2", "k3", "ruler_scale", "tilts"])
 def test_the_bayes_factor_is_the_ratio_of_marginal_likelihoods(name: str) -> None:
     rig = lens(thesis_rig(), k3=0.3)
-    fitted = fit(rig, World(rig, 3).sightings())
+    fitted = fit(rig, World(rig, 3).observations())
     index = model_terms._indices(fitted, [name])
     residual, jacobian, _ = linear(fitted)
     without = np.delete(jacobian, index, axis=1)
@@ -69,7 +69,7 @@ def test_the_bayes_factor_is_the_ratio_of_marginal_likelihoods(name: str) -> Non
 def test_what_is_carried_is_the_error_of_the_smaller_estimate() -> None:
     """Its gain applied to data whose k3 is as the prior says, against `_carried`."""
     rig = lens(thesis_rig(), k3=0.05)
-    fitted = fit(rig, World(rig, 3).sightings())
+    fitted = fit(rig, World(rig, 3).observations())
     index = model_terms._indices(fitted, ["k3"])
     _, jacobian, free = linear(fitted)
     free[index] = False
@@ -91,7 +91,7 @@ def test_p_values_of_an_absent_term_are_uniform() -> None:
     worlds = [World(lens(rig, k3=0.0), seed) for seed in range(40)]
     p_values = []
     for world in worlds:
-        fitted = fit(rig, [s for s in world.sightings() if s.standoff_mm > 150])
+        fitted = fit(rig, [s for s in world.observations() if s.standoff_mm > 150])
         p_values.append(model_terms._compare(fitted, model_terms._indices(fitted, ["k3"])).p_value)
     assert kstest(p_values, "uniform").pvalue > 0.01
 
@@ -131,7 +131,7 @@ def test_a_k3_that_buys_nothing_is_left_out_and_stays_in_the_covariance(seed: in
     k3 = names.index("k3")
     exported = without_idle(fitted)
     assert (exported.values[k3], exported.sd[k3]) == (0.0, pytest.approx(0.1))
-    refitted = fit(lens(rig, k3=0.0), world.sightings())
+    refitted = fit(lens(rig, k3=0.0), world.observations())
     free = refitted.sd > 0
     np.testing.assert_allclose((exported.values - refitted.values)[free] / refitted.sd[free], 0.0, atol=0.05)
     full = chosen(rig, world, keep=("k3",))
@@ -161,9 +161,9 @@ def test_the_shift_of_a_range_is_that_of_two_fits(seed: int) -> None:
     """Ranged with and without k2, spots of the model with it; differences of the fits themselves."""
     world = World(thesis_rig(), seed)
     world.values |= {"k2": 0.1}  # small, so that first order is enough
-    full = fit(thesis_rig(), world.sightings())
-    reduced = fit(lens(thesis_rig(), k2=0.0), world.sightings())
-    with_it, without = (Sensor(calibrate(f, Acceptance(), PROVENANCE)[0]) for f in (full, reduced))
+    full = fit(thesis_rig(), world.observations())
+    reduced = fit(lens(thesis_rig(), k2=0.0), world.observations())
+    with_it, without = (CalibratedSensor(calibrate(f, Acceptance(), PROVENANCE)[0]) for f in (full, reduced))
     standoffs = np.geomspace(125.0, 4500.0, model_terms.GRID)
     shifts = []
     for laser in with_it.ids:
@@ -181,8 +181,8 @@ def test_the_shift_of_a_range_is_that_of_two_fits(seed: int) -> None:
 def test_terms_that_can_replace_each_other_are_not_both_idle(seed: int) -> None:
     rig = lens(thesis_rig(), k1=0.3, k2=1.0, k3=3.0)
     world = World(thesis_rig(), seed)
-    sightings = [s for s in world.sightings() if s.standoff_mm > 150]
-    fitted = fit_chosen(rig, sightings)
+    observations = [s for s in world.observations() if s.standoff_mm > 150]
+    fitted = fit_chosen(rig, observations)
     idle = [t.name for t in fitted.terms if t.verdict == "idle"]
     assert idle
     shift, widening = model_terms._effect_on_ranges(fitted, model_terms._indices(fitted, idle))
@@ -198,7 +198,7 @@ def test_spots_that_the_model_lacks_a_term_for_are_not_thrown_out(seed: int) -> 
     world = World(thesis_rig(), seed)
     world.values |= {"k1": -0.2, "k2": 0.4}
     fitted = chosen(rig, world)
-    assert len(fitted.used) == len(world.sightings())
+    assert len(fitted.used) == len(world.observations())
     assert told(fitted)["k2"].p_value < 1e-6
 
 
@@ -220,9 +220,9 @@ def test_a_smaller_model_is_fitted_to_the_captures_in_their_order() -> None:
     """What moved is found by the order of captures, those with a stray spot among them."""
     rig = thesis_rig()
     square = rig.model_copy(update={"bench": rig.bench.model_copy(update={"tilt_sd_deg": 0.0})})
-    by_repeat = sorted(World(square, 3).sightings(), key=lambda s: (s.standoff_mm, s.source[::-1]))
-    sightings = [replace(by_repeat[0], u_px=by_repeat[0].u_px + 3.0), *by_repeat[1:]]
-    fitted = fit_chosen(rig, sightings)
+    by_repeat = sorted(World(square, 3).observations(), key=lambda s: (s.standoff_mm, s.source[::-1]))
+    observations = [replace(by_repeat[0], u_px=by_repeat[0].u_px + 3.0), *by_repeat[1:]]
+    fitted = fit_chosen(rig, observations)
     assert told(fitted)["tilts"].verdict == "absent"
-    assert [r.stray for r in fitted.rejected] == [sightings[0]]
-    assert fitted.cells.captures == tuple(sightings)
+    assert [r.stray for r in fitted.rejected] == [observations[0]]
+    assert fitted.cells.captures == tuple(observations)

@@ -16,7 +16,7 @@ from workbench.model.errors import BadInputError
 
 def calibration_of(world: World, session: int) -> Calibration:
     """One session's calibration of a world: same sensor, new placements and noise."""
-    return calibrate(fit(world.rig, world.sightings(session=session)), Acceptance(), PROVENANCE)[0]
+    return calibrate(fit(world.rig, world.observations(session=session)), Acceptance(), PROVENANCE)[0]
 
 
 def moved(seed: int, **change: float) -> Comparison:

@@ -15,7 +15,7 @@ import pytest
 import yaml as pyyaml
 
 from tests.support.rigs import PROVENANCE, World, thesis_rig
-from workbench.calibration.estimation.fit import Fit, fit
+from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.verdict.assessment import Assessment, judge
 from workbench.calibration.verdict.export import calibrate, render, write_calibration
 from workbench.model.acceptance import Acceptance
@@ -24,12 +24,12 @@ from workbench.model.errors import BadInputError, LimitFailedError
 
 
 @pytest.fixture(scope="module")
-def fitted() -> Fit:
-    return fit(thesis_rig(), World(thesis_rig(), 1).sightings())
+def fitted() -> CalibrationFit:
+    return fit(thesis_rig(), World(thesis_rig(), 1).observations())
 
 
 @pytest.fixture(scope="module")
-def calibration(fitted: Fit) -> Calibration:
+def calibration(fitted: CalibrationFit) -> Calibration:
     return calibrate(fitted, Acceptance(), PROVENANCE)[0]
 
 
@@ -206,18 +206,18 @@ def test_rendering_is_reproducible(calibration: Calibration) -> None:
     assert render(calibration) == render(calibration.model_copy())
 
 
-def judged(fitted: Fit, worst: float = 0.01, **limits: float) -> Assessment:
+def judged(fitted: CalibrationFit, worst: float = 0.01, **limits: float) -> Assessment:
     return judge(fitted, Acceptance.model_validate(limits), worst)
 
 
-def test_a_good_fit_is_accepted(fitted: Fit, calibration: Calibration) -> None:
+def test_a_good_fit_is_accepted(fitted: CalibrationFit, calibration: Calibration) -> None:
     found = judged(fitted)
     assert (found.verdict, found.reasons) == ("accepted", ())
     assert calibration.laser_ranger.validity.standoff_mm == (125.0, 4500.0)
     assert 0.001 < calibration.laser_ranger.validity.max_relative_range_sd < 0.03
 
 
-def test_limits_that_fail_are_named(fitted: Fit) -> None:
+def test_limits_that_fail_are_named(fitted: CalibrationFit) -> None:
     assert "expected at most 0.001 px" in judged(fitted, max_rms_px=0.001).reasons[0]
     assert "up to 30 % of it, expected at most 5 %" in judged(fitted, worst=0.3).reasons[0]
     assert "seen at 11 standoffs, expected at least 12" in judged(fitted, min_standoffs=12).reasons[1]
@@ -226,12 +226,12 @@ def test_limits_that_fail_are_named(fitted: Fit) -> None:
 
 def test_a_laser_that_never_lit_is_named() -> None:
     rig = thesis_rig()
-    sightings = [s for s in World(rig, 1).sightings(repeats=1) if s.laser_id != "L2"]
-    (reason,) = judged(fit(rig, sightings)).reasons
+    observations = [s for s in World(rig, 1).observations(repeats=1) if s.laser_id != "L2"]
+    (reason,) = judged(fit(rig, observations)).reasons
     assert reason.startswith("laser L2 never lit: no capture is of it. Do: check its supply")
 
 
-def test_the_warnings_say_what_the_data_cannot_tell(fitted: Fit) -> None:
+def test_the_warnings_say_what_the_data_cannot_tell(fitted: CalibrationFit) -> None:
     text = " ".join(calibrate(fitted, Acceptance(), PROVENANCE)[1].warnings)
     assert "(f_px) and all baselines cannot be known apart" in text
     assert "the rig file's value stands: ruler_scale" in text
@@ -251,7 +251,7 @@ def test_a_link_is_followed_and_a_special_file_is_left_alone(calibration: Calibr
     assert pipe.is_fifo()
 
 
-def test_a_fit_that_puts_every_spot_outside_the_picture_is_refused(fitted: Fit) -> None:
+def test_a_fit_that_puts_every_spot_outside_the_picture_is_refused(fitted: CalibrationFit) -> None:
     values = fitted.values.copy()
     values[1] += 5000.0
     with pytest.raises(LimitFailedError, match="no spot in the picture"):

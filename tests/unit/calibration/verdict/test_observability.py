@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.support.rigs import PROVENANCE, World, prior, thesis_rig
-from workbench.calibration.estimation.fit import Fit, data_share, fit
-from workbench.calibration.estimation.problem import Problem
+from workbench.calibration.estimation.fit import CalibrationFit, data_share, fit
+from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.model.prediction import Layout, SpotData, predict_spots
 from workbench.calibration.verdict.export import calibrate
 from workbench.calibration.verdict.observability import (
@@ -17,18 +17,18 @@ from workbench.calibration.verdict.observability import (
     information_of,
 )
 from workbench.model.acceptance import Acceptance
-from workbench.model.nested import hold
+from workbench.model.nested import fix_parameters
 from workbench.model.rig import Rig
 
 SEEDS = (1, 2, 3)
 
 
-def directions_of(fitted: Fit) -> tuple[NullDirection, ...]:
+def directions_of(fitted: CalibrationFit) -> tuple[NullDirection, ...]:
     return calibrate(fitted, Acceptance(), PROVENANCE)[1].directions
 
 
 def pinhole() -> Rig:
-    return hold(thesis_rig(), ("k1", "k2"))
+    return fix_parameters(thesis_rig(), ("k1", "k2"))
 
 
 def by_first(directions: tuple[NullDirection, ...]) -> dict[str, NullDirection]:
@@ -36,11 +36,11 @@ def by_first(directions: tuple[NullDirection, ...]) -> dict[str, NullDirection]:
 
 
 @pytest.fixture(scope="module", params=SEEDS)
-def fitted(request: pytest.FixtureRequest) -> Fit:
-    return fit(pinhole(), World(pinhole(), request.param).sightings())
+def fitted(request: pytest.FixtureRequest) -> CalibrationFit:
+    return fit(pinhole(), World(pinhole(), request.param).observations())
 
 
-def test_a_pinhole_leaves_open_what_algebra_says(fitted: Fit) -> None:
+def test_a_pinhole_leaves_open_what_algebra_says(fitted: CalibrationFit) -> None:
     """u = cx + f (b / z + t): f with b, cx with all t, cy likewise, the ruler with f or b; nothing else."""
     found = by_first(directions_of(fitted))
     assert set(found) == {"ruler_scale", "f_px", "cx_px", "cy_px"}
@@ -58,7 +58,7 @@ def test_a_pinhole_leaves_open_what_algebra_says(fitted: Fit) -> None:
             assert change[f"L{i}.{pointing}"] == pytest.approx(-change[first] / f, rel=0.05)
 
 
-def test_a_named_direction_shows_in_no_spot(fitted: Fit) -> None:
+def test_a_named_direction_shows_in_no_spot(fitted: CalibrationFit) -> None:
     """By the model itself, not by its derivatives: all spots move by far less than one sd in all."""
     cells = fitted.cells
     layout = Layout(4, len(cells.placements), 0)
@@ -84,7 +84,7 @@ def test_a_named_direction_shows_in_no_spot(fitted: Fit) -> None:
         assert moved_sd(one.change) < max(0.5, 0.1 * alone)
 
 
-def test_ranges_are_hurt_where_a_direction_moves_them(fitted: Fit) -> None:
+def test_ranges_are_hurt_where_a_direction_moves_them(fitted: CalibrationFit) -> None:
     found = by_first(directions_of(fitted))
     for name in ("f_px", "cx_px", "cy_px"):
         assert not found[name].hurts_ranges
@@ -95,7 +95,7 @@ def test_ranges_are_hurt_where_a_direction_moves_them(fitted: Fit) -> None:
     assert "Ranges suffer, by up to 0.05 %. Do: check the ruler" in found["ruler_scale"].line
 
 
-def test_words_and_remedies(fitted: Fit) -> None:
+def test_words_and_remedies(fitted: CalibrationFit) -> None:
     found = by_first(directions_of(fitted))
     assert found["f_px"].words.startswith(
         "the focal length (f_px) and all baselines cannot be known apart: changed together by +0.2"
@@ -108,8 +108,8 @@ def test_words_and_remedies(fitted: Fit) -> None:
 
 
 def test_a_baseline_known_exactly_resolves_f() -> None:
-    rig = hold(pinhole(), ("L1.x_mm",))
-    found = by_first(directions_of(fit(rig, World(rig, 1).sightings())))
+    rig = fix_parameters(pinhole(), ("L1.x_mm",))
+    found = by_first(directions_of(fit(rig, World(rig, 1).observations())))
     # Only the ruler's scale is left to trade with it.
     assert "f_px" not in found
     assert "f_px" in found["ruler_scale"].change
@@ -117,7 +117,7 @@ def test_a_baseline_known_exactly_resolves_f() -> None:
 
 def test_lasers_that_are_each_open_by_themselves_are_one_line() -> None:
     rig = pinhole()
-    found = directions_of(fit(rig, World(rig, 1).sightings((2000.0, 2500.0, 3000.0))))
+    found = directions_of(fit(rig, World(rig, 1).observations((2000.0, 2500.0, 3000.0))))
     (one,) = [d for d in found if d.words.startswith("the baseline and the")]
     assert one.lasers == ("L1", "L2", "L3", "L4")
     assert "each by itself" in one.words
@@ -135,7 +135,7 @@ def test_a_laser_above_has_its_baseline_along_v() -> None:
         for laser in lasers[2:]
     )
     rig = pinhole().model_copy(update={"lasers": turned})
-    found = by_first(directions_of(fit(rig, World(rig, 1).sightings())))
+    found = by_first(directions_of(fit(rig, World(rig, 1).observations())))
     assert set(found["f_px"].change) == {"f_px", "L3.y_mm", "L4.y_mm"}
     assert "all baselines" in found["f_px"].words
 
@@ -144,7 +144,7 @@ def test_what_no_spot_shows_stands_alone() -> None:
     rig = pinhole().model_copy(
         update={"camera": pinhole().camera.model_copy(update={"k3": prior(0.0, 1e-3)})}
     )
-    found = by_first(directions_of(fit(rig, World(rig, 1).sightings((1000.0, 2000.0, 4000.0)))))
+    found = by_first(directions_of(fit(rig, World(rig, 1).observations((1000.0, 2000.0, 4000.0)))))
     assert found["k3"].change.keys() == {"k3"}
     assert "the lens term k3 cannot be known" in found["k3"].words
     assert not any("k3" in line for line in direction_lines(tuple(found.values())))
@@ -152,7 +152,7 @@ def test_what_no_spot_shows_stands_alone() -> None:
 
 def test_the_reader_is_not_drowned() -> None:
     rig = thesis_rig()
-    found = directions_of(fit(rig, World(rig, 1).sightings((300.0, 301.0, 302.0))))
+    found = directions_of(fit(rig, World(rig, 1).observations((300.0, 301.0, 302.0))))
     lines = direction_lines(found)
     assert len(found) > 5
     assert len(lines) == 5
@@ -164,11 +164,11 @@ def test_the_reader_is_not_drowned() -> None:
 def test_information_is_that_of_the_data_alone() -> None:
     """Against the normal equations with the placements eliminated, and the share that they give."""
     world = World(thesis_rig(), 1)
-    fitted = fit(world.rig, world.sightings())
+    fitted = fit(world.rig, world.observations())
     free = fitted.table.free[fitted.table.is_sensor[fitted.table.free]]
     sd = fitted.table.prior_sd[free]
     scaled = fitted.covariance[np.ix_(free, free)] / np.outer(sd, sd)
-    problem = Problem.of(4, fitted.table, fitted.cells, (), world.rig.board)
+    problem = LeastSquaresProblem.of(4, fitted.table, fitted.cells, (), world.rig.board)
     jacobian = problem.solve(fitted.noise_scale).jacobian
     ours, theirs = jacobian[:, free], jacobian[:, ~fitted.table.is_sensor]
     noise = np.eye(len(jacobian)) + theirs @ theirs.T
@@ -180,6 +180,8 @@ def test_information_is_that_of_the_data_alone() -> None:
 
 def test_a_rig_of_constants_has_none() -> None:
     rig = thesis_rig()
-    everything = [p.name for p in fit(rig, World(rig, 1).sightings()).table.parameters if p.kind == "sensor"]
-    fixed = hold(rig, everything)
-    assert directions_of(fit(fixed, World(fixed, 1).sightings())) == ()
+    everything = [
+        p.name for p in fit(rig, World(rig, 1).observations()).table.parameters if p.kind == "sensor"
+    ]
+    fixed = fix_parameters(rig, everything)
+    assert directions_of(fit(fixed, World(fixed, 1).observations())) == ()

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from workbench.devices.protocols import Image
 from workbench.model.event import ExposureSet
 from workbench.model.exposure import AIM, GOOD, verdict_of
-from workbench.procedure.capture.brightness import Peak, look_at_peak
+from workbench.procedure.capture.brightness import Brightness, measure_brightness
 from workbench.procedure.capture.exposure import (
     BOLDEST,
     MOST_TRIALS,
-    Trial,
+    ExposureTrial,
     best_of,
     search_exposure,
     share_of,
@@ -44,7 +44,7 @@ class Sensor:
         self.rng = np.random.default_rng(5)
         self.asked: list[float] = []
 
-    def __call__(self, exposure: float, number: int) -> Trial:
+    def __call__(self, exposure: float, number: int) -> ExposureTrial:
         assert number == len(self.asked)
         self.asked.append(exposure)
         taken = max(self.step * round(exposure / self.step), self.step) if self.step else exposure
@@ -54,7 +54,9 @@ class Sensor:
         dn = FULL if dn > self.jumps_at * FULL else dn
         peak = float(np.clip(np.rint(dn), 0, FULL)) / FULL
         noise = max(self.noise_dn, 0.5) / FULL
-        return Trial(taken, Peak(peak, peak - dark, noise) if peak - dark > 6 * noise else Peak(dark))
+        return ExposureTrial(
+            taken, Brightness(peak, peak - dark, noise) if peak - dark > 6 * noise else Brightness(dark)
+        )
 
 
 @given(st.floats(-1.2, 5.2), st.floats(0, 0.1), st.sampled_from([0.0, 1.5]))
@@ -170,7 +172,7 @@ def frames(seed: int, spot_dn: int, noise_dn: float = 1.5) -> tuple[list[Image],
 @pytest.mark.parametrize("seed", range(5))
 def test_the_brightest_lit_pixel_and_its_share(seed: int) -> None:
     on, off = frames(seed, 90)
-    seen = look_at_peak(on, off, EVERYWHERE, FULL)
+    seen = measure_brightness(on, off, EVERYWHERE, FULL)
     assert seen.peak == max(image[10, 11] for image in on) / FULL
     assert seen.lit == pytest.approx(90 / FULL, abs=3 * 1.5 / FULL)
     assert seen.noise == pytest.approx(1.5 * 2**0.5 / FULL, rel=0.15)
@@ -179,19 +181,19 @@ def test_the_brightest_lit_pixel_and_its_share(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_noise_is_no_spot(seed: int) -> None:
     on, off = frames(seed, 0)
-    assert look_at_peak(on, off, EVERYWHERE, FULL) == Peak(7 / FULL)
+    assert measure_brightness(on, off, EVERYWHERE, FULL) == Brightness(7 / FULL)
 
 
 def test_a_room_that_clips_is_not_dark() -> None:
     white = np.full((20, 30), 255, np.uint8)
-    assert look_at_peak([white, white], [white, white], EVERYWHERE, FULL) == Peak(1.0)
+    assert measure_brightness([white, white], [white, white], EVERYWHERE, FULL) == Brightness(1.0)
 
 
 def test_a_hot_pixel_or_a_steady_lamp_is_not_the_spot() -> None:
     on, off = frames(1, 90)
     for image in (*on, *off):
         image[3, 4] = 255
-    assert look_at_peak(on, off, EVERYWHERE, FULL).peak < 0.5
+    assert measure_brightness(on, off, EVERYWHERE, FULL).peak < 0.5
 
 
 def flickering(seed: int, depth_dn: float) -> tuple[list[Image], list[Image]]:
@@ -208,14 +210,18 @@ def test_a_lamp_beside_the_scanlines_is_not_looked_at() -> None:
     rows = np.zeros_like(EVERYWHERE)
     rows[8:13] = True
     for seed in range(50):
-        assert look_at_peak(*flickering(seed, 100), rows, FULL).peak == pytest.approx(67 / FULL, abs=0.03)
+        assert measure_brightness(*flickering(seed, 100), rows, FULL).peak == pytest.approx(
+            67 / FULL, abs=0.03
+        )
 
 
 def test_a_lamp_that_flickers_among_the_spots_is_seldom_taken_for_one() -> None:
     """Brighter than the spot by far, and its flicker too. Of four random phases both lit ones are the highest
     once in six; differing from frame to frame rules out nearly all of these.
     """
-    misled = sum(look_at_peak(*flickering(seed, 100), EVERYWHERE, FULL).peak > 0.32 for seed in range(400))
+    misled = sum(
+        measure_brightness(*flickering(seed, 100), EVERYWHERE, FULL).peak > 0.32 for seed in range(400)
+    )
     by_chance = sum(
         float(on[0][3, 22]) - float(off[1][3, 22]) > 67
         for on, off in (flickering(s, 100) for s in range(400))

@@ -17,10 +17,10 @@ from workbench.model.prompt import Action, Answer, Prompt, Quantity
 from workbench.model.target import Placement
 from workbench.procedure.capture.quality import quality_of
 from workbench.procedure.engine.check import check_file
-from workbench.procedure.engine.durations import Pace, PaceMeter
-from workbench.procedure.engine.operator import Nobody, Scripted
+from workbench.procedure.engine.durations import DurationMeter, StepDurations
+from workbench.procedure.engine.operator import NoOperator, ScriptedOperator
 from workbench.procedure.engine.plan import PlannedStep
-from workbench.procedure.engine.progress import Forecast
+from workbench.procedure.engine.progress import TimeLeft
 from workbench.procedure.engine.prompts import placement_prompt
 
 ROOT = Path(__file__).parents[4]
@@ -83,7 +83,7 @@ def test_only_yes_confirms() -> None:
 
 def test_nobody_names_the_prompt() -> None:
     with pytest.raises(AnswerNeededError, match=r"prompt p: Read it.*no terminal") as caught:
-        Nobody("no terminal").ask(NUMBER)
+        NoOperator("no terminal").ask(NUMBER)
     assert caught.value.exit_code == 6
 
 
@@ -95,7 +95,7 @@ def test_an_answers_file(tmp_path: Path) -> None:
     path = tmp_path / "answers.yaml"
     path.write_text("p: 502\nsafety: true\nq: {action: skip, reason: no room}\n")
     skipped = Prompt("q", "Place it.", may={"skip": "leave it out"})
-    script = Scripted.load(path, by_key(NUMBER, CONFIRM, skipped), Nobody("no terminal"))
+    script = ScriptedOperator.load(path, by_key(NUMBER, CONFIRM, skipped), NoOperator("no terminal"))
     assert script.ask(NUMBER) == Answer(value=502.0, by="answers file")
     answer = script.ask(skipped)
     assert (answer.action, answer.reason, answer.by) == ("skip", "no room", "answers file")
@@ -136,7 +136,7 @@ def test_a_files_answer_is_taken_as_a_persons_would_be(
 ) -> None:
     path = tmp_path / "answers.yaml"
     path.write_text(f"{prompt.key}: {given}\n")
-    script = Scripted.load(path, by_key(prompt), Nobody("no terminal"))
+    script = ScriptedOperator.load(path, by_key(prompt), NoOperator("no terminal"))
     assert script.answers == {prompt.key: Answer(value=value, by="answers file")}
 
 
@@ -164,7 +164,7 @@ def test_an_answer_that_cannot_fit_is_told_with_its_line(
     path = tmp_path / "answers.yaml"
     path.write_text(f"# ours\n{prompt.key}: {given}\n")
     with pytest.raises(BadInputError) as caught:
-        Scripted.load(path, by_key(prompt), Nobody("no terminal"))
+        ScriptedOperator.load(path, by_key(prompt), NoOperator("no terminal"))
     (line,) = str(caught.value).splitlines()
     assert line.startswith(f"{path}:2: {prompt.key}")
     assert says in line
@@ -177,14 +177,14 @@ def test_a_file_of_another_kind_is_no_answers_file(tmp_path: Path, text: str, ca
     path = tmp_path / "answers.yaml"
     path.write_text(text)
     with pytest.raises(BadInputError, match=f":1: expected answers to prompts by their keys, got {came}"):
-        Scripted.load(path, by_key(PLACE), Nobody("no terminal"))
+        ScriptedOperator.load(path, by_key(PLACE), NoOperator("no terminal"))
 
 
 def test_answers_that_nobody_asks_for_are_told_with_the_nearest_key(tmp_path: Path) -> None:
     path = tmp_path / "answers.yaml"
     path.write_text("card: green\nsafty: true\np: 500\nsafety: true\np: 510\n7: [1]\n")
     with pytest.raises(BadInputError) as caught:
-        Scripted.load(path, by_key(PLACE, CHOICE, CONFIRM), Nobody("no terminal"))
+        ScriptedOperator.load(path, by_key(PLACE, CHOICE, CONFIRM), NoOperator("no terminal"))
     lines = str(caught.value).replace(f"{path}:", "").splitlines()
     assert [line.split(":")[0] for line in lines] == ["1", "2", "5", "6"]
     assert lines[1] == "2: safty: nothing of this name is asked; expected one of safety, p, card"
@@ -258,8 +258,8 @@ def finished(index: int) -> ev.StepFinished:
     return ev.StepFinished(procedure="p", index=index, outcome="")
 
 
-def told_by(*timed: tuple[float, ev.Event]) -> PaceMeter:
-    meter = PaceMeter()
+def told_by(*timed: tuple[float, ev.Event]) -> DurationMeter:
+    meter = DurationMeter()
     for record in records(*timed):
         meter.take(record)
     return meter
@@ -279,7 +279,7 @@ STEPS = [PlannedStep("p", 1, "grid", 3, 6), PlannedStep("p", 2, "fit", 0, 0, 7.0
 
 def test_pace_is_what_was_measured() -> None:
     """The mean: sums are right."""
-    pace = told_by(*TOLD).pace(Pace(without_shots_s={"fit": 7.0}))
+    pace = told_by(*TOLD).pace(StepDurations(without_shots_s={"fit": 7.0}))
     assert pace.placing_s == 30.0
     assert pace.shot_s == pytest.approx((1 + 3) / 2), "the first was loading programs"
     assert pace.lit_s == pytest.approx(0.2)
@@ -294,7 +294,7 @@ def test_a_break_tells_nothing_of_the_next_placing() -> None:
     for n, took in enumerate((20.0, 30.0, 3600.0, 25.0, 50.0, 25.0)):
         at += took
         session.append((at, placed(f"{n}")))
-    assert told_by(*session).pace(Pace()).placing_s == pytest.approx((20 + 30 + 25 + 50 + 25) / 5)
+    assert told_by(*session).pace(StepDurations()).placing_s == pytest.approx((20 + 30 + 25 + 50 + 25) / 5)
 
 
 def test_a_plan_takes_as_long_as_the_session_that_told_it() -> None:
@@ -324,7 +324,7 @@ def test_a_plan_takes_as_long_as_the_session_that_told_it() -> None:
         PlannedStep("p", 2, "fit", 0, 0),
         PlannedStep("p", 3, "export", 0, 0),
     ]
-    pace = meter.pace(Pace())
+    pace = meter.pace(StepDurations())
     assert sum(map(pace.seconds, steps)) == pytest.approx(132.0, rel=0.02)
     assert pace.seconds(PlannedStep("p", 1, "place", 1, 0)) == 40.0, "somebody has to place it"
 
@@ -332,7 +332,7 @@ def test_a_plan_takes_as_long_as_the_session_that_told_it() -> None:
 def test_what_a_stop_tore_apart_tells_no_duration() -> None:
     resumed = ev.SessionResumed(from_n=1, operator="", command="", created="")
     meter = told_by((0, started(1, 4)), (20, placed("a")), (9000, resumed), (9001, placed("a")))
-    assert meter.pace(Pace()).placing_s == 20.0
+    assert meter.pace(StepDurations()).placing_s == 20.0
 
 
 def test_nor_does_a_question_that_comes_once() -> None:
@@ -340,13 +340,18 @@ def test_nor_does_a_question_that_comes_once() -> None:
     safety = ev.Answered(key="safety", question="?", answer=Answer())
     skip = ev.Answered(key="b", question="?", answer=Answer(action="skip", reason="no room"))
     meter = told_by((0, started(1, 4)), (300, safety), (320, placed("a")), (620, skip), (640, placed("c")))
-    assert meter.pace(Pace()).placing_s == 20.0
+    assert meter.pace(StepDurations()).placing_s == 20.0
     kept = ev.Answered(key="a/L1/snr", question="Keep?", answer=Answer())
     asked = told_by((0, started(1, 4)), *shot(1, "a1"), (300, kept), (301, ev.PlacementFinished(key="a")))
-    assert asked.pace(Pace()).finishing_s == Pace().finishing_s, "a limit that failed was asked about"
+    assert asked.pace(StepDurations()).finishing_s == StepDurations().finishing_s, (
+        "a limit that failed was asked about"
+    )
     own = ev.StepStarted(procedure="p", index=1, step="ask", title="Which?", shots=0)
     answered = ev.Answered(key="p.1", question="Which?", answer=Answer(value="grey"))
-    assert told_by((0, own), (30, answered), (30, finished(1))).pace(Pace()).without_shots_s["Which?"] == 30.0
+    assert (
+        told_by((0, own), (30, answered), (30, finished(1))).pace(StepDurations()).without_shots_s["Which?"]
+        == 30.0
+    )
 
 
 def test_what_is_compiled_for_the_first_capture_is_not_expected_again() -> None:
@@ -356,7 +361,7 @@ def test_what_is_compiled_for_the_first_capture_is_not_expected_again() -> None:
     for n in range(1, 20):
         session += shot(141 + n / 10, f"a{n}", 0.1)
     session.append((143.1, ev.PlacementFinished(key="a")))
-    forecast = Forecast([PlannedStep("p", 1, "grid", 11, 220)], Pace())
+    forecast = TimeLeft([PlannedStep("p", 1, "grid", 11, 220)], StepDurations())
     for record in records(*session):
         forecast.take(record)
     assert forecast.seconds_left == pytest.approx(10 * (20 + 1 + 20 * 0.1), rel=0.1)
@@ -364,14 +369,14 @@ def test_what_is_compiled_for_the_first_capture_is_not_expected_again() -> None:
 
 def test_what_other_sessions_told_is_left_step_by_step() -> None:
     """One placing of 90 s does not make a session of half a minute each three times as long."""
-    learned = Pace(placing_s=30.0, sessions=3)
+    learned = StepDurations(placing_s=30.0, sessions=3)
     session: list[tuple[float, ev.Event]] = [(0, started(1, 4)), (90, placed("a"))]
     assert told_by(*session).pace(learned).placing_s == pytest.approx((2 * 30 + 90) / 3)
-    assert told_by(*session).pace(Pace()).placing_s == 90.0, "a guess counts for nothing"
+    assert told_by(*session).pace(StepDurations()).placing_s == 90.0, "a guess counts for nothing"
 
 
 def test_the_forecast_counts_placements_and_what_is_left() -> None:
-    forecast = Forecast(STEPS, Pace())
+    forecast = TimeLeft(STEPS, StepDurations())
     for record in records(*TOLD):
         forecast.take(record)
     assert (forecast.done, forecast.total) == (2, 3)
@@ -383,7 +388,7 @@ def test_a_placement_repeated_or_left_out_counts_once() -> None:
     again = ev.SetAside(key="b", from_n=8, reason="snr", retry=True)
     out = ev.SetAside(key="b", from_n=8, reason="no room", left_out=True)
     skip = ev.Answered(key="b", question="?", answer=Answer(action="skip", reason="no room"))
-    forecast = Forecast(STEPS, Pace())
+    forecast = TimeLeft(STEPS, StepDurations())
     told = []
     retried: list[tuple[float, ev.Event]] = [(65.0, again), (65.0, placed("b")), *shot(66, "b1")]
     for record in records(*TOLD, *retried, (70, out), (70, skip)):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from workbench.calibration.data.observations import Sighting
-from workbench.calibration.design.expected_spot import Whereabouts, whereabouts
+from workbench.calibration.data.observations import Observation
+from workbench.calibration.design.expected_spot import ExpectedSpot, expected_spot
 from workbench.calibration.model.parameters import sensor_parameters
 from workbench.model.rig import Rig, load_rig
 from workbench.procedure.engine.missing_spot import in_words, why_not_measured
@@ -35,15 +35,17 @@ def spot(sensor: dict[str, float], laser_id: str, standoff_mm: float) -> FloatAr
 
 def seen(
     sensor: dict[str, float], standoffs_mm: list[float], lasers: str, rng: np.random.Generator
-) -> list[Sighting]:
+) -> list[Observation]:
     """Readings of the lasers at placements that are as wrong as the rig file lets them be."""
-    sightings = []
+    observations = []
     for asked in standoffs_mm:
         at = asked + rng.normal(0, RIG.bench.placement_sd_mm)
         for name in lasers.split():
             u, v = spot(sensor, name, at) + rng.normal(0, 0.05, 2)
-            sightings.append(Sighting("s", name, f"{asked:g}", asked, 0, float(u), float(v), 0.05, 0.05))
-    return sightings
+            observations.append(
+                Observation("s", name, f"{asked:g}", asked, 0, float(u), float(v), 0.05, 0.05)
+            )
+    return observations
 
 
 @pytest.mark.parametrize(
@@ -59,7 +61,7 @@ def test_the_spot_is_where_it_is_said_to_be(standoffs_mm: list[float], lasers: s
     off = []
     for _ in range(DRAWS):
         sensor = drawn(RIG, rng)
-        told = whereabouts(RIG, seen(sensor, standoffs_mm, lasers, rng), "L4", 125.0)
+        told = expected_spot(RIG, seen(sensor, standoffs_mm, lasers, rng), "L4", 125.0)
         true = spot(sensor, "L4", 125.0 + rng.normal(0, RIG.bench.placement_sd_mm))
         off.append((np.array([told.u_px, told.v_px]) - true) / [told.u_sd_px, told.v_sd_px])
     z = np.array(off)
@@ -73,22 +75,22 @@ def test_spots_seen_narrow_it_down() -> None:
     sensor = {p.name: p.prior.value for p in sensor_parameters(RIG)}
     sensor["cx_px"] += 80.0
     rng = np.random.default_rng(3)
-    assert whereabouts(RIG, [], "L4", 125.0).place == "at the edge"
+    assert expected_spot(RIG, [], "L4", 125.0).place == "at the edge"
     shifted = seen(sensor, [125.0, 160.0], "L1 L2 L3", rng)
     assert spot(sensor, "L4", 125.0)[0] > RIG.camera.width_px
-    assert whereabouts(RIG, shifted, "L4", 125.0).place == "outside"
+    assert expected_spot(RIG, shifted, "L4", 125.0).place == "outside"
     sensor["cx_px"] -= 80.0
-    assert whereabouts(RIG, seen(sensor, [125.0, 160.0], "L1 L2 L3", rng), "L4", 125.0).place == "inside"
+    assert expected_spot(RIG, seen(sensor, [125.0, 160.0], "L1 L2 L3", rng), "L4", 125.0).place == "inside"
 
 
 def test_what_is_said_of_it() -> None:
-    outside = in_words(RIG, "L4", Whereabouts(662.3, 248.4, 6.6, 3.6, "outside"))
+    outside = in_words(RIG, "L4", ExpectedSpot(662.3, 248.4, 6.6, 3.6, "outside"))
     assert "u = 662 +- 7, v = 248 +- 4 px (1 sigma), outside the picture of 640 x 480" in outside
     assert "nothing is wrong" in outside
-    inside = in_words(RIG, "L4", Whereabouts(600.0, 248.4, 6.6, 3.5, "inside"))
+    inside = in_words(RIG, "L4", ExpectedSpot(600.0, 248.4, 6.6, 3.5, "inside"))
     assert "is L4 lit" in inside
     assert "nothing is wrong" not in inside
-    edge = in_words(RIG, "L4", Whereabouts(640.0, 248.4, 6.6, 3.5, "at the edge"))
+    edge = in_words(RIG, "L4", ExpectedSpot(640.0, 248.4, 6.6, 3.5, "at the edge"))
     assert "if it is outside" in edge
 
 
