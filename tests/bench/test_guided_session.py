@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from tests.crash.short import CALLER, RESUMER, go_on, results, story, write_files
-from workbench.devices.protocols import Bench, Frame, Image, Operator, StreamingCamera
+from workbench.devices.protocols import Bench, Frame, Operator, StreamingCamera
 from workbench.devices.registry import open_bench
 from workbench.emulator.camera import EmulatedCamera
 from workbench.model import event as ev
+from workbench.model.arrays import Image
 from workbench.model.errors import (
     AnswerNeededError,
     BadInputError,

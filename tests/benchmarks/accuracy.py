@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.benchmarks.others import OTHERS, cut_out
-from tests.benchmarks.render import Floats, Sensor, spot
+from tests.benchmarks.render import Sensor, spot
+from workbench.model.arrays import FloatArray
 from workbench.spots import find_spots
 from workbench.spots.crlb import Camera, position_bound_px
 
@@ -45,7 +46,7 @@ def measure_cell(width_px: float, electrons: float, trials: int = TRIALS, seed: 
     side = 2 * int(np.ceil(7 * width_px + 12)) + 1
     phases = rng.uniform(-0.5, 0.5, (trials, 2))
     errors, sds = np.full((trials, 2), np.nan), np.full((trials, 2), np.nan)
-    rivals: dict[str, list[Floats]] = {name: [] for name in OTHERS}
+    rivals: dict[str, list[FloatArray]] = {name: [] for name in OTHERS}
     extra = 0
     for i, phase in enumerate(phases):
         true = side // 2 + phase
@@ -79,19 +80,19 @@ def measure_cell(width_px: float, electrons: float, trials: int = TRIALS, seed: 
     )
 
 
-def rms(errors: Floats) -> float:
+def rms(errors: FloatArray) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(errors**2)))
 
 
-def bound(width_px: float, electrons: float, phases: Floats) -> float:
+def bound(width_px: float, electrons: float, phases: FloatArray) -> float:
     """Fisher bound, root mean square over phases and both axes."""
     camera = Camera(SENSOR.electrons_per_dn, SENSOR.read_sd_electrons, BACKGROUND_ELECTRONS)
     bounds = [position_bound_px(electrons, width_px, (float(u), float(v)), camera) for u, v in phases]
     return rms(np.array(bounds))
 
 
-def phase_bias(phases: Floats, errors: Floats) -> tuple[float, float]:
+def phase_bias(phases: FloatArray, errors: FloatArray) -> tuple[float, float]:
     """Largest bias over the phase within a pixel, and its sampling deviation.
 
     The bias repeats with the pixel: mean, sine and cosine of the first two harmonics are fitted to the errors
@@ -104,7 +105,7 @@ def phase_bias(phases: Floats, errors: Floats) -> tuple[float, float]:
     return float(np.abs(curve).max()), float(error.std() * np.sqrt(waves.shape[1] / error.size))
 
 
-def _waves(phase: Floats) -> Floats:
+def _waves(phase: FloatArray) -> FloatArray:
     angle = 2.0 * np.pi * phase
     return np.stack([np.ones_like(angle), *(f(k * angle) for k in (1, 2) for f in (np.sin, np.cos))], axis=1)
 

@@ -22,8 +22,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tests.proofs import simulate, study
-from tests.proofs.simulate import Floats
 from workbench.calibration.estimation.batch import BatchFit, fit_batch
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig, load_rig
 
 ROOT = Path(__file__).parents[2]
@@ -31,10 +31,10 @@ STANDOFFS_MM = np.array([125.0, 160, 210, 280, 400, 600, 900, 1400, 2200, 3200, 
 FITS = 2000
 LOOP = 40
 POLISH = 12
-Residuals = Callable[[Floats], Floats]
+Residuals = Callable[[FloatArray], FloatArray]
 
 
-def residuals_of(batch: BatchFit, rig: Rig, position: Floats, sd: Floats, scale: float) -> Residuals:
+def residuals_of(batch: BatchFit, rig: Rig, position: FloatArray, sd: FloatArray, scale: float) -> Residuals:
     """Residuals of one calibration in numpy, (spots seen + free parameters,), in standard deviations."""
     table = batch.table
     free, mean, prior_sd = table.free, table.prior_mean, table.prior_sd
@@ -43,7 +43,7 @@ def residuals_of(batch: BatchFit, rig: Rig, position: Floats, sd: Floats, scale:
     measured, weight = position[seen], 1.0 / (scale * sd[seen])
     sensor = simulate.COMMON + 4 * lasers
 
-    def residuals(y: Floats) -> Floats:
+    def residuals(y: FloatArray) -> FloatArray:
         values = mean.astype(y.dtype)
         values[free] += prior_sd[free] * y
         f, cx, cy, k1, k2, p1, p2, k3, offset, scale = values[: simulate.COMMON]
@@ -62,7 +62,7 @@ def residuals_of(batch: BatchFit, rig: Rig, position: Floats, sd: Floats, scale:
     return residuals
 
 
-def polished(residuals: Residuals, y: Floats) -> Floats:
+def polished(residuals: Residuals, y: FloatArray) -> FloatArray:
     """The optimum near `y` to the last digits: Gauss-Newton with derivatives by complex steps."""
     for _ in range(POLISH):
         jacobian = np.stack([residuals(y + 1e-30j * axis).imag / 1e-30 for axis in np.eye(len(y))], axis=1)
@@ -70,13 +70,13 @@ def polished(residuals: Residuals, y: Floats) -> Floats:
     return y
 
 
-def ours(batch: BatchFit, index: int) -> Floats:
+def ours(batch: BatchFit, index: int) -> FloatArray:
     """(free,) one optimum of the batch in units of the priors."""
     table, free = batch.table, batch.table.free
     return np.asarray((batch.values[index, free] - table.prior_mean[free]) / table.prior_sd[free])
 
 
-def distance_sd(batch: BatchFit, index: int, a: Floats, b: Floats) -> float:
+def distance_sd(batch: BatchFit, index: int, a: FloatArray, b: FloatArray) -> float:
     """Largest difference of a parameter between two optima, in posterior standard deviations."""
     free = batch.table.free
     return float(np.abs((a - b) * batch.table.prior_sd[free] / batch.sd[index, free]).max())

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from tests.benchmarks.render import Floats, Sensor, spot
+from tests.benchmarks.render import Sensor, spot
+from workbench.model.arrays import FloatArray
 from workbench.spots import Scanline, SpotFinder
 
 PAIRS = 10_000
@@ -43,7 +44,7 @@ class Count:
     false: int = 0
 
 
-def clutter(rng: np.random.Generator) -> Floats:
+def clutter(rng: np.random.Generator) -> FloatArray:
     """Ambient light (electrons) on a scene of bright and dark patches, out of focus like everything."""
     scene = np.full(SHAPE, rng.uniform(50.0, 600.0))
     for _ in range(int(rng.integers(0, 12))):
@@ -52,7 +53,7 @@ def clutter(rng: np.random.Generator) -> Floats:
     return np.asarray(cv2.GaussianBlur(scene, (0, 0), BLUR_PX), np.float64)
 
 
-def lasers(rng: np.random.Generator, ambient: Floats) -> tuple[Floats, list[Truth]]:
+def lasers(rng: np.random.Generator, ambient: FloatArray) -> tuple[FloatArray, list[Truth]]:
     """Light of the lasers on a flat target, and the truth."""
     z_mm = float(np.exp(rng.uniform(np.log(100.0), np.log(5000.0))))
     row = ROW + rng.uniform(-1.5, 1.5)
@@ -78,13 +79,13 @@ def lasers(rng: np.random.Generator, ambient: Floats) -> tuple[Floats, list[Trut
     return light, truths
 
 
-def _noise_electrons(ambient: Floats, v: float, u: float) -> float:
+def _noise_electrons(ambient: FloatArray, v: float, u: float) -> float:
     """Standard deviation of the difference image where a spot lies, without the spot."""
     here = float(ambient[round(v), round(u)])
     return float(np.sqrt(2.0 * (here + SENSOR.read_sd_electrons**2 + SENSOR.electrons_per_dn**2 / 12.0)))
 
 
-def nuisances(rng: np.random.Generator) -> tuple[Floats, Floats]:
+def nuisances(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Light in the on-frame alone (reflections, blinking pixels) and in both frames (hot pixels)."""
     on, both = np.zeros(SHAPE), np.zeros(SHAPE)
     for _ in range(int(rng.integers(0, 3))):

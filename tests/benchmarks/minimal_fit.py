@@ -10,8 +10,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
+
+from workbench.model.arrays import FloatArray
 
 BASELINES_MM = (-60.0, -30.0, 30.0, 60.0)
 MEAN = np.array([533.3, 319.5, 239.5, 0, 0, 0, 0, *(n for x in BASELINES_MM for n in (x, 0, 0, 0))])
@@ -36,7 +37,7 @@ mean = np.concatenate([MEAN, np.zeros(3 * len(standoffs))])
 prior_sd = np.concatenate([SD, np.tile(PLACEMENT_SD, len(standoffs))])
 
 
-def residuals(y: NDArray[np.float64]) -> NDArray[np.float64]:
+def residuals(y: FloatArray) -> FloatArray:
     """Spots, then priors, in standard deviations."""
     values = mean + prior_sd * y
     f, cx, cy, k1, k2, offset, scale = values[:7]

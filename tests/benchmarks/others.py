@@ -10,26 +10,26 @@ from photutils.centroids import centroid_2dg, centroid_quadratic  # type: ignore
 from skimage.filters import threshold_otsu
 from skimage.measure import label, regionprops
 
-from tests.benchmarks.render import Floats
+from workbench.model.arrays import FloatArray
 
 Centre = tuple[float, float]
 
 
-def cut_out(frame: NDArray[np.generic], centre: tuple[int, int], half: int) -> Floats:
+def cut_out(frame: NDArray[np.generic], centre: tuple[int, int], half: int) -> FloatArray:
     """The frame around (row, column), background (median of the frame) taken off."""
     row, col = centre
-    part: Floats = frame[row - half : row + half + 1, col - half : col + half + 1].astype(np.float64)
+    part: FloatArray = frame[row - half : row + half + 1, col - half : col + half + 1].astype(np.float64)
     return part - float(np.median(frame.astype(np.float64)))
 
 
-def thresholded_centroid(image: Floats) -> Centre:
+def thresholded_centroid(image: FloatArray) -> Centre:
     """Mean position of what exceeds half of the peak, weighted by its height."""
     kept = np.where(image > 0.5 * image.max(), image, 0.0)
     v, u = np.mgrid[: image.shape[0], : image.shape[1]]
     return float((kept * u).sum() / kept.sum()), float((kept * v).sum() / kept.sum())
 
 
-def scikit_image(image: Floats) -> Centre:
+def scikit_image(image: FloatArray) -> Centre:
     """Otsu's threshold, labels, weighted centroid of the brightest region."""
     labels = label(image > threshold_otsu(image))  # type: ignore[no-untyped-call]
     regions = regionprops(labels, intensity_image=image)  # type: ignore[no-untyped-call]
@@ -38,7 +38,7 @@ def scikit_image(image: Floats) -> Centre:
     return float(u), float(v)
 
 
-def photutils_2dg(image: Floats) -> Centre:
+def photutils_2dg(image: FloatArray) -> Centre:
     """Fit of a sampled two-dimensional Gaussian."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -46,7 +46,7 @@ def photutils_2dg(image: Floats) -> Centre:
     return float(u), float(v)
 
 
-def photutils_quadratic(image: Floats) -> Centre:
+def photutils_quadratic(image: FloatArray) -> Centre:
     """Parabola through the pixels around the peak."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

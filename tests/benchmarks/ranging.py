@@ -8,7 +8,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from tests.benchmarks.render import spot
 from tests.benchmarks.speed import SENSOR, SHAPE, Frame
@@ -16,6 +15,7 @@ from tests.support.rigs import PROVENANCE, World
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig, load_rig
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
@@ -23,7 +23,6 @@ from workbench.spots import Finding, SpotFinder
 
 RIG = Path(__file__).parents[2] / "rigs/thesis-both-emulated.yaml"
 PAIRS, ROUNDS, WARM_UP = 48, 40, 96
-Floats = NDArray[np.float64]
 Scene = Callable[[str, float], float]
 """Range in mm of a laser's spot, from its axis and its place along it."""
 Pair = tuple[Frame, Frame]
@@ -88,7 +87,7 @@ class Bench:
         return " ".join(line.shape.kind for line in reading.lines)
 
 
-def times_us(task: Callable[[int], object]) -> tuple[Floats, float]:
+def times_us(task: Callable[[int], object]) -> tuple[FloatArray, float]:
     """(ROUNDS * PAIRS,) microseconds of each call by the clock, and their mean by the processor's time.
 
     The clock also counts what else the machine did in between; for the mean of one core that must not count.

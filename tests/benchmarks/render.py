@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
-Floats = NDArray[np.float64]
+from workbench.model.arrays import FloatArray, Image
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,7 @@ class Sensor:
         """Highest number."""
         return (1 << self.bits) - 1
 
-    def expose(self, light: Floats, rng: np.random.Generator) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    def expose(self, light: FloatArray, rng: np.random.Generator) -> Image:
         """A frame of `light` (electrons expected in each pixel)."""
         electrons = rng.poisson(light) + rng.normal(0.0, self.read_sd_electrons, light.shape)
         numbers = np.rint(electrons / self.electrons_per_dn + self.black_dn)
@@ -33,13 +32,13 @@ class Sensor:
         return clipped.astype(np.uint8) if self.bits == 8 else clipped.astype(np.uint16)
 
 
-def axis_share(centre: float, sd: float, n: int) -> Floats:
+def axis_share(centre: float, sd: float, n: int) -> FloatArray:
     """(n,) share of a unit Gaussian in each pixel of a row."""
     edges = (np.arange(n + 1) - 0.5 - centre) / (np.sqrt(2.0) * sd)
-    share: Floats = 0.5 * np.diff(erf(edges))
+    share: FloatArray = 0.5 * np.diff(erf(edges))
     return share
 
 
-def spot(shape: tuple[int, int], u: float, v: float, su: float, sv: float) -> Floats:
+def spot(shape: tuple[int, int], u: float, v: float, su: float, sv: float) -> FloatArray:
     """(height, width): an upright Gaussian of unit sum, integrated over the pixels."""
     return axis_share(v, sv, shape[0])[:, None] * axis_share(u, su, shape[1])

@@ -9,25 +9,26 @@ from __future__ import annotations
 import numpy as np
 
 from tests.proofs import simulate
-from tests.proofs.simulate import Calibrations, Floats
+from tests.proofs.simulate import Calibrations
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
 STEP_SD = 1e-4
 """Of the differences, in prior standard deviations."""
 
 
-def parameter_covariance(rig: Rig, standoffs_mm: Floats, data: Calibrations) -> Floats:
+def parameter_covariance(rig: Rig, standoffs_mm: FloatArray, data: Calibrations) -> FloatArray:
     """(N, S, S) bound on the covariance of the sensor's parameters; constants have none."""
     count, placements = data.errors.shape[:2]
     sd = np.array([p.sd for p in simulate.priors(rig)])
     tilt = np.radians(rig.bench.tilt_sd_deg)
     error_sd = np.array([rig.bench.placement_sd_mm, tilt, tilt])
 
-    def seen(truth: Floats, errors: Floats) -> Floats:
+    def seen(truth: FloatArray, errors: FloatArray) -> FloatArray:
         z0 = simulate.depths(truth, standoffs_mm, errors[..., 0])
         return simulate.spots(truth, z0, errors[..., 1:]) / data.sd_px
 
-    def difference(sensor_step: Floats, error_step: Floats) -> Floats:
+    def difference(sensor_step: FloatArray, error_step: FloatArray) -> FloatArray:
         ahead = seen(data.truth + STEP_SD * sensor_step, data.errors + STEP_SD * error_step)
         behind = seen(data.truth - STEP_SD * sensor_step, data.errors - STEP_SD * error_step)
         slope = (ahead - behind) / (2.0 * STEP_SD)
@@ -43,12 +44,12 @@ def parameter_covariance(rig: Rig, standoffs_mm: Floats, data: Calibrations) -> 
 
 
 def range_variance(
-    rig: Rig, truth: Floats, covariance: Floats, range_mm: Floats, spot_sd_px: float
-) -> Floats:
+    rig: Rig, truth: FloatArray, covariance: FloatArray, range_mm: FloatArray, spot_sd_px: float
+) -> FloatArray:
     """(N, K, L) bound on the variance of a range from one spot of this sd at K ranges of a square target."""
     sd = np.array([p.sd for p in simulate.priors(rig)])
 
-    def seen(sensors: Floats, step_mm: float = 0.0) -> Floats:
+    def seen(sensors: FloatArray, step_mm: float = 0.0) -> FloatArray:
         z0 = range_mm + sensors[:, 8][:, None] + step_mm
         return simulate.spots(sensors, z0, np.zeros((*z0.shape, 2)))
 

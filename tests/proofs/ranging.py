@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from tests.proofs.simulate import COMMON, LENS, RAY, Floats
+from tests.proofs.simulate import COMMON, LENS, RAY
+from workbench.model.arrays import FloatArray
 from workbench.optics.lens import Lens
 from workbench.optics.rays import Ray
 from workbench.optics.triangulate import MeasuredSpot, estimate_depth
@@ -19,13 +20,13 @@ from workbench.optics.triangulate import MeasuredSpot, estimate_depth
 class Ranged:
     """Ranges (N, K, L) in mm, 1 sigma, as their calibrations state them."""
 
-    range_mm: Floats
-    sd_mm: Floats
-    spot_sd_mm: Floats
-    gradient: Floats
+    range_mm: FloatArray
+    sd_mm: FloatArray
+    spot_sd_mm: FloatArray
+    gradient: FloatArray
     """(N, K, L, S) derivatives by the sensor's parameters."""
 
-    def flat(self, covariance: Floats) -> tuple[Floats, Floats]:
+    def flat(self, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(N, K) range of a flat from all lasers, as the ranger weights them, and its sd."""
         weight = np.where(np.isfinite(self.range_mm), 1.0 / self.spot_sd_mm**2, 0.0)
         weight /= weight.sum(axis=-1, keepdims=True)
@@ -37,7 +38,7 @@ class Ranged:
         return np.asarray(mean), np.sqrt(shared + own.sum(axis=-1))
 
 
-def ranges(sensor: Floats, covariance: Floats, position_px: Floats, sd_px: Floats) -> Ranged:
+def ranges(sensor: FloatArray, covariance: FloatArray, position_px: FloatArray, sd_px: FloatArray) -> Ranged:
     """Range the spots of N sensors.
 
     Args:

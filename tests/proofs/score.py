@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.proofs.simulate import Floats
+from workbench.model.arrays import FloatArray
 
 COVERAGE = (0.93, 0.97)
 """Of a stated 95 % interval."""
@@ -60,7 +60,7 @@ class Score:
 HEADER = f"{'':>14}{'n':>8}{'stated sd':>12}{'coverage %':>18}{'rms / bound':>20}{'bias / sd':>20}"
 
 
-def score(name: str, error: Floats, sd: Floats, bound_variance: Floats) -> Score:
+def score(name: str, error: FloatArray, sd: FloatArray, bound_variance: FloatArray) -> Score:
     """Score errors (n,); those that are not finite do not exist (a spot out of the frame)."""
     there = np.isfinite(error)
     error, sd, bound_variance = error[there], sd[there], bound_variance[there]

@@ -22,10 +22,10 @@ from scipy.stats import binom, chi2, kstest, norm
 from tests.crash.short import CALLER
 from tests.proofs import simulate
 from tests.proofs.score import NORMAL_95
-from tests.proofs.simulate import Floats
 from tests.proofs.study import RANGES_MM
 from tests.proofs.tables import keep
 from workbench.calibration.verdict.assessment import PRIOR_UNMOVED
+from workbench.model.arrays import FloatArray
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import WorkbenchError
 from workbench.model.rig import Rig, load_rig
@@ -50,12 +50,12 @@ FEWEST = 20
 class Outcome:
     """An exported calibration against the bench that it was made on."""
 
-    parameter_z: Floats
+    parameter_z: FloatArray
     """(S,) error over stated deviation; NaN where the data do not determine the parameter."""
-    range_z: Floats
+    range_z: FloatArray
     """(K, L) at RANGES_MM, of the calibration alone: the spots are where the truth has them. NaN where the
     spot is out of the picture."""
-    relative: Floats
+    relative: FloatArray
     """(K, L) error of the range."""
     distance: float
     """Squared distance of all free parameters from the truth, by their covariance."""
@@ -160,7 +160,7 @@ def scores(rig: Rig, outcomes: Sequence[Outcome]) -> tuple[list[str], list[str]]
     return told, misses
 
 
-def _misses(z: Floats, inside: int) -> Iterator[str]:
+def _misses(z: FloatArray, inside: int) -> Iterator[str]:
     """What is too far from a normal distribution to be chance."""
     low, high = binom.ppf(RARE / 2, z.size, 0.95), binom.ppf(1 - RARE / 2, z.size, 0.95)
     if not low <= inside <= high:
@@ -172,7 +172,7 @@ def _misses(z: Floats, inside: int) -> Iterator[str]:
         yield f"mean z {mean:+.3f}, expected within {most:.3f} of 0"
 
 
-def _ranged(sensor: CalibratedSensor, seen: Floats) -> tuple[Floats, Floats]:
+def _ranged(sensor: CalibratedSensor, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Ranges (K, L) of spots (K, L, 2) and what the calibration adds to their deviations, mm."""
     found, sd = np.full(seen.shape[:2], np.nan), np.full(seen.shape[:2], np.nan)
     for n, laser in enumerate(sensor.ids):
@@ -184,7 +184,7 @@ def _ranged(sensor: CalibratedSensor, seen: Floats) -> tuple[Floats, Floats]:
     return found, sd
 
 
-def _truth(rig: Rig, path: Path) -> Floats:
+def _truth(rig: Rig, path: Path) -> FloatArray:
     """(S,) in the order of `simulate.names`."""
     told = YAML(typ="safe").load(path)
     common = [float(told[name]) for name in (*simulate.LENS, *simulate.BENCH)]

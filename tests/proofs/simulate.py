@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.rig import Prior, Rig
 
-Floats = NDArray[np.float64]
 LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
 BENCH = ("offset_mm", "ruler_scale")
 RAY = ("x_mm", "y_mm", "tx", "ty")
@@ -25,13 +24,13 @@ COMMON = len(LENS) + len(BENCH)
 class Calibrations:
     """What N sensors gave to fit."""
 
-    truth: Floats
+    truth: FloatArray
     """(N, S)"""
-    errors: Floats
+    errors: FloatArray
     """(N, J, 3) true placement error in mm and tangents of the tilts."""
-    position_px: Floats
+    position_px: FloatArray
     """(N, J, L, 2) means of the repeats, NaN where every one fell out of the frame."""
-    sd_px: Floats
+    sd_px: FloatArray
     """(N, J, L, 2) 1 sigma of the means, speckle included; NaN likewise."""
 
 
@@ -47,12 +46,12 @@ def names(rig: Rig) -> list[str]:
     return [*LENS, *BENCH, *(f"{laser.id}.{name}" for laser in rig.lasers for name in RAY)]
 
 
-def draw_truths(rig: Rig, n: int, rng: np.random.Generator) -> Floats:
+def draw_truths(rig: Rig, n: int, rng: np.random.Generator) -> FloatArray:
     """(N, S) sensors drawn from the rig's priors."""
     return np.stack([rng.normal(p.value, p.sd, n) for p in priors(rig)], axis=1)
 
 
-def spots(sensors: Floats, z0_mm: Floats, slopes: Floats) -> Floats:
+def spots(sensors: FloatArray, z0_mm: FloatArray, slopes: FloatArray) -> FloatArray:
     """(N, J, L, 2) where the lasers' spots on planes appear; NaN beyond the fold of the drawn lens.
 
     k1 and k2 drawn from wide tolerances can make a polynomial that folds over within the picture, so that one
@@ -78,20 +77,20 @@ def spots(sensors: Floats, z0_mm: Floats, slopes: Floats) -> Floats:
     )
 
 
-def depths(sensors: Floats, standoff_mm: Floats, error_mm: Floats | float = 0.0) -> Floats:
+def depths(sensors: FloatArray, standoff_mm: FloatArray, error_mm: FloatArray | float = 0.0) -> FloatArray:
     """(N, J) depths of planes at standoffs (J,) by the ruler."""
     offset, scale = sensors[:, len(LENS)], sensors[:, len(LENS) + 1]
     return standoff_mm * (1.0 + scale[:, None]) + offset[:, None] + error_mm
 
 
-def in_frame(rig: Rig, position_px: Floats) -> NDArray[np.bool_]:
+def in_frame(rig: Rig, position_px: FloatArray) -> BoolArray:
     """(...) whether positions (..., 2) lie between the centres of the outermost pixels."""
     size = np.array([rig.camera.width_px, rig.camera.height_px])
     return np.asarray(((position_px >= 0) & (position_px <= size - 1)).all(axis=-1))
 
 
 def calibrations(
-    rig: Rig, standoffs_mm: Floats, repeats: int, n: int, rng: np.random.Generator
+    rig: Rig, standoffs_mm: FloatArray, repeats: int, n: int, rng: np.random.Generator
 ) -> Calibrations:
     """Draw N sensors, place the target with errors and tilts, see every spot `repeats` times."""
     truth = draw_truths(rig, n, rng)
@@ -109,14 +108,14 @@ def calibrations(
     return Calibrations(truth, np.concatenate([error[..., None], slopes], axis=-1), mean, sd)
 
 
-def _unfolded(sensors: Floats, points: Floats) -> NDArray[np.bool_]:
+def _unfolded(sensors: FloatArray, points: FloatArray) -> BoolArray:
     """(N, J, L) whether the distorted radius still grows with the radius."""
     k1, k2, k3 = (sensors[:, LENS.index(name), None, None] for name in ("k1", "k2", "k3"))
     r2 = (points[..., 0] ** 2 + points[..., 1] ** 2) / points[..., 2] ** 2
     return np.asarray(1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3)) > 0)
 
 
-def _project(sensor: Floats, points: Floats) -> Floats:
+def _project(sensor: FloatArray, points: FloatArray) -> FloatArray:
     f, cx, cy = sensor[:3]
     camera = np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
     pixels, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera, sensor[3:8])

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.proofs.simulate import Calibrations, Floats
+from tests.proofs.simulate import Calibrations
 from workbench.calibration.data.observations import Observation, PlacementInfo
 from workbench.calibration.estimation.batch import fit_batch
 from workbench.calibration.selection.model_terms import fit_chosen, without_idle
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
 
@@ -18,13 +19,13 @@ from workbench.model.rig import Rig
 class Solved:
     """N calibrations of S parameters."""
 
-    sensor: Floats
+    sensor: FloatArray
     """(N, S)"""
-    covariance: Floats
+    covariance: FloatArray
     """(N, S, S)"""
-    noise_scale: Floats
+    noise_scale: FloatArray
     """(N,)"""
-    converged: Floats
+    converged: FloatArray
     """(N,) 1 or 0."""
 
 
@@ -51,7 +52,7 @@ def one_by_one(rig: Rig, placements: Sequence[PlacementInfo], data: Calibrations
 
 
 def _observations(
-    rig: Rig, placements: Sequence[PlacementInfo], position: Floats, sd: Floats
+    rig: Rig, placements: Sequence[PlacementInfo], position: FloatArray, sd: FloatArray
 ) -> list[Observation]:
     """One observation a cell: the mean of its repeats and its sd; the fit adds speckle."""
     own = np.sqrt(np.maximum(sd**2 - rig.noise.speckle_sd_px**2, 0.0))

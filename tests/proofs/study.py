@@ -8,9 +8,9 @@ import numpy as np
 
 from tests.proofs import bound, simulate
 from tests.proofs.ranging import ranges
-from tests.proofs.simulate import Floats
 from tests.proofs.solve import Solve, at_once
 from workbench.calibration.data.observations import Observation, PlacementInfo, group
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
 RANGES_MM = np.array([120.0, 180.0, 270.0, 400.0, 600.0, 900.0, 1400.0, 2100.0, 3200.0, 5000.0])
@@ -24,28 +24,28 @@ HELD_MM = np.array(
 class Outcome:
     """Errors (measured - true), stated standard deviations and bounds on the variance, N calibrations."""
 
-    parameter: Floats
+    parameter: FloatArray
     """(N, S)"""
-    parameter_sd: Floats
-    parameter_bound: Floats
-    range: Floats
+    parameter_sd: FloatArray
+    parameter_bound: FloatArray
+    range: FloatArray
     """(N, K, L) at RANGES_MM; NaN where the spot was out of the frame. Beyond infinity: infinite."""
-    range_sd: Floats
-    range_bound: Floats
-    held: Floats
+    range_sd: FloatArray
+    range_bound: FloatArray
+    held: FloatArray
     """(N, H, L) at HELD_MM, one spot each."""
-    held_flat: Floats
+    held_flat: FloatArray
     """(N, H) of all lasers together, as the ranger puts them."""
-    noise_scaled: Floats
+    noise_scaled: FloatArray
     """(N,) 1 where the fit found the residuals too large for the stated noise."""
-    unsolved: Floats
+    unsolved: FloatArray
     """(N,) 1 where the fit did not converge."""
-    missing: Floats
+    missing: FloatArray
     """(N,) share of the cells without a spot in the frame."""
 
 
 def run(
-    rig: Rig, standoffs_mm: Floats, repeats: int, n: int, rng: np.random.Generator, solve: Solve = at_once
+    rig: Rig, standoffs_mm: FloatArray, repeats: int, n: int, rng: np.random.Generator, solve: Solve = at_once
 ) -> Outcome:
     """Simulate and score N calibrations."""
     data = simulate.calibrations(rig, standoffs_mm, repeats, n, rng)
@@ -72,7 +72,7 @@ def run(
     )
 
 
-def placements(rig: Rig, standoffs_mm: Floats) -> tuple[PlacementInfo, ...]:
+def placements(rig: Rig, standoffs_mm: FloatArray) -> tuple[PlacementInfo, ...]:
     """The target at standoffs (J,), square, with the rig's tolerances."""
     seen = [
         Observation(f"{s:g} mm", rig.laser_ids[0], f"{s:g} mm", s, 0, 0.0, 0.0) for s in standoffs_mm.tolist()
@@ -85,7 +85,7 @@ def joined(parts: list[Outcome]) -> Outcome:
     return Outcome(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Outcome)))
 
 
-def _read(rig: Rig, truth: Floats, range_mm: Floats, rng: np.random.Generator) -> Floats:
+def _read(rig: Rig, truth: FloatArray, range_mm: FloatArray, rng: np.random.Generator) -> FloatArray:
     """(N, K, L, 2) one spot of each laser on a square target at true ranges; NaN out of the frame."""
     z0 = range_mm + truth[:, len(simulate.LENS)][:, None]
     seen = simulate.spots(truth, z0, np.zeros((*z0.shape, 2)))

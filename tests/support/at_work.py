@@ -15,10 +15,10 @@ import termios
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.cli.stopping import StopAfterShot
 from workbench.devices.serial_lasers import SerialLaserBank
+from workbench.model.arrays import FloatArray
 
 
 def compute(for_s: float = 0.1) -> None:
@@ -29,7 +29,7 @@ def compute(for_s: float = 0.1) -> None:
     hashlib.pbkdf2_hmac("sha256", b"", b"", max(1, round(rounds * (for_s - took) / took)))
 
 
-def load() -> NDArray[np.float64]:
+def load() -> FloatArray:
     """What a session has in memory: the solver, the recording, frames."""
     importlib.import_module("workbench.procedure.engine.run")
     importlib.import_module("workbench.viewer.recording")

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from tests.support.rigs import World
 from workbench.calibration.data.boards import BoardView
@@ -15,7 +14,6 @@ from workbench.calibration.data.observations import Observation, PlacementInfo
 from workbench.corners.board import BoardCorners
 from workbench.model.board import sag_mm
 
-Floats = NDArray[np.float64]
 CORNER_SD_PX = 0.02
 TILTED_SD_MM = 10.0
 PLACINGS = (

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
-Floats = NDArray[np.float64]
-Frame = NDArray[np.uint8] | NDArray[np.uint16]
+from workbench.model.arrays import FloatArray, Image
 
 
 @dataclass(frozen=True)
@@ -22,7 +20,7 @@ class Sensor:
     bits: int = 12
     black_dn: float = 10.0
 
-    def expose(self, light: Floats, rng: np.random.Generator) -> Frame:
+    def expose(self, light: FloatArray, rng: np.random.Generator) -> Image:
         electrons = rng.poisson(light) + rng.normal(0.0, self.read_sd, light.shape)
         numbers = np.rint(electrons / self.electrons_per_dn + self.black_dn)
         clipped = np.clip(numbers, 0, 2**self.bits - 1)
@@ -41,7 +39,7 @@ class Drawn:
     angle: float = 0.0
 
 
-def profile(shape: tuple[int, int], spot: Drawn) -> Floats:
+def profile(shape: tuple[int, int], spot: Drawn) -> FloatArray:
     """Light of one spot; turned ellipses by sampling each pixel 9 x 9 times."""
     if spot.angle == 0.0:
         return spot.electrons * _share(spot.v, spot.sv, shape[0])[:, None] * _share(spot.u, spot.su, shape[1])
@@ -51,13 +49,13 @@ def profile(shape: tuple[int, int], spot: Drawn) -> Floats:
     cos, sin = np.cos(spot.angle), np.sin(spot.angle)
     exponent = ((cos * u + sin * v) / spot.su) ** 2 + ((cos * v - sin * u) / spot.sv) ** 2
     density = np.exp(-0.5 * exponent) / (2.0 * np.pi * spot.su * spot.sv)
-    summed: Floats = density.reshape(shape[0], 9, shape[1], 9).mean(axis=(1, 3))
+    summed: FloatArray = density.reshape(shape[0], 9, shape[1], 9).mean(axis=(1, 3))
     return spot.electrons * summed
 
 
-def _share(centre: float, sd: float, n: int) -> Floats:
+def _share(centre: float, sd: float, n: int) -> FloatArray:
     edges = (np.arange(n + 1) - 0.5 - centre) / (np.sqrt(2.0) * sd)
-    share: Floats = 0.5 * np.diff(erf(edges))
+    share: FloatArray = 0.5 * np.diff(erf(edges))
     return share
 
 
@@ -66,8 +64,8 @@ def draw(
     rng: np.random.Generator,
     shape: tuple[int, int] = (60, 120),
     sensor: Sensor | None = None,
-    ambient: Floats | float = 20.0,
-) -> Frame:
+    ambient: FloatArray | float = 20.0,
+) -> Image:
     """A frame with spots."""
     light = np.zeros(shape) + ambient
     for spot in spots:

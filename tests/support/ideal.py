@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.emulator.scene import BenchScene
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.spot import Spot
 from workbench.emulator.truth import draw_truth
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 from workbench.model.target import FlatTarget, Placement, TargetShape
 
@@ -73,7 +73,7 @@ def painted(rig: Rig, folder: Path, standoff_mm: float, target: TargetShape | No
     return spot
 
 
-def moments(spot: Spot) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def moments(spot: Spot) -> tuple[FloatArray, FloatArray]:
     """Centroid (u, v) px and variances (u, v) px^2."""
     rate = spot.rate.astype(np.float64)
     v, u = np.mgrid[: rate.shape[0], : rate.shape[1]]

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.data.observations import Observation
+from workbench.model.arrays import FloatArray
 from workbench.model.calibration import Provenance
 from workbench.model.rig import BenchSpec, CameraSpec, LaserSpec, NoiseSpec, Prior, Rig
 
@@ -89,7 +89,7 @@ class World:
             for name in ("x_mm", "y_mm", "tx", "ty"):
                 self.values[f"{laser.id}.{name}"] = draw(rng, getattr(laser, name))
 
-    def pixel(self, laser_id: str, z0_mm: float, yaw: float = 0.0, pitch: float = 0.0) -> NDArray[np.float64]:
+    def pixel(self, laser_id: str, z0_mm: float, yaw: float = 0.0, pitch: float = 0.0) -> FloatArray:
         """(2,) where the laser's spot on a tilted flat appears, by linear algebra and OpenCV's lens."""
         x, y, tx, ty = (self.values[f"{laser_id}.{name}"] for name in ("x_mm", "y_mm", "tx", "ty"))
         system = np.array([[1, 0, -tx], [0, 1, -ty], [-np.tan(yaw), -np.tan(pitch), 1.0]])

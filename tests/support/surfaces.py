@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray
 from workbench.ranging.points import Points
 from workbench.ranging.shape import Shape, fit_shape
 
-Floats = NDArray[np.float64]
-Surface = Callable[[Floats], Floats]
+Surface = Callable[[FloatArray], FloatArray]
 X = np.array([-60.0, -30.0, 30.0, 60.0])
 SD_PX = 0.064  # a spot's 0.05 px and the speckle's 0.04
 F_PX = 533.0
@@ -38,12 +37,12 @@ def cylinder(range_mm: float, axis_x_mm: float = 0.0, radius_mm: float = 89.0) -
     return lambda x: range_mm + radius_mm - np.sqrt(radius_mm**2 - (x - axis_x_mm) ** 2)
 
 
-def seen(x: Floats, range_mm: Floats, sd_px: float = SD_PX) -> Points:
+def seen(x: FloatArray, range_mm: FloatArray, sd_px: float = SD_PX) -> Points:
     """What spots of this deviation tell: r^2 / (f b) of it in range."""
     return Points(x, range_mm, np.diag((sd_px * range_mm**2 / (F_PX * np.abs(x))) ** 2))
 
 
-def readings(surface: Surface, n: int, seed: int, x: Floats = X, sd_px: float = SD_PX) -> list[Shape]:
+def readings(surface: Surface, n: int, seed: int, x: FloatArray = X, sd_px: float = SD_PX) -> list[Shape]:
     """n noisy readings: Gaussian in pixels, that is in the inverse of the range."""
     rng = np.random.default_rng(seed)
     noise = rng.normal(0.0, 1.0, (n, len(x))) * sd_px / (F_PX * np.abs(x))

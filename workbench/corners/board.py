@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.corners.subpixel import fit_saddles
+from workbench.model.arrays import FloatArray, Image, IndexArray
 from workbench.model.board import Board
 from workbench.model.errors import BadInputError
-from workbench.spots.types import Image
 
-Floats = NDArray[np.float64]
-Ids = NDArray[np.intp]
 FEWEST_CORNERS = 12
 """A pose has six unknowns; this many corners over-determine it with room for a bad one."""
 ENLARGED = 2
@@ -28,11 +26,11 @@ NEIGHBOURS = 8
 class BoardCorners:
     """Corners of the board that were found, k of them."""
 
-    ids: Ids
+    ids: IndexArray
     """(k,) their rows in `Board.corners_mm`."""
-    position_px: Floats
+    position_px: FloatArray
     """(k, 2)"""
-    sd_px: Floats
+    sd_px: FloatArray
     """(k, 2) 1 sigma."""
     spoiled: int
     """Corners that were seen and are left out: something lay on them, or they lie at the frame's border."""
@@ -71,14 +69,14 @@ def find_board(frames: Sequence[Image], board: Board) -> BoardCorners:
 class _Markers:
     """Markers of the board that were seen, m of them."""
 
-    ids: Ids
-    corners_px: Floats
+    ids: IndexArray
+    corners_px: FloatArray
     """(m, 4, 2)"""
-    corners_mm: Floats
+    corners_mm: FloatArray
     """(m, 4, 2)"""
 
 
-def _markers(mean: Floats, board: Board) -> _Markers:
+def _markers(mean: FloatArray, board: Board) -> _Markers:
     dictionary = _dictionary(board)
     detector = cv2.aruco.ArucoDetector(dictionary)
     picture = cv2.resize(_stretched(mean), None, fx=ENLARGED, fy=ENLARGED, interpolation=cv2.INTER_CUBIC)
@@ -90,7 +88,7 @@ def _markers(mean: Floats, board: Board) -> _Markers:
     return _Markers(ids[known], (corners[known] + 0.5) / ENLARGED - 0.5, places[ids[known]])
 
 
-def _corners(mean: Floats, board: Board, markers: _Markers) -> tuple[Ids, Floats]:
+def _corners(mean: FloatArray, board: Board, markers: _Markers) -> tuple[IndexArray, FloatArray]:
     """Ids and places (to a pixel) of the corners between markers that were seen."""
     picture = _stretched(mean)
     ids, places = [np.array([], np.intp)], [np.zeros((0, 2))]
@@ -108,7 +106,7 @@ def _corners(mean: Floats, board: Board, markers: _Markers) -> tuple[Ids, Floats
     return np.concatenate(ids), np.concatenate(places)
 
 
-def _surroundings(corners_mm: Floats, markers: _Markers) -> Floats:
+def _surroundings(corners_mm: FloatArray, markers: _Markers) -> FloatArray:
     """(k, 2, 2) derivatives of the pixel position by the board's x, y at its corners, from what is near."""
     points_mm, points_px = markers.corners_mm.reshape(-1, 2), markers.corners_px.reshape(-1, 2)
     matrices = []
@@ -119,13 +117,13 @@ def _surroundings(corners_mm: Floats, markers: _Markers) -> Floats:
     return np.array(matrices)
 
 
-def _stretched(mean: Floats) -> NDArray[np.uint8]:
+def _stretched(mean: FloatArray) -> NDArray[np.uint8]:
     """The frame with its tones spread over 8 bits: room light may leave the board in a few of them."""
     dark, bright = np.percentile(mean, (1, 99))
     return np.asarray(np.clip((mean - dark) / max(bright - dark, 1e-9) * 255, 0, 255), np.uint8)
 
 
-def _ids(found: object) -> Ids:
+def _ids(found: object) -> IndexArray:
     """OpenCV says None where it found none."""
     return np.array([], np.intp) if found is None else np.asarray(found, np.intp).ravel()
 
@@ -140,7 +138,7 @@ def _charuco(board: Board, block: int) -> cv2.aruco.CharucoBoard:
     return cv2.aruco.CharucoBoard(size, board.square_mm, board.marker_mm, _dictionary(board), ids)
 
 
-def _marker_places(board: Board, block: int) -> Floats:
+def _marker_places(board: Board, block: int) -> FloatArray:
     """(markers, 4, 2) corners of a block's markers, mm, clockwise from their top left."""
     places = np.array(_charuco(board, block).getObjPoints(), np.float64)[:, :, :2]
     return np.asarray(places + np.array([board.left_mm, board.block_tops_mm[block]]), np.float64)

@@ -14,10 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
-Floats = NDArray[np.float64]
+from workbench.model.arrays import BoolArray, FloatArray
+
 WINDOW_PX = 6.0
 """Radius. Lenses bend edges: over more than this a strong one moves the corner by a hundredth of a pixel."""
 SQUARE_SHARE = 0.45
@@ -50,16 +50,16 @@ FLOOR_SD_PX = 0.004
 class Saddles:
     """Fitted corners, n of them."""
 
-    position_px: Floats
+    position_px: FloatArray
     """(n, 2)"""
-    sd_px: Floats
+    sd_px: FloatArray
     """(n, 2) 1 sigma by axis, from the scatter of the pixels about the model."""
-    good: NDArray[np.bool_]
+    good: BoolArray
     """(n,) whether what was fitted is a corner; the rest of a bad one means nothing."""
 
 
 def fit_saddles(
-    image: Floats, start_px: Floats, px_per_mm: Floats, square_mm: float, gap_mm: float
+    image: FloatArray, start_px: FloatArray, px_per_mm: FloatArray, square_mm: float, gap_mm: float
 ) -> Saddles:
     """Fit every corner.
 
@@ -82,8 +82,8 @@ def fit_saddles(
 
 
 def _windows(
-    image: Floats, start_px: Floats, px_per_mm: Floats, square_mm: float, gap_mm: float
-) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+    image: FloatArray, start_px: FloatArray, px_per_mm: FloatArray, square_mm: float, gap_mm: float
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Pixel positions x, y, their tones, and which of them count: all (n, pixels)."""
     span = np.arange(-int(WINDOW_PX), int(WINDOW_PX) + 1)
     dy, dx = (grid.ravel() for grid in np.meshgrid(span, span, indexing="ij"))
@@ -105,7 +105,7 @@ def _windows(
     return x.astype(float), y.astype(float), tone, near & off_markers & (whole & resolved)[:, None]
 
 
-def _start(start_px: Floats, px_per_mm: Floats, tone: Floats, use: NDArray[np.bool_]) -> Floats:
+def _start(start_px: FloatArray, px_per_mm: FloatArray, tone: FloatArray, use: BoolArray) -> FloatArray:
     """(n, 7) u, v, angles of both edges' normals, log of the blur, a, b (of either sign: set by the data)."""
     along_x, along_y = px_per_mm[:, :, 0], px_per_mm[:, :, 1]
     # The edge along the board's y has its normal across it, on the side of the board's x; and so the other.
@@ -119,13 +119,13 @@ def _start(start_px: Floats, px_per_mm: Floats, tone: Floats, use: NDArray[np.bo
     return np.column_stack([start_px, angle_1, angle_2, np.full(n, np.log(START_BLUR_PX)), a, np.zeros(n)])
 
 
-def _model(p: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def _model(p: FloatArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Tones (n, pixels) and their derivatives by the unknowns (n, pixels, 7)."""
     u, v, angle_1, angle_2, log_blur, a, b = (column[:, None] for column in p.T)
     blur = np.exp(log_blur)
     du, dv = x - u, y - v
 
-    def edge(angle: Floats) -> tuple[Floats, ...]:
+    def edge(angle: FloatArray) -> tuple[FloatArray, ...]:
         c, s = np.cos(angle), np.sin(angle)
         d = (du * c + dv * s) / blur
         slope = np.sqrt(2 / np.pi) * np.exp(-(d**2) / 2)
@@ -139,7 +139,7 @@ def _model(p: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return a + b * g * h, np.stack(jacobian, axis=2)
 
 
-def _improve(p: Floats, x: Floats, y: Floats, tone: Floats, use: NDArray[np.bool_]) -> Floats:
+def _improve(p: FloatArray, x: FloatArray, y: FloatArray, tone: FloatArray, use: BoolArray) -> FloatArray:
     """Gauss-Newton steps, the first for the tones alone."""
     p = p.copy()
     value, jacobian = _model(p, x, y)
@@ -157,7 +157,7 @@ def _improve(p: Floats, x: Floats, y: Floats, tone: Floats, use: NDArray[np.bool
     return p
 
 
-def _step(jacobian: Floats, rest: Floats, use: NDArray[np.bool_]) -> Floats:
+def _step(jacobian: FloatArray, rest: FloatArray, use: BoolArray) -> FloatArray:
     """(n, unknowns) solution of the normal equations, in scaled unknowns and damped by rounding's size."""
     weighted = np.where(use[:, :, None], jacobian, 0.0)
     information = weighted.transpose(0, 2, 1) @ weighted
@@ -168,7 +168,7 @@ def _step(jacobian: Floats, rest: Floats, use: NDArray[np.bool_]) -> Floats:
 
 
 def _judge(
-    p: Floats, x: Floats, y: Floats, tone: Floats, use: NDArray[np.bool_], start_px: Floats
+    p: FloatArray, x: FloatArray, y: FloatArray, tone: FloatArray, use: BoolArray, start_px: FloatArray
 ) -> Saddles:
     value, jacobian = _model(p, x, y)
     freedom = use.sum(axis=1) - p.shape[1]

@@ -12,7 +12,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from workbench.devices.protocols import Frame, Image
+from workbench.devices.protocols import Frame
+from workbench.model.arrays import Image
 from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import CameraDevice, CameraSpec
 

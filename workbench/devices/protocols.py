@@ -8,13 +8,9 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
+from workbench.model.arrays import Image
 from workbench.model.prompt import Answer, Prompt
 from workbench.model.target import Placement
-
-Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.emulator.spec import BeamSpec
 from workbench.emulator.truth import Ray
-
-Array = NDArray[np.float64]
+from workbench.model.arrays import FloatArray
 
 
 class Beam:
@@ -23,7 +21,7 @@ class Beam:
         self._exit_mm = spec.exit_diameter_mm
         self._divergence = spec.divergence_mrad * 1e-3
 
-    def irradiance(self, points: Array, normals: Array) -> Array:
+    def irradiance(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Power per area of the surface (W / mm^2) at points (n, 3) with unit front normals (n, 3).
 
         Gaussian of 1/e^2 diameter exit + divergence x path, 2 P / (pi w^2) on its axis so that its integral
@@ -38,7 +36,7 @@ class Beam:
         cosine = np.maximum(0.0, -normals @ self._axis)
         return np.where(path > 0, peak * np.exp(-2 * rho2 / radius**2) * cosine, 0.0)
 
-    def outline(self, radii: float, count: int) -> tuple[Array, Array]:
+    def outline(self, radii: float, count: int) -> tuple[FloatArray, FloatArray]:
         """Rays (origins (n, 3), directions (n, 3)) on the cone at `radii` times the beam's 1/e^2 radius.
 
         The radius grows linearly with the path, so this outline is made of straight lines.

@@ -11,17 +11,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from workbench.emulator.lens import Lens
 from workbench.emulator.spec import SurfaceSpec
 from workbench.emulator.spot import ImageFormat
 from workbench.emulator.truth import BoardError, PlacementError, Truth
+from workbench.model.arrays import BoolArray, Float32Array, FloatArray
 from workbench.model.board import Board, sag_mm
 from workbench.model.target import BoardTarget
 
-Array = NDArray[np.float64]
 CELLS_PER_MM = 10
 SAMPLES = 3
 """Along a pixel's side."""
@@ -43,16 +42,16 @@ class Print:
         self._tone = 1 - (1 - ink) * np.minimum(black, 1.0)
         self._integral = np.pad(self._tone.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
 
-    def on_page(self, x: Array, y: Array) -> NDArray[np.bool_]:
+    def on_page(self, x: FloatArray, y: FloatArray) -> BoolArray:
         """Whether board points lie on the paper."""
         return np.asarray((np.abs(x) < self._half[0]) & (np.abs(y) < self._half[1]), np.bool_)
 
-    def tone(self, x: Array, y: Array) -> Array:
+    def tone(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Tone at board points, mm."""
         at = np.array([(y + self._half[1]) * CELLS_PER_MM - 0.5, (x + self._half[0]) * CELLS_PER_MM - 0.5])
         return np.asarray(map_coordinates(self._tone, at, order=1, mode="nearest"), np.float64)
 
-    def mean_tone(self, x: Array, y: Array, half_x: Array, half_y: Array) -> Array:
+    def mean_tone(self, x: FloatArray, y: FloatArray, half_x: FloatArray, half_y: FloatArray) -> FloatArray:
         """Mean tone of rectangles around board points, half sides given, mm."""
         left, right = x - half_x, x + half_x
         top, bottom = y - half_y, y + half_y
@@ -61,7 +60,7 @@ class Print:
         )
         return np.asarray(total / (4 * half_x * half_y * CELLS_PER_MM**2), np.float64)
 
-    def _sum(self, x: Array, y: Array) -> Array:
+    def _sum(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Integral of the tone from the page's corner; exact, the tone being constant in every cell."""
         at = np.array([(y + self._half[1]) * CELLS_PER_MM, (x + self._half[0]) * CELLS_PER_MM])
         return np.asarray(map_coordinates(self._integral, at, order=1, mode="nearest"), np.float64)
@@ -71,19 +70,19 @@ class Print:
 class BoardSurface:
     """The board as it stands. Camera frame, mm; front is the side that faces the sensor."""
 
-    origin_mm: Array
+    origin_mm: FloatArray
     """(3,) the middle of its band."""
-    axes: Array
+    axes: FloatArray
     """(3, 3) rows: its x, its y, and its z into the paper."""
     scale: float
     """True length over printed length."""
-    bow_mm: Array
+    bow_mm: FloatArray
     """(3,) see `sag_mm`."""
     print: Print
     albedo: float
     """Of its paper."""
 
-    def depth(self, origin: Array, direction: Array) -> Array:
+    def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Surface`."""
         normal = self.axes[2]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -95,15 +94,15 @@ class BoardSurface:
                 t = (to_plane + sag_mm(self.bow_mm, np.column_stack([x, y]))) / facing
             return np.where((t > 0) & self.print.on_page(x, y), t, np.nan)
 
-    def normal(self, points: Array) -> Array:
+    def normal(self, points: FloatArray) -> FloatArray:
         """See `Surface`; the slope of the sag, a thousandth, is left out."""
         return np.broadcast_to(-self.axes[2], points.shape)
 
-    def shade(self, points: Array) -> Array:
+    def shade(self, points: FloatArray) -> FloatArray:
         """See `Surface`."""
         return self.print.tone(*self._on_board(points))
 
-    def lit_by_room(self, lens: Lens, image: ImageFormat, blur_px: float) -> NDArray[np.float32]:
+    def lit_by_room(self, lens: Lens, image: ImageFormat, blur_px: float) -> Float32Array:
         """(height, width) brightness in room light; that of the paper, and of all beside the board, is 1."""
         n = SAMPLES
         offsets = (np.arange(n) + 0.5) / n - 0.5
@@ -123,7 +122,7 @@ class BoardSurface:
             tone = gaussian_filter(tone, blur_px * n, mode="nearest", truncate=5.0)
         return np.asarray(tone.reshape(image.height, n, image.width, n).mean(axis=(1, 3)), np.float32)
 
-    def _on_board(self, points: Array) -> tuple[Array, Array]:
+    def _on_board(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """x, y as printed, mm, of points (n, 3)."""
         along = (points - self.origin_mm) @ self.axes[:2].T / self.scale
         return along[:, 0], along[:, 1]
@@ -163,7 +162,7 @@ class _Covered:
 
     first: int
     last: int
-    share: Array
+    share: FloatArray
 
 
 def _covered(start_mm: float, length_mm: float, cells: int) -> _Covered:

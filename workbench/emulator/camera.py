@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.devices.protocols import Frame, Image
+from workbench.devices.protocols import Frame
 from workbench.emulator.keyed import generator
 from workbench.emulator.scene import BenchScene
-from workbench.emulator.sensor import ImageSensor, Map
+from workbench.emulator.sensor import ImageSensor
 from workbench.emulator.spec import EmulatorSpec
 from workbench.emulator.spot import Spot
+from workbench.model.arrays import Float32Array, Image
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Exposure:
     """What one frame was exposed to."""
 
     spots: tuple[Spot, ...]
-    picture: Map | None
+    picture: Float32Array | None
     """What room light shows, see `BenchScene.picture`."""
     lit: bool
     key: str

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from workbench.emulator.truth import Truth
+from workbench.model.arrays import FloatArray
 from workbench.model.errors import BadInputError
 
-Array = NDArray[np.float64]
 NEWTON_STEPS = 30
 NEWTON_PX = 1e-7
 ZERO = np.zeros(3)
@@ -22,9 +21,9 @@ ZERO = np.zeros(3)
 class LinesOfSight:
     """Where pixels look: x = X/Z and y = Y/Z of their lines of sight, and area = |d(x, y)/d(u, v)|."""
 
-    x: Array
-    y: Array
-    area: Array
+    x: FloatArray
+    y: FloatArray
+    area: FloatArray
 
 
 class Lens:
@@ -35,12 +34,12 @@ class Lens:
         self._matrix = np.array([[f, 0, truth.cx_px], [0, f, truth.cy_px], [0, 0, 1]])
         self._distortion = np.array([truth.k1, truth.k2, truth.p1, truth.p2, truth.k3])
 
-    def project(self, points_mm: Array) -> Array:
+    def project(self, points_mm: FloatArray) -> FloatArray:
         """Pixels (n, 2) of points (n, 3), mm, all in front of the camera."""
         pixels, _ = cv2.projectPoints(points_mm.reshape(-1, 1, 3), ZERO, ZERO, self._matrix, self._distortion)
         return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
 
-    def back_project(self, u_px: Array, v_px: Array) -> LinesOfSight:
+    def back_project(self, u_px: FloatArray, v_px: FloatArray) -> LinesOfSight:
         """Lines of sight of pixels (n,), by Newton's method on OpenCV's projection.
 
         OpenCV's own inverse is a fixed-point iteration that need not converge for a strongly curved lens.
@@ -66,7 +65,9 @@ class Lens:
             f" k1, k2, p1, p2, k3 = {self._distortion.tolist()}; check the rig's camera and emulator.truth"
         )
 
-    def back_project_grid(self, u_px: Array, v_px: Array, samples_u: Array, samples_v: Array) -> LinesOfSight:
+    def back_project_grid(
+        self, u_px: FloatArray, v_px: FloatArray, samples_u: FloatArray, samples_v: FloatArray
+    ) -> LinesOfSight:
         """Lines of sight (rows of v, columns of u) on a fine grid, by cubic splines between whole pixels.
 
         `u_px`, `v_px` are whole pixels around the samples. A lens bends over hundreds of pixels: the
@@ -80,7 +81,7 @@ class Lens:
         )
         return LinesOfSight(x, y, area)
 
-    def _miss(self, xy: Array, target: Array) -> tuple[Array, Array, Array]:
+    def _miss(self, xy: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Target minus projection, u and v, and the projection's Jacobian d(u, v)/d(x, y), (2, 2, n)."""
         points = np.column_stack([xy, np.ones(len(xy))]).reshape(-1, 1, 3)
         pixels, derivatives = cv2.projectPoints(points, ZERO, ZERO, self._matrix, self._distortion)

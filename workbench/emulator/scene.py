@@ -9,7 +9,6 @@ from pathlib import Path
 from workbench.emulator.beam import Beam
 from workbench.emulator.board import BoardSurface, Print, stand
 from workbench.emulator.lens import Lens
-from workbench.emulator.sensor import Map
 from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
 from workbench.emulator.spot import ImageFormat, Spot, SpotPainter
 from workbench.emulator.surfaces import Cylinder, Plane, Polynomial, Surface, wall_in_mirror
@@ -20,6 +19,7 @@ from workbench.emulator.truth import (
     draw_board_error,
     draw_placement_error,
 )
+from workbench.model.arrays import Float32Array
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.model.target import (
@@ -47,7 +47,7 @@ class BenchScene:
         self._key = ""
         self._f_step = 0
         self._spots: dict[str, list[Spot]] = {}
-        self._picture: Map | None = None
+        self._picture: Float32Array | None = None
         self.moves = 0
         """Counts placements."""
 
@@ -81,7 +81,7 @@ class BenchScene:
             self._spots[laser_id] = self._paint(laser_id)
         return self._spots[laser_id]
 
-    def picture(self, f_scale: float = 1.0) -> Map | None:
+    def picture(self, f_scale: float = 1.0) -> Float32Array | None:
         """(height, width) what room light shows of a board, at a drifted f; None for all other targets."""
         board = self._surfaces[0][0] if self._surfaces else None
         if not isinstance(board, BoardSurface):

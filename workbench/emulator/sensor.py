@@ -6,14 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
-from workbench.devices.protocols import Image
 from workbench.emulator.keyed import generator
 from workbench.emulator.spec import EmulatorSpec
 from workbench.emulator.spot import ImageFormat, Spot
+from workbench.model.arrays import Float32Array, Image
 
-Map = NDArray[np.float32]
 CLUTTER_THINGS = 40
 
 
@@ -34,7 +32,7 @@ class ImageSensor:
         gain: float,
         ambient: float,
         rng: Generator,
-        picture: Map | None = None,
+        picture: Float32Array | None = None,
     ) -> Image:
         """One frame; `ambient` multiplies the ambient light, and `picture` (height, width) does so by pixel.
 
@@ -61,7 +59,7 @@ class ImageSensor:
         level = (peak - self._spec.black_level) * self._spec.full_well_e / gain
         return level / rate if rate > 0 else float("inf")
 
-    def _digitise(self, electrons: Map, gain: float) -> Image:
+    def _digitise(self, electrons: Float32Array, gain: float) -> Image:
         electrons *= np.float32(gain * self._full_scale / self._spec.full_well_e)
         electrons += np.float32(self._spec.black_level * self._full_scale)
         np.rint(electrons, out=electrons)
@@ -69,12 +67,12 @@ class ImageSensor:
         return electrons.astype(np.uint8) if self._full_scale < 256 else electrons.astype(np.uint16)
 
 
-def _window(image: Map, spot: Spot) -> Map:
+def _window(image: Float32Array, spot: Spot) -> Float32Array:
     height, width = spot.rate.shape
     return image[spot.top : spot.top + height, spot.left : spot.left + width]
 
 
-def _ambient_map(spec: EmulatorSpec, image: ImageFormat) -> Map:
+def _ambient_map(spec: EmulatorSpec, image: ImageFormat) -> Float32Array:
     ambient = spec.ambient
     u = (np.arange(image.width) / max(image.width - 1, 1) - 0.5) * ambient.gradient_u
     v = (np.arange(image.height) / max(image.height - 1, 1) - 0.5) * ambient.gradient_v
@@ -87,7 +85,7 @@ def _ambient_map(spec: EmulatorSpec, image: ImageFormat) -> Map:
     return (ambient.level_e_per_s * light).astype(np.float32)
 
 
-def _hot_map(spec: EmulatorSpec, image: ImageFormat) -> Map:
+def _hot_map(spec: EmulatorSpec, image: ImageFormat) -> Float32Array:
     rng = generator(spec.seed, "hot pixels")
     pixels = np.zeros(image.width * image.height, dtype=np.float32)
     count = min(spec.sensor.hot_pixels, pixels.size)

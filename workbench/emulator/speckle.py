@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
+
+from workbench.model.arrays import FloatArray
 
 
 def subsamples(grain_px: float) -> int:
@@ -17,7 +18,7 @@ def subsamples(grain_px: float) -> int:
 
 def speckle_field(
     shape: tuple[int, int], step_px: float, grain_px: float, contrast: float, rng: Generator
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """Relative intensity of a speckle pattern, every `step_px`: mean 1, standard deviation `contrast`.
 
     A circular pupil of diameter 1 / (lambda N) in spatial frequency passes random, independent amplitudes;

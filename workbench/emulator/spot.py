@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.constants import c, h
 from scipy.ndimage import gaussian_filter
 
@@ -25,8 +24,8 @@ from workbench.emulator.lens import Lens
 from workbench.emulator.spec import EmulatorSpec
 from workbench.emulator.speckle import speckle_field, subsamples
 from workbench.emulator.surfaces import Surface
+from workbench.model.arrays import Float32Array, FloatArray
 
-Array = NDArray[np.float64]
 OUTLINE_RADII = 3.0
 """A window ends where the beam is down to exp(-18) of its peak, and five sigma of blur beyond."""
 LARGEST_WINDOW = 1_500_000
@@ -39,7 +38,7 @@ class Spot:
 
     left: int
     top: int
-    rate: NDArray[np.float32]
+    rate: Float32Array
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ class SpotPainter:
         right, bottom = (int(np.clip(a, 0, s)) for a, s in zip(high, size, strict=True))
         return (left, top, right - left, bottom - top) if right > left and bottom > top else None
 
-    def _samples(self, beam: Beam, surface: Surface, box: tuple[int, int, int, int], n: int) -> Array:
+    def _samples(self, beam: Beam, surface: Surface, box: tuple[int, int, int, int], n: int) -> FloatArray:
         """Power from each of n x n points a pixel, as if it filled the pixel: E cos^4(alpha) d(x, y)."""
         left, top, width, height = box
         offsets = (np.arange(n) + 0.5) / n - 0.5

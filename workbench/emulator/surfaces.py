@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.model.arrays import FloatArray
+
 NODES = 2049
 FARTHEST_INVERSE = 1e-6
 """1/mm: what lies a kilometre away is not there."""
@@ -21,23 +21,23 @@ class Surface(Protocol):
     def albedo(self) -> float:
         """Diffuse reflectance."""
 
-    def depth(self, origin: Array, direction: Array) -> Array:
+    def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """First t > 0 at which origin + t direction meets the surface, NaN where it does not.
 
         Shapes: origin (3,) or (n, 3), direction (n, 3) with third component 1, result (n,).
         """
 
-    def normal(self, points: Array) -> Array:
+    def normal(self, points: FloatArray) -> FloatArray:
         """Unit normals (n, 3) towards the front at points (n, 3) on the surface."""
 
-    def shade(self, points: Array) -> Array | float:
+    def shade(self, points: FloatArray) -> FloatArray | float:
         """Diffuse reflectance at points (n, 3) on the surface over `albedo`."""
 
 
 class Plain:
     """A surface of one colour."""
 
-    def shade(self, points: Array) -> float:
+    def shade(self, points: FloatArray) -> float:
         """See `Surface`."""
         return 1.0
 
@@ -54,7 +54,7 @@ class Plane(Plain):
     half_height_mm: float = np.inf
     centre_x_mm: float = 0.0
 
-    def depth(self, origin: Array, direction: Array) -> Array:
+    def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Surface`."""
         gradient = np.array([-self.slope_x, -self.slope_y, 1.0])
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -65,7 +65,7 @@ class Plane(Plain):
             met = (t > 0) & (np.abs(x) <= self.half_width_mm) & (np.abs(y) <= self.half_height_mm)
         return np.where(met, t, np.nan)
 
-    def normal(self, points: Array) -> Array:
+    def normal(self, points: FloatArray) -> FloatArray:
         """See `Surface`."""
         normal = np.array([self.slope_x, self.slope_y, -1.0])
         return np.broadcast_to(normal / np.linalg.norm(normal), points.shape)
@@ -83,12 +83,12 @@ class SeenInMirror(Plain):
         """See `Surface`."""
         return self.image.albedo
 
-    def depth(self, origin: Array, direction: Array) -> Array:
+    def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Surface`; rays that pass the mirror by see nothing in it."""
         through = np.isfinite(self.mirror.depth(origin, direction))
         return np.where(through, self.image.depth(origin, direction), np.nan)
 
-    def normal(self, points: Array) -> Array:
+    def normal(self, points: FloatArray) -> FloatArray:
         """See `Surface`."""
         return self.image.normal(points)
 
@@ -120,7 +120,7 @@ class Cylinder(Plain):
     radius_mm: float
     albedo: float
 
-    def depth(self, origin: Array, direction: Array) -> Array:
+    def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Surface`."""
         ox, oz = origin[..., 0] - self.axis_x_mm, origin[..., 2] - self.axis_z_mm
         dx, dz = direction[:, 0], direction[:, 2]
@@ -129,7 +129,7 @@ class Cylinder(Plain):
         t = (-half_b - np.sqrt(np.where(root >= 0, root, np.nan))) / a
         return np.where(t > 0, t, np.nan)
 
-    def normal(self, points: Array) -> Array:
+    def normal(self, points: FloatArray) -> FloatArray:
         """See `Surface`."""
         out = points - np.array([self.axis_x_mm, 0.0, self.axis_z_mm])
         out[:, 1] = 0.0
@@ -145,7 +145,7 @@ class Polynomial(Plain):
     shift_mm: float
     albedo: float
 
-    def depth(self, origin: Array, direction: Array) -> Array:
+    def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Surface`.
 
         Rays of one origin meet a surface that is the same at every height at a depth that depends on their
@@ -158,13 +158,13 @@ class Polynomial(Plain):
         nodes = np.column_stack([x, np.zeros(NODES), np.ones(NODES)])
         return np.interp(direction[:, 0], x, self._first_crossing(origin, nodes))
 
-    def normal(self, points: Array) -> Array:
+    def normal(self, points: FloatArray) -> FloatArray:
         """See `Surface`."""
         slope = np.polynomial.Polynomial([0.0, *self.coefficients]).deriv()(points[:, 0] - self.shift_mm)
         out = np.stack([slope, np.zeros_like(slope), -np.ones_like(slope)], axis=1)
         return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
 
-    def _first_crossing(self, origin: Array, direction: Array) -> Array:
+    def _first_crossing(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """`depth` of each ray for itself.
 
         Every crossing is an eigenvalue of a companion matrix, so that the first one is the first. The unknown
@@ -181,7 +181,7 @@ class Polynomial(Plain):
         first = np.where(real, inverse.real, -np.inf).max(axis=1)
         return np.where(first > FARTHEST_INVERSE, 1 / np.maximum(first, FARTHEST_INVERSE), np.nan)
 
-    def _along(self, origin: Array, direction: Array) -> Array:
+    def _along(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """Coefficients (n, degree + 1) of surface minus ray in powers of t."""
         x0 = np.broadcast_to(origin[..., 0] - self.shift_mm, len(direction))
         total = np.zeros((len(direction), len(self.coefficients) + 1))

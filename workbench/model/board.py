@@ -10,12 +10,11 @@ from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from workbench.model.arrays import FloatArray
 from workbench.model.yamlfile import FileModel
 
-Array = NDArray[np.float64]
 Millimetres = Annotated[float, Field(gt=0)]
 PAGE_MARGIN_MM = 5.0
 """No printer reaches the edge of the paper."""
@@ -73,7 +72,7 @@ class Board(FileModel):
         return -self.columns * self.square_mm / 2
 
     @cached_property
-    def corners_mm(self) -> Array:
+    def corners_mm(self) -> FloatArray:
         """(K, 2) x, y of every inner corner: upper block first, then row by row."""
         x = self.left_mm + self.square_mm * np.arange(1, self.columns)
         y = np.concatenate([top + self.square_mm * np.arange(1, self.rows) for top in self.block_tops_mm])
@@ -85,7 +84,7 @@ class Board(FileModel):
         """Half of all: corner ids of the lower block begin here."""
         return (self.columns - 1) * (self.rows - 1)
 
-    def black_mm(self) -> Array:
+    def black_mm(self) -> FloatArray:
         """(n, 4) left, top, width, height of every black rectangle: squares, and cells of the markers."""
         squares = [
             (
@@ -121,7 +120,7 @@ class Board(FileModel):
         ]
 
 
-def sag_mm(bow_mm: Array, points_mm: Array) -> Array:
+def sag_mm(bow_mm: FloatArray, points_mm: FloatArray) -> FloatArray:
     """(n,) how far the paper at board points (n, 2) lies behind the plane that it should be.
 
     A quadratic, whatever bends a sheet that is fixed all over; `bow_mm` (3,) are its values, in the order of

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import LARGEST, MOST_PX, LaserId, NonNegativeFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
@@ -105,7 +105,7 @@ class Parameters(FileModel):
         return self
 
     @property
-    def covariance_array(self) -> NDArray[np.float64]:
+    def covariance_array(self) -> FloatArray:
         """(P, P)."""
         return np.array(self.covariance.data).reshape(self.covariance.rows, self.covariance.cols)
 
@@ -248,7 +248,7 @@ def load_calibration(path: Path) -> Calibration:
     return load_yaml_model(path, Calibration)
 
 
-def _check_covariance(covariance: NDArray[np.float64]) -> None:
+def _check_covariance(covariance: FloatArray) -> None:
     if not np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0):
         raise ValueError("covariance: expected a symmetric matrix")
     if (np.diag(covariance) < 0).any():

@@ -10,7 +10,9 @@ from jax import Array
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-Numbers = TypeVar("Numbers", float, Array, NDArray[np.float64])
+from workbench.model.arrays import FloatArray
+
+Numbers = TypeVar("Numbers", float, Array, FloatArray)
 EitherArray = Array | NDArray[Any]
 """JAX's, or numpy's where all inputs are numpy's arrays."""
 

@@ -7,13 +7,11 @@ from functools import lru_cache
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
-FloatArray = NDArray[np.float64]
-Ints = NDArray[np.intp]
 MOST_MISFIT_SD = 6.0
 """A spot farther from a laser's line is not that laser's: by chance one in 5e8 is."""
 IMPROBABLE = 1e-4
@@ -38,7 +36,7 @@ class Pairs:
     misfit_sd: FloatArray
     """(L, S)"""
 
-    def chosen(self, lasers: Ints, spots: Ints) -> RangeEstimates:
+    def chosen(self, lasers: IndexArray, spots: IndexArray) -> RangeEstimates:
         """Ranges of some pairs."""
         return self.ranges.only(lasers * self.misfit_sd.shape[1] + spots)
 
@@ -60,7 +58,7 @@ def pair_up(sensor: CalibratedSensor, position_px: FloatArray, sd_px: FloatArray
     return Pairs(ranges, np.where(possible, inverse_depth, -1.0), np.where(possible, misfit, np.inf))
 
 
-def assign(pairs: Pairs, lasers: Ints) -> tuple[Ints, Ints] | None:
+def assign(pairs: Pairs, lasers: IndexArray) -> tuple[IndexArray, IndexArray] | None:
     """Indices of lasers and of the spots that they made, equally many; None where the spots do not tell.
 
     Spots that lie off the line of every laser are other light. Each way of dealing the others to the lasers
@@ -103,6 +101,6 @@ def assign(pairs: Pairs, lasers: Ints) -> tuple[Ints, Ints] | None:
 
 
 @lru_cache(maxsize=64)
-def _ways(lasers: int, spots: int) -> Ints:
+def _ways(lasers: int, spots: int) -> IndexArray:
     """(ways, spots) every way of giving each spot a laser of its own."""
     return np.array(list(permutations(range(lasers), spots)), np.intp)

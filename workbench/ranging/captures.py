@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.data.averaging import scatter_chi2, strays, weighted_mean
 from workbench.calibration.estimation.noise_scale import scale_called_for
+from workbench.model.arrays import FloatArray
 from workbench.model.captures import ALL_LASERS, CaptureRow
 from workbench.model.errors import BadInputError
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.session.capture_spots import find_row_spots
-
-FloatArray = NDArray[np.float64]
 
 
 def scenes(rows: Sequence[CaptureRow]) -> dict[str, list[CaptureRow]]:

@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray
 from workbench.ranging.points import Closest, Points
 
-FloatArray = NDArray[np.float64]
 STEPS = 12
 MOST_RELATIVE_SIGMA = 0.5
 """A radius known worse tells nothing that a parabola does not."""

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray
 from workbench.ranging.points import Points
 from workbench.ranging.shape import Shape, fit_shape
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
-FloatArray = NDArray[np.float64]
 Axis = Literal["u", "v"]
 NAMES: dict[Axis, str] = {"u": "horizontal", "v": "vertical"}
 Weights = Literal["information", "pixels"]

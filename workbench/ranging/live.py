@@ -9,12 +9,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from workbench.devices.protocols import Bench
+from workbench.model.arrays import Image
 from workbench.model.calibration import Calibration
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.rig import Rig
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
-from workbench.spots import Finding, Image, Spot, SpotFinder, is_same_spot, persistent_spots
+from workbench.spots import Finding, Spot, SpotFinder, is_same_spot, persistent_spots
 
 LEASE_S = 2.0
 """Longest time that a laser stays lit for one frame."""

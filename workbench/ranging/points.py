@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtri
 
-FloatArray = NDArray[np.float64]
+from workbench.model.arrays import FloatArray
+
 LEVEL = 0.95
 """Of every interval that the ranger states."""
 REACH = float(ndtri(0.5 + 0.5 * LEVEL))

@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray
 from workbench.ranging.points import Closest, Points
 
-FloatArray = NDArray[np.float64]
 STEPS = 3
 """Gauss-Newton steps: the start is exact but for the curvature of inverse depth over a few deviations."""
 

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import Calibration
 from workbench.model.event import LaserRange
 from workbench.ranging.assignment import MOST_MISFIT_SD, Pairs, assign, pair_up
@@ -20,9 +20,6 @@ from workbench.ranging.validity_checks import objections, outside_validity
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 from workbench.spots import Scanline, Spot
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-Ints = NDArray[np.intp]
 NOTHING_SEEN = "no spot was seen"
 Status = Literal["done", "not_enough_points", "no_points"]
 MERGING_WIDTHS = 4.0
@@ -60,9 +57,9 @@ class Reading:
 class Assignment:
     """The spots of a frame in which every laser is lit, as far as they tell their lasers."""
 
-    lasers: Ints
+    lasers: IndexArray
     """(n,) indices of lasers with a spot."""
-    spots: Ints
+    spots: IndexArray
     """(n,) indices of their spots."""
     ranges: RangeEstimates
     """(n)"""
@@ -120,7 +117,7 @@ class Ranger:
         return {i: self.sensor.spot_px(i, ends) for i in self.sensor.ids}
 
     @cached_property
-    def _axes(self) -> dict[Axis, Ints]:
+    def _axes(self) -> dict[Axis, IndexArray]:
         """The lasers of each line that there is."""
         axes: tuple[Axis, ...] = ("u", "v")
         return {axis: lasers for axis in axes if len(lasers := self.sensor.lasers_on(axis))}
@@ -198,7 +195,7 @@ class Ranger:
         return Assignment(lasers, dealt, pairs.chosen(lasers, dealt), ids, notes)
 
     def _hidden(
-        self, spots: Sequence[Spot], pairs: Pairs, told: Ints, dealt: Ints, lasers: Ints
+        self, spots: Sequence[Spot], pairs: Pairs, told: IndexArray, dealt: IndexArray, lasers: IndexArray
     ) -> list[tuple[int, int]]:
         """Lasers of a line without a spot, each with a spot that its own would lie on at a depth told."""
         if len(told) in (0, len(lasers)):

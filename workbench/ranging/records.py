@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray
 from workbench.model.event import LaserRange
 from workbench.ranging.points import interval_mm
 from workbench.sensor.calibrated import RangeEstimates
 from workbench.spots import Failure, Spot
 
-FloatArray = NDArray[np.float64]
 FLAGGED = {
     Failure.SATURATED: "is saturated: its range is known less well",
     Failure.MERGED: "runs into another: both ranges err together",

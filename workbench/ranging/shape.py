@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray
 from workbench.ranging.cylinder import CylinderFit, fit_cylinder
 from workbench.ranging.points import Closest, Points, interval_mm, probability
 from workbench.ranging.polynomial import PolynomialFit, fit_polynomial
 
-FloatArray = NDArray[np.float64]
 Kind = Literal["flat", "incline", "round", "cylinder", "unknown"]
 SIGNIFICANCE = 0.01
 """A shape is rejected when its residuals are less likely than this: one flat in a hundred is."""

@@ -8,11 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray
 from workbench.spots.kernels.compiled import compiled
-
-FloatArray = NDArray[np.float64]
 
 
 @compiled

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray
 from workbench.model.calibration import Validity
 from workbench.model.event import LaserRange
 from workbench.ranging.assignment import MOST_MISFIT_SD
 from workbench.sensor.calibrated import RangeEstimates
 
-FloatArray = NDArray[np.float64]
 MOST_RELATIVE_SIGMA = 0.5
 """Beyond, the spot is so near to its place at infinity that its range may be anything."""
 LEAST_BEYOND_PX = 0.5

@@ -8,14 +8,12 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.model.parameters import LENS, RAY
+from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.calibration import Calibration
 from workbench.optics.lens import Lens, radial_slope
 from workbench.sensor.curves import SpotCurves
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class RangeEstimates:
         """(n,) 1 sigma of each range."""
         return np.sqrt(np.diag(self.covariance_mm2))
 
-    def only(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> RangeEstimates:
+    def only(self, index: IndexArray | BoolArray) -> RangeEstimates:
         """Some of them."""
         return RangeEstimates(
             self.range_mm[index],
@@ -80,7 +78,7 @@ class CalibratedSensor:
         return {name: i for i, name in enumerate(self.calibration.laser_ranger.parameters.names)}
 
     @cached_property
-    def _own_columns(self) -> NDArray[np.intp]:
+    def _own_columns(self) -> IndexArray:
         """(lasers, 12) columns of the lens and of each laser's ray."""
         lens = [self._columns[name] for name in LENS]
         return np.array([[*lens, *(self._columns[f"{i}.{name}"] for name in RAY)] for i in self.ids])
@@ -90,7 +88,7 @@ class CalibratedSensor:
         """(P, P) of the calibration's parameters."""
         return self.calibration.laser_ranger.parameters.covariance_array
 
-    def lasers_on(self, axis: Literal["u", "v"]) -> NDArray[np.intp]:
+    def lasers_on(self, axis: Literal["u", "v"]) -> IndexArray:
         """Indices of the lasers whose spots move along an image axis."""
         lasers = self.calibration.laser_ranger.lasers
         return np.array([n for n, laser in enumerate(lasers) if laser.axis == axis], np.intp)
@@ -133,9 +131,7 @@ class CalibratedSensor:
         """
         return self.ranges_of(np.array([self.ids.index(i) for i in laser_ids], np.intp), position_px, sd_px)
 
-    def ranges_of(
-        self, laser: NDArray[np.intp], position_px: FloatArray, sd_px: FloatArray
-    ) -> RangeEstimates:
+    def ranges_of(self, laser: IndexArray, position_px: FloatArray, sd_px: FloatArray) -> RangeEstimates:
         """As `ranges`, of lasers by their indices (n,) in the order of `ids`."""
         noise = self.calibration.laser_ranger.noise
         measured = np.isfinite(position_px)
@@ -185,7 +181,7 @@ class CalibratedSensor:
         typical = np.full((len(range_mm), 2), np.nan)
         return self.ranges([laser_id] * len(range_mm), self.spot_px(laser_id, range_mm), typical)
 
-    def in_frame(self, laser_id: str, range_mm: FloatArray) -> NDArray[np.bool_]:
+    def in_frame(self, laser_id: str, range_mm: FloatArray) -> BoolArray:
         """(n,) whether the laser's spot lies in the image, where the lens model does not fold over."""
         u, v = self.spot_px(laser_id, range_mm).T
         laser, w = self._points(laser_id, range_mm)
@@ -195,12 +191,12 @@ class CalibratedSensor:
         inside = (u > -0.5) & (u < width - 0.5) & (v > -0.5) & (v < height - 0.5) & unfolded
         return np.asarray(inside, bool)
 
-    def _points(self, laser_id: str, range_mm: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    def _points(self, laser_id: str, range_mm: FloatArray) -> tuple[IndexArray, FloatArray]:
         """Index of the laser, n times, and the inverse depths of ranges (n,)."""
         index = np.full(len(range_mm), self.ids.index(laser_id), np.intp)
         return index, 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
 
-    def _by_parameter(self, laser: NDArray[np.intp], own: FloatArray) -> FloatArray:
+    def _by_parameter(self, laser: IndexArray, own: FloatArray) -> FloatArray:
         """(n, P) from (n, 12) derivatives by lens and own ray; those by other lasers' rays are 0."""
         gradient = np.zeros((len(laser), len(self._columns)))
         gradient[np.arange(len(laser))[:, None], self._own_columns[laser]] = own

@@ -11,13 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.optics.lens import Lens
 from workbench.optics.rays import Ray, spot_at_inverse_depth
 
-FloatArray = NDArray[np.float64]
-Ints = NDArray[np.intp]
 TERMS = 8
 """Of a polynomial: r^6 times the coordinate is the highest power."""
 PARAMETERS = 12
@@ -70,11 +68,11 @@ class SpotCurves:
         self._place_and_slope = np.concatenate((place, slope), axis=2)
         self._derivatives = self._table[:, :, 2:]
 
-    def spots(self, laser: Ints, inverse_depth_per_mm: FloatArray) -> FloatArray:
+    def spots(self, laser: IndexArray, inverse_depth_per_mm: FloatArray) -> FloatArray:
         """(n, 2) pixels where points of the lasers `laser` (n,) at inverse depths (n,) appear."""
         return _at(self._table[laser, :, :2], inverse_depth_per_mm / self._unit[laser])
 
-    def gradients(self, laser: Ints, inverse_depth_per_mm: FloatArray) -> FloatArray:
+    def gradients(self, laser: IndexArray, inverse_depth_per_mm: FloatArray) -> FloatArray:
         """(n, 2, 13) derivatives of `spots` by the lens's eight parameters, the ray's four, inverse depth."""
         unit = self._unit[laser]
         t = inverse_depth_per_mm / unit
@@ -82,7 +80,7 @@ class SpotCurves:
         slope = _at(self._place_and_slope[laser], t)[:, 2:] / unit[:, None]
         return np.concatenate((own, slope[:, :, None]), axis=2)
 
-    def invert(self, laser: Ints, position_px: FloatArray, inverse_sd: FloatArray) -> Inverted:
+    def invert(self, laser: IndexArray, position_px: FloatArray, inverse_sd: FloatArray) -> Inverted:
         """Maximum-likelihood inverse depths of n spots, by Gauss-Newton from infinity.
 
         Args:

@@ -9,14 +9,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import Image
 from workbench.model.contents import not_text
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import FrameRef
 from workbench.session.files import sync_folder, write_record
-
-Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """From a pair of frames to laser spots with their uncertainty."""
 
+from workbench.model.arrays import Image
 from workbench.spots.explain import explain
 from workbench.spots.finder import SpotFinder, find_spots, is_compiled
 from workbench.spots.persistence import is_same_spot, persistent_spots
-from workbench.spots.types import Failure, Finding, Image, Scanline, Spot
+from workbench.spots.types import Failure, Finding, Scanline, Spot
 
 __all__ = [
     "Failure",

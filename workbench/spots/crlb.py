@@ -11,8 +11,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import gammaln, ndtr, xlogy
 
+from workbench.model.arrays import FloatArray
 from workbench.spots.psf import FLUX, derivatives
-from workbench.spots.types import Floats
 
 # Above this many electrons a Poisson count is Gaussian to 1e-3 of its information.
 _MANY_ELECTRONS = 400.0
@@ -61,14 +61,16 @@ def _variance(electrons: float, camera: Camera) -> float:
 
 
 @lru_cache(maxsize=16)
-def _excess_curve(camera: Camera) -> tuple[Floats, Floats]:
+def _excess_curve(camera: Camera) -> tuple[FloatArray, FloatArray]:
     """How much more than the inverse variance a pixel tells, over the mean; 1 above `_MANY_ELECTRONS`."""
     means = np.geomspace(0.05, _MANY_ELECTRONS, 24)
     excess = np.array([pixel_information(float(m), camera) * _variance(float(m), camera) for m in means])
     return means, np.append(excess[:-1], 1.0)
 
 
-def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera) -> Floats:
+def fisher_matrix(
+    electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera
+) -> FloatArray:
     """(6, 6) information about background, flux, u, v, ln width along u and along v of a round spot.
 
     Args:
@@ -85,14 +87,14 @@ def fisher_matrix(electrons: float, width_px: float, phase_px: tuple[float, floa
     jacobian[2:] *= electrons
     means, excess = _excess_curve(camera)
     variance = mean + camera.read_sd_electrons**2 + camera.electrons_per_dn**2 / 12.0
-    matrix: Floats = (jacobian * np.interp(mean, means, excess) / variance) @ jacobian.T
+    matrix: FloatArray = (jacobian * np.interp(mean, means, excess) / variance) @ jacobian.T
     return matrix
 
 
 def position_bound_px(
     electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera
-) -> Floats:
+) -> FloatArray:
     """(2,) lowest standard deviation of u and v for an unbiased estimator to which nothing else is known."""
     cov = np.linalg.inv(fisher_matrix(electrons, width_px, phase_px, camera))
-    bound: Floats = np.sqrt(np.diag(cov)[2:4])
+    bound: FloatArray = np.sqrt(np.diag(cov)[2:4])
     return bound

@@ -8,11 +8,10 @@ from typing import Final, NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import Float32Array, FloatArray
 from workbench.spots.kernels.strip_pixels import peaks_of
 from workbench.spots.strip import Strip
-from workbench.spots.types import Floats
 
 # White noise passes 5.5 sd once in 5e7 looks.
 PEAK_SD: Final = 5.5
@@ -24,9 +23,9 @@ _NO_MASK: Final = np.zeros((0, 0), bool)
 class Peaks(NamedTuple):
     """Local maxima of the smoothed signal, highest first."""
 
-    rows: Floats
-    cols: Floats
-    height_dn: Floats
+    rows: FloatArray
+    cols: FloatArray
+    height_dn: FloatArray
     scale_px: float
 
 
@@ -36,14 +35,14 @@ def smoothed_sd(variance: float, scale_px: float) -> float:
 
 
 @lru_cache(maxsize=8)
-def _taps(scale_px: float) -> NDArray[np.float32]:
+def _taps(scale_px: float) -> Float32Array:
     """(n,) weights of a Gaussian."""
     size = 2 * round(2.5 * scale_px) + 1
     return np.asarray(cv2.getGaussianKernel(size, scale_px), np.float32).ravel()
 
 
 def find_peaks(
-    signal: NDArray[np.float32],
+    signal: Float32Array,
     strip: Strip,
     variance: float,
     scale_px: float = FINE_PX,

@@ -6,10 +6,11 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from workbench.model.arrays import Image
 from workbench.model.errors import BadInputError
 from workbench.spots.frames import check_pair, default_saturation_dn
 from workbench.spots.strip import check_line
-from workbench.spots.types import Finding, Image, Scanline
+from workbench.spots.types import Finding, Scanline
 
 
 class SpotFinder:

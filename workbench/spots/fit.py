@@ -7,19 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.spots.kernels.single import JUDGED, score
 from workbench.spots.noise import Noise
-from workbench.spots.types import Bools, Floats
 
 
 class Windows(NamedTuple):
     """Equal windows of the signal, one spot each, all arrays (n, height, width)."""
 
-    data: Floats
+    data: FloatArray
     """DN."""
-    usable: Bools
+    usable: BoolArray
     """False where a pixel is clipped, hot or outside the image."""
-    clip_dn: Floats
+    clip_dn: FloatArray
     """Value at which the pixel clips; infinite where nothing is near to it."""
 
     @property
@@ -32,28 +32,28 @@ class Windows(NamedTuple):
 class SpotFit:
     """Result for n windows. `cov` is that of background, flux, and flux times each further parameter."""
 
-    params: Floats
+    params: FloatArray
     """(n, k)."""
-    cov: Floats
+    cov: FloatArray
     """(n, k, k)."""
-    signal: Floats
+    signal: FloatArray
     """(n, height, width), expected value above the background, DN."""
-    residual: Floats
+    residual: FloatArray
     """(n, height, width), DN."""
-    weight: Floats
+    weight: FloatArray
     """(n, height, width), inverse variance, 0 where unused."""
-    converged: Bools
+    converged: BoolArray
     """(n,)."""
-    slope_dn: Floats
+    slope_dn: FloatArray
     """(n,) measured photon-transfer slope."""
-    judged: Floats
+    judged: FloatArray
     """(n, JUDGED): largest squared residual over its variance; the mean of these over the used pixels of the
     window's rim; highest value of the signal, DN; its square over the variance, summed; standard deviation of
     flux (DN), u and v (pixels); square of the score by a shear over its variance, 0 if the model has a shear;
     number of the rim's used pixels."""
 
 
-def fit_spots(win: Windows, start: Floats, noise: Noise) -> SpotFit:
+def fit_spots(win: Windows, start: FloatArray, noise: Noise) -> SpotFit:
     """Fit one spot per window; the photon-transfer slope is measured from the residuals on the way.
 
     Args:

@@ -6,8 +6,8 @@ from typing import cast
 
 import numpy as np
 
+from workbench.model.arrays import Image
 from workbench.model.errors import BadInputError
-from workbench.spots.types import Image
 
 _DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16))
 _FULL_SCALES_IN_16_BITS = tuple(2**bits - 1 for bits in (10, 12, 14, 16))

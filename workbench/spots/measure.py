@@ -7,13 +7,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from workbench.model.arrays import FloatArray
 from workbench.spots.detect import FINE_PX, Peaks
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.acceptance import COLUMNS, NEXT_HALF, U_SD, fit_group
 from workbench.spots.kernels.windows import HALVES_PX, flag_codes, guess, halves_for
 from workbench.spots.pair import PairSignal
 from workbench.spots.psf import FLUX, LN_SU, U, V
-from workbench.spots.types import NO_FLAGS, Failure, Floats, Spot
+from workbench.spots.types import NO_FLAGS, Failure, Spot
 
 # First guesses of the width scatter upwards; a window too small is cut anew.
 _GUESSED: Final = 0.7
@@ -34,7 +35,7 @@ class FittedSpot(NamedTuple):
     """A measured spot with what telling neighbours apart needs."""
 
     spot: Spot
-    params: Floats
+    params: FloatArray
     """(6,) or (7,) as in `gaussian`, u and v in pixels of the image."""
     slope_dn: float
     reach_px: float
@@ -45,7 +46,7 @@ class FittedSpot(NamedTuple):
     """The strip that it was found in."""
 
 
-def spot_flags(scene: PairSignal, params: Floats) -> list[frozenset[Failure]]:
+def spot_flags(scene: PairSignal, params: FloatArray) -> list[frozenset[Failure]]:
     """What the places of n spots (n, 6 or more) in the image tell: cut by its border, clipped."""
     codes = np.empty(len(params), np.intp)
     flag_codes(scene.pair.on, scene.pair.clip_dn, params, codes)
@@ -81,7 +82,7 @@ def measure(scene: PairSignal, peaks: Peaks) -> list[FittedSpot]:
     return _traces(scene, found)
 
 
-def first_guess(win: Windows, peaks: Peaks) -> tuple[Floats, float]:
+def first_guess(win: Windows, peaks: Peaks) -> tuple[FloatArray, float]:
     """Start (n, 6) in pixels of the image, and by how much its widths tend to be too large.
 
     From the shape of a sharp peak, from what the search was matched to for a wide one.
@@ -96,7 +97,7 @@ def first_guess(win: Windows, peaks: Peaks) -> tuple[Floats, float]:
     return start, 1.0
 
 
-def _traces(scene: PairSignal, found: Floats) -> list[FittedSpot]:
+def _traces(scene: PairSignal, found: FloatArray) -> list[FittedSpot]:
     """What the table of fits says is a spot."""
     flags = spot_flags(scene, found)
     traces = []

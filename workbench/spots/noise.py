@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from workbench.model.arrays import Float32Array, FloatArray
 from workbench.spots.kernels.photon_transfer import transfer_slope
 from workbench.spots.kernels.strip_pixels import level_of
-from workbench.spots.types import Floats
 
 _SAMPLES = 1200
 _CLIP_SD = 4.0
@@ -21,13 +18,13 @@ ROUNDING_DN2 = 1.0 / 12.0
 class Noise:
     """Variance of a pixel as a straight line over its expected signal (photon transfer)."""
 
-    floor_dn2: Floats
+    floor_dn2: FloatArray
     """(n,), one for each window: variance without signal, DN^2."""
-    slope_dn: Floats
+    slope_dn: FloatArray
     """(n,): variance per signal, DN^2 / DN."""
 
 
-def level_and_variance(values: NDArray[np.float32]) -> tuple[float, float]:
+def level_and_variance(values: Float32Array) -> tuple[float, float]:
     """Robust mean and variance of pixels among which a few are spots.
 
     Quantiles first, then mean and variance of what lies within 4 sd of them: the former resist the spots, the
@@ -37,8 +34,8 @@ def level_and_variance(values: NDArray[np.float32]) -> tuple[float, float]:
 
 
 def photon_transfer_slope(
-    signal: Floats, residual: Floats, weight: Floats, leverage: Floats, noise: Noise
-) -> Floats:
+    signal: FloatArray, residual: FloatArray, weight: FloatArray, leverage: FloatArray, noise: Noise
+) -> FloatArray:
     """(n,) variance per signal (DN) measured from the residuals of all spots of a frame.
 
     On average a squared residual is its variance less the share that the fit has absorbed (its leverage), so

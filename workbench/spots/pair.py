@@ -6,15 +6,13 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import Float32Array, FloatArray, Image, IndexArray
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.windows import cut
 from workbench.spots.noise import level_and_variance
 from workbench.spots.strip import Strip
-from workbench.spots.types import Floats, Image, Ints
 
-Floats32 = NDArray[np.float32]
 # A change of the level below one DN or a quarter of the noise moves no spot: the fit has a background of its
 # own.
 _LEVEL_CHANGE_DN = 1.0
@@ -32,7 +30,7 @@ class Pair(NamedTuple):
     off_share: float = 1.0
     level_dn: float = 0.0
 
-    def signal(self, strip: Strip) -> Floats32:
+    def signal(self, strip: Strip) -> Float32Array:
         """The signal in a strip, DN."""
         on = self.on[strip.at]
         if self.off is None:
@@ -42,7 +40,7 @@ class Pair(NamedTuple):
         out = cv2.addWeighted(on, 1.0, self.off[strip.at], -self.off_share, -self.level_dn, dtype=cv2.CV_32F)
         return np.asarray(out, np.float32)
 
-    def cut(self, rows: Floats, cols: Floats, group: Ints, half: int) -> Windows:
+    def cut(self, rows: FloatArray, cols: FloatArray, group: IndexArray, half: int) -> Windows:
         """Square windows of 2 half + 1 pixels around the peaks `group` (n,) of all, at `rows` and `cols`.
 
         No pixel outside the image is usable, and none that lies nearer to another peak.
@@ -59,7 +57,7 @@ class PairSignal(NamedTuple):
 
     pair: Pair
     strip: Strip
-    signal: Floats32
+    signal: Float32Array
     """The strip's signal, DN; zero where no spot is."""
     variance: float
     """Of a pixel without a spot, DN^2."""
@@ -85,7 +83,7 @@ def measure_signal(pair: Pair, strip: Strip) -> PairSignal:
     return PairSignal(pair, strip, pair.signal(strip), variance, ambient_changed=pair.off is not None)
 
 
-def _share_of_off(on: Floats, off: Floats) -> float:
+def _share_of_off(on: FloatArray, off: FloatArray) -> float:
     """Slope of on over off, spots left out as outliers; 1 where the off-frame is too even to tell."""
     share = 1.0
     for _ in range(3):

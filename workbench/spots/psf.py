@@ -10,14 +10,14 @@ import math
 
 import numpy as np
 
+from workbench.model.arrays import FloatArray
 from workbench.spots.kernels.profiles import sheared_rows, upright_rows
-from workbench.spots.types import Floats
 
 BACKGROUND, FLUX, U, V, LN_SU, LN_SV, SHEAR = range(7)
 """Order of a spot's parameters: DN per pixel, DN, pixels, pixels, ln(pixels) twice, pixels per pixel."""
 
 
-def derivatives(params: Floats, shape: tuple[int, int]) -> Floats:
+def derivatives(params: FloatArray, shape: tuple[int, int]) -> FloatArray:
     """(n, k, height, width) derivatives of the pixels of n windows; `[:, FLUX]` is the spot for a flux of 1.
 
     Args:
@@ -33,7 +33,7 @@ def derivatives(params: Floats, shape: tuple[int, int]) -> Floats:
     return rows
 
 
-def principal_axes(params: Floats) -> tuple[Floats, Floats]:
+def principal_axes(params: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Short and long width in pixels (2,), their directions as columns (2, 2), of one spot (6,) or (7,)."""
     var_u, var_v = math.exp(2.0 * params[LN_SU]), math.exp(2.0 * params[LN_SV])
     shear = float(params[SHEAR]) if params.size > SHEAR else 0.0

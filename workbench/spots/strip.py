@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.errors import BadInputError
-from workbench.spots.types import Bools, Floats, Scanline
+from workbench.spots.types import Scanline
 
 # Smoothing at the strip's rim needs some rows beyond it.
 _RIM_PX = 3
@@ -20,7 +21,7 @@ class Strip:
 
     rows: slice
     cols: slice
-    mask: Bools | None
+    mask: BoolArray | None
     """None where every pixel may hold a spot."""
 
     @property
@@ -29,10 +30,10 @@ class Strip:
         return self.rows, self.cols
 
 
-def distance_px(line: Scanline, u_px: Floats, v_px: Floats) -> Floats:
+def distance_px(line: Scanline, u_px: FloatArray, v_px: FloatArray) -> FloatArray:
     """Distance of points from the line."""
     across = (u_px - line.u0_px) * line.dv - (v_px - line.v0_px) * line.du
-    distance: Floats = np.abs(across) / np.hypot(line.du, line.dv)
+    distance: FloatArray = np.abs(across) / np.hypot(line.du, line.dv)
     return distance
 
 
@@ -74,7 +75,7 @@ def strip_of(line: Scanline, shape: tuple[int, int]) -> Strip:
     return Strip(rows, cols, distance_px(line, u, v) <= line.half_width_px + 1.0)
 
 
-def _span(ends: Floats, reach: float, size: int) -> slice:
+def _span(ends: FloatArray, reach: float, size: int) -> slice:
     first = int(np.clip(np.floor(ends.min() - reach), 0, size))
     last = int(np.clip(np.ceil(ends.max() + reach) + 1, first, size))
     return slice(first, last)

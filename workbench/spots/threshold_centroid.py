@@ -11,9 +11,10 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray, Image
 from workbench.spots.frames import check_pair
 from workbench.spots.strip import check_line, distance_px
-from workbench.spots.types import Bools, Floats, Image, Scanline
+from workbench.spots.types import Scanline
 
 _FIRST_THRESHOLD_DN = 50.0
 _MIN_THRESHOLD_DN = 4.0
@@ -27,7 +28,7 @@ def thesis_centres(
     scanlines: Sequence[Scanline] = (),
     expected: int,
     ambiguous_px: float = 0.0,
-) -> Floats:
+) -> FloatArray:
     """(k, 2) centroids (u, v) in pixels, brightest first; k may differ from `expected`.
 
     Args:
@@ -57,7 +58,7 @@ def thesis_centres(
     return best
 
 
-def _allowed(shape: tuple[int, ...], scanlines: Sequence[Scanline], ambiguous_px: float) -> Bools:
+def _allowed(shape: tuple[int, ...], scanlines: Sequence[Scanline], ambiguous_px: float) -> BoolArray:
     """Pixels on a scanline, and not near to two."""
     if not scanlines:
         return np.ones(shape, bool)
@@ -65,11 +66,11 @@ def _allowed(shape: tuple[int, ...], scanlines: Sequence[Scanline], ambiguous_px
     distances = np.stack([distance_px(line, u, v) for line in scanlines])
     half_widths = np.array([line.half_width_px for line in scanlines])[:, None, None]
     on_a_line = np.logical_or.reduce(distances <= half_widths, axis=0)
-    allowed: Bools = on_a_line & (np.count_nonzero(distances < ambiguous_px, axis=0) < 2)
+    allowed: BoolArray = on_a_line & (np.count_nonzero(distances < ambiguous_px, axis=0) < 2)
     return allowed
 
 
-def _centroids(diff: Floats, threshold: float) -> Floats:
+def _centroids(diff: FloatArray, threshold: float) -> FloatArray:
     """Centres of mass of the connected pixels above the threshold, by falling mass."""
     above = (diff > threshold).astype(np.uint8)
     count, labels = cv2.connectedComponents(above)
@@ -77,5 +78,5 @@ def _centroids(diff: Floats, threshold: float) -> Floats:
     v, u = np.mgrid[: diff.shape[0], : diff.shape[1]]
     sums = [np.bincount(labels.ravel(), (kept * w).ravel(), count)[1:] for w in (1, u, v)]
     order = np.argsort(-sums[0], kind="stable")
-    centres: Floats = np.stack([sums[1], sums[2]], axis=1)[order] / sums[0][order, None]
+    centres: FloatArray = np.stack([sums[1], sums[2]], axis=1)[order] / sums[0][order, None]
     return centres

@@ -5,14 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
-Image = NDArray[np.uint8] | NDArray[np.uint16]
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.intp]
-
 
 class Failure(StrEnum):
     """What went wrong with a capture, or with one of its spots; `explain` tells cause and remedy."""

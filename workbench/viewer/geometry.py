@@ -11,13 +11,12 @@ from math import radians, tan
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import FloatArray
 from workbench.model.event import ParameterRecord
 from workbench.model.rig import Rig
 from workbench.model.target import BoardTarget, FlatTarget
 
-Array = NDArray[np.float64]
 _LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
 _RAY = ("x_mm", "y_mm", "tx", "ty")
 
@@ -57,7 +56,7 @@ class Geometry:
         )
 
     @property
-    def camera_matrix(self) -> Array:
+    def camera_matrix(self) -> FloatArray:
         """(3, 3), pixels; the centre of the top-left pixel is (0, 0)."""
         f, cx, cy = (self.lens[name] for name in ("f_px", "cx_px", "cy_px"))
         return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
@@ -67,7 +66,7 @@ class Geometry:
         x, y, tx, ty = self.rays[laser]
         return (x + tx * z_mm, y + ty * z_mm, z_mm)
 
-    def seen_on(self, target: FlatTarget | BoardTarget, standoff_mm: float, pixels: Array) -> Array:
+    def seen_on(self, target: FlatTarget | BoardTarget, standoff_mm: float, pixels: FloatArray) -> FloatArray:
         """Where the lines of sight of `pixels`, (N, 2), meet a flat target: (N, 3) mm."""
         slope_x, slope_y = tan(radians(target.yaw_deg)), tan(radians(target.pitch_deg))
         sight = self._directions(pixels)
@@ -75,7 +74,7 @@ class Geometry:
         depth = (standoff_mm + self.offset_mm) / facing
         return np.column_stack([sight * depth[:, None], depth])
 
-    def _directions(self, pixels: Array) -> Array:
+    def _directions(self, pixels: FloatArray) -> FloatArray:
         """Undistorted (x/z, y/z) of `pixels`, both (N, 2)."""
         if not len(pixels):
             return np.zeros((0, 2))

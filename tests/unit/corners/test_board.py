@@ -15,6 +15,7 @@ from workbench.corners.board import BoardCorners, find_board
 from workbench.corners.subpixel import FLOOR_SD_PX
 from workbench.emulator import open_bench
 from workbench.emulator.board import BoardSurface
+from workbench.model.arrays import FloatArray
 from workbench.model.board import Board, sag_mm
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig, load_rig
@@ -39,7 +40,7 @@ def rig_of(seed: int, **emulator: Any) -> Rig:
 @dataclass(frozen=True)
 class Seen:
     frames: list[NDArray[Any]]
-    true_px: NDArray[np.float64]
+    true_px: FloatArray
     """(K, 2) of every corner of the board, in the frame or not."""
 
 
@@ -59,7 +60,7 @@ def look(rig: Rig, folder: Path, standoff_mm: float, yaw_deg: float, pitch_deg: 
         return Seen(frames, bench.target._lens().project(points))
 
 
-def errors(found: BoardCorners, seen: Seen) -> NDArray[np.float64]:
+def errors(found: BoardCorners, seen: Seen) -> FloatArray:
     return found.position_px - seen.true_px[found.ids]
 
 

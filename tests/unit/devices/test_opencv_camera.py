@@ -16,8 +16,9 @@ from pydantic import ValidationError
 
 from tests.support.mjpeg import Picture, Stream
 from workbench.devices.opencv_camera import OpenCvCamera
-from workbench.devices.protocols import Bench, Frame, Image, StreamingCamera
+from workbench.devices.protocols import Bench, Frame, StreamingCamera
 from workbench.devices.real_bench import PlacedByHand
+from workbench.model.arrays import Image
 from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import CameraDevice, CameraSpec, Rig, exactly
 from workbench.procedure.capture.exposure import set_exposure

@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.support.ideal import exact, ideal_rig, laser, moments
-from workbench.devices.protocols import Image
 from workbench.devices.registry import open_bench as open_named_bench
 from workbench.emulator import EmulatedBench, open_bench
 from workbench.emulator.spot import Spot
+from workbench.model.arrays import Image
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import FlatTarget, Placement
 from workbench.model.yamlfile import parse_document

@@ -15,6 +15,7 @@ from workbench.emulator.sensor import ImageSensor
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.speckle import speckle_field
 from workbench.emulator.spot import ImageFormat, Spot
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 
@@ -127,7 +128,7 @@ def test_ambient_light_has_the_stated_gradient() -> None:
 
 
 def test_clutter_stands_still_and_has_edges() -> None:
-    def room(seed: int, clutter: float, frame: int = 0) -> NDArray[np.float64]:
+    def room(seed: int, clutter: float, frame: int = 0) -> FloatArray:
         ambient = {"level_e_per_s": 1e6, "gradient_u": 0.0, "gradient_v": 0.0, "clutter": clutter}
         rig = ideal_rig(seed=seed, camera={"bits": 16}, ambient=ambient)
         return sensor_of(rig).expose((), 0.01, 1.0, 1.0, generator(seed, "f", frame)).astype(float)

@@ -11,7 +11,6 @@ from scipy.optimize import least_squares
 from tests.support.surfaces import (
     F_PX,
     SD_PX,
-    Floats,
     Surface,
     X,
     cubic,
@@ -24,6 +23,7 @@ from tests.support.surfaces import (
     seen,
     share,
 )
+from workbench.model.arrays import FloatArray
 from workbench.ranging.cylinder import fit_cylinder
 from workbench.ranging.points import Points, interval_mm
 from workbench.ranging.polynomial import fit_polynomial
@@ -32,7 +32,7 @@ from workbench.ranging.shape import SIGNIFICANCE, fit_shape
 SEEDS = (1, 2, 3)
 
 
-def inverse_of_information(jac: object) -> Floats:
+def inverse_of_information(jac: object) -> FloatArray:
     j = np.asarray(jac, np.float64)
     return np.asarray(np.linalg.inv(j.T @ j), np.float64)
 
@@ -80,7 +80,7 @@ def test_polynomials_against_scipy(degree: int, seed: int) -> None:
     depth = points.range_mm + 12.0
     whiten = np.linalg.inv(np.linalg.cholesky(points.covariance_mm2 / np.outer(depth**2, depth**2)))
 
-    def residual(c: Floats) -> Floats:
+    def residual(c: FloatArray) -> FloatArray:
         model = np.polynomial.polynomial.polyval(x, c) + 12.0
         return np.asarray(whiten @ (1.0 / depth - 1.0 / model))
 
@@ -104,7 +104,7 @@ def test_circles_against_scipy(seed: int) -> None:
     sigma = np.array([0.1, 0.2, 0.15, 0.2, 0.1])
     r = cylinder(250.0, 12.0)(x) + rng.normal(0.0, sigma)
 
-    def residual(p: Floats) -> Floats:
+    def residual(p: FloatArray) -> FloatArray:
         return np.asarray((p[1] - np.sqrt(p[2] ** 2 - (x - p[0]) ** 2) - r) / sigma)
 
     found = least_squares(residual, [12.0, 339.0, 89.0], xtol=1e-15, ftol=1e-15, gtol=1e-15)

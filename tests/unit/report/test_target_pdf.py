@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from workbench.cli.target import write_target
 from workbench.corners.board import find_board
+from workbench.model.arrays import FloatArray
 from workbench.model.board import Board
 from workbench.model.errors import BadInputError
 from workbench.report.target_pdf import ruler_mm, target_pdf
@@ -43,7 +44,7 @@ class Page:
         pattern = " ".join(" ".join([NUMBER] * p) if isinstance(p, int) else p for p in parts)
         return [[float(n) for n in m.groups()] for m in re.finditer(rf"(?m)^{pattern}$", text)]
 
-    def on_page(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_page(self, points: FloatArray) -> FloatArray:
         """(n, 2) user space to mm; PDF counts y from the bottom."""
         at = (points * self._scale + self._shift) * MM
         return np.column_stack([at[:, 0], self.size_mm[1] - at[:, 1]])

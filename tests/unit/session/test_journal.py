@@ -7,10 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
+from workbench.model.arrays import Image
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import SessionFinished, SessionStarted, StepStarted
 from workbench.session.files import write_atomically
-from workbench.session.frames import FrameStore, Image, read_image
+from workbench.session.frames import FrameStore, read_image
 from workbench.session.journal import JOURNAL, Journal, read_journal
 
 STARTED = SessionStarted(session="s", rig="r", procedures=("p",))

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from tests.support.draw import Frame
+from workbench.model.arrays import FloatArray, Image
 from workbench.model.errors import BadInputError
 from workbench.spots import Failure, Finding, Scanline, find_spots
 
@@ -24,11 +23,11 @@ DTYPES = st.sampled_from([np.uint8, np.uint16])
 KINDS = st.sampled_from(["noise", "black", "white", "uniform", "sparse", "ramp", "twelve bits", "blob"])
 
 
-def image(kind: str, shape: tuple[int, int], dtype: type, seed: int) -> Frame:
+def image(kind: str, shape: tuple[int, int], dtype: type, seed: int) -> Image:
     rng = np.random.default_rng(seed)
     top = int(np.iinfo(dtype).max)
     v, u = np.mgrid[: shape[0], : shape[1]]
-    made: dict[str, NDArray[np.float64]] = {
+    made: dict[str, FloatArray] = {
         "noise": rng.normal(20, rng.uniform(0.1, 8), shape),
         "black": np.zeros(shape),
         "white": np.full(shape, float(top)),

@@ -22,7 +22,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc, ndtr, stdtr
 
 from workbench.calibration.estimation.fit import CalibrationFit
@@ -36,8 +35,8 @@ from workbench.calibration.estimation.refit import (
     refit_with_scale,
     rows_of,
 )
+from workbench.model.arrays import BoolArray, FloatArray
 
-FloatArray = NDArray[np.float64]
 FALSE_ALARM = 1e-3
 """Of one fit whose priors and noise are as stated: the chance that any of its standoffs raises an alarm."""
 FEWEST_PLACEMENTS = 3
@@ -143,7 +142,7 @@ def _leave_out(
     )
 
 
-def rows_at(problem: LeastSquaresProblem, index: int) -> NDArray[np.bool_]:
+def rows_at(problem: LeastSquaresProblem, index: int) -> BoolArray:
     """(R,) rows of everything seen at a placement, corners of the board too."""
     placement = np.concatenate([problem.data.spots.placement, problem.data.corners.placement])
     return np.repeat(placement == index, 2)
@@ -160,19 +159,19 @@ def by_standoff(left: Refit) -> FloatArray:
     return left.problem.by_standoff(left.y, left.scale)
 
 
-def predictive(left: Refit, rows: NDArray[np.bool_]) -> FloatArray:
+def predictive(left: Refit, rows: BoolArray) -> FloatArray:
     """(n, n) covariance of the residuals of rows that the refit has not used."""
     own = left.jacobian[rows]
     return np.eye(len(own)) + own @ left.covariance @ own.T
 
 
-def deleted_chi2(left: Refit, rows: NDArray[np.bool_]) -> float:
+def deleted_chi2(left: Refit, rows: BoolArray) -> float:
     """Distance of rows that the refit has not used from their prediction, squared."""
     distance = left.residual[rows]
     return float(distance @ np.linalg.solve(predictive(left, rows), distance))
 
 
-def range_error(left: Refit, rows: NDArray[np.bool_], w: FloatArray) -> tuple[float, float]:
+def range_error(left: Refit, rows: BoolArray, w: FloatArray) -> tuple[float, float]:
     """Range by the spots of `rows` - their standoff, and its standard deviation, mm."""
     weight = np.linalg.solve(predictive(left, rows), w[rows])
     information = float(weight @ w[rows])

@@ -16,16 +16,14 @@ from math import log
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
 
 from workbench.calibration.checks.cross_validation import by_standoff, predictive, range_error, rows_at
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit, rows_of
+from workbench.model.arrays import BoolArray, FloatArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 Kind = Literal["lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "spot"]
 IMPROBABLE = 1e-4
 """Data less likely than this make the search look further than at single spots."""

@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from workbench.calibration.data.observations import Rejected
 from workbench.calibration.model.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.model.prediction import predict_cell
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
 
-def name_out_of_frame(
-    rig: Rig, values: NDArray[np.float64], rejected: Sequence[Rejected]
-) -> tuple[Rejected, ...]:
+def name_out_of_frame(rig: Rig, values: FloatArray, rejected: Sequence[Rejected]) -> tuple[Rejected, ...]:
     """Give the right reason to captures whose spot the fit puts outside the picture.
 
     Args:
@@ -27,7 +23,7 @@ def name_out_of_frame(
     return tuple(_renamed(rig, values, r) for r in rejected)
 
 
-def _renamed(rig: Rig, values: NDArray[np.float64], rejected: Rejected) -> Rejected:
+def _renamed(rig: Rig, values: FloatArray, rejected: Rejected) -> Rejected:
     observation = rejected.missing
     if observation is None:
         return rejected

@@ -33,8 +33,8 @@ from scipy.special import chdtrc, gammainc, gammaincc, ndtr
 from workbench.calibration.data.observations import positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit
+from workbench.model.arrays import FloatArray, IndexArray
 
-FloatArray = NDArray[np.float64]
 FALSE_ALARM = 0.01
 """Of one sound fit: the chance that any of its residual tests raises an alarm."""
 ABSORBED = 0.02
@@ -115,8 +115,8 @@ class _Spots:
     covariance: FloatArray
     """(n, n) of the residuals."""
     sd_px: FloatArray
-    laser: NDArray[np.intp]
-    axis: NDArray[np.intp]
+    laser: IndexArray
+    axis: IndexArray
     """0 for u, 1 for v."""
     outward: FloatArray
     """1 or -1 along the laser's axis, as its baseline points; 0 across."""
@@ -201,7 +201,7 @@ def _of_spots(fit: CalibrationFit, spots: _Spots) -> Iterator[ResidualTest]:
 
 
 def _contrasts(
-    fit: CalibrationFit, laser: NDArray[np.intp], axis: NDArray[np.intp], distance: FloatArray
+    fit: CalibrationFit, laser: IndexArray, axis: IndexArray, distance: FloatArray
 ) -> Iterator[tuple[str, FloatArray]]:
     """What a variance may differ by, as weights whose mean is 0."""
     candidates = [("over standoff", distance), ("of u and v", np.where(axis == 0, 1.0, -1.0))]

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from math import log
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.checks.cross_validation import by_standoff
 from workbench.calibration.checks.hypotheses import DECISIVE, SPOT_COST
@@ -22,8 +21,8 @@ from workbench.calibration.data.averaging import scatter_chi2
 from workbench.calibration.data.observations import Observation, positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.refit import Refit, measured, problem_of, refit_with_scale, rows_of
+from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 
-FloatArray = NDArray[np.float64]
 ANYWHERE = 10.0
 """Prior deviation of a standoff that is free, as a factor on the standoff."""
 STEP_COST = 2 * log(100 / 0.1)
@@ -67,15 +66,15 @@ class _Captures:
     """One placement's captures in their order, n measured coordinates in all."""
 
     observations: tuple[Observation, ...]
-    capture: NDArray[np.intp]
+    capture: IndexArray
     """(n,) which capture a coordinate is of."""
-    axis: NDArray[np.intp]
-    cell: NDArray[np.intp]
+    axis: IndexArray
+    cell: IndexArray
     """(n,) which cell of the fit it belongs to."""
     position_px: FloatArray
     sd_px: FloatArray
     """(n,) as the repeats of the fit scatter; shared errors are apart from it."""
-    stray: NDArray[np.bool_]
+    stray: BoolArray
 
     @classmethod
     def of(cls, fit: CalibrationFit, index: int) -> _Captures:
@@ -172,7 +171,7 @@ def _prediction(
     return mean, slope, variance + own @ left.covariance @ own.T + np.outer(anywhere, anywhere)
 
 
-def _is_one_spot(lasers: NDArray[np.intp], step: int) -> bool:
+def _is_one_spot(lasers: IndexArray, step: int) -> bool:
     """Whether a step only sets all captures of one laser apart: that may be a wrong spot as well."""
     before, after = lasers[:step], lasers[step:]
     return not set(before.tolist()) & set(after.tolist()) and 1 in {len(set(before)), len(set(after))}
@@ -187,7 +186,7 @@ def _rival(captures: _Captures, whitened: FloatArray, white: FloatArray) -> floa
     return max(_score(whitened, white, [mask[:, None] & axes for mask in account]) for account in accounts)
 
 
-def _score(whitened: FloatArray, white: FloatArray, wrong: list[NDArray[np.bool_]]) -> float:
+def _score(whitened: FloatArray, white: FloatArray, wrong: list[BoolArray]) -> float:
     if not wrong:
         return 0.0
     columns = whitened @ np.concatenate(wrong, axis=1).astype(float)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from workbench.model.arrays import BoolArray, FloatArray
+
 STRAY_SD = 6.0
 """A repeat this far from the median of its fellows is no repeat. Of honest Gaussian repeats 1 in 5e8 lies so
 far out when their deviation is stated rightly; stated far too small, 1 in 250 of ten (their own median

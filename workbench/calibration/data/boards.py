@@ -8,7 +8,6 @@ from math import atan2
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.data.observations import MeanObservations, Observation, PlacementInfo, Rejected
 from workbench.model.board import Board
@@ -18,9 +17,8 @@ from workbench.model.rig import Rig
 # OpenCV is imported where there is a board: a fit of spots alone starts without it.
 if TYPE_CHECKING:
     from workbench.corners.board import BoardCorners
-    from workbench.spots.types import Image
+    from workbench.model.arrays import Image
 
-Floats = NDArray[np.float64]
 BAND_EDGE_MM = 3.0
 """A spot's middle must lie this far inside the band: beams are some 2.5 mm wide where a board is read."""
 

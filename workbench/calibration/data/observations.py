@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from math import isnan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.data.averaging import (
     is_torn,
@@ -19,10 +18,9 @@ from workbench.calibration.data.averaging import (
     weighted_mean,
 )
 from workbench.calibration.estimation.noise_scale import scale_called_for
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.errors import BadInputError
 from workbench.model.rig import NoiseSpec
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -97,8 +95,8 @@ class MeanObservations:
     """
 
     placements: tuple[PlacementInfo, ...]
-    laser: NDArray[np.intp]
-    placement: NDArray[np.intp]
+    laser: IndexArray
+    placement: IndexArray
     position_px: FloatArray
     """(N, 2) u, v; NaN where a coordinate was not measured."""
     sd_px: FloatArray
@@ -119,8 +117,8 @@ def group(
     """Average the repeats of each laser at each placement; repeats far from their fellows are rejected.
 
     Where the repeats scatter significantly more than their stated deviations, all of these are enlarged to
-    match (`MeanObservations.repeat_scale`). A spot whose repeats alone do (`MeanObservations.torn`) has its own
-    deviation enlarged and leaves the others' alone: so it weighs as little as it should.
+    match (`MeanObservations.repeat_scale`). A spot whose repeats alone do (`MeanObservations.torn`) has its
+    own deviation enlarged, and the others keep theirs.
 
     Raises:
         BadInputError: observations of one placement disagree about where the target stood.

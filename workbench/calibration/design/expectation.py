@@ -12,7 +12,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from workbench.calibration.estimation.jit_cache import jit_cached
 from workbench.calibration.model.parameters import (
@@ -24,11 +23,10 @@ from workbench.calibration.model.parameters import (
     sensor_parameters,
 )
 from workbench.calibration.model.prediction import predict_cell
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.rig import Rig
 from workbench.optics.lens import Lens, radial_slope
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 COMMON = len(LENS) + len(REFERENCE)
 SENSOR_INPUTS = COMMON + len(RAY)
 BLOCK = 4096

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.data.observations import Observation, group
 from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.model.parameters import ParameterTable, sensor_parameters
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
-FloatArray = NDArray[np.float64]
 ROUNDS = 5
 """Of Gauss and Newton: the second already moves a spot by less than a pixel."""
 SURE_SD = 2.0

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.design.standoffs import Aim, drawn_sensors, mean_sd_px, posterior, worst_of
@@ -19,11 +18,11 @@ from workbench.calibration.verdict.observability import (
     information_of,
     null_directions,
 )
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.calibration import DeterminedBy
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 
-FloatArray = NDArray[np.float64]
 RANGES_MM = (100.0, 150.0, 200.0, 300.0, 500.0, 700.0, 1000.0, 1500.0, 2000.0, 3000.0, 4000.0, 5000.0)
 OFTEN = 0.05
 """A spot that is out of the picture in more than this part of the drawn sensors is worth a note."""
@@ -114,7 +113,7 @@ def _ranges(rig: Rig, aim: Aim, variance: FloatArray) -> tuple[RangeForecast, ..
     return tuple(RangeForecast(laser, at, t, c) for (laser, at), t, c in zip(places, total, own, strict=True))
 
 
-def _median_seen(values: FloatArray, seen: NDArray[np.bool_]) -> list[float | None]:
+def _median_seen(values: FloatArray, seen: BoolArray) -> list[float | None]:
     """Of (N, K) over the sensors that see the spot; None where less than half of them do."""
     return [
         float(np.median(column[has])) if has.mean() >= 0.5 else None

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.data.observations import MeanObservations, Observation, group, positions, stated_sd
 from workbench.calibration.design.expectation import Expectation
@@ -21,9 +20,9 @@ from workbench.calibration.estimation.fit import table_of
 from workbench.calibration.estimation.noise_scale import scale_called_for
 from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import measured, refit
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import NoiseSpec, Rig
 
-FloatArray = NDArray[np.float64]
 FEWEST = 2
 """Placements before there is anything to say."""
 RANGES = 18

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.model.parameters import ParameterTable, sensor_parameters
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.errors import BadInputError
 from workbench.model.rig import NoiseSpec, Rig
 
-FloatArray = NDArray[np.float64]
 RANGES_MM = np.geomspace(100.0, 5000.0, 18)
 DRAWS = 256
 SEARCH_DRAWS = 32
@@ -117,7 +116,7 @@ def worst_of(variance: FloatArray) -> FloatArray:
     return np.asarray(np.median(np.sqrt(np.maximum(variance, 0.0).max(axis=-1)), axis=0))
 
 
-def typical_of(variance: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
+def typical_of(variance: FloatArray, seen: BoolArray) -> FloatArray:
     """(C,) of (N, C, K): geometric mean of the relative sd over all ranges that are seen (N, K)."""
     logs = np.log(variance, out=np.zeros_like(variance), where=np.broadcast_to(seen[:, None], variance.shape))
     return np.asarray(np.exp(0.5 * logs.sum(axis=(0, 2)) / max(int(seen.sum()), 1)))
@@ -185,7 +184,7 @@ def propose(choice: Choice, count: int) -> tuple[float, ...]:
     return tuple(sorted(choice.standoff_mm[_exchanged(choice, chosen, seen, typical)].tolist()))
 
 
-def _exchanged(choice: Choice, chosen: list[int], allowed: NDArray[np.bool_], cost: Cost) -> list[int]:
+def _exchanged(choice: Choice, chosen: list[int], allowed: BoolArray, cost: Cost) -> list[int]:
     """The chosen candidates, each exchanged for another while that lowers the cost."""
     reached = np.inf
     for _ in range(ROUNDS):
@@ -200,7 +199,7 @@ def _exchanged(choice: Choice, chosen: list[int], allowed: NDArray[np.bool_], co
     return chosen
 
 
-def _best(choice: Choice, chosen: Sequence[int], allowed: NDArray[np.bool_], cost: Cost) -> tuple[int, float]:
+def _best(choice: Choice, chosen: Sequence[int], allowed: BoolArray, cost: Cost) -> tuple[int, float]:
     """The candidate beside the chosen ones with the least cost, and that cost."""
     costs = np.where(allowed, cost(choice.with_one_more(choice.covariance(chosen))), np.inf)
     costs[list(chosen)] = np.inf

@@ -17,16 +17,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from workbench.calibration.data.observations import MeanObservations, PlacementInfo
 from workbench.calibration.estimation.fit import table_of
 from workbench.calibration.estimation.noise_scale import scale_called_for
 from workbench.calibration.model.parameters import LENS, PLACEMENT, RAY, REFERENCE, ParameterTable
 from workbench.calibration.model.prediction import predict_cell
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.rig import Rig
 
-FloatArray = NDArray[np.float64]
 CHUNK = 16
 """Fits solved in step: enough to fill the vector units, few enough not to wait long for the slowest one."""
 COMMON = len(LENS) + len(REFERENCE)
@@ -58,7 +57,7 @@ class BatchFit:
     """(B,) of the data at the stated noise."""
     degrees_of_freedom: FloatArray
     """(B,)"""
-    converged: NDArray[np.bool_]
+    converged: BoolArray
     """(B,)"""
 
     @property
@@ -139,7 +138,7 @@ class _Solved(NamedTuple):
     placement_covariance: FloatArray
     chi2: FloatArray
     freedom: FloatArray
-    converged: NDArray[np.bool_]
+    converged: BoolArray
 
 
 def _in_chunks(

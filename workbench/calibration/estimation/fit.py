@@ -8,7 +8,6 @@ from functools import cached_property
 from math import radians, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.checks.out_of_frame import name_out_of_frame
 from workbench.calibration.data.boards import BoardView, PoseGuess, guess_pose, with_placements
@@ -36,11 +35,11 @@ from workbench.calibration.model.parameters import (
     unit_of,
 )
 from workbench.calibration.model.term import Term
+from workbench.model.arrays import FloatArray
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.rig import Prior, Rig
 from workbench.sensor.curves import SpotCurves
 
-FloatArray = NDArray[np.float64]
 POSE_SD = {"slope_x": 1.0, "slope_y": 1.0, "board_x_mm": 100.0, "board_y_mm": 100.0, "board_roll_rad": 1.0}
 """A board's pose is what its corners say: these priors about the first guess are wider than it could err."""
 FLAT_PRIOR_SD = 1e3

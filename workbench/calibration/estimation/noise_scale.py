@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import chdtrc
+
+from workbench.model.arrays import FloatArray
 
 SCATTER_SIGNIFICANCE = 0.01
 """Residuals less likely than this under the stated noise make the fit estimate the noise from them."""
 
 
-def scale_called_for(chi2: ArrayLike, freedom: ArrayLike) -> NDArray[np.float64]:
+def scale_called_for(chi2: ArrayLike, freedom: ArrayLike) -> FloatArray:
     """Factor on the stated noise that residuals of this chi2 call for, 1 where they agree with it."""
     chi2, freedom = np.asarray(chi2, float), np.asarray(freedom, float)
     countable = np.where(freedom > 0, freedom, 1.0)

@@ -11,7 +11,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
-from numpy.typing import NDArray
 
 from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import MeanObservations
@@ -25,9 +24,8 @@ from workbench.calibration.model.prediction import (
     predict_corners,
     predict_spots,
 )
+from workbench.model.arrays import FloatArray
 from workbench.model.board import Board
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from math import radians
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.board import BOW
 from workbench.model.rig import Prior, Rig
 
@@ -87,22 +87,22 @@ class ParameterTable:
     parameters: tuple[Parameter, ...]
 
     @property
-    def prior_mean(self) -> NDArray[np.float64]:
+    def prior_mean(self) -> FloatArray:
         """Prior means of all parameters, (P,), each in its unit."""
         return np.array([p.prior.value for p in self.parameters])
 
     @property
-    def prior_sd(self) -> NDArray[np.float64]:
+    def prior_sd(self) -> FloatArray:
         """Prior standard deviations of all parameters, (P,), each in its unit."""
         return np.array([p.prior.sd for p in self.parameters])
 
     @property
-    def free(self) -> NDArray[np.intp]:
+    def free(self) -> IndexArray:
         """Indices of the free parameters."""
         return np.flatnonzero(self.prior_sd > 0)
 
     @property
-    def is_sensor(self) -> NDArray[np.bool_]:
+    def is_sensor(self) -> BoolArray:
         """Which of all parameters belong to the sensor, (P,)."""
         return np.array([p.kind == "sensor" for p in self.parameters])
 

@@ -16,7 +16,6 @@ from math import log
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from workbench.calibration.data.boards import BoardView
@@ -26,12 +25,12 @@ from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.model.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.model.term import Term
 from workbench.calibration.selection.outliers import fit_without_outliers, without_outliers
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import TermVerdict
 from workbench.model.errors import BadInputError
 from workbench.model.nested import TILTS, fix_parameters
 from workbench.model.rig import Prior, Rig
 
-FloatArray = NDArray[np.float64]
 STRONG = 1.0
 """log10 of a Bayes factor that is strong evidence (R. E. Kass and A. E. Raftery, JASA 90 (1995) 773)."""
 IDLE_SHIFT_SD = 0.1
@@ -170,7 +169,7 @@ def _candidates(fitted: CalibrationFit) -> list[str]:
     return [*found, TILTS] if len(_indices(fitted, [TILTS])) else found
 
 
-def _indices(fitted: CalibrationFit, names: Sequence[str]) -> NDArray[np.intp]:
+def _indices(fitted: CalibrationFit, names: Sequence[str]) -> IndexArray:
     """(T,) where the parameters of terms stand among all."""
     wanted = set(" ".join(names).split())
     if TILTS in wanted:
@@ -180,7 +179,7 @@ def _indices(fitted: CalibrationFit, names: Sequence[str]) -> NDArray[np.intp]:
     return np.flatnonzero([p.name in wanted and p.prior.sd > 0 for p in fitted.table.parameters])
 
 
-def _compare(fitted: CalibrationFit, index: NDArray[np.intp]) -> _Comparison:
+def _compare(fitted: CalibrationFit, index: IndexArray) -> _Comparison:
     prior_sd = fitted.table.prior_sd[index]
     offset = fitted.values[index] - fitted.table.prior_mean[index]
     posterior = fitted.covariance[np.ix_(index, index)]
@@ -204,7 +203,7 @@ def _p_value(score: FloatArray, information: FloatArray) -> float:
     return float(chdtrc(known.sum(), chi2)) if known.any() else 1.0
 
 
-def _effect_on_ranges(fitted: CalibrationFit, index: NDArray[np.intp]) -> tuple[float, float]:
+def _effect_on_ranges(fitted: CalibrationFit, index: IndexArray) -> tuple[float, float]:
     """Without a term: the largest shift of a range in its deviations, and the largest change of these.
 
     The deviation without it is of ranges whose covariance still carries the term's prior.
@@ -218,7 +217,7 @@ def _effect_on_ranges(fitted: CalibrationFit, index: NDArray[np.intp]) -> tuple[
     return float(shift.max(initial=0.0)), float(np.abs(without_sd / with_sd - 1).max(initial=0.0))
 
 
-def _carried(fitted: CalibrationFit, index: NDArray[np.intp], follow: FloatArray) -> FloatArray:
+def _carried(fitted: CalibrationFit, index: IndexArray, follow: FloatArray) -> FloatArray:
     """(P, P) of an estimate that holds a term at its prior's mean while the truth is as its prior says.
 
     S. F. Schmidt's consider covariance (Advances in Control Systems 3 (1966) 293).

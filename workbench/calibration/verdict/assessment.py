@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.checks.cross_validation import LeftOut, alarms, leave_each_out
 from workbench.calibration.checks.faults import Fault, find_faults
@@ -18,6 +17,7 @@ from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.model.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.verdict.observability import NullDirection, direction_lines
 from workbench.model.acceptance import Acceptance
+from workbench.model.arrays import FloatArray
 from workbench.model.calibration import DeterminedBy
 
 CONTRADICTION_SD = 5.0
@@ -163,7 +163,7 @@ def _derive_one(fit: CalibrationFit, index: int) -> Derived:
     )
 
 
-def _sd(fit: CalibrationFit, gradient: NDArray[np.float64]) -> float:
+def _sd(fit: CalibrationFit, gradient: FloatArray) -> float:
     return float(np.sqrt(gradient @ fit.covariance @ gradient))
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from workbench.model.arrays import FloatArray
 from workbench.model.calibration import Calibration
 from workbench.model.errors import BadInputError
 from workbench.sensor.calibrated import CalibratedSensor
 
-FloatArray = NDArray[np.float64]
 Pairs = list[tuple[str, FloatArray]]
 """Laser ids, each with ranges in mm."""
 SIGNIFICANCE = 0.01

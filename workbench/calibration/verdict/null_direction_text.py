@@ -6,13 +6,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import hypot
 
-import numpy as np
-from numpy.typing import NDArray
-
 from workbench.calibration.model.parameters import LENS, PRINT
 from workbench.model.rig import Rig
 
-FloatArray = NDArray[np.float64]
 LEAST_PART = 0.3
 """What moves the spots by less than this part of what the strongest of a combination does is not named."""
 LEAST_EFFECT = 0.01

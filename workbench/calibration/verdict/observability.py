@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.calibration.estimation.fit import FLAT_PRIOR_SD
 from workbench.calibration.model.parameters import LENS, PRINT, Parameter
@@ -25,9 +24,9 @@ from workbench.calibration.verdict.null_direction_text import (
     parameter_change,
     remedy,
 )
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
-FloatArray = NDArray[np.float64]
 SHARED_FIRST = ("ruler_scale", *PRINT, "offset_mm", *LENS)
 NOT_HURT = 1 / 3
 """A direction that moves ranges by less than this part of their sd adds at most some 5 % to it."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.calibration.data.spot_rows import prior_scanline
-from workbench.devices.protocols import Image
+from workbench.model.arrays import BoolArray, Image
 from workbench.model.rig import Rig
 from workbench.spots.strip import distance_px
 
@@ -34,7 +34,7 @@ class Brightness:
     """Standard deviation of `lit`."""
 
 
-def searched_pixels(rig: Rig) -> NDArray[np.bool_]:
+def searched_pixels(rig: Rig) -> BoolArray:
     """Where the rig file lets its lasers' spots lie, or everywhere if that is beside the picture.
 
     Shape (height, width).
@@ -46,7 +46,7 @@ def searched_pixels(rig: Rig) -> NDArray[np.bool_]:
 
 
 def measure_brightness(
-    on: Sequence[Image], off: Sequence[Image], searched: NDArray[np.bool_], full_scale: int
+    on: Sequence[Image], off: Sequence[Image], searched: BoolArray, full_scale: int
 ) -> Brightness:
     """What the lasers light most.
 

@@ -17,7 +17,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from workbench.devices.protocols import Bench, Camera, ExposableCamera, Image, StreamingCamera, settable
+from workbench.devices.protocols import Bench, Camera, ExposableCamera, StreamingCamera, settable
+from workbench.model.arrays import Image
 from workbench.model.errors import RigNotReadyError
 from workbench.model.event import ExposureSet
 from workbench.model.exposure import AIM, CLIPPED, GOOD, verdict_of

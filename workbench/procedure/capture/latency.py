@@ -9,7 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from workbench.calibration.data.spot_rows import prior_scanline
-from workbench.devices.protocols import Image, LaserBank, StreamingCamera, settable
+from workbench.devices.protocols import LaserBank, StreamingCamera, settable
+from workbench.model.arrays import Image
 from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import Rig
 from workbench.spots import Spot, find_spots

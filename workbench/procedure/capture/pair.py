@@ -11,6 +11,7 @@ from pathlib import Path
 from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.devices.protocols import Bench
 from workbench.model import event as ev
+from workbench.model.arrays import Image
 from workbench.model.captures import ALL_LASERS, BOARD
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.rig import Rig
@@ -19,7 +20,7 @@ from workbench.procedure.capture.exposure import set_exposure
 from workbench.procedure.capture.latency import LEASE_S
 from workbench.session.frames import FrameStore, read_image
 from workbench.session.state import Group
-from workbench.spots import Finding, Image, Scanline, Spot, find_spots, persistent_spots
+from workbench.spots import Finding, Scanline, Spot, find_spots, persistent_spots
 
 
 @dataclass

@@ -11,6 +11,7 @@ from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Rejected
 from workbench.devices.protocols import Bench, Operator, StreamingCamera
 from workbench.model import event as ev
+from workbench.model.arrays import Image
 from workbench.model.calibration import Calibration, Provenance
 from workbench.model.errors import RigNotReadyError, StoppedError
 from workbench.model.prompt import Answer, Prompt
@@ -20,7 +21,7 @@ from workbench.procedure.capture.latency import count_latency
 from workbench.procedure.capture.pair import PairSource, spots_found
 from workbench.procedure.engine.prompts import safety_prompt
 from workbench.procedure.engine.replay import SAFETY, ReplayingJournal
-from workbench.spots import Finding, Image, Scanline, find_spots
+from workbench.spots import Finding, Scanline, find_spots
 
 
 @dataclass(frozen=True)

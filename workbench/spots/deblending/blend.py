@@ -11,6 +11,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.spots.deblending.clusters import TAIL_WIDTHS, mixes, stands_alone
 from workbench.spots.deblending.joint_fit import Joint, evidence, fit_joint, halves, hidden_spot
 from workbench.spots.fit import Windows, fit_spots
@@ -20,7 +21,7 @@ from workbench.spots.measure import FittedSpot, spot_flags
 from workbench.spots.noise import Noise
 from workbench.spots.pair import PairSignal
 from workbench.spots.psf import FLUX, LN_SU, SHEAR, U, principal_axes
-from workbench.spots.types import Bools, Failure, Floats, Spot
+from workbench.spots.types import Failure, Spot
 
 # F statistic that a further spot must reach: with some hundred pixels, chance gives this once in 1e5.
 _EVIDENCE = 10.0
@@ -68,14 +69,14 @@ class Blend:
         centre = np.array([self.row0 + half], float), np.array([self.col0 + half], float)
         win = self.scene.pair.cut(*centre, np.array([0]), half)
         elsewhere = ~self._light_of(others, win.shape)
-        self.allowed: Bools = self._in_a_strip(scenes, win.shape) & elsewhere
+        self.allowed: BoolArray = self._in_a_strip(scenes, win.shape) & elsewhere
         # What lies off the scanline is not explained by spots on it.
         size = 2 * int(np.ceil(TAIL_WIDTHS * reach)) + 1
         near = cv2.dilate(self.allowed.astype(np.uint8), np.ones((size, size), np.uint8)).astype(bool)
         self.win = win._replace(usable=(near & elsewhere)[None] & win.usable)
         """A window around all of them."""
 
-    def start_of(self, traces: Sequence[FittedSpot]) -> Floats:
+    def start_of(self, traces: Sequence[FittedSpot]) -> FloatArray:
         """(n, 6) their parameters, in pixels of the window."""
         return np.array([t.params[:SHEAR] for t in traces]) - (0, 0, self.col0, self.row0, 0, 0)
 
@@ -98,7 +99,7 @@ class Blend:
             traces.append(FittedSpot(spot, params, slope, reach, flux / float(sd[0]), self.scene))
         return traces
 
-    def _light_of(self, traces: Sequence[FittedSpot], shape: tuple[int, int]) -> Bools:
+    def _light_of(self, traces: Sequence[FittedSpot], shape: tuple[int, int]) -> BoolArray:
         """(height, width) where light of these spots comes."""
         found = np.zeros(shape, bool)
         if traces:
@@ -106,7 +107,7 @@ class Blend:
             mark_light(self.row0, self.col0, lights, found)
         return found
 
-    def _in_a_strip(self, scenes: Sequence[PairSignal], shape: tuple[int, int]) -> Bools:
+    def _in_a_strip(self, scenes: Sequence[PairSignal], shape: tuple[int, int]) -> BoolArray:
         """(height, width) where a scanline lets a spot be."""
         found = np.zeros(shape, bool)
         for strip in (scene.strip for scene in scenes):
@@ -171,7 +172,7 @@ def fit_blends(
     return [group[i] for i in kept] if best is None else crowd.as_traces(best)
 
 
-def _needed(crowd: Blend, start: Floats, alone: Bools) -> tuple[Joint | None, list[int]]:
+def _needed(crowd: Blend, start: FloatArray, alone: BoolArray) -> tuple[Joint | None, list[int]]:
     """The fit of the spots that the data ask for, and their indices; no fit where there is no sound one.
 
     All at first, then without the least certain one: to a model that lacks a spot its light is noise, and in
@@ -192,7 +193,7 @@ def _needed(crowd: Blend, start: Floats, alone: Bools) -> tuple[Joint | None, li
     return None, kept
 
 
-def _least_certain(full: Joint, start: Floats, open_: list[int]) -> int:
+def _least_certain(full: Joint, start: FloatArray, open_: list[int]) -> int:
     """Of the spots `open_` the one to leave out first.
 
     Spots of a fit that did not converge tell nothing: most likely two of them are one, the nearest two.
@@ -207,7 +208,7 @@ def _least_certain(full: Joint, start: Floats, open_: list[int]) -> int:
     return min((n for n in nearest if n in open_), key=lambda n: float(start[n, FLUX]))
 
 
-def _halved(start: Floats, alone: Bools) -> tuple[Floats, Bools]:
+def _halved(start: FloatArray, alone: BoolArray) -> tuple[FloatArray, BoolArray]:
     """First guesses in which longish spots are two, and which of these stand alone."""
     narrowest = start[:, LN_SU:].min()
     long = start[:, LN_SU:].max(axis=1) > narrowest + np.log(_LONGISH)
@@ -263,7 +264,7 @@ def split(scenes: Sequence[PairSignal], trace: FittedSpot, others: list[FittedSp
     return crowd.as_traces(two)
 
 
-def _settled(win: Windows, start: Floats, noise: Noise) -> Joint:
+def _settled(win: Windows, start: FloatArray, noise: Noise) -> Joint:
     """Fit with the noise that the model itself measures, without pixels that no spot explains."""
     for _ in range(_TURNS):
         joint = fit_joint(win, start, noise)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.joint import score_together
 from workbench.spots.kernels.joint_sums import OWN, SHARED
 from workbench.spots.noise import Noise, photon_transfer_slope
 from workbench.spots.psf import FLUX, LN_SU, SHEAR, U, V, principal_axes
-from workbench.spots.types import Bools, Floats
 
 _HIDDEN_SD = 5.0
 _AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
@@ -24,24 +24,24 @@ _SECOND_ORDER = 10.0
 class Joint:
     """Spots of one window that share their widths: lasers of one kind on one target."""
 
-    params: Floats
+    params: FloatArray
     """(k, 6) in the order of `gaussian`; background and widths are the same in all rows."""
-    sd: Floats
+    sd: FloatArray
     """(k, 3): of flux, u, v."""
     chi2: float
     """Sum of squared residuals over the variance of the fit that the evidence is asked of."""
-    signal: Floats
+    signal: FloatArray
     """(height, width) expected value above the background, DN."""
-    residual: Floats
+    residual: FloatArray
     """(height, width), DN."""
-    weight: Floats
+    weight: FloatArray
     """(height, width) inverse variance, 0 where unused."""
     noise: Noise
     """With the photon-transfer slope that the residuals tell, unless the weights were fixed."""
     converged: bool
 
 
-def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None = None) -> Joint:
+def fit_joint(win: Windows, start: FloatArray, noise: Noise, weight: FloatArray | None = None) -> Joint:
     """Fit k spots in a single window (n = 1).
 
     Args:
@@ -75,17 +75,17 @@ def fit_joint(win: Windows, start: Floats, noise: Noise, weight: Floats | None =
     return Joint(params, sd, float(np.vdot(used, residual**2)), signal, residual, used, noise, converged)
 
 
-def _with_second_order(sd_px: Floats, width_px: Floats) -> Floats:
+def _with_second_order(sd_px: FloatArray, width_px: FloatArray) -> FloatArray:
     """(k, 2) deviations of u and v, with the next term of their series in 1 / A, as in `judging`.
 
     The variance of a spot alone in white noise is 2 width^2 / A; so A is taken from it, for a neighbour that
     overlaps takes a part of what tells away.
     """
-    widened: Floats = sd_px * np.sqrt(1.0 + 0.5 * _SECOND_ORDER * (sd_px / width_px) ** 2)
+    widened: FloatArray = sd_px * np.sqrt(1.0 + 0.5 * _SECOND_ORDER * (sd_px / width_px) ** 2)
     return widened
 
 
-def halves(params: Floats) -> Floats:
+def halves(params: FloatArray) -> FloatArray:
     """(2, 6) first guess for two spots from the fit (6,) or (7,) of their sum: apart along its long axis."""
     widths, axes = principal_axes(params)
     apart = max(np.sqrt(widths[1] ** 2 - widths[0] ** 2), 0.4 * widths[1])
@@ -106,7 +106,7 @@ def evidence(one: float, two: float, pixels: int, parameters: int) -> float:
     return (one - two) / 3.0 / max(left, 1e-12)
 
 
-def hidden_spot(joint: Joint, win: Windows, allowed: Bools) -> Floats | None:
+def hidden_spot(joint: Joint, win: Windows, allowed: BoolArray) -> FloatArray | None:
     """(6,) first guess of a spot of the same widths that stands out of the residuals; None without one."""
     su, sv = np.exp(joint.params[0, LN_SU:SHEAR])
     weight, residual = joint.weight, joint.residual
@@ -122,6 +122,6 @@ def hidden_spot(joint: Joint, win: Windows, allowed: Bools) -> Floats | None:
     row, col = np.unravel_index(int(height.argmax()), win.shape)
     if height[row, col] < _HIDDEN_SD:
         return None
-    hidden: Floats = joint.params[0].copy()
+    hidden: FloatArray = joint.params[0].copy()
     hidden[FLUX], hidden[U], hidden[V] = matched[row, col] / told[row, col], col, row
     return hidden

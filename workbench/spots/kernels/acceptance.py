@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.spots.kernels.compiled import compiled
 from workbench.spots.kernels.single import JUDGED, score
 from workbench.spots.kernels.windows import half_for
 from workbench.spots.noise import ROUNDING_DN2
-from workbench.spots.types import Bools, Floats, Ints
 
 # Columns of a table of spots, one row each. The first seven are the parameters as in `gaussian`, in pixels of
 # the image; the next half-width is 0 for a spot whose window fits.
@@ -40,8 +40,8 @@ _RIM_SD: Final = 5.0
 
 @compiled
 def without_outliers(
-    usable: Bools, signal: Floats, residual: Floats, weight: Floats, judged: Floats
-) -> tuple[Bools, bool]:
+    usable: BoolArray, signal: FloatArray, residual: FloatArray, weight: FloatArray, judged: FloatArray
+) -> tuple[BoolArray, bool]:
     """Usable pixels of n windows without the few that no spot explains, and whether there are any.
 
     These are hot pixels. The arguments are as in `Windows` and `Fit`.
@@ -61,7 +61,7 @@ def without_outliers(
 
 
 @compiled
-def _follow_rim(floor: Floats, judged: Floats) -> bool:
+def _follow_rim(floor: FloatArray, judged: FloatArray) -> bool:
     """Take the floor (n,) of windows from their rim where it is not as noisy as predicted; whether any is.
 
     Clutter and bright surroundings make it noisier, a dark patch of a bright scene quieter. The threshold is
@@ -80,7 +80,7 @@ def _follow_rim(floor: Floats, judged: Floats) -> bool:
 
 
 @compiled
-def _is_spot(params: Floats, judged: Floats, shape: tuple[int, int]) -> bool:
+def _is_spot(params: FloatArray, judged: FloatArray, shape: tuple[int, int]) -> bool:
     """Whether a fit that converged is a spot in the image; see `Fit` for `judged`."""
     mean_width = math.exp(0.5 * (params[4] + params[5]))
     return (
@@ -97,8 +97,14 @@ def _is_spot(params: Floats, judged: Floats, shape: tuple[int, int]) -> bool:
 
 @compiled
 def _fit_tilted(
-    data: Floats, usable: Bools, clip: Floats, floor: Floats, guess: Floats, start: Floats, tilted: Floats
-) -> tuple[bool, Floats, float]:
+    data: FloatArray,
+    usable: BoolArray,
+    clip: FloatArray,
+    floor: FloatArray,
+    guess: FloatArray,
+    start: FloatArray,
+    tilted: FloatArray,
+) -> tuple[bool, FloatArray, float]:
     """Fit one window by an ellipse at any angle: whether that converged, `Fit.judged`, slope.
 
     `start` (6,) is that of an upright one, `tilted` (1, 7) is filled.
@@ -112,7 +118,7 @@ def _fit_tilted(
 
 
 @compiled
-def _note(params: Floats, judged: Floats, slope: float, row: Floats) -> None:
+def _note(params: FloatArray, judged: FloatArray, slope: float, row: FloatArray) -> None:
     """Fill a spot's row of the table, all but the next window."""
     row[6] = 0.0
     row[: params.size] = params
@@ -123,7 +129,7 @@ def _note(params: Floats, judged: Floats, slope: float, row: Floats) -> None:
 
 @compiled
 def _ask_for_another_window(
-    params: Floats, half: int, rows: Floats, cols: Floats, k: int, found: Floats
+    params: FloatArray, half: int, rows: FloatArray, cols: FloatArray, k: int, found: FloatArray
 ) -> None:
     """Note that spot k needs another window, and where, if it outgrows its own or lies off its middle."""
     margin = _WIDTH_SD * found[k, FLUX_SD] / params[1]
@@ -135,17 +141,17 @@ def _ask_for_another_window(
 
 @compiled
 def fit_group(
-    data: Floats,
-    usable: Bools,
-    clip: Floats,
-    group: Ints,
-    rows: Floats,
-    cols: Floats,
-    start: Floats,
+    data: FloatArray,
+    usable: BoolArray,
+    clip: FloatArray,
+    group: IndexArray,
+    rows: FloatArray,
+    cols: FloatArray,
+    start: FloatArray,
     variance: float,
     slope_dn: float,
     shape: tuple[int, int],
-    found: Floats,
+    found: FloatArray,
 ) -> None:
     """Fit windows of one size that belong to the peaks `group` of all; fill the rows of those that are spots.
 

@@ -10,10 +10,10 @@ from typing import Final
 
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.spots.kernels.compiled import compiled
 from workbench.spots.kernels.joint_sums import OWN, SHARED, add_pairs, leverages, profiles, sums_alone
 from workbench.spots.kernels.single_sums import invert
-from workbench.spots.types import Bools, Floats, Ints
 
 _MAX_STEPS: Final = 30
 _MAX_MOVE_PX: Final = 0.7
@@ -23,7 +23,9 @@ _TOLERANCE_SD: Final = 0.1
 
 
 @compiled
-def _signal(params: Floats, along_u: Floats, along_v: Floats, box: Ints, out: Floats) -> None:
+def _signal(
+    params: FloatArray, along_u: FloatArray, along_v: FloatArray, box: IndexArray, out: FloatArray
+) -> None:
     """Fill (height, width): expected value above the background, DN."""
     out[:] = 0.0
     for i in range(len(params)):
@@ -34,7 +36,7 @@ def _signal(params: Floats, along_u: Floats, along_v: Floats, box: Ints, out: Fl
 
 
 @compiled
-def _weigh(usable: Bools, signal: Floats, floor: float, slope: float, out: Floats) -> None:
+def _weigh(usable: BoolArray, signal: FloatArray, floor: float, slope: float, out: FloatArray) -> None:
     """Inverse of the variance that the model predicts, 0 where a pixel is not to be used."""
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
@@ -42,7 +44,7 @@ def _weigh(usable: Bools, signal: Floats, floor: float, slope: float, out: Float
 
 
 @compiled
-def _moved(params: Floats, delta: Floats) -> None:
+def _moved(params: FloatArray, delta: FloatArray) -> None:
     """A step, kept from jumping; after it all spots have one background and shape. `params` is changed."""
     params[:, 0] = params[0, 0] + delta[0]
     for j in range(2):
@@ -57,17 +59,17 @@ def _moved(params: Floats, delta: Floats) -> None:
 
 @compiled
 def score_together(
-    data: Floats,
-    usable: Bools,
+    data: FloatArray,
+    usable: BoolArray,
     floor: float,
     slope: float,
     fixed: bool,
-    params: Floats,
-    cov: Floats,
-    signal: Floats,
-    residual: Floats,
-    weight: Floats,
-    leverage: Floats,
+    params: FloatArray,
+    cov: FloatArray,
+    signal: FloatArray,
+    residual: FloatArray,
+    weight: FloatArray,
+    leverage: FloatArray,
 ) -> bool:
     """Fit k spots to a window (height, width), starting at `params`; whether that converged.
 

@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.spots.kernels.compiled import compiled
 from workbench.spots.kernels.profiles import ALONG_U, ALONG_V, profile
-from workbench.spots.types import Floats, Ints
 
 SHARED: Final = 3
 """Parameters before those of the single spots: background and both widths."""
@@ -23,7 +23,7 @@ _REACH_WIDTHS: Final = 5.0
 
 
 @compiled
-def profiles(params: Floats, along_u: Floats, along_v: Floats, box: Ints) -> None:
+def profiles(params: FloatArray, along_u: FloatArray, along_v: FloatArray, box: IndexArray) -> None:
     """Fill (k, 4, width) and (k, 4, height), see `shapes.profile`, and the boxes (k, 4) of the spots' light.
 
     A box has the first column, the one after the last, the first row and the one after the last.
@@ -44,7 +44,7 @@ def _place(i: int, p: int) -> int:
 
 
 @compiled
-def _overlap(box: Ints, i: int, j: int) -> tuple[int, int, int, int]:
+def _overlap(box: IndexArray, i: int, j: int) -> tuple[int, int, int, int]:
     """Columns and rows where light of both spots comes, as in `profiles`."""
     return (
         max(box[i, 0], box[j, 0]),
@@ -56,14 +56,14 @@ def _overlap(box: Ints, i: int, j: int) -> tuple[int, int, int, int]:
 
 @compiled
 def sums_alone(
-    params: Floats,
-    along_u: Floats,
-    along_v: Floats,
-    box: Ints,
-    weight: Floats,
-    residual: Floats,
-    information: Floats,
-    gradient: Floats,
+    params: FloatArray,
+    along_u: FloatArray,
+    along_v: FloatArray,
+    box: IndexArray,
+    weight: FloatArray,
+    residual: FloatArray,
+    information: FloatArray,
+    gradient: FloatArray,
 ) -> None:
     """Fill the gradient (m,) and the background's row and column of the information (m, m); the rest is 0."""
     weighted = weight * residual
@@ -92,7 +92,12 @@ def sums_alone(
 
 @compiled
 def add_pairs(
-    params: Floats, along_u: Floats, along_v: Floats, box: Ints, weight: Floats, information: Floats
+    params: FloatArray,
+    along_u: FloatArray,
+    along_v: FloatArray,
+    box: IndexArray,
+    weight: FloatArray,
+    information: FloatArray,
 ) -> None:
     """Add what every spot and every two that overlap tell to the information (m, m).
 
@@ -125,7 +130,14 @@ def add_pairs(
 
 
 @compiled
-def leverages(params: Floats, along_u: Floats, along_v: Floats, box: Ints, cov: Floats, out: Floats) -> None:
+def leverages(
+    params: FloatArray,
+    along_u: FloatArray,
+    along_v: FloatArray,
+    box: IndexArray,
+    cov: FloatArray,
+    out: FloatArray,
+) -> None:
     """Fill (height, width): variance of the fitted pixel values, DN^2."""
     out[:] = cov[0, 0]
     mixed = np.empty((3, 3))

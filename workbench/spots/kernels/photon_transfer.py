@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.spots.kernels.compiled import compiled
-from workbench.spots.types import Bools, Floats
 
 _SLOPE_ROUNDS: Final = 2
 # Windows whose slope is surely this many times the lowest are left to themselves: misfits only raise it.
@@ -20,7 +20,12 @@ _PRIOR_PIXELS: Final = 0.25
 
 @compiled
 def _slope_sums(
-    signal: Floats, residual: Floats, weight: Floats, leverage: Floats, floor: float, slope: float
+    signal: FloatArray,
+    residual: FloatArray,
+    weight: FloatArray,
+    leverage: FloatArray,
+    floor: float,
+    slope: float,
 ) -> tuple[float, float]:
     """Weighted moments of one window; the weights are those of `weight`, or of `slope` unless it is 0."""
     told = over = 0.0
@@ -36,14 +41,14 @@ def _slope_sums(
 
 
 @compiled
-def _agreeing(told: Floats, over: Floats) -> Bools:
+def _agreeing(told: FloatArray, over: FloatArray) -> BoolArray:
     """(n,) which windows agree on the slope; each of the others is far above and left to itself.
 
     A window that holds no spot, or two, looks as if its light were noisier; it must not speak for the others.
     """
     own = over / np.maximum(told, 1e-30)
     doubt = 2.0 * np.sqrt(2.0 / np.maximum(told, 1e-30))
-    alike: Bools = own <= _ALIKE * (own + doubt).min() + doubt
+    alike: BoolArray = own <= _ALIKE * (own + doubt).min() + doubt
     return alike
 
 
@@ -61,8 +66,13 @@ def _pooled(told: float, over: float, slope: float, assumed: float) -> float:
 
 @compiled
 def transfer_slope(
-    signal: Floats, residual: Floats, weight: Floats, leverage: Floats, floor: Floats, assumed: Floats
-) -> Floats:
+    signal: FloatArray,
+    residual: FloatArray,
+    weight: FloatArray,
+    leverage: FloatArray,
+    floor: FloatArray,
+    assumed: FloatArray,
+) -> FloatArray:
     """See `noise.photon_transfer_slope`."""
     n = len(signal)
     told, over, slope = np.empty(n), np.empty(n), assumed.copy()

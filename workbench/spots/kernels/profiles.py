@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
+from workbench.model.arrays import FloatArray
 from workbench.spots.kernels.compiled import compiled
-from workbench.spots.types import Floats
 
 _INV_SQRT_2: Final = 1.0 / math.sqrt(2.0)
 _INV_SQRT_2PI: Final = 1.0 / math.sqrt(2.0 * math.pi)
@@ -26,7 +26,7 @@ ALONG_U: Final = np.array([3, 0, 1, 0, 2, 0])
 
 
 @compiled
-def profile(centre: float, ln_sd: float, out: Floats) -> None:
+def profile(centre: float, ln_sd: float, out: FloatArray) -> None:
     """Fill (4, n): share of a unit Gaussian in each of n pixels, by centre, by ln of its width, and ones."""
     sd = math.exp(ln_sd)
     z = (-0.5 - centre) / sd
@@ -43,7 +43,7 @@ def profile(centre: float, ln_sd: float, out: Floats) -> None:
 
 
 @compiled
-def upright_rows(params: Floats, rows: Floats) -> None:
+def upright_rows(params: FloatArray, rows: FloatArray) -> None:
     """Fill (6, height, width): derivatives of the pixels of one upright ellipse (6,)."""
     along_u, along_v = np.empty((4, rows.shape[2])), np.empty((4, rows.shape[1]))
     profile(params[2], params[4], along_u)
@@ -56,7 +56,7 @@ def upright_rows(params: Floats, rows: Floats) -> None:
 
 
 @compiled
-def sheared_rows(params: Floats, rows: Floats) -> None:
+def sheared_rows(params: FloatArray, rows: FloatArray) -> None:
     """Fill (7, height, width): derivatives of one ellipse (7,) at any angle.
 
     Rows are integrated by quadrature, columns exactly.

@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.spots.kernels.compiled import compiled
 from workbench.spots.kernels.photon_transfer import transfer_slope
 from workbench.spots.kernels.profiles import profile, sheared_rows, upright_rows
 from workbench.spots.kernels.single_sums import dense_sums, fill_leverage, invert, separable_sums
-from workbench.spots.types import Bools, Floats
 
 # Columns of `Fit.judged`.
 JUDGED: Final = 9
@@ -35,7 +35,13 @@ _CLIP_MARGIN_SD: Final = 2.0
 
 @compiled
 def _weigh(
-    usable: Bools, clip: Floats, signal: Floats, background: float, floor: float, slope: float, out: Floats
+    usable: BoolArray,
+    clip: FloatArray,
+    signal: FloatArray,
+    background: float,
+    floor: float,
+    slope: float,
+    out: FloatArray,
 ) -> None:
     """Inverse of the variance that the model predicts, 0 where a pixel is not to be used."""
     for y in range(out.shape[0]):
@@ -49,7 +55,7 @@ def _weigh(
 
 
 @compiled
-def _moved(params: Floats, delta: Floats) -> None:
+def _moved(params: FloatArray, delta: FloatArray) -> None:
     """Step of one window, kept from jumping out of it; `params` is changed."""
     flux = max(abs(params[1]), 1e-9)
     for j in range(params.size):
@@ -60,7 +66,7 @@ def _moved(params: Floats, delta: Floats) -> None:
 
 
 @compiled
-def _within(delta: Floats, cov: Floats, small: float) -> bool:
+def _within(delta: FloatArray, cov: FloatArray, small: float) -> bool:
     """Whether a step is within 0.1 sd; or within 1 sd if that is small, too, DN."""
     for j in range(delta.size):
         variance = cov[j, j]
@@ -74,13 +80,13 @@ def _within(delta: Floats, cov: Floats, small: float) -> bool:
 
 @compiled
 def _evaluate(
-    params: Floats,
-    data: Floats,
-    along_u: Floats,
-    along_v: Floats,
-    rows: Floats,
-    signal: Floats,
-    residual: Floats,
+    params: FloatArray,
+    data: FloatArray,
+    along_u: FloatArray,
+    along_v: FloatArray,
+    rows: FloatArray,
+    signal: FloatArray,
+    residual: FloatArray,
 ) -> None:
     """Fill profiles or derivatives of one window, its signal and residual, at `params`."""
     if params.size == 7:
@@ -97,13 +103,13 @@ def _evaluate(
 
 @compiled
 def _solve(
-    along_u: Floats,
-    along_v: Floats,
-    rows: Floats,
-    weight: Floats,
-    residual: Floats,
-    cov: Floats,
-    delta: Floats,
+    along_u: FloatArray,
+    along_v: FloatArray,
+    rows: FloatArray,
+    weight: FloatArray,
+    residual: FloatArray,
+    cov: FloatArray,
+    delta: FloatArray,
 ) -> None:
     """Fill the covariance (k, k) and the step (k,) of one window."""
     information, gradient = np.empty_like(cov), np.empty_like(delta)
@@ -121,7 +127,7 @@ def _solve(
 
 
 @compiled
-def _leverages(params: Floats, cov: Floats, data: Floats) -> Floats:
+def _leverages(params: FloatArray, cov: FloatArray, data: FloatArray) -> FloatArray:
     """(n, height, width) leverage of every window's pixels."""
     leverage = np.empty_like(data)
     rows = np.empty((params.shape[1], data.shape[1], data.shape[2]))
@@ -135,7 +141,7 @@ def _leverages(params: Floats, cov: Floats, data: Floats) -> Floats:
 
 
 @compiled
-def _tilt(along_u: Floats, along_v: Floats, weight: Floats, residual: Floats) -> float:
+def _tilt(along_u: FloatArray, along_v: FloatArray, weight: FloatArray, residual: FloatArray) -> float:
     """Square of the score by the shear over its variance, of an upright window."""
     score = told = 0.0
     for y in range(weight.shape[0]):
@@ -147,7 +153,14 @@ def _tilt(along_u: Floats, along_v: Floats, weight: Floats, residual: Floats) ->
 
 
 @compiled
-def _judge(signal: Floats, residual: Floats, weight: Floats, cov: Floats, flux: float, out: Floats) -> None:
+def _judge(
+    signal: FloatArray,
+    residual: FloatArray,
+    weight: FloatArray,
+    cov: FloatArray,
+    flux: float,
+    out: FloatArray,
+) -> None:
     """Fill a window's `Fit.judged`, all but the score by a shear."""
     height, width = signal.shape
     worst = at_rim = told = 0.0
@@ -169,19 +182,19 @@ def _judge(signal: Floats, residual: Floats, weight: Floats, cov: Floats, flux: 
 
 @compiled
 def score(
-    data: Floats,
-    usable: Bools,
-    clip: Floats,
-    floor: Floats,
-    guess: Floats,
-    params: Floats,
-    cov: Floats,
-    signal: Floats,
-    residual: Floats,
-    weight: Floats,
-    last: Bools,
-    slope: Floats,
-    judged: Floats,
+    data: FloatArray,
+    usable: BoolArray,
+    clip: FloatArray,
+    floor: FloatArray,
+    guess: FloatArray,
+    params: FloatArray,
+    cov: FloatArray,
+    signal: FloatArray,
+    residual: FloatArray,
+    weight: FloatArray,
+    last: BoolArray,
+    slope: FloatArray,
+    judged: FloatArray,
 ) -> None:
     """Fit one spot per window, starting at `params`; from there on the arguments are filled: see `Fit`.
 

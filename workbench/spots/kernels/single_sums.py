@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from workbench.model.arrays import FloatArray
 from workbench.spots.kernels.compiled import compiled
 from workbench.spots.kernels.profiles import ALONG_U, ALONG_V
-from workbench.spots.types import Floats
 
 # Products of two of the four factors of a derivative, numbered.
 _PAIR: Final = np.array([[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]])
@@ -16,7 +16,7 @@ _PAIRS: Final = 10
 
 
 @compiled
-def invert(matrix: Floats, out: Floats) -> None:
+def invert(matrix: FloatArray, out: FloatArray) -> None:
     """Inverse of an information matrix (k, k), by elimination with pivots; `matrix` is used up.
 
     A ridge that only a singular one feels keeps the result finite.
@@ -48,7 +48,9 @@ def invert(matrix: Floats, out: Floats) -> None:
 
 
 @compiled
-def _summed_along_v(along_v: Floats, weight: Floats, residual: Floats) -> tuple[Floats, Floats]:
+def _summed_along_v(
+    along_v: FloatArray, weight: FloatArray, residual: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Columns' sums of weight times products of profiles (10, width), of weighted residuals (4, width)."""
     height, width = weight.shape
     squares, weighted = np.zeros((_PAIRS, width)), np.zeros((4, width))
@@ -69,7 +71,12 @@ def _summed_along_v(along_v: Floats, weight: Floats, residual: Floats) -> tuple[
 
 @compiled
 def separable_sums(
-    along_u: Floats, along_v: Floats, weight: Floats, residual: Floats, information: Floats, gradient: Floats
+    along_u: FloatArray,
+    along_v: FloatArray,
+    weight: FloatArray,
+    residual: FloatArray,
+    information: FloatArray,
+    gradient: FloatArray,
 ) -> None:
     """Sums over the pixels of an upright window: information (6, 6) and gradient (6,).
 
@@ -92,7 +99,9 @@ def separable_sums(
 
 
 @compiled
-def dense_sums(rows: Floats, weight: Floats, residual: Floats, information: Floats, gradient: Floats) -> None:
+def dense_sums(
+    rows: FloatArray, weight: FloatArray, residual: FloatArray, information: FloatArray, gradient: FloatArray
+) -> None:
     """The same sums from derivatives (k, height, width) that are written out."""
     for i in range(rows.shape[0]):
         weighted = rows[i] * weight
@@ -102,7 +111,7 @@ def dense_sums(rows: Floats, weight: Floats, residual: Floats, information: Floa
 
 
 @compiled
-def fill_leverage(rows: Floats, cov: Floats, out: Floats) -> None:
+def fill_leverage(rows: FloatArray, cov: FloatArray, out: FloatArray) -> None:
     """Fill (height, width): variance of the fitted pixel values, from that of the parameters (k, k)."""
     out[:] = 0.0
     for i in range(rows.shape[0]):

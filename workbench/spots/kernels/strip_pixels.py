@@ -6,12 +6,10 @@ import math
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import BoolArray, Float32Array, FloatArray, IndexArray
 from workbench.spots.kernels.compiled import compiled
-from workbench.spots.types import Bools, Floats, Ints
 
-Floats32 = NDArray[np.float32]
 _MAX_PEAKS: Final = 64
 # Peaks nearer than this are one unless a valley lies between them, this deep in sd and as a share of the
 # lower.
@@ -22,7 +20,7 @@ _BINS: Final = 2000
 
 
 @compiled
-def _is_top(image: Floats32, row: int, col: int) -> bool:
+def _is_top(image: Float32Array, row: int, col: int) -> bool:
     """Whether no neighbour is higher."""
     for y in range(max(row - 1, 0), min(row + 2, image.shape[0])):
         for x in range(max(col - 1, 0), min(col + 2, image.shape[1])):
@@ -32,7 +30,7 @@ def _is_top(image: Floats32, row: int, col: int) -> bool:
 
 
 @compiled
-def _lowest_between(image: Floats32, row: int, col: int, dv: int, du: int) -> float:
+def _lowest_between(image: Float32Array, row: int, col: int, dv: int, du: int) -> float:
     """Lowest pixel on the way from (row, col) to (row + dv, col + du)."""
     steps = 2 * max(abs(du), abs(dv))
     lowest = math.inf
@@ -44,7 +42,7 @@ def _lowest_between(image: Floats32, row: int, col: int, dv: int, du: int) -> fl
 
 
 @compiled
-def _is_ripple(image: Floats32, top: Ints, tops: Ints, sd: float) -> bool:
+def _is_ripple(image: Float32Array, top: IndexArray, tops: IndexArray, sd: float) -> bool:
     """Whether no valley parts a peak (2,) from one of the higher `tops` (n, 2): noise, a clipped plateau."""
     row, col = top[0], top[1]
     height = np.float64(image[row, col])
@@ -58,7 +56,7 @@ def _is_ripple(image: Floats32, top: Ints, tops: Ints, sd: float) -> bool:
 
 
 @compiled
-def _tops_of(image: Floats32, mask: Bools, threshold: np.float32, sd: float) -> Ints:
+def _tops_of(image: Float32Array, mask: BoolArray, threshold: np.float32, sd: float) -> IndexArray:
     """(n, 2) rows and columns of local maxima above `threshold`, highest first, ripples left out."""
     everywhere = mask.shape != image.shape
     rows, cols, heights = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
@@ -84,7 +82,7 @@ def _tops_of(image: Floats32, mask: Bools, threshold: np.float32, sd: float) -> 
 
 
 @compiled
-def _quantiles(sample: Floats32, shares: tuple[float, float, float]) -> tuple[float, float, float]:
+def _quantiles(sample: Float32Array, shares: tuple[float, float, float]) -> tuple[float, float, float]:
     """Quantiles, to half a bin: 1 DN, which is exact for whole numbers, or a 2000th of the range."""
     n, first, last = sample.size, np.float64(sample.min()), np.float64(sample.max())
     width = max(1.0, (last - first) / _BINS)
@@ -111,7 +109,9 @@ def _stride(width: int, wanted: int) -> int:
 
 
 @compiled
-def level_of(values: Floats32, samples: int, clip_sd: float, least_variance: float) -> tuple[float, float]:
+def level_of(
+    values: Float32Array, samples: int, clip_sd: float, least_variance: float
+) -> tuple[float, float]:
     """Robust mean and variance: see `noise.level_and_variance`."""
     sample = values.ravel()[:: _stride(values.shape[1], max(1, values.size // samples))].copy()
     low, middle, high = _quantiles(sample, (0.1587, 0.5, 0.8413))
@@ -132,7 +132,7 @@ def level_of(values: Floats32, samples: int, clip_sd: float, least_variance: flo
 
 
 @compiled
-def _smoothed(signal: Floats32, taps: Floats32) -> Floats32:
+def _smoothed(signal: Float32Array, taps: Float32Array) -> Float32Array:
     """A strip after a separable filter with an odd number of taps; beyond the rim its last pixels repeat."""
     height, width = signal.shape
     half = taps.size // 2
@@ -156,8 +156,14 @@ def _smoothed(signal: Floats32, taps: Floats32) -> Floats32:
 
 @compiled
 def peaks_of(
-    signal: Floats32, taps: Floats32, mask: Bools, threshold: float, sd: float, row0: int, col0: int
-) -> Floats:
+    signal: Float32Array,
+    taps: Float32Array,
+    mask: BoolArray,
+    threshold: float,
+    sd: float,
+    row0: int,
+    col0: int,
+) -> FloatArray:
     """(n, 3) row, column and smoothed height (DN) of local maxima, highest first, ripples left out.
 
     Args:

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
+from workbench.model.arrays import BoolArray, FloatArray, Image, IndexArray
 from workbench.spots.kernels.compiled import compiled
-from workbench.spots.types import Bools, Floats, Image, Ints
 
 _PER_HALF_HEIGHT: Final = 1.0 / (2.0 * math.pi * math.log(2.0))
 _EDGE_WIDTHS: Final = 2.5
@@ -28,7 +28,7 @@ def half_for(width_px: float) -> int:
 
 
 @compiled
-def _part(usable: Bools, rows: Floats, cols: Floats, group: Ints) -> None:
+def _part(usable: BoolArray, rows: FloatArray, cols: FloatArray, group: IndexArray) -> None:
     """Make the pixels unusable that lie nearer to another peak than to the window's own."""
     half = usable.shape[1] // 2
     for i in range(len(group)):
@@ -50,12 +50,12 @@ def cut(
     share: float,
     level: float,
     clip_dn: float,
-    rows: Floats,
-    cols: Floats,
-    group: Ints,
-    data: Floats,
-    usable: Bools,
-    clip: Floats,
+    rows: FloatArray,
+    cols: FloatArray,
+    group: IndexArray,
+    data: FloatArray,
+    usable: BoolArray,
+    clip: FloatArray,
 ) -> None:
     """Fill data, usable pixels and clipping values (see `Windows`) around the peaks `group` (n,) of all."""
     n, side = len(group), data.shape[1]
@@ -83,7 +83,7 @@ def cut(
 
 
 @compiled
-def guess(data: Floats, usable: Bools, rows: Floats, cols: Floats, start: Floats) -> None:
+def guess(data: FloatArray, usable: BoolArray, rows: FloatArray, cols: FloatArray, start: FloatArray) -> None:
     """Fill a start (n, 6) in pixels of the image, from windows around pixels (n,).
 
     The width is that of a spot with as many pixels above half the peak (2 pi ln 2 widths squared).
@@ -110,7 +110,7 @@ def guess(data: Floats, usable: Bools, rows: Floats, cols: Floats, start: Floats
 
 
 @compiled
-def is_near_edge(params: Floats, height: int, width: int) -> bool:
+def is_near_edge(params: FloatArray, height: int, width: int) -> bool:
     """Whether the border of the image cuts a spot (6 or more, in pixels of the image)."""
     along_u, along_v = min(params[2], width - 1 - params[2]), min(params[3], height - 1 - params[3])
     cut_off: bool = along_u < _EDGE_WIDTHS * math.exp(params[4]) or along_v < _EDGE_WIDTHS * math.exp(
@@ -120,7 +120,7 @@ def is_near_edge(params: Floats, height: int, width: int) -> bool:
 
 
 @compiled
-def is_clipped(on: Image, clip_dn: float, params: Floats) -> bool:
+def is_clipped(on: Image, clip_dn: float, params: FloatArray) -> bool:
     """Whether a pixel within two widths of a spot (6 or more, in pixels of the image) is clipped."""
     u, v, reach_u, reach_v = params[2], params[3], 2 * math.exp(params[4]), 2 * math.exp(params[5])
     first_row, last_row = int(np.rint(v - reach_v)), int(np.rint(v + reach_v))
@@ -133,7 +133,7 @@ def is_clipped(on: Image, clip_dn: float, params: Floats) -> bool:
 
 
 @compiled
-def flag_codes(on: Image, clip_dn: float, params: Floats, codes: Ints) -> None:
+def flag_codes(on: Image, clip_dn: float, params: FloatArray, codes: IndexArray) -> None:
     """Fill (n,) codes: 1 for a spot (n, 6 or more) that the border cuts, plus 2 for one that is clipped."""
     for i in range(len(params)):
         cut_off = is_near_edge(params[i], on.shape[0], on.shape[1])
@@ -141,14 +141,14 @@ def flag_codes(on: Image, clip_dn: float, params: Floats, codes: Ints) -> None:
 
 
 @compiled
-def halves_for(params: Floats, scale: float, halves: Ints) -> None:
+def halves_for(params: FloatArray, scale: float, halves: IndexArray) -> None:
     """Fill (n,) half-widths of windows for spots (n, 6) whose widths are to be multiplied by `scale`."""
     for i in range(len(params)):
         halves[i] = half_for(scale * math.exp(params[i, 4]))
 
 
 @compiled
-def mark_light(row0: int, col0: int, lights: Floats, out: Bools) -> None:
+def mark_light(row0: int, col0: int, lights: FloatArray, out: BoolArray) -> None:
     """Mark pixels of a window (height, width) that lie within discs (n, 3): u, v and radius in the image.
 
     `row0` and `col0` are the window's first pixel in the image.
@@ -163,7 +163,7 @@ def mark_light(row0: int, col0: int, lights: Floats, out: Bools) -> None:
 
 @compiled
 def mark_strip(
-    row0: int, col0: int, rows: tuple[int, int], cols: tuple[int, int], mask: Bools, out: Bools
+    row0: int, col0: int, rows: tuple[int, int], cols: tuple[int, int], mask: BoolArray, out: BoolArray
 ) -> None:
     """Mark pixels of a window (height, width) that lie in a strip of the image.
 

@@ -13,7 +13,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from workbench.trials.thesis.scene import BoolArray, FloatArray, Line
+from workbench.model.arrays import BoolArray, FloatArray
+from workbench.trials.thesis.scene import Line
 
 Frame = NDArray[np.uint8]
 BAND_PX = 64

@@ -12,14 +12,12 @@ from math import atan, degrees, radians, tan
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.model.simulation import LineName, SimulatedScene
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 BEAM_EXIT_MM = 1.5
 DIVERGENCE = 1.6e-3
 """Full angle, radians."""

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.trials.thesis.scene import BoolArray, FloatArray, Line, Outcome, angle_deg
+from workbench.model.arrays import BoolArray, FloatArray
+from workbench.trials.thesis.scene import Line, Outcome, angle_deg
 
 IntArray = NDArray[np.int64]
 BRIGHTEST_DN = 255

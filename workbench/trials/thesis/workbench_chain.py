@@ -10,6 +10,7 @@ import numpy as np
 from numpy.random import Generator
 
 from workbench.calibration.model.parameters import LENS, RAY
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.calibration import (
     Calibration,
     FitSummary,
@@ -27,7 +28,7 @@ from workbench.ranging.ranger import Ranger, Reading
 from workbench.ranging.shape import Shape
 from workbench.spots import Finding, SpotFinder
 from workbench.trials.thesis.camera import BAND_PX, expose
-from workbench.trials.thesis.scene import BoolArray, FloatArray, Line, Outcome
+from workbench.trials.thesis.scene import Line, Outcome
 
 TYPICAL_SPOT_SD_PX = 0.01
 

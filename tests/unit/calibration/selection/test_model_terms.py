@@ -7,7 +7,6 @@ from math import log
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.stats import kstest
 
 from tests.support.rigs import PROVENANCE, World, prior, thesis_rig
@@ -18,11 +17,11 @@ from workbench.calibration.selection import model_terms
 from workbench.calibration.selection.model_terms import fit_chosen, without_idle
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.sensor.calibrated import CalibratedSensor
 
-FloatArray = NDArray[np.float64]
 SEEDS = (3, 4, 8)
 
 
@@ -40,7 +39,7 @@ def told(fitted: CalibrationFit) -> dict[str, Term]:
     return {term.name: term for term in fitted.terms}
 
 
-def linear(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+def linear(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray, BoolArray]:
     """At the priors' means: residuals (n,), derivatives (n, P) in priors' sd; which are free (P,)."""
     problem = LeastSquaresProblem.of(len(fitted.rig.lasers), fitted.table, fitted.cells, (), fitted.rig.board)
     sd = fitted.table.prior_sd

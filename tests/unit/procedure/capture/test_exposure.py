@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from workbench.devices.protocols import Image
+from workbench.model.arrays import Image
 from workbench.model.event import ExposureSet
 from workbench.model.exposure import AIM, GOOD, verdict_of
 from workbench.procedure.capture.brightness import Brightness, measure_brightness

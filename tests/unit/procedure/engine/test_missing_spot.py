@@ -6,17 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.design.expected_spot import ExpectedSpot, expected_spot
 from workbench.calibration.model.parameters import sensor_parameters
+from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig, load_rig
 from workbench.procedure.engine.missing_spot import in_words, why_not_measured
 
 RIG = load_rig(Path(__file__).parents[4] / "rigs/thesis-emulated.yaml")
 DRAWS = 300
-FloatArray = NDArray[np.float64]
 
 
 def drawn(rig: Rig, rng: np.random.Generator) -> dict[str, float]:

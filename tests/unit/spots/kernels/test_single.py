@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from tests.support.draw import Drawn, Sensor, draw
+from workbench.model.arrays import FloatArray
 from workbench.spots import find_spots
 from workbench.spots.kernels.acceptance import _SECOND_ORDER
 from workbench.spots.psf import FLUX, U, derivatives
 
-Floats = NDArray[np.float64]
 WIDTH, HALF, NOISE_SD = 4.0, 19, 1.0
 SHAPE = (2 * HALF + 1, 2 * HALF + 1)
 PAIRS, TOLD, STEPS = 1200, 400.0, 8
 
 
-def linearised(params: Floats) -> tuple[Floats, Floats, Floats]:
+def linearised(params: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Signal (n, pixels), derivatives by all six parameters (n, 6, pixels), inverse Fisher matrix."""
     rows = derivatives(params, SHAPE).reshape(*params.shape, -1)
     signal = params[:, FLUX, None] * rows[:, FLUX]
@@ -25,7 +24,7 @@ def linearised(params: Floats) -> tuple[Floats, Floats, Floats]:
     return signal, rows, np.asarray(np.linalg.inv(rows @ rows.transpose(0, 2, 1)), np.float64)
 
 
-def fitted(data: Floats, start: Floats) -> Floats:
+def fitted(data: FloatArray, start: FloatArray) -> FloatArray:
     """Least squares, which is maximum likelihood where the noise is white."""
     params = start.copy()
     for _ in range(STEPS):

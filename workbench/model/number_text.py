@@ -1,0 +1,23 @@
+"""Numbers for people: as many digits as their standard deviation leaves meaningful."""
+
+from __future__ import annotations
+
+from math import floor, log10
+
+
+def significant(value: float, sd: float) -> str:
+    """`value` to the second significant digit of its standard deviation; as it is where `sd` is 0."""
+    if sd <= 0:
+        return f"{value:g}"
+    digits = max(0, 1 - floor(log10(sd)))
+    return f"{value:.{digits}f}"
+
+
+def with_sd(value: float, sd: float) -> str:
+    """A value with its standard deviation: `500.3 +- 0.4`."""
+    return f"{significant(value, sd)} +- {two_digits(sd)}"
+
+
+def two_digits(sd: float) -> str:
+    """Two significant digits, without an exponent for what a person would write out."""
+    return f"{float(f'{sd:.2g}'):g}"
