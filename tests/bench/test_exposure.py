@@ -17,7 +17,8 @@ from workbench.model import event as ev
 from workbench.model.captures import load_captures
 from workbench.model.errors import StoppedError
 from workbench.model.rig import load_rig
-from workbench.procedure.engine.run import Plan, run
+from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.run import run
 from workbench.ranging.ranger import Ranger
 from workbench.session.capture_table import write_capture_table
 from workbench.session.journal import read_journal

@@ -164,9 +164,11 @@ def test_the_terminal_shows_steps_and_the_trial_in_80_columns(demo: Demo) -> Non
     ):
         assert word in demo.terminal
     (trial,) = [r.event for r in read_journal(demo.folder) if isinstance(r.event, TrialFinished)]
-    for row in trial.rows:
-        assert f"{row.standoff_mm:g}" in demo.terminal
-        assert f"{row.mean_error_mm:+.2f}" in demo.terminal
+    (table,) = trial.tables
+    assert len(table.rows) == 11
+    for row in range(len(table.rows)):
+        for column in range(len(table.columns)):
+            assert table.text(row, column) in demo.terminal
 
 
 def test_fit_and_range_on_the_session_s_images_give_the_session_s_results(demo: Demo, tmp_path: Path) -> None:

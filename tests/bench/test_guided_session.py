@@ -29,10 +29,10 @@ from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
 from workbench.procedure.capture.latency import WHOLE, count_latency
 from workbench.procedure.doctor import examine
-from workbench.procedure.engine.expected_prompts import expected_prompts
 from workbench.procedure.engine.operator import ScriptedOperator
+from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.resume import resume
-from workbench.procedure.engine.run import NOBODY, Plan, run
+from workbench.procedure.engine.run import NOBODY, run
 from workbench.session.journal import Journal, read_journal
 from workbench.session.state import effective, session_status
 
@@ -84,7 +84,7 @@ def session(folder: Path, steps: str, operator: Operator, emulator: str = "") ->
     rig, procedure = write_files(folder, HEAD + steps)
     rig.write_text(rig.read_text() + "  answers: false\n" + emulator)
     plan = Plan.load(rig, [procedure])
-    held = Foreseen(operator, expected_prompts(plan.procedures, plan.rig))
+    held = Foreseen(operator, plan.prompts())
     run(plan, folder / "s", (), CALLER, lambda: None, held)
     return folder / "s"
 

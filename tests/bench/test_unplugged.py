@@ -24,8 +24,9 @@ from tests.unit.devices.test_real_bench import Scene, write_rig
 from tests.unit.procedure.engine.test_check import PROCEDURE
 from workbench.model import event as ev
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, WorkbenchError
+from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.resume import resume
-from workbench.procedure.engine.run import Plan, run
+from workbench.procedure.engine.run import run
 from workbench.session.journal import read_journal
 from workbench.session.state import effective, groups, session_status
 

@@ -32,8 +32,9 @@ from tests.crash.short import CALLER, RESUMER, results, story, write_files
 from workbench.model import event as ev
 from workbench.model.errors import RigNotReadyError, StoppedError
 from workbench.model.prompt import Answer, Prompt
+from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.resume import resume
-from workbench.procedure.engine.run import Plan, run
+from workbench.procedure.engine.run import run
 from workbench.session.journal import Journal, read_journal
 from workbench.session.state import effective
 

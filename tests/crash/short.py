@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from workbench.model import event as ev
+from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.resume import resume
-from workbench.procedure.engine.run import Invocation, Plan, run
+from workbench.procedure.engine.run import Invocation, run
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
 

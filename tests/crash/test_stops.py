@@ -13,7 +13,8 @@ import pytest
 from tests.crash.short import CALLER, PROCEDURE, begin, go_on, results, story, write_files
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
-from workbench.procedure.engine.run import Plan, run
+from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.run import run
 from workbench.session.journal import read_journal
 from workbench.session.state import session_status
 

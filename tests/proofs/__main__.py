@@ -12,8 +12,9 @@ import numpy as np
 
 from tests.proofs import report, study
 from tests.proofs.solve import Solve, at_once, one_by_one
-from workbench.model.procedure import CaptureGridStep, load_procedure
 from workbench.model.rig import Prior, Rig, load_rig
+from workbench.procedure.engine.procedure_file import load_procedure
+from workbench.steps.capture_grid import CaptureGridStep
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "docs" / "benchmarks"

@@ -20,9 +20,10 @@ from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.verdict.assessment import determined_by
 from workbench.model.captures import load_captures
-from workbench.model.procedure import Procedure, load_procedure
 from workbench.model.rig import Rig, load_rig
-from workbench.procedure.engine.run import Invocation, Plan, run
+from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.procedure_file import Procedure, load_procedure
+from workbench.procedure.engine.run import Invocation, run
 
 ROOT = Path(__file__).parents[2]
 RIG = ROOT / "rigs/thesis-emulated.yaml"

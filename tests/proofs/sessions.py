@@ -29,7 +29,8 @@ from workbench.model.arrays import FloatArray
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import WorkbenchError
 from workbench.model.rig import Rig, load_rig
-from workbench.procedure.engine.run import Plan, run
+from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.run import run
 from workbench.sensor.calibrated import CalibratedSensor
 
 ROOT = Path(__file__).parents[2]

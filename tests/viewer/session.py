@@ -14,6 +14,8 @@ from workbench.model import event as ev
 from workbench.model.calibration import TermSummary
 from workbench.model.rig import CameraSpec, LaserSpec, Prior, Rig
 from workbench.model.target import FlatTarget, Placement
+from workbench.trials.accuracy.statistics import AccuracyRow
+from workbench.trials.accuracy.trial import accuracy_table
 
 SESSION = "20261105T101500-made-up"
 LASERS = {"L1": -60.0, "L2": -30.0, "L3": 30.0, "L4": 60.0}
@@ -103,8 +105,8 @@ class MadeUpSession:
                 yield from self._capture("trial", tuple(LASERS), f"t{i}", standoff, reading)
                 yield self._record(self._reading(standoff, reading))
             yield self._record(ev.StepFinished(procedure=name, index=i, outcome="3 readings"))
-        rows = tuple(_row(standoff) for standoff in TRIAL_STANDOFFS)
-        yield self._record(ev.TrialFinished(trial=name, rows=rows))
+        table = accuracy_table(name, [_row(standoff) for standoff in TRIAL_STANDOFFS])
+        yield self._record(ev.TrialFinished(trial=name, tables=(table,)))
 
     def _record(self, event: ev.Event) -> ev.Record:
         self.n += 1
@@ -261,9 +263,9 @@ def _residuals() -> Iterator[ev.ResidualRecord]:
             )
 
 
-def _row(standoff: float) -> ev.TrialRow:
+def _row(standoff: float) -> AccuracyRow:
     sd = 0.05 * standoff**2 / (F_PX * 60.0)
-    return ev.TrialRow(
+    return AccuracyRow(
         standoff_mm=standoff,
         readings=READINGS,
         mean_error_mm=0.3 * sd,

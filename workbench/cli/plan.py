@@ -12,8 +12,7 @@ from workbench.procedure.capture.exposure import LIT_FRAMES, MOST_TRIALS
 from workbench.procedure.capture.latency import LEASE_S
 from workbench.procedure.engine.check import check_file
 from workbench.procedure.engine.durations import StepDurations, learn_durations
-from workbench.procedure.engine.plan import PlannedStep, outline
-from workbench.procedure.engine.run import Plan
+from workbench.procedure.engine.plan import Plan, PlannedStep
 
 
 def check_files(files: list[Path]) -> None:
@@ -47,10 +46,10 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
     if sessions.exists() and not sessions.is_dir():
         raise BadInputError(f"{sessions}: expected a folder of sessions, this is a file")
     pace = learn_durations(sessions, plan.rig.rig)
-    steps = outline(plan.procedures, plan.rig)
+    steps = plan.steps()
     console = Console(stderr=True, markup=False)
     console.print(_table(steps, pace))
-    total = sum(step.shots for step in steps)
+    total = sum(step.captures for step in steps)
     console.print(
         f"{total} shots, {emission(total, pace)}; {duration(sum(map(pace.seconds, steps)))} in all",
         highlight=False,
@@ -87,8 +86,10 @@ def _table(steps: list[PlannedStep], pace: StepDurations) -> Table:
     for column in ("placements", "shots", "emission", "time"):
         table.add_column(column, justify="right")
     for step in steps:
-        lit_s = step.shots * (LEASE_S if pace.lit_s is None else pace.lit_s)
-        counts = [str(step.placements), str(step.shots), f"{lit_s:.1f} s"] if step.shots else ["", "", ""]
+        lit_s = step.captures * (LEASE_S if pace.lit_s is None else pace.lit_s)
+        counts = (
+            [str(step.placements), str(step.captures), f"{lit_s:.1f} s"] if step.captures else ["", "", ""]
+        )
         name = f"{step.procedure}.{step.index}"
         table.add_row(name, step.title, *counts, duration(pace.seconds(step)))
     return table

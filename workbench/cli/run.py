@@ -24,13 +24,11 @@ from workbench.model.errors import (
     StoppedError,
 )
 from workbench.procedure.engine.durations import learn_durations
-from workbench.procedure.engine.expected_prompts import expected_prompts
 from workbench.procedure.engine.operator import ScriptedOperator
-from workbench.procedure.engine.plan import outline
+from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.progress import TimeLeft
 from workbench.procedure.engine.resume import files_now, plan_of, resume
-from workbench.procedure.engine.run import NOBODY, Invocation, Plan, run
-from workbench.report.thesis_figures import FigureWriter
+from workbench.procedure.engine.run import NOBODY, Invocation, run
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
@@ -84,8 +82,8 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     asked = StopAfterShot()
     script = None
     if answers.file is not None:
-        script = ScriptedOperator.load(answers.file, expected_prompts(plan.procedures, plan.rig), NOBODY)
-    steps = outline(plan.procedures, plan.rig)
+        script = ScriptedOperator.load(answers.file, plan.prompts(), NOBODY)
+    steps = plan.steps()
     if not is_compiled():
         say("note: the search for spots is compiled at the first capture: a minute or two, this once")
     forecast = TimeLeft(steps, learn_durations(session_dir.parent, plan.rig.rig))
@@ -94,8 +92,7 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
         person = choose_operator(answers.no_input, console, lambda: asked.reason, terminal.quiet)
         operator = person if script is None else replace(script, other=person)
-        figures = FaultTolerantConsumer(FigureWriter(session_dir), "drawing figures", console)
-        consumers = (FaultTolerantConsumer(terminal, "the progress", console), figures, beside)
+        consumers = (FaultTolerantConsumer(terminal, "the progress", console), beside)
         try:
             yield Screen(consumers, lambda: asked.reason, operator)
         except (RigNotReadyError, StoppedError, AnswerNeededError, LaserOffNotConfirmedError):

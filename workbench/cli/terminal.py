@@ -14,17 +14,15 @@ from rich.text import Text
 
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
-from workbench.model.simulation import SceneSimulated, SimulationFinished
 from workbench.procedure.capture.quality import Quality, quality_of
 from workbench.procedure.engine.progress import TimeLeft
 from workbench.report.tables import (
-    claim_table,
     left_out_table,
     parameter_table,
     rejected_lines,
     term_table,
-    trial_table,
 )
+from workbench.report.terminal_table import TerminalTable
 
 
 class Terminal:
@@ -109,11 +107,10 @@ class Terminal:
                 for warning in e.warnings:
                     self._print(f"note: {warning}")
             case ev.TrialFinished() as e:
-                self._console.print(trial_table(e.rows))
-            case SceneSimulated() as e:
-                self._print(f"{e.scene.name}, {e.scene.source}: {len(e.set_mm)} distances")
-            case SimulationFinished() as e:
-                self._console.print(claim_table(e.rows))
+                for table in e.tables:
+                    self._console.print(TerminalTable(table))
+            case ev.TrialProgress() as e:
+                self._print(e.text)
             case _:
                 pass
 

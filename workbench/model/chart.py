@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from workbench.model.yamlfile import FileModel
 
@@ -74,7 +74,7 @@ class Limit(FileModel):
 class Chart(FileModel):
     """What is drawn over two axes."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")]
+    name: str
     """Names the chart's file and its place in the recording."""
     title: str
     x: Axis

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from workbench.model.exposure import Verdict as BrightnessVerdict
 from workbench.model.fit_event import FaultRecord as FaultRecord
@@ -21,14 +21,14 @@ from workbench.model.fit_event import ParameterRecord as ParameterRecord
 from workbench.model.fit_event import RejectedRecord as RejectedRecord
 from workbench.model.fit_event import ResidualRecord as ResidualRecord
 from workbench.model.fit_event import ResidualTestRecord as ResidualTestRecord
+from workbench.model.legacy_events import upgraded
 from workbench.model.limit import Verdict
 from workbench.model.prompt import Answer, By
-from workbench.model.simulation import SceneSimulated, SimulationFinished
 from workbench.model.target import Placement
 from workbench.model.trial_event import LaserRange as LaserRange
 from workbench.model.trial_event import ReadingTaken as ReadingTaken
 from workbench.model.trial_event import TrialFinished as TrialFinished
-from workbench.model.trial_event import TrialRow as TrialRow
+from workbench.model.trial_event import TrialProgress as TrialProgress
 from workbench.model.yamlfile import FileModel
 
 
@@ -327,11 +327,11 @@ Event = Annotated[
     | FitFinished
     | CalibrationExported
     | ReadingTaken
+    | TrialProgress
     | TrialFinished
-    | SceneSimulated
-    | SimulationFinished
     | SessionFinished,
     Field(discriminator="kind"),
+    BeforeValidator(upgraded),
 ]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date
 from difflib import get_close_matches
-from typing import Any, get_args
+from typing import Any, Protocol, get_args, runtime_checkable
 
 from pydantic import BaseModel, RootModel
 from pydantic_core import ErrorDetails
@@ -62,6 +62,15 @@ SPELLED = {
 AS_THEY_ARE = {"missing", "extra_forbidden", "invalid_key"}
 SELF_EVIDENT = AS_THEY_ARE | {"too_short", "too_long"}
 """What came is nothing, or is said already."""
+
+
+@runtime_checkable
+class LaterModels(Protocol):
+    """Annotation of a field whose models are registered by other packages."""
+
+    @staticmethod
+    def models() -> list[type[BaseModel]]:
+        """Those that are registered."""
 
 
 @dataclass(frozen=True)
@@ -224,4 +233,6 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
         return _models_in(annotation.model_fields["root"].annotation)
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
+    if isinstance(annotation, type) and issubclass(annotation, LaterModels):
+        return annotation.models()
     return [model for part in get_args(annotation) for model in _models_in(part)]

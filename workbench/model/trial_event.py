@@ -1,9 +1,11 @@
-"""Readings of a trial, and their statistics."""
+"""Events of a trial: its readings, its progress, and its results as tables and charts."""
 
 from __future__ import annotations
 
 from typing import Literal
 
+from workbench.model.chart import Chart
+from workbench.model.table import Table
 from workbench.model.yamlfile import FileModel
 
 
@@ -34,27 +36,22 @@ class ReadingTaken(FileModel):
     lasers: tuple[LaserRange, ...]
 
 
-class TrialRow(FileModel):
-    """Statistics of one standoff of an accuracy trial; errors are measured - true, in mm, 1 sigma."""
+class TrialProgress(FileModel):
+    """A part of a trial is done."""
 
-    standoff_mm: float
-    readings: int
-    """With a range; the numbers below are of these, and None where there are too few of them."""
-    missing: int = 0
-    """Readings without a range."""
-    mean_error_mm: float | None = None
-    max_error_mm: float | None = None
-    min_error_mm: float | None = None
-    sd_mm: float | None = None
-    range_sd_mm: float | None = None
-    """Stated standard deviation of one reading: calibration and spots."""
-    reference_sd_mm: float
-    """Standard deviation of the true range itself: the placement's, by the ruler."""
+    kind: Literal["trial_progress"] = "trial_progress"
+    trial: str
+    text: str
+    """One line for people."""
+    charts: tuple[Chart, ...] = ()
+    """What there is to see so far."""
 
 
 class TrialFinished(FileModel):
-    """A trial's table."""
+    """A trial's results, as data that any renderer shows."""
 
     kind: Literal["trial_finished"] = "trial_finished"
     trial: str
-    rows: tuple[TrialRow, ...]
+    """Name of the step."""
+    tables: tuple[Table, ...] = ()
+    charts: tuple[Chart, ...] = ()

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 
-from workbench.model.event import Record
-from workbench.model.simulation import ChainReadings, SceneSimulated, SimulatedScene, SimulationFinished
 from workbench.report.line_chart import LineChart, Series
-from workbench.session.files import write_record
+from workbench.trials.thesis.schema import ChainReadings, SceneSimulated, SimulatedScene
 
 CHAINS = (("thesis", "#d08010", 1.2), ("noisy", "#70a0d8", 1.2), ("ours", "#0a2f80", 2.0))
 """Name, colour, width, in the order they are drawn."""
@@ -41,23 +38,6 @@ FIGURES = (
     Figure(30, "round, degree 4", ("round-4",), 5000, (-0.1, 0.2)),
 )
 SURFACES = ((25, "round-2-shifted"), (27, "round-3-shifted"), (29, "round-4"))
-
-
-@dataclass
-class FigureWriter:
-    """A consumer of records that writes the figures whose scenes were simulated into the session folder."""
-
-    session_dir: Path
-    _simulated: dict[str, SceneSimulated] = field(default_factory=dict)
-
-    def __call__(self, record: Record) -> None:
-        """Take one record."""
-        if isinstance(record.event, SceneSimulated):
-            self._simulated[record.event.scene.name] = record.event
-        elif isinstance(record.event, SimulationFinished):
-            for name, chart in figures(self._simulated).items():
-                write_record(self.session_dir / f"{name}.svg", chart.svg().encode())
-            self._simulated.clear()
 
 
 def figures(simulated: dict[str, SceneSimulated]) -> dict[str, LineChart]:

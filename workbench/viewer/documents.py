@@ -11,10 +11,7 @@ from workbench.model.event import (
     LeftOutRecord,
     ParameterRecord,
     ReadingTaken,
-    TrialFinished,
-    TrialRow,
 )
-from workbench.model.simulation import ClaimRow, SimulationFinished
 
 
 def fit_summary(fit: FitFinished) -> str:
@@ -89,48 +86,12 @@ def _term_table(terms: Sequence[TermSummary]) -> str:
     return "# Terms of the model\n\n" + _table(head, rows)
 
 
-def trial_table(trial: TrialFinished, readings: Sequence[ReadingTaken]) -> str:
-    """The table of an accuracy trial, and the readings that gave no range."""
-    head = ("true mm", "n", "missing", "mean error", "max", "min", "sd", "stated sd", "sd of the true range")
-    rows = [_trial_row(row) for row in trial.rows]
-    parts = [f"# Trial {trial.trial}", "Errors are measured - true, in mm.", _table(head, rows)]
-    return "\n\n".join([*parts, *_without_range(readings)])
-
-
-def claim_table(finished: SimulationFinished) -> str:
-    """What the thesis states of its simulation, what its chain reaches, and ours without and with noise."""
-    head = ("scene", "what", "stated", "thesis", "ours", "noise")
-    rows = [
-        (
-            row.scene,
-            f"{row.quantity}, {row.nearest_mm:g} to {row.farthest_mm:g} mm",
-            *(_claimed(row, value) for value in (row.stated, row.thesis, row.ours, row.noisy)),
-        )
-        for row in finished.rows
-    ]
-    legend = "range, angle: largest error; shape: farthest distance with the right one, mm; readings: number."
-    return "\n\n".join([f"# Simulation {finished.trial}", legend, _table(head, rows)])
-
-
-def _claimed(row: ClaimRow, value: float | None) -> str:
-    return _number(value, ".2%" if row.quantity in {"range", "angle"} else ".0f")
-
-
-def _trial_row(row: TrialRow) -> tuple[str, ...]:
-    return (
-        f"{row.standoff_mm:g}",
-        str(row.readings),
-        str(row.missing),
-        *(_number(value, "+.2f") for value in (row.mean_error_mm, row.max_error_mm, row.min_error_mm)),
-        *(_number(value, ".2f") for value in (row.sd_mm, row.range_sd_mm, row.reference_sd_mm)),
-    )
-
-
 def _number(value: float | None, form: str) -> str:
     return "-" if value is None else format(value, form)
 
 
-def _without_range(readings: Iterable[ReadingTaken]) -> list[str]:
+def without_range(readings: Iterable[ReadingTaken]) -> list[str]:
+    """The readings that gave no range, as one list; none where all have one."""
     missing = [
         f"{one.standoff_mm:g} mm, reading {one.reading}: {one.status}"
         for one in readings

@@ -15,9 +15,8 @@ from types import TracebackType
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
-from workbench.model.simulation import SceneSimulated, SimulationFinished
 from workbench.model.target import Placement
-from workbench.viewer import camera, fit, scene, simulation, steps
+from workbench.viewer import camera, fit, scene, steps
 from workbench.viewer import entities as at
 from workbench.viewer.blueprint import blueprint
 from workbench.viewer.geometry import Geometry
@@ -245,17 +244,11 @@ class _OpenRecording:
     @_log.register
     def _(self, event: ev.TrialFinished, moment: Moment) -> None:
         self._trial.finish(event)
-        steps.say(self.stream, f"Trial {event.trial} finished, {len(event.rows)} standoffs")
+        steps.say(self.stream, f"Trial {event.trial} finished, {len(event.tables)} tables")
 
     @_log.register
-    def _(self, event: SceneSimulated, moment: Moment) -> None:
-        simulation.log_scene(self.stream, event)
-        steps.say(self.stream, f"Scene {event.scene.name} simulated at {len(event.set_mm)} distances")
-
-    @_log.register
-    def _(self, event: SimulationFinished, moment: Moment) -> None:
-        simulation.log_claims(self.stream, event)
-        steps.say(self.stream, f"Simulation {event.trial} finished, {len(event.rows)} rows")
+    def _(self, event: ev.TrialProgress, moment: Moment) -> None:
+        steps.say(self.stream, event.text)
 
     @_log.register
     def _(self, event: ev.SessionFinished, moment: Moment) -> None:

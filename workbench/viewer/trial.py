@@ -13,6 +13,7 @@ from workbench.viewer import documents
 from workbench.viewer import entities as at
 from workbench.viewer.chart import Chart, Mark, log_chart
 from workbench.viewer.stream import Stream
+from workbench.viewer.table_text import table_text
 
 PERCENT = 100.0
 
@@ -41,9 +42,10 @@ class TrialView:
         log_errors(self.stream, reading, self.colors)
 
     def finish(self, trial: TrialFinished) -> None:
-        """Log the table, and the chart of all readings with its outliers."""
-        self._log_chart({row.standoff_mm: row.reference_sd_mm for row in trial.rows})
-        self._document(documents.trial_table(trial, self.readings))
+        """Log the tables, the readings without a range, and the charts."""
+        self._log_chart()
+        parts = [table_text(table) for table in trial.tables]
+        self._document("\n\n".join([*parts, *documents.without_range(self.readings)]))
 
     def stop(self) -> None:
         """The session ends: show what there is."""

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from workbench.model.errors import BadInputError
-from workbench.model.procedure import load_procedure
 from workbench.model.rig import load_rig
+from workbench.procedure.engine.procedure_file import load_procedure
 
 RIG = """\
 format: 1
@@ -107,5 +107,6 @@ def test_procedure_errors(tmp_path: Path) -> None:
     assert "p.yaml:5: steps[0]" in lines[0]
     assert "must differ" in lines[0]
     assert "p.yaml:8: steps[1]" in lines[1]
-    assert "expected one of message, confirm" in lines[1]
+    assert "steps[1].step: expected one of" in lines[1]
+        assert "measure_latency" in lines[1]
     assert "dance" in lines[1]

@@ -8,6 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
+from workbench.model.limit import Limit
+from workbench.model.yamlfile import FileModel
+
 SATURATED = "saturated"
 
 
@@ -24,6 +27,15 @@ class SpotLike(Protocol):
     def width_px(self) -> float: ...  # noqa: D102
     @property
     def flags(self) -> Collection[str]: ...  # noqa: D102
+
+
+class CaptureLimits(FileModel):
+    """Limits on the captures of one laser at one placement; of the quantities of `Quality`."""
+
+    missing: Limit | None = None
+    saturated: Limit | None = None
+    snr: Limit | None = None
+    scatter_px: Limit | None = None
 
 
 @dataclass(frozen=True)

@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from workbench.devices.registry import blocks_of, not_installed
 from workbench.model.errors import BadInputError
 from workbench.model.problems import SchemaProblem
-from workbench.model.procedure import Procedure, Step
 from workbench.model.rig import Rig
-from workbench.model.yamlfile import Document, FileModel, Mistake, kind_of, line_of, read_document, refuse
-
-KINDS: dict[str, type[FileModel]] = {
-    get_args(kind.model_fields["step"].annotation)[0]: kind for kind in get_args(get_args(Step)[0])
-}
-"""The kinds of steps, by their names."""
+from workbench.model.yamlfile import Document, Mistake, kind_of, line_of, read_document, refuse
+from workbench.procedure.engine.procedure_file import Procedure
+from workbench.procedure.engine.registry import step_kinds
 
 
 @dataclass(frozen=True)
@@ -57,21 +53,21 @@ def _in_procedure(document: Document) -> Iterator[Mistake]:
 
 def _between_steps(document: Document, steps: list[Any]) -> Iterator[Mistake]:
     """Steps that do not find what they need. One that is no known kind might have given anything."""
-    kinds = [KINDS.get(str(step.get("step"))) if isinstance(step, dict) else None for step in steps]
-    made: set[str] = set()
+    known = step_kinds()
+    kinds = [known.get(str(step.get("step"))) if isinstance(step, dict) else None for step in steps]
+    made: set[str | None] = set()
     for index, kind in enumerate(kinds):
         if kind is None:
             return
-        needs: str | None = getattr(kind, "needs", None)
-        if needs is not None and needs not in made:
+        if (needs := kind.needs) is not None and needs not in made:
             line, where = line_of(document.data, ("steps", index)), f"steps[{index}]: {steps[index]['step']}"
-            if any(getattr(later, "gives", None) == needs for later in kinds[index:]):
+            if any(later is not None and later.gives == needs for later in kinds[index:]):
                 yield Mistake(line, f"{where} needs what gives {needs} before it, which comes after it")
             else:
                 wanted = f"needs a procedure before this one, in the same call, that gives {needs}"
                 yield _Note(line, f"{where} {wanted}")
             made.add(needs)
-        made.add(getattr(kind, "gives", ""))
+        made.add(kind.gives)
 
 
 def _in_rig(document: Document) -> Iterator[Mistake]:

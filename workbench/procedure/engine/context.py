@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from workbench.calibration.checks.cross_validation import LeftOut
-from workbench.calibration.data.boards import BoardView
-from workbench.calibration.data.observations import Rejected
 from workbench.devices.protocols import Bench, Operator, StreamingCamera
 from workbench.model import event as ev
 from workbench.model.arrays import Image
@@ -19,19 +17,15 @@ from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.capture.latency import count_latency
 from workbench.procedure.capture.pair import PairSource, spots_found
-from workbench.procedure.engine.prompts import safety_prompt
-from workbench.procedure.engine.replay import SAFETY, ReplayingJournal
+from workbench.procedure.engine.prompts import SAFETY, safety_prompt
+from workbench.procedure.engine.replay import ReplayingJournal
+from workbench.procedure.engine.step import Step
 from workbench.spots import Finding, Scanline, find_spots
 
-
-@dataclass(frozen=True)
-class UpcomingFit:
-    """The fit to come in this procedure."""
-
-    planned_mm: tuple[float, ...]
-    """Standoffs of all capture_grid steps before it."""
-    limit: float
-    """On the relative sd of ranges."""
+if TYPE_CHECKING:  # results of steps: a file is checked without the solver
+    from workbench.calibration.checks.cross_validation import LeftOut
+    from workbench.calibration.data.boards import BoardView
+    from workbench.calibration.data.observations import Rejected
 
 
 @dataclass
@@ -51,14 +45,16 @@ class Context:
     """By the capture's key."""
     boards: dict[str, BoardView | Rejected] = field(default_factory=dict)
     """By the placement's key."""
-    ahead: UpcomingFit | None = None
-    """What the captures of the present step are for; None where no fit follows in its procedure."""
+    steps: Sequence[Step] = ()
+    """All of the procedure under way."""
+    step_index: int = 0
+    """Of the step under way among `steps`, from 0."""
     accepted: Calibration | None = None
     """What the last fit amounts to."""
     left_out: tuple[LeftOut, ...] = ()
     """And what it says of each placement when it has not seen it."""
     calibration: Calibration | None = None
-    """The exported one: what a trial ranges with."""
+    """The exported one: trials range with it."""
     pairs: PairSource = field(init=False)
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ from workbench.model import event as ev
 from workbench.model.captures import BOARD
 from workbench.model.errors import BadInputError
 from workbench.procedure.engine.plan import PlannedStep
-from workbench.procedure.engine.replay import SAFETY
+from workbench.procedure.engine.prompts import SAFETY
 from workbench.session.journal import read_journal
 from workbench.session.manifest import MANIFEST
 
@@ -47,10 +47,10 @@ class StepDurations:
 
     def seconds(self, step: PlannedStep) -> float:
         """How long the step will take."""
-        if step.shots:
+        if step.captures:
             each = self.placing_s + self.exposing_s + self.finishing_s
-            return step.placements * each + step.shots * self.shot_s
-        guess_s = step.placements * self.placing_s if step.placements else step.guess_s
+            return step.placements * each + step.captures * self.shot_s
+        guess_s = step.placements * self.placing_s if step.placements else step.default_duration_s
         return self.without_shots_s.get(step.title, guess_s)
 
 

@@ -2,26 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeVar
 
 from workbench.model import event as ev
 from workbench.model.errors import LimitFailedError
 from workbench.model.limit import Limit
-from workbench.model.procedure import GridLimits
 from workbench.model.prompt import Prompt
+from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
-from workbench.procedure.capture.quality import quality_of
+from workbench.procedure.capture.quality import CaptureLimits, quality_of
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.missing_spot import expected_position_text, why_not_measured
 from workbench.procedure.engine.placements import RetakeError, settle
 from workbench.procedure.engine.prompts import captures_prompt
 
+Limits = TypeVar("Limits", bound=FileModel)
 RETRIES = 2
 """`on_fail: retry` captures a placement again so often in a session before it stops."""
 
 
-def check_captures(context: Context, step: str, placement: Placement, limits: GridLimits) -> None:
+def capture_limit_prompts(placements: Sequence[Placement], rig: Rig, limits: CaptureLimits) -> list[Prompt]:
+    """Prompts that limits with `on_fail: ask` may put, of each laser at each placement."""
+    return [
+        captures_prompt(f"{placement.key}/{laser_id}/{name}", name, placement)
+        for placement in placements
+        for laser_id in rig.laser_ids
+        for name in _asking(limits)
+    ]
+
+
+def fit_limit_prompts(step: str, limits: FileModel) -> list[Prompt]:
+    """Prompts that limits with `on_fail: ask` may put about a fit."""
+    return [Prompt(f"{step}/{name}", "Go on all the same?") for name in _asking(limits)]
+
+
+def refuse_retry(limits: Limits) -> Limits:
+    """Validate limits on a fit: the same captures give the same fit again.
+
+    Raises:
+        ValueError: one has `on_fail: retry`.
+    """
+    for name, limit in _stated(limits):
+        if limit.on_fail == "retry":
+            raise ValueError(f"{name}: on_fail: retry would give the same fit again; expected ask or stop")
+    return limits
+
+
+def check_captures(context: Context, step: str, placement: Placement, limits: CaptureLimits) -> None:
     """Hold what each laser gave at a placement against the limits.
 
     Args:
@@ -47,7 +75,7 @@ def check_captures(context: Context, step: str, placement: Placement, limits: Gr
                 continue  # a spot that is not there is asked about once
             if limit.on_fail == "retry" and context.recorder.retries(placement.key) < RETRIES:
                 raise RetakeError(failed, by_limit=True)
-            where = expected_position_text(context, laser_id, placement) if unseen else ""
+            where = _expected_position(context, laser_id, placement) if unseen else ""
             if limit.on_fail != "ask":
                 raise LimitFailedError(f"{failed}. {where}" if unseen else failed)
             shown = f"{why} at {placement.standoff_mm:g} mm ({name}: expected {limit.describe()})"
@@ -97,5 +125,26 @@ def _check(
     return f"{of}: {quantity}: expected {limit.describe()}, got {came}" if verdict == "fail" else None
 
 
+def _asking(limits: FileModel) -> Iterator[str]:
+    return (name for name, limit in _stated(limits) if limit.on_fail == "ask")
+
+
 def _stated(limits: FileModel) -> Iterator[tuple[str, Limit]]:
     return ((name, limit) for name, limit in limits if limit is not None)
+
+
+def why_not_measured(quantity: str, laser_id: str, spots: Sequence[int]) -> str:
+    """Why a quantity could not be measured, where each capture of a laser shows so many `spots`."""
+    captures = "1 capture" if len(spots) == 1 else f"{len(spots)} captures"
+    if 1 in spots:
+        return f"{quantity} takes a spot of {laser_id} in two captures or more"
+    if any(spots):
+        return f"{laser_id} cannot be told among up to {max(spots)} spots in {captures}"
+    return f"no spot of {laser_id} was found in {captures}"
+
+
+def _expected_position(context: Context, laser_id: str, placement: Placement) -> str:
+    # Imports the solver, which a file that is only checked does not need.
+    from workbench.procedure.engine.observed import expected_position_text
+
+    return expected_position_text(context, laser_id, placement)

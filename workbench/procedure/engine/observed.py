@@ -1,4 +1,4 @@
-"""What a fit is told of a running session's captures."""
+"""Observations of a running session for a fit, and where a spot that was not found is expected."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from math import nan
 
 from workbench.calibration.data.observations import Observation, Rejected
 from workbench.calibration.data.spot_rows import observe
+from workbench.calibration.design.expected_spot import ExpectedSpot, expected_spot
 from workbench.model import event as ev
 from workbench.model.captures import BOARD
+from workbench.model.rig import Rig
+from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 
 
@@ -37,3 +40,23 @@ def observed_so_far(context: Context) -> list[Observation]:
         and capture.placement_key not in context.boards
     ]
     return [f for f in found if isinstance(f, Observation)]
+
+
+def expected_position_text(context: Context, laser_id: str, placement: Placement) -> str:
+    """By the rig file and by what was seen so far, of a square flat target; what that means."""
+    where = expected_spot(context.rig, observed_so_far(context), laser_id, placement.standoff_mm)
+    return in_words(context.rig, laser_id, where)
+
+
+def in_words(rig: Rig, laser_id: str, where: ExpectedSpot) -> str:
+    """For the person at the bench."""
+    picture = f"the picture of {rig.camera.width_px} x {rig.camera.height_px}"
+    told = {
+        "outside": f"outside {picture}: {laser_id} cannot be seen here, and nothing is wrong.",
+        "at the edge": f"at the edge of {picture}: if it is outside, nothing is wrong.",
+        "inside": f"inside {picture}: is {laser_id} lit, and does its beam reach the target?",
+    }
+    return (
+        f"By what is known so far, its spot is at u = {where.u_px:.0f} +- {where.u_sd_px:.0f},"
+        f" v = {where.v_px:.0f} +- {where.v_sd_px:.0f} px (1 sigma), {told[where.place]}"
+    )

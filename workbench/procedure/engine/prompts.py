@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from workbench.model.prompt import Action, Prompt, Quantity
 from workbench.model.rig import Rig
 from workbench.model.target import BoardTarget, Placement
-from workbench.procedure.engine.replay import SAFETY
 
+SAFETY = "safety"
+"""Key of the confirmation before the first emission; asked again whenever a session goes on."""
 MISREAD = 0.1
 """A standoff that differs by more than this share from what was asked for is taken for a slip."""
 
@@ -35,6 +38,11 @@ def placement_prompt(placement: Placement, before: Placement | None) -> Prompt:
         at_bench=True,
         may=_instead(placement, before),
     )
+
+
+def placement_prompts(placements: Sequence[Placement]) -> list[Prompt]:
+    """Prompts of placements that follow one another."""
+    return [placement_prompt(*pair) for pair in zip(placements, [None, *placements], strict=False)]
 
 
 def captures_prompt(key: str, failed: str, placement: Placement, where: str = "") -> Prompt:

@@ -14,11 +14,9 @@ from typing import TypeGuard
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.model.prompt import Answer
+from workbench.procedure.engine.prompts import SAFETY
 from workbench.session.journal import Journal
 from workbench.session.state import Group, groups, safe_part
-
-SAFETY = "safety"
-"""Key of the confirmation before the first emission; asked for anew whenever a session goes on."""
 
 
 class ReplayingJournal:

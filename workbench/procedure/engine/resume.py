@@ -11,11 +11,12 @@ from workbench.devices.protocols import Operator
 from workbench.devices.registry import open_bench
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
-from workbench.model.procedure import Procedure
 from workbench.model.rig import Rig
 from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model
+from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.procedure_file import Procedure
 from workbench.procedure.engine.replay import ReplayingJournal
-from workbench.procedure.engine.run import NOBODY, Invocation, Plan, go_through, open_context
+from workbench.procedure.engine.run import NOBODY, Invocation, go_through, open_context
 from workbench.session.journal import JOURNAL, Journal, read_journal
 from workbench.session.manifest import (
     MANIFEST,

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.devices.protocols import Bench, Operator
-from workbench.devices.registry import check_driver, open_bench
+from workbench.devices.registry import open_bench
 from workbench.model import event as ev
 from workbench.model.calibration import Provenance
 from workbench.model.errors import BadInputError, StoppedError, WorkbenchError
-from workbench.model.procedure import CaptureGridStep, FitStep, Procedure, Step, load_procedure
-from workbench.model.rig import Rig, load_rig
-from workbench.procedure.engine.context import Context, UpcomingFit
+from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.operator import NoOperator, operator_of_bench
+from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.replay import ReplayingJournal
-from workbench.procedure.steps import run_step, shots
 from workbench.session.journal import Journal
 from workbench.session.manifest import create_session, workbench_version
 
@@ -32,66 +29,6 @@ class Invocation:
     operator: str
     command: str
     created: str
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What is about to run, read and checked before anything is switched on."""
-
-    rig: Rig
-    rig_path: Path
-    procedures: tuple[Procedure, ...]
-    procedure_paths: tuple[Path, ...]
-
-    @classmethod
-    def load(cls, rig_path: Path, procedure_paths: Sequence[Path]) -> Plan:
-        """Read the files.
-
-        Raises:
-            BadInputError: one of them is wrong.
-        """
-        procedures = tuple(load_procedure(path) for path in procedure_paths)
-        return cls.of(load_rig(rig_path), rig_path, procedures, procedure_paths)
-
-    @classmethod
-    def of(
-        cls, rig: Rig, rig_path: Path, procedures: Sequence[Procedure], procedure_paths: Sequence[Path]
-    ) -> Plan:
-        """Check what was read.
-
-        Raises:
-            BadInputError: steps do not find what they need, two procedures have one name, no such driver.
-        """
-        names = [p.procedure for p in procedures]
-        for path, name in zip(procedure_paths, names, strict=True):
-            if names.count(name) > 1:
-                raise BadInputError(
-                    f"{path}: procedure: expected a name that no other procedure of this call has, got {name}"
-                )
-        _check_order(procedures, procedure_paths)
-        check_driver(rig)
-        return cls(rig, rig_path, tuple(procedures), tuple(procedure_paths))
-
-    def new_session(self, sessions: Path) -> Path:
-        """A folder name that sorts by time and says what was run; with a number where it is taken."""
-        stamp = time.strftime("%Y%m%d-%H%M%S", time.localtime())
-        base = sessions / f"{stamp}-{self.procedures[0].procedure}"
-        taken = (base.with_name(f"{base.name}-{n}") for n in range(2, 1000))
-        return base if not base.exists() else next(path for path in taken if not path.exists())
-
-
-def _check_order(procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:
-    """Every step finds what it needs made by an earlier one, of its own or an earlier procedure."""
-    made: set[str] = set()
-    for path, procedure in zip(paths, procedures, strict=True):
-        for index, step in enumerate(procedure.steps):
-            needs: str | None = getattr(step, "needs", None)
-            if needs is not None and needs not in made:
-                raise BadInputError(
-                    f"{path}: steps[{index}]: {step.step} needs a step before it that gives {needs};"
-                    " add one, or give a procedure that has one before this in the same call"
-                )
-            made.add(getattr(step, "gives", ""))
 
 
 def run(
@@ -178,16 +115,6 @@ def open_context(
     )
 
 
-def _ahead(steps: Sequence[Step], index: int) -> UpcomingFit | None:
-    """The next fit from a step on, and what is planned before it."""
-    for number, fit in enumerate(steps[index:], start=index):
-        if isinstance(fit, FitStep):
-            before = [step for step in steps[:number] if isinstance(step, CaptureGridStep)]
-            planned = tuple(standoff for step in before for standoff in step.standoffs_mm)
-            return UpcomingFit(planned, fit.limits.max_relative_range_sd)
-    return None
-
-
 def _ending(error: BaseException) -> ev.SessionFinished:
     if isinstance(error, WorkbenchError):
         return ev.SessionFinished(exit_code=error.exit_code, message=str(error))
@@ -210,9 +137,9 @@ def _run_all(plan: Plan, context: Context) -> None:
                     index=index,
                     step=step.step,
                     title=step.title,
-                    shots=shots(step, plan.rig),
+                    shots=step.captures(plan.rig),
                 )
             )
-            context.ahead = _ahead(procedure.steps, index - 1)
-            outcome = run_step(step, context, f"{procedure.procedure}.{index}")
+            context.steps, context.step_index = procedure.steps, index - 1
+            outcome = step.run(context, procedure.step_name(index))
             context.emit(ev.StepFinished(procedure=procedure.procedure, index=index, outcome=outcome))

@@ -16,7 +16,7 @@ import numpy as np
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
-from workbench.model.simulation import LineName, SimulatedScene
+from workbench.trials.thesis.schema import LineName, SimulatedScene
 
 BEAM_EXIT_MM = 1.5
 DIVERGENCE = 1.6e-3

@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.random import Generator
 
 from workbench.model.rig import Rig
-from workbench.model.simulation import ChainReadings, Claim, ClaimRow, SceneSimulated, SimulatedScene
 from workbench.trials.thesis import thesis_chain
 from workbench.trials.thesis.scene import Line, Outcome, line_of, seen, surface_mm, truth
+from workbench.trials.thesis.schema import ChainReadings, Claim, ClaimRow, SceneSimulated, SimulatedScene
 from workbench.trials.thesis.workbench_chain import Chain
 
 CHAINS = ("thesis", "ours", "noisy")
@@ -47,7 +47,7 @@ class Lines:
         )
 
 
-def simulate(trial: str, scene: SimulatedScene, rig: Rig, points: int, rng: Generator) -> SceneSimulated:
+def simulate(scene: SimulatedScene, rig: Rig, points: int, rng: Generator) -> SceneSimulated:
     """Put the scene at `points` distances and range it with every chain.
 
     They are evenly spaced in their square root: a tooth of the thesis's error is as long as the square of the
@@ -61,7 +61,6 @@ def simulate(trial: str, scene: SimulatedScene, rig: Rig, points: int, rng: Gene
     distances = (np.linspace(nearest**0.5, farthest**0.5, points) ** 2).tolist()
     read = [_read(lines, scene, set_mm, rng) for set_mm in distances]
     return SceneSimulated(
-        trial=trial,
         scene=scene,
         set_mm=tuple(distances),
         true_mm=tuple(_true_mm(lines, scene, set_mm) for set_mm in distances),

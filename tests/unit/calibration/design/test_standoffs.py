@@ -32,9 +32,10 @@ from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
 from workbench.model.errors import BadInputError
 from workbench.model.nested import fix_parameters
-from workbench.model.procedure import load_procedure
 from workbench.model.rig import BenchSpec, Rig, load_rig
+from workbench.procedure.engine.procedure_file import load_procedure
 from workbench.sensor.calibrated import CalibratedSensor
+from workbench.steps.capture_grid import CaptureGridStep
 
 ROOT = Path(__file__).parents[4]
 RIG = load_rig(ROOT / "rigs/thesis-emulated.yaml")
@@ -357,4 +358,4 @@ class TestAdvice:
 
     def test_the_shipped_procedure_is_the_one_meant_here(self) -> None:
         steps = load_procedure(ROOT / "procedures/calibrate-flat.yaml").steps
-        assert [s.standoffs_mm for s in steps if s.step == "capture_grid"] == [SHIPPED]
+        assert [s.standoffs_mm for s in steps if isinstance(s, CaptureGridStep)] == [SHIPPED]

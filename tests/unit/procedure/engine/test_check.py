@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from workbench.model.errors import BadInputError
-from workbench.model.procedure import load_procedure
 from workbench.model.rig import load_rig
 from workbench.procedure.engine.check import check_file
+from workbench.procedure.engine.procedure_file import load_procedure
 
 ROOT = Path(__file__).parents[4]
 RIG = (ROOT / "rigs/thesis-emulated.yaml").read_text()
@@ -66,7 +66,7 @@ def test_one_mistake_is_one_line(tmp_path: Path, old: str, new: str, says: str) 
 
 def test_a_step_that_is_none_is_told_with_those_there_are(tmp_path: Path) -> None:
     (line,) = wrong(tmp_path, changed(PROCEDURE, "capture_grid", "capture_grd"))
-    assert line.startswith("f.yaml:5: steps[0].step: expected one of capture_grid, capture_board, message, ")
+    assert line.startswith("f.yaml:5: steps[0].step: expected one of capture_grid, capture_board, ")
     assert line.endswith(", got 'capture_grd'")
 
 

@@ -11,14 +11,14 @@ from scipy.stats import chi2
 
 from workbench.emulator.spec import BeamSpec, LensSpec, SensorSpec, StreamSpec
 from workbench.model.errors import BadInputError
-from workbench.model.procedure import ThesisSimulationStep, load_procedure
 from workbench.model.rig import Rig, load_rig
-from workbench.model.simulation import ChainReadings, Claim, LineName, SceneSimulated, SimulatedScene
+from workbench.procedure.engine.procedure_file import load_procedure
 from workbench.report.line_chart import LineChart, Series, ticks
 from workbench.spots import find_spots
 from workbench.spots.threshold_centroid import thesis_centres
-from workbench.trials.thesis import camera, thesis_chain
+from workbench.trials.thesis import ThesisSimulationStep, camera, thesis_chain
 from workbench.trials.thesis import scene as scenes
+from workbench.trials.thesis.schema import ChainReadings, Claim, LineName, SceneSimulated, SimulatedScene
 from workbench.trials.thesis.simulation import claim_rows, readings_csv, simulate, together
 from workbench.trials.thesis.workbench_chain import Chain
 
@@ -43,9 +43,7 @@ def scene(**changes: object) -> SimulatedScene:
 
 def simulated(one: SimulatedScene, thesis: ChainReadings, ours: ChainReadings) -> SceneSimulated:
     set_mm = (100.0, 200.0, 400.0, 800.0)
-    return SceneSimulated(
-        trial="t", scene=one, set_mm=set_mm, true_mm=set_mm, thesis=thesis, ours=ours, noisy=ours
-    )
+    return SceneSimulated(scene=one, set_mm=set_mm, true_mm=set_mm, thesis=thesis, ours=ours, noisy=ours)
 
 
 def readings(
@@ -228,7 +226,7 @@ def test_ranges_of_nothing_are_counted() -> None:
 
 def test_a_simulation_is_the_same_again(rig: Rig) -> None:
     one = scene(lines=("horizontal", "vertical"))
-    first, second = (simulate("t", one, rig, 3, np.random.default_rng(5)) for _ in range(2))
+    first, second = (simulate(one, rig, 3, np.random.default_rng(5)) for _ in range(2))
     assert first == second
     lines = readings_csv([first]).splitlines()
     assert len(lines) == 1 + 3
@@ -246,7 +244,7 @@ def test_a_simulation_is_the_same_again(rig: Rig) -> None:
 )
 def test_scenes_that_make_no_sense(rig: Rig, changes: dict[str, object], message: str) -> None:
     with pytest.raises((BadInputError, ValueError), match=message):
-        simulate("t", scene(**changes), rig, 2, np.random.default_rng(1))
+        simulate(scene(**changes), rig, 2, np.random.default_rng(1))
 
 
 def test_a_rig_has_to_be_ideal(rig: Rig) -> None:

@@ -77,8 +77,6 @@ class ChainReadings(FileModel):
 class SceneSimulated(FileModel):
     """A scene was put at many distances and ranged by three chains."""
 
-    kind: Literal["scene_simulated"] = "scene_simulated"
-    trial: str
     scene: SimulatedScene
     set_mm: tuple[float, ...]
     true_mm: tuple[float, ...]
@@ -108,11 +106,3 @@ class ClaimRow(FileModel):
     better: bool
     """Whether ours, without noise as the thesis's, is better than the thesis's, or as good where both are
     perfect."""
-
-
-class SimulationFinished(FileModel):
-    """All scenes are done."""
-
-    kind: Literal["simulation_finished"] = "simulation_finished"
-    trial: str
-    rows: tuple[ClaimRow, ...]

@@ -12,7 +12,8 @@ from workbench.calibration.design.expected_spot import ExpectedSpot, expected_sp
 from workbench.calibration.model.parameters import sensor_parameters
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig, load_rig
-from workbench.procedure.engine.missing_spot import in_words, why_not_measured
+from workbench.procedure.engine.limits import why_not_measured
+from workbench.procedure.engine.observed import in_words
 
 RIG = load_rig(Path(__file__).parents[4] / "rigs/thesis-emulated.yaml")
 DRAWS = 300

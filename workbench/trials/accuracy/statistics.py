@@ -1,23 +1,36 @@
-"""The accuracy trial: readings of a flat at known standoffs, and their errors."""
+"""Statistics of the accuracy trial: errors of readings of a flat at a known standoff."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
-from workbench.model.event import TrialRow
 from workbench.model.rig import BenchSpec
 from workbench.ranging.ranger import Reading
 
 
-def accuracy_csv(rows: Sequence[TrialRow]) -> str:
-    """The trial's table as CSV, a line a standoff, columns as in `TrialRow`."""
-    return pd.DataFrame([row.model_dump() for row in rows]).to_csv(index=False, lineterminator="\n")
+@dataclass(frozen=True)
+class AccuracyRow:
+    """Statistics of one standoff; errors are measured - true, in mm, 1 sigma."""
+
+    standoff_mm: float
+    readings: int
+    """With a range; the numbers below are of these, and None where there are too few of them."""
+    missing: int = 0
+    """Readings without a range."""
+    mean_error_mm: float | None = None
+    max_error_mm: float | None = None
+    min_error_mm: float | None = None
+    sd_mm: float | None = None
+    range_sd_mm: float | None = None
+    """Stated standard uncertainty of one reading: calibration and spots."""
+    reference_sd_mm: float = 0.0
+    """Standard uncertainty of the true range itself: the placement's, by the ruler."""
 
 
-def accuracy_row(standoff_mm: float, readings: Sequence[Reading], bench: BenchSpec) -> TrialRow:
+def accuracy_row(standoff_mm: float, readings: Sequence[Reading], bench: BenchSpec) -> AccuracyRow:
     """Statistics of the readings at one standoff; errors are measured - true, mm, 1 sigma.
 
     The standard deviation over the readings shows what differs between them. What they share (calibration,
@@ -32,11 +45,11 @@ def accuracy_row(standoff_mm: float, readings: Sequence[Reading], bench: BenchSp
     ranges = np.array([r.flat_mm for r in readings if r.flat_mm is not None])
     stated = np.array([r.flat_sigma_mm for r in readings if r.flat_sigma_mm is not None])
     if not len(ranges):
-        return TrialRow(
+        return AccuracyRow(
             standoff_mm=standoff_mm, readings=0, missing=len(readings), reference_sd_mm=bench.placement_sd_mm
         )
     error = ranges - standoff_mm
-    return TrialRow(
+    return AccuracyRow(
         standoff_mm=standoff_mm,
         readings=len(ranges),
         missing=len(readings) - len(ranges),

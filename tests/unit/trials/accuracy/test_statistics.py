@@ -9,7 +9,8 @@ import pytest
 
 from workbench.model.rig import BenchSpec, Prior
 from workbench.ranging.ranger import Reading
-from workbench.trials.accuracy import accuracy_csv, accuracy_row
+from workbench.trials.accuracy.statistics import accuracy_row
+from workbench.trials.accuracy.trial import accuracy_table
 
 BENCH = BenchSpec(ruler_scale=Prior(value=0.0, sd=0.001), placement_sd_mm=0.3)
 EMPTY = Reading("s", "no_points")
@@ -40,7 +41,7 @@ def test_no_reading_at_all() -> None:
 
 def test_the_table_as_csv() -> None:
     rows = [accuracy_row(400.0, readings(401.1, 399.3), BENCH), accuracy_row(500.0, [EMPTY], BENCH)]
-    table = pd.read_csv(io.StringIO(accuracy_csv(rows)))
+    table = pd.read_csv(io.StringIO(accuracy_table("a.1", rows).to_csv()))
     assert table["mean_error_mm"][0] == pytest.approx(rows[0].mean_error_mm, rel=1e-14)
     assert table["missing"].tolist() == [0, 1]
     assert np.isnan(table["mean_error_mm"][1])

@@ -1,0 +1,37 @@
+"""The procedure file: a name, a title, and steps of registered kinds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from workbench.model.yamlfile import FileModel, load_yaml_model
+from workbench.procedure.engine.registry import AnyStep, holds_steps
+
+
+class Procedure(FileModel):
+    """A procedure file, format 1."""
+
+    told_by = "procedure"
+    format: Literal[1]
+    procedure: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+    title: str
+    steps: Annotated[tuple[AnyStep, ...], Field(min_length=1)]
+
+    def step_name(self, index: int) -> str:
+        """Name of the step at `index`, from 1: unique in a session."""
+        return f"{self.procedure}.{index}"
+
+
+holds_steps(Procedure)
+
+
+def load_procedure(path: Path) -> Procedure:
+    """Read a procedure file.
+
+    Raises:
+        BadInputError: see `load_yaml_model`.
+    """
+    return load_yaml_model(path, Procedure)

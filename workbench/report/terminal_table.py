@@ -1,0 +1,71 @@
+"""A table on the terminal: no wider than the terminal, and no number cut or wrapped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from rich import box
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from workbench.model.table import Table
+from workbench.model.table_layout import TextColumn, text_columns
+
+GAP = 1
+"""Characters between columns."""
+NARROWEST_TEXT = 12
+"""Characters that a column of words keeps before columns are moved to a block of their own below."""
+
+
+@dataclass(frozen=True)
+class TerminalTable:
+    """Title, columns and caption of a table; print it with a Rich console.
+
+    Numbers are aligned to the right. A table wider than the terminal is printed as blocks of columns, one
+    below the other, the first column in each.
+    """
+
+    table: Table
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
+        """Title, blocks and caption, each in lines of the terminal's width."""
+        yield Text(self.table.title, style="bold")
+        for block in blocks(text_columns(self.table), options.max_width):
+            yield _rich_table(block)
+        if self.table.caption:
+            yield Text(self.table.caption, style="dim italic")
+
+
+def blocks(columns: Sequence[TextColumn], width: int) -> list[list[TextColumn]]:
+    """Columns in blocks that are at most `width` characters wide, each with the first column."""
+    first, *others = columns
+    found = [[first]]
+    for column in others:
+        if sum(_least_width(c) + GAP for c in (*found[-1], column)) > width + GAP and len(found[-1]) > 1:
+            found.append([first])
+        found[-1].append(column)
+    return found
+
+
+def _least_width(column: TextColumn) -> int:
+    if column.is_number:
+        return column.width
+    return min(column.width, max(NARROWEST_TEXT, *map(len, column.heading)))
+
+
+def _rich_table(columns: Sequence[TextColumn]) -> RichTable:
+    table = RichTable(box=box.SIMPLE_HEAD, padding=(0, GAP, 0, 0), pad_edge=False, show_edge=False)
+    for column in columns:
+        # Text, not markup: names may have brackets in them.
+        table.add_column(
+            Text("\n".join(column.heading)),
+            justify="right" if column.is_number else "left",
+            no_wrap=column.is_number,
+            overflow="fold",
+            vertical="bottom" if column.is_number else "top",
+        )
+    for cells in zip(*(column.cells for column in columns), strict=True):
+        table.add_row(*map(Text, cells))
+    return table

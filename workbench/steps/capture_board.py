@@ -1,0 +1,88 @@
+"""Step `capture_board`: the printed board in room light and under each laser, placed at several tilts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from workbench.model.fields import Count, Standoff
+from workbench.model.rig import NonNegativeFloat, Rig
+from workbench.model.target import BoardTarget, Placement
+from workbench.model.yamlfile import FileModel
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.lasers import capture_lasers
+from workbench.procedure.engine.placements import visit_placements
+from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.step import StepModel
+
+
+class BoardPlacing(FileModel):
+    """How the board is to stand: at a standoff, turned about the vertical and the horizontal."""
+
+    standoff_mm: Standoff
+    yaw_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
+    """Positive moves its right side away."""
+    pitch_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
+    """Positive moves its lower side away."""
+    standoff_sd_mm: NonNegativeFloat | None = None
+    """Standard uncertainty of the standoff of a board tilted by hand; the rig's if not stated."""
+
+
+@register
+class CaptureBoardStep(StepModel):
+    """At each placement of the printed board: `frames` in room light, then `repeats` pairs of each laser."""
+
+    gives: ClassVar[str | None] = "captures"
+    step: Literal["capture_board"]
+    placings: Annotated[tuple[BoardPlacing, ...], Field(min_length=1)]
+    frames: Count
+    repeats: Count
+
+    @property
+    def title(self) -> str:
+        """How much is captured."""
+        return f"Capture the board in {len(self.placings)} placements"
+
+    def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
+        """Numbered from 1: the board may stand at one standoff with several tilts."""
+        upright = all(laser.axis == "v" for laser in rig.lasers)
+        return [
+            Placement(
+                key=f"{name}/{number:02d}-{placing.standoff_mm:.12g}mm",
+                standoff_mm=placing.standoff_mm,
+                target=BoardTarget(
+                    yaw_deg=placing.yaw_deg, pitch_deg=placing.pitch_deg, roll_deg=90.0 if upright else 0.0
+                ),
+                standoff_sd_mm=placing.standoff_sd_mm,
+            )
+            for number, placing in enumerate(self.placings, start=1)
+        ]
+
+    def captures(self, rig: Rig) -> int:
+        """Frames in room light and pairs of each laser, at each placement."""
+        return len(self.placings) * (self.frames + self.repeats * len(rig.lasers))
+
+    def run(self, context: Context, name: str) -> str:
+        """Capture at every placement; the errors of `visit_placements`."""
+        from workbench.calibration.data.boards import BoardView, see_board
+        from workbench.calibration.data.observations import PlacementInfo, Rejected
+
+        def work(placement: Placement) -> None:
+            frames = [
+                context.capture_room_light(f"{placement.key}/board/{repeat:02d}", placement, repeat)
+                for repeat in range(self.frames)
+            ]
+            standoff_sd_mm = nan if placement.standoff_sd_mm is None else placement.standoff_sd_mm
+            info = PlacementInfo(placement.key, placement.standoff_mm, standoff_sd_mm, 0.0, placement.key)
+            context.boards[placement.key] = see_board(frames, context.rig.board, info)
+            capture_lasers(context, placement, self.repeats)
+
+        visit_placements(context, self.placements(name, context.rig), work)
+        views = [seen for key, seen in context.boards.items() if key.startswith(f"{name}/")]
+        corners = sum(len(seen.corners.ids) for seen in views if isinstance(seen, BoardView))
+        missed = [seen.reason for seen in views if isinstance(seen, Rejected)]
+        found = f"{corners} corners in {len(views) - len(missed)} of {len(views)} placements"
+        return "; ".join([found, *missed])

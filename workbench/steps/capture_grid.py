@@ -1,0 +1,94 @@
+"""Step `capture_grid`: fire each laser alone at each standoff."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import ClassVar, Literal
+
+from pydantic import model_validator
+
+from workbench.model.event import StandoffAdvised
+from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.prompt import Prompt
+from workbench.model.rig import Rig
+from workbench.model.target import Placement
+from workbench.procedure.capture.quality import CaptureLimits
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.lasers import capture_lasers
+from workbench.procedure.engine.limits import capture_limit_prompts, check_captures
+from workbench.procedure.engine.placements import visit_placements
+from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.step import Step, StepModel, flat_placement
+from workbench.steps.fit import FitStep
+
+
+@register
+class CaptureGridStep(StepModel):
+    """Fire each laser alone at each standoff, `repeats` pairs of frames each."""
+
+    gives: ClassVar[str | None] = "captures"
+    step: Literal["capture_grid"]
+    standoffs_mm: Standoffs
+    repeats: Count
+    limits: CaptureLimits = CaptureLimits()
+
+    @model_validator(mode="after")
+    def _standoffs_differ(self) -> CaptureGridStep:
+        require_different(self.standoffs_mm, "repeats")
+        return self
+
+    @property
+    def title(self) -> str:
+        """How much is captured."""
+        return f"Capture at {len(self.standoffs_mm)} standoffs, {self.repeats} pairs a laser"
+
+    def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
+        """One a standoff."""
+        return [flat_placement(name, standoff_mm) for standoff_mm in self.standoffs_mm]
+
+    def captures(self, rig: Rig) -> int:
+        """Each laser's repeats at each standoff."""
+        return len(self.standoffs_mm) * self.repeats * len(rig.lasers)
+
+    def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
+        """Of the placements, then of limits that ask where they fail."""
+        limits = capture_limit_prompts(self.placements(name, rig), rig, self.limits)
+        return [*super().prompts(name, rig), *limits]
+
+    def run(self, context: Context, name: str) -> str:
+        """Capture at every placement; the errors of `visit_placements` and `check_captures`."""
+
+        def work(placement: Placement) -> int:
+            pairs = capture_lasers(context, placement, self.repeats)
+            check_captures(context, name, placement, self.limits)
+            _advise(context)
+            return pairs
+
+        return f"{sum(visit_placements(context, self.placements(name, context.rig), work))} pairs"
+
+
+def _advise(context: Context) -> None:
+    """Journal how good ranges are by the captures so far, and the standoff that would help most next.
+
+    Nothing where no fit follows, or where the board was seen: its corners would not count.
+    """
+    from workbench.calibration.design.next_standoff import advise
+    from workbench.procedure.engine.observed import observed_so_far
+
+    ahead = _next_fit(context.steps, context.step_index)
+    if ahead is None or context.boards:
+        return
+    planned_mm, fit = ahead
+    if (advice := advise(context.rig, observed_so_far(context), planned_mm)) is not None:
+        limit = fit.limits.max_relative_range_sd
+        context.emit(StandoffAdvised(limit=limit, **asdict(advice)))
+
+
+def _next_fit(steps: Sequence[Step], index: int) -> tuple[tuple[float, ...], FitStep] | None:
+    """The next fit of the procedure from the step at `index` on, and the standoffs planned before it."""
+    for number, step in enumerate(steps[index:], start=index):
+        if isinstance(step, FitStep):
+            grids = [one for one in steps[:number] if isinstance(one, CaptureGridStep)]
+            return tuple(standoff for grid in grids for standoff in grid.standoffs_mm), step
+    return None

@@ -1,0 +1,64 @@
+"""Step `fit`: fit the calibration to the captures so far."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from workbench.model.acceptance import Acceptance
+from workbench.model.captures import BOARD
+from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.step import StepModel
+from workbench.session.capture_table import CALIBRATION_TABLE, write_capture_table
+
+
+@register
+class FitStep(StepModel):
+    """Fit the calibration to the captures so far; the session ends with exit code 3 where a limit fails."""
+
+    needs: ClassVar[str | None] = "captures"
+    gives: ClassVar[str | None] = "fit"
+    step: Literal["fit"]
+    limits: Acceptance = Acceptance()
+
+    @property
+    def title(self) -> str:
+        """What is done."""
+        return "Fit the calibration"
+
+    def run(self, context: Context, name: str) -> str:
+        """Write captures.csv, fit, journal the fit.
+
+        Raises:
+            BadInputError: there are no captures to fit.
+            LimitFailedError: the calibration is refused.
+        """
+        from workbench.calibration.data.boards import BoardView, on_boards
+        from workbench.calibration.data.observations import Observation, Rejected
+        from workbench.calibration.selection.model_terms import fit_chosen
+        from workbench.calibration.verdict.export import calibrate
+        from workbench.calibration.verdict.records import fit_finished
+        from workbench.procedure.engine.observed import observe_capture
+
+        captures = [c for c in context.captures if c.purpose == "calibration"]
+        if not captures:
+            raise BadInputError(f"step {name}: nothing to fit; expected a capture_grid step before it")
+        sha256 = write_capture_table(context.session_dir / CALIBRATION_TABLE, captures)
+        spots = [observe_capture(context, capture) for capture in captures if capture.laser_id != BOARD]
+        found = on_boards(context.rig.board, context.boards, spots)
+        observations = [f for f in found if isinstance(f, Observation)]
+        rejected = [f for f in (*found, *context.boards.values()) if isinstance(f, Rejected)]
+        boards = [b for b in context.boards.values() if isinstance(b, BoardView)]
+        fitted = fit_chosen(context.rig, observations, rejected, boards)
+        provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
+        calibration, assessment = calibrate(fitted, self.limits, provenance)
+        context.emit(fit_finished(fitted, assessment))
+        if assessment.verdict == "refused":
+            raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
+        context.accepted, context.left_out = calibration, assessment.left_out
+        worst = calibration.laser_ranger.validity.max_relative_range_sd
+        return (
+            f"accepted: rms {fitted.rms_px:.3f} px over {len(observations)} spots, {len(fitted.rejected)} not"
+            f" used; ranges to {100 * worst:.2g} % (1 sigma) or better"
+        )

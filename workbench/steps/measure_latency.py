@@ -1,0 +1,29 @@
+"""Step `measure_latency`: count the frames from switching a laser on to the first that shows it."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.step import StepModel
+
+
+@register
+class MeasureLatencyStep(StepModel):
+    """Measure the camera's latency in frames; that many are discarded before each later capture."""
+
+    needs: ClassVar[str | None] = "target"
+    step: Literal["measure_latency"]
+    most_frames: Annotated[int, Field(ge=0, le=50)] = 20
+
+    @property
+    def title(self) -> str:
+        """What is measured."""
+        return "Measure the camera's latency"
+
+    def run(self, context: Context, name: str) -> str:
+        """Measure, and have the camera discard that many frames."""
+        return f"{context.measure_latency(name, self.most_frames)} frames, discarded before each capture"

@@ -1,0 +1,31 @@
+"""Step `message`: show a text."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.step import StepModel
+
+
+@register
+class MessageStep(StepModel):
+    """Show a text to the technician."""
+
+    step: Literal["message"]
+    text: str
+
+    @property
+    def default_duration_s(self) -> float:
+        """Shown at once."""
+        return 0.0
+
+    @property
+    def title(self) -> str:
+        """The text itself."""
+        return self.text
+
+    def run(self, context: Context, name: str) -> str:
+        """Nothing more: the title was shown when the step began."""
+        return "shown"

@@ -1,0 +1,36 @@
+"""Step `warm_up`: let the camera run with the lasers off until its focal length drifts less."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from workbench.model.fields import Count
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.step import StepModel
+
+SECONDS_PER_FRAME = 0.1
+"""Default: 30 frames a second, two of three discarded as too old."""
+
+
+@register
+class WarmUpStep(StepModel):
+    """Let the camera run for some frames with the lasers off."""
+
+    step: Literal["warm_up"]
+    frames: Count
+
+    @property
+    def title(self) -> str:
+        """The number of frames."""
+        return f"Warm up for {self.frames} frames"
+
+    @property
+    def default_duration_s(self) -> float:
+        """That of the frames."""
+        return SECONDS_PER_FRAME * self.frames
+
+    def run(self, context: Context, name: str) -> str:
+        """Grab the frames."""
+        context.warm_up(name, self.frames)
+        return f"{self.frames} frames"

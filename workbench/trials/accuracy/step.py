@@ -1,0 +1,55 @@
+"""Step `accuracy_trial`: range a flat at standoffs that the fit did not see."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, Literal
+
+from pydantic import model_validator
+
+from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.rig import Rig
+from workbench.model.target import Placement
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.step import StepModel, flat_placement
+
+
+@register
+class AccuracyTrialStep(StepModel):
+    """Range a flat at standoffs that the fit did not see; a table and a chart of the errors."""
+
+    needs: ClassVar[str | None] = "calibration"
+    step: Literal["accuracy_trial"]
+    standoffs_mm: Standoffs
+    readings: Count
+
+    @model_validator(mode="after")
+    def _standoffs_differ(self) -> AccuracyTrialStep:
+        require_different(self.standoffs_mm, "readings")
+        return self
+
+    @property
+    def title(self) -> str:
+        """How much is measured."""
+        return f"Accuracy at {len(self.standoffs_mm)} standoffs, {self.readings} readings each"
+
+    def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
+        """One a standoff."""
+        return [flat_placement(name, standoff_mm) for standoff_mm in self.standoffs_mm]
+
+    def captures(self, rig: Rig) -> int:
+        """One a reading; a reading takes more where the lasers have to be fired one by one."""
+        return len(self.standoffs_mm) * self.readings
+
+    def run(self, context: Context, name: str) -> str:
+        """Take the readings at every placement, and write their statistics.
+
+        Raises:
+            BadInputError: there is no calibration.
+            WorkbenchError: see `visit_placements`.
+        """
+        # Imported here: a file is checked without the ranger.
+        from workbench.trials.accuracy.trial import run_trial
+
+        return run_trial(context, name, self.placements(name, context.rig), self.readings)

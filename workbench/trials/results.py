@@ -1,0 +1,32 @@
+"""Results of a trial: every table as a CSV file, and all of them in the journal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from workbench.model.chart import Chart
+from workbench.model.event import TrialFinished
+from workbench.model.table import Table
+from workbench.procedure.engine.context import Context
+from workbench.session.capture_table import TRIAL_TABLE, write_capture_table
+from workbench.session.files import write_record
+
+
+def finish_trial(context: Context, name: str, tables: Sequence[Table], charts: Sequence[Chart] = ()) -> None:
+    """Write the tables and the trial's captures into the session folder, and journal the results.
+
+    Args:
+        context: the session.
+        name: of the step.
+        tables: each is written to `<its name>.csv`, with the columns' keys as its header.
+        charts: shown by the recording and the report.
+
+    Raises:
+        StoppedError: the disk is full or cannot be written.
+    """
+    captures = [capture for capture in context.captures if capture.purpose == "trial"]
+    if captures:
+        write_capture_table(context.session_dir / TRIAL_TABLE, captures)
+    for table in tables:
+        write_record(context.session_dir / f"{table.name}.csv", table.to_csv().encode())
+    context.emit(TrialFinished(trial=name, tables=tuple(tables), charts=tuple(charts)))

@@ -1,0 +1,104 @@
+"""The run of the thesis's simulation, and its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from zlib import crc32
+
+import numpy as np
+
+from workbench.model.event import TrialProgress
+from workbench.model.table import Column, Table
+from workbench.procedure.engine.context import Context
+from workbench.session.files import write_record
+from workbench.trials.results import finish_trial
+from workbench.trials.thesis.schema import ClaimRow, Quantity, SimulatedScene
+from workbench.trials.thesis.simulation import claim_rows, claims_csv, readings_csv, simulate
+
+SEED = 2001
+"""With a scene's name it draws the scene's noise: adding a scene leaves the others as they were."""
+PERCENT = 100.0
+TITLES: dict[Quantity, str] = {
+    "range": "Largest relative error of the closest range",
+    "angle": "Largest relative error of the incline's angle",
+    "shape": "Farthest distance up to which the shape is right",
+    "readings": "Readings with a range",
+}
+RELATIVE = {"range", "angle"}
+
+
+def run_trial(context: Context, name: str, scenes: Sequence[SimulatedScene], points: int) -> str:
+    """Simulate the scenes at `points` distances each; returns the outcome in one line.
+
+    Raises:
+        BadInputError: a scene and the rig do not go together.
+        StoppedError: a stop was asked for.
+    """
+    simulated, rows = [], []
+    for scene in scenes:
+        context.check_stop()
+        rng = np.random.default_rng([SEED, crc32(scene.name.encode())])
+        one = simulate(scene, context.rig, scene.points or points, rng)
+        simulated.append(one)
+        rows += claim_rows(one)
+        text = f"{scene.name}, {scene.source}: {len(one.set_mm)} distances"
+        context.emit(TrialProgress(trial=name, text=text))
+    write_record(context.session_dir / f"{name}.csv", claims_csv(rows).encode())
+    write_record(context.session_dir / f"{name}-readings.csv", readings_csv(simulated).encode())
+    finish_trial(context, name, claim_tables(name, rows))
+    stated = [row for row in rows if row.reproduced is not None]
+    return (
+        f"as in the thesis: {sum(row.reproduced is True for row in stated)} of {len(stated)} claims kept;"
+        f" ours better in {sum(row.better for row in rows)} of {len(rows)} rows; tables in {name}.csv"
+    )
+
+
+def claim_tables(name: str, rows: Sequence[ClaimRow]) -> list[Table]:
+    """Stated and reached values, a table for each quantity that is claimed."""
+    return [
+        _claim_table(name, quantity, [row for row in rows if row.quantity == quantity])
+        for quantity in TITLES
+        if any(row.quantity == quantity for row in rows)
+    ]
+
+
+def _claim_table(name: str, quantity: Quantity, rows: Sequence[ClaimRow]) -> Table:
+    relative = quantity in RELATIVE
+    form = {"format": ".2f", "scale": PERCENT} if relative else {"format": ".0f"}
+    unit = "%" if relative else "mm" if quantity == "shape" else ""
+    suffix = "" if relative or not unit else f"_{unit}"
+
+    def value(key: str, heading: str, meaning: str) -> Column:
+        return Column(key=f"{key}{suffix}", name=heading, unit=unit, meaning=meaning, **form)
+
+    columns = (
+        Column(key="scene", name="scene"),
+        Column(key="nearest_mm", name="from", unit="mm"),
+        Column(key="farthest_mm", name="to", unit="mm"),
+        value("stated", "stated", "By the thesis."),
+        value("thesis", "thesis", "Its own chain, run again."),
+        Column(key="not_reproduced", name="", meaning="!: the chain does not reach what the thesis states."),
+        value("ours", "ours", "The workbench's chain, without noise."),
+        Column(key="not_better", name="", meaning="!: not better than the thesis's chain."),
+        value("noisy", "noise", "The workbench's chain, with noise."),
+    )
+    return Table(
+        name=f"{name}-{quantity}",
+        title=TITLES[quantity],
+        columns=columns,
+        rows=tuple(
+            (
+                row.scene,
+                row.nearest_mm,
+                row.farthest_mm,
+                row.stated,
+                row.thesis,
+                row.reproduced is False,
+                row.ours,
+                not row.better,
+                row.noisy,
+            )
+            for row in rows
+        ),
+        caption="! after thesis: not what it states; ! after ours: not better than the thesis's",
+    )
