@@ -108,5 +108,5 @@ def test_procedure_errors(tmp_path: Path) -> None:
     assert "must differ" in lines[0]
     assert "p.yaml:8: steps[1]" in lines[1]
     assert "steps[1].step: expected one of" in lines[1]
-        assert "measure_latency" in lines[1]
+    assert "measure_latency" in lines[1]
     assert "dance" in lines[1]
