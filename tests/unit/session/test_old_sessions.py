@@ -1,0 +1,82 @@
+"""Sessions recorded by version 0.1.0 are read: listed, shown, fitted and ranged as they were."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.viewer.readback import Contents
+from workbench.calibration.data.spot_rows import observations_of_rows
+from workbench.calibration.selection.model_terms import fit_chosen
+from workbench.model.calibration import load_calibration
+from workbench.model.captures import load_captures
+from workbench.model.event import TrialFinished, TrialProgress
+from workbench.ranging.captures import read_captures
+from workbench.ranging.ranger import Ranger
+from workbench.session.journal import read_journal
+from workbench.session.manifest import load_session_rig
+from workbench.session.state import session_status
+from workbench.viewer.recording import rebuild
+
+DATA = Path(__file__).parents[3] / "data"
+SESSION, SIMULATION = DATA / "session-0.1.0", DATA / "simulation-0.1.0"
+
+
+def finished(session: Path) -> TrialFinished:
+    (event,) = [r.event for r in read_journal(session) if isinstance(r.event, TrialFinished)]
+    return event
+
+
+@pytest.mark.parametrize(("session", "captures"), [(SESSION, 7), (SIMULATION, 0)])
+def test_status(session: Path, captures: int) -> None:
+    status = session_status(session)
+    assert (status.state, status.captures) == ("finished", captures)
+
+
+def test_the_table_of_the_accuracy_trial_has_the_numbers_of_its_csv_file() -> None:
+    (table,) = finished(SESSION).tables
+    old = pd.read_csv(SESSION / "reference.8.csv")
+    assert [column.key for column in table.columns] == list(old.columns)
+    (row,) = table.rows
+    # One reading has no standard deviation: empty in the file.
+    assert [value for value in row if value is not None] == [v for v in old.iloc[0].tolist() if v == v]
+
+
+def test_the_claims_of_the_simulation_are_a_table() -> None:
+    events = [record.event for record in read_journal(SIMULATION)]
+    assert sum(isinstance(event, TrialProgress) for event in events) == 2
+    (table,) = finished(SIMULATION).tables
+    old = pd.read_csv(SIMULATION / "reference-simulation.1.csv")
+    assert len(table.rows) == len(old) == 3
+    keys = [column.key for column in table.columns]
+    assert [row[keys.index("ours")] for row in table.rows] == pytest.approx(old["ours"].tolist(), rel=1e-12)
+
+
+def test_the_recording_is_made_again(tmp_path: Path) -> None:
+    session = tmp_path / "session"
+    shutil.copytree(SESSION, session)
+    rebuild(session, load_session_rig(session), read_journal(session), session / "recording.rrd")
+    contents = Contents(session / "recording.rrd")
+    assert len(contents.values("/bench/camera/image", "EncodedImage:blob")) == 7
+    assert "800" in contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
+
+
+def test_the_fit_of_its_captures_is_its_calibration() -> None:
+    rig = load_session_rig(SESSION)
+    fitted = fit_chosen(rig, *observations_of_rows(rig, load_captures(SESSION / "captures.csv")))
+    old = load_calibration(SESSION / "calibration.yaml").geometry()
+    parameters, sensor = fitted.table.parameters[fitted.sensor], fitted.sensor
+    assert {p.name for p in parameters} == set(old)
+    # What drops out of the model has changed since then: what stays moves by a part of its deviation.
+    for parameter, value, sd in zip(parameters, fitted.values[sensor], fitted.sd[sensor], strict=True):
+        assert abs(value - old[parameter.name]) <= 0.3 * sd
+
+
+def test_its_calibration_ranges_its_trial() -> None:
+    ranger = Ranger(load_calibration(SESSION / "calibration.yaml"))
+    (reading,) = read_captures(ranger, load_captures(SESSION / "trial-captures.csv"))
+    old = pd.read_csv(SESSION / "reference.8.csv")
+    assert reading.flat_mm == pytest.approx(800.0 + old["mean_error_mm"][0], abs=1e-3)
