@@ -99,7 +99,7 @@ def _told_by(pace: StepDurations, rig: str) -> str:
     if pace.sessions == 0:
         return (
             f"Times are guesses: {pace.placing_s:g} s to place the target, {pace.exposing_s:g} s for the"
-            f" exposure, {pace.shot_s:g} s a shot; no session of {rig} has told them yet."
+            f" exposure, {pace.capture_s:g} s a shot; no session of {rig} has told them yet."
         )
     sessions = "the last session" if pace.sessions == 1 else f"the last {pace.sessions} sessions"
     return f"Times as {sessions} of {rig} told them, in the mean, without breaks while placing the target."

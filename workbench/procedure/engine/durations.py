@@ -1,4 +1,4 @@
-"""How long what a session does takes: as measured in it, as sessions before it told, or by a guess."""
+"""Step durations for the time-left estimate: measured, learned from the last sessions, or a default."""
 
 from __future__ import annotations
 
@@ -18,44 +18,45 @@ from workbench.session.journal import read_journal
 from workbench.session.manifest import MANIFEST
 
 SESSIONS_USED = 5
-"""So many of the latest sessions of a rig tell its pace."""
+"""Number of most recent sessions that durations are learned from."""
 PRIOR_WEIGHT = 2
-"""What other sessions told of a duration counts as so many measurements of this one's; a guess as none."""
+"""Weight of a duration learned from other sessions, in measurements of this one; a default has none."""
 LONG_PAUSE_FACTOR = 3
-LOADED = frozenset({"exposing_s", "shot_s", "finishing_s"})
-"""The first of these in a program's life takes longer: what computes it is loaded, or even compiled, then."""
+"""A placement that takes this many medians is a break."""
+LOADED = frozenset({"exposing_s", "capture_s", "finishing_s"})
+"""Durations whose first occurrence in a process takes longer, as code is loaded or compiled then."""
 
 
 @dataclass(frozen=True)
 class StepDurations:
-    """Means; of what a person does without what took `LONG_PAUSE_FACTOR` times as long as usual."""
+    """Mean durations; those of a person without pauses of `LONG_PAUSE_FACTOR` times the median."""
 
     placing_s: float = 60.0
-    """From the end of one placement to the target's standing at the next."""
+    """From the end of one placement to the target being placed at the next."""
     exposing_s: float = 3.0
     """Setting the exposure for a placement."""
-    shot_s: float = 1.0
+    capture_s: float = 1.0
     """One capture, with storing it, finding its spots and working out a range."""
     finishing_s: float = 1.0
     """From a placement's last capture to its end: limits, advice."""
     lit_s: float | None = None
     """Emission of one capture."""
-    without_shots_s: Mapping[str, float] = field(default_factory=dict)
+    without_captures_s: Mapping[str, float] = field(default_factory=dict)
     """Steps without captures, by their titles."""
     sessions: int = 0
-    """That it was learned from; 0: guesses."""
+    """Number that they were learned from; 0: defaults."""
 
     def seconds(self, step: PlannedStep) -> float:
         """How long the step will take."""
         if step.captures:
             each = self.placing_s + self.exposing_s + self.finishing_s
-            return step.placements * each + step.captures * self.shot_s
+            return step.placements * each + step.captures * self.capture_s
         guess_s = step.placements * self.placing_s if step.placements else step.default_duration_s
-        return self.without_shots_s.get(step.title, guess_s)
+        return self.without_captures_s.get(step.title, guess_s)
 
 
 def learn_durations(sessions: Path, rig: str) -> StepDurations:
-    """The pace of the latest sessions of `rig`; guesses where there are none."""
+    """Durations of the latest sessions of `rig`; defaults where there are none."""
     meter = DurationMeter()
     used = 0
     for manifest in sorted(sessions.glob(f"*/{MANIFEST}"), reverse=True):
@@ -69,14 +70,14 @@ def learn_durations(sessions: Path, rig: str) -> StepDurations:
             used += 1
             for record in records:
                 meter.take(record)
-    return replace(meter.pace(StepDurations()), sessions=used)
+    return replace(meter.durations(StepDurations()), sessions=used)
 
 
 class DurationMeter:
     """Measures durations between records that follow one another."""
 
     def __init__(self) -> None:
-        self._told: dict[str, list[float]] = defaultdict(list)
+        self._measured: dict[str, list[float]] = defaultdict(list)
         self._loading: dict[str, float] = {}
         """The first of each of `LOADED`, which tells of the others only where it is all that there is."""
         self._fresh = set(LOADED)
@@ -87,22 +88,22 @@ class DurationMeter:
         """Of such a step, while nothing but time has gone by in it."""
         self._since: ev.Record | None = None
 
-    def pace(self, otherwise: StepDurations) -> StepDurations:
-        """What was measured, together with `otherwise` where that was learned; the rest is as `otherwise`."""
+    def durations(self, otherwise: StepDurations) -> StepDurations:
+        """Measured durations, weighted with `otherwise` where those were learned; the rest is `otherwise`."""
         worth = PRIOR_WEIGHT if otherwise.sessions else 0
-        told: dict[str, Any] = dict(self._loading)
-        for name, values in self._told.items():
+        measured: dict[str, Any] = dict(self._loading)
+        for name, values in self._measured.items():
             usual = _usual(values) if name == "placing_s" else fmean(values)
             before = getattr(otherwise, name)
             weight = 0 if before is None else worth
-            told[name] = (len(values) * usual + weight * (before or 0.0)) / (len(values) + weight)
+            measured[name] = (len(values) * usual + weight * (before or 0.0)) / (len(values) + weight)
         steps = {title: fmean(values) for title, values in self._steps.items()}
         # A session that captures without setting an exposure has a camera whose exposure is fixed.
-        told |= {"exposing_s": 0.0} if "shot_s" in told and "exposing_s" not in told else {}
-        return replace(otherwise, **told, without_shots_s={**otherwise.without_shots_s, **steps})
+        measured |= {"exposing_s": 0.0} if "capture_s" in measured and "exposing_s" not in measured else {}
+        return replace(otherwise, **measured, without_captures_s={**otherwise.without_captures_s, **steps})
 
     def take(self, record: ev.Record) -> None:
-        """Note what a record tells; nothing is told by what a stop tore apart."""
+        """Take the time of a record; what an interruption cut short is not counted."""
         match record.event:
             case ev.SessionStarted() | ev.SessionResumed():
                 self._fresh = set(LOADED)
@@ -121,11 +122,11 @@ class DurationMeter:
             case ev.CaptureTaken() as e:
                 self._title = None
                 if e.lit_s is not None:
-                    self._told["lit_s"].append(e.lit_s)
+                    self._measured["lit_s"].append(e.lit_s)
                 if e.laser_id == BOARD:  # no spots are looked for
-                    self._note("shot_s", record)
+                    self._note("capture_s", record)
             case ev.SpotsFound():
-                self._note("shot_s", record)
+                self._note("capture_s", record)
             case ev.PlacementFinished():
                 if self._since is not None and isinstance(self._since.event, ev.SpotsFound | ev.CaptureTaken):
                     self._note("finishing_s", record)
@@ -138,19 +139,19 @@ class DurationMeter:
                 pass
 
     def _note(self, name: str, end: ev.Record) -> None:
-        """That something has taken from the last record until now; the next begins."""
+        """Count the time since the last record as one duration of `name`."""
         if self._since is not None:
             took = _seconds(self._since, end)
             if name in self._fresh:
                 self._fresh.remove(name)
                 self._loading[name] = took
             else:
-                self._told[name].append(took)
+                self._measured[name].append(took)
         self._since = end
 
 
 def _usual(values: Sequence[float]) -> float:
-    """The mean, as sums of them are to be right; but somebody may go to lunch."""
+    """Mean without long pauses: sums of it are to be right, and a person may take a break."""
     most = LONG_PAUSE_FACTOR * median(values)
     return fmean(value for value in values if value <= most)
 

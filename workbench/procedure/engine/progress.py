@@ -60,13 +60,13 @@ class TimeLeft:
     @property
     def seconds_left(self) -> float:
         """From the last record to the end of the session."""
-        pace = self._meter.pace(self._otherwise)
+        pace = self._meter.durations(self._otherwise)
         step = self._steps[self._step]
         ahead = step.placements - len(self._visited)
         each = step.captures // max(step.placements, 1)
         to_come = replace(step, placements=ahead, captures=ahead * each)
         here = pace.seconds(to_come) if ahead or not step.placements else 0.0
         if self._here is not None and step.captures:
-            here += (each - min(self._visited[self._here], each)) * pace.shot_s + pace.finishing_s
+            here += (each - min(self._visited[self._here], each)) * pace.capture_s + pace.finishing_s
             here += 0.0 if self._exposed else pace.exposing_s
         return here + sum(pace.seconds(later) for later in self._steps[self._step + 1 :])

@@ -1,8 +1,7 @@
-"""The journal as a running procedure sees it: it writes what is new, and knows what is there already.
+"""Deterministic replay: a resumed session runs its procedures again over its own journal.
 
-A resumed session runs its procedures from the start. What it would tell again, word for word, is taken from
-the journal; from the first thing on that is new, it is written. Captures of whole placements are served from
-the frames on disk, everything computed from them is computed again.
+Events already in the journal are matched, from the first new one on they are appended. Captures of whole
+placements are read from the frames on disk; everything computed from them is computed again.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from workbench.session.state import Group, groups, safe_part
 
 
 class ReplayingJournal:
-    """Writes events and shows their records to the consumers."""
+    """Appends new events to the journal, and shows the records of all events to the consumers."""
 
     def __init__(
         self,
@@ -35,14 +34,14 @@ class ReplayingJournal:
         self._from_n = 0
         self._resumed = resumed if before else None
         self.whole = {key: group for key, group in groups(before).items() if group.whole}
-        """By placement key: what need not be captured again."""
+        """Whole placements by key: they are not captured again."""
         self._answers = {
             e.key: e for e in (record.event for record in self._kept) if isinstance(e, ev.Answered)
         }
 
         self._retries = Counter(r.event.key for r in before if _is_retry(r.event))
-        told = [e for e in (r.event for r in self._kept) if isinstance(e, ev.LatencyMeasured)]
-        self.latency = told[-1].frames if told else None
+        measured = [e for e in (r.event for r in self._kept) if isinstance(e, ev.LatencyMeasured)]
+        self.latency = measured[-1].frames if measured else None
         """As measured before the session ended early."""
 
     def emit(self, event: ev.Event) -> ev.Record:

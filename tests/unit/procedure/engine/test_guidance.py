@@ -279,9 +279,9 @@ STEPS = [PlannedStep("p", 1, "grid", 3, 6), PlannedStep("p", 2, "fit", 0, 0, 7.0
 
 def test_pace_is_what_was_measured() -> None:
     """The mean: sums are right."""
-    pace = told_by(*TOLD).pace(StepDurations(without_shots_s={"fit": 7.0}))
+    pace = told_by(*TOLD).durations(StepDurations(without_captures_s={"fit": 7.0}))
     assert pace.placing_s == 30.0
-    assert pace.shot_s == pytest.approx((1 + 3) / 2), "the first was loading programs"
+    assert pace.capture_s == pytest.approx((1 + 3) / 2), "the first was loading programs"
     assert pace.lit_s == pytest.approx(0.2)
     assert (pace.exposing_s, pace.finishing_s) == (0.0, 0.0), "this camera's exposure is fixed"
     assert pace.seconds(STEPS[1]) == 7.0
@@ -294,7 +294,9 @@ def test_a_break_tells_nothing_of_the_next_placing() -> None:
     for n, took in enumerate((20.0, 30.0, 3600.0, 25.0, 50.0, 25.0)):
         at += took
         session.append((at, placed(f"{n}")))
-    assert told_by(*session).pace(StepDurations()).placing_s == pytest.approx((20 + 30 + 25 + 50 + 25) / 5)
+    assert told_by(*session).durations(StepDurations()).placing_s == pytest.approx(
+        (20 + 30 + 25 + 50 + 25) / 5
+    )
 
 
 def test_a_plan_takes_as_long_as_the_session_that_told_it() -> None:
@@ -324,7 +326,7 @@ def test_a_plan_takes_as_long_as_the_session_that_told_it() -> None:
         PlannedStep("p", 2, "fit", 0, 0),
         PlannedStep("p", 3, "export", 0, 0),
     ]
-    pace = meter.pace(StepDurations())
+    pace = meter.durations(StepDurations())
     assert sum(map(pace.seconds, steps)) == pytest.approx(132.0, rel=0.02)
     assert pace.seconds(PlannedStep("p", 1, "place", 1, 0)) == 40.0, "somebody has to place it"
 
@@ -332,7 +334,7 @@ def test_a_plan_takes_as_long_as_the_session_that_told_it() -> None:
 def test_what_a_stop_tore_apart_tells_no_duration() -> None:
     resumed = ev.SessionResumed(from_n=1, operator="", command="", created="")
     meter = told_by((0, started(1, 4)), (20, placed("a")), (9000, resumed), (9001, placed("a")))
-    assert meter.pace(StepDurations()).placing_s == 20.0
+    assert meter.durations(StepDurations()).placing_s == 20.0
 
 
 def test_nor_does_a_question_that_comes_once() -> None:
@@ -340,16 +342,18 @@ def test_nor_does_a_question_that_comes_once() -> None:
     safety = ev.Answered(key="safety", question="?", answer=Answer())
     skip = ev.Answered(key="b", question="?", answer=Answer(action="skip", reason="no room"))
     meter = told_by((0, started(1, 4)), (300, safety), (320, placed("a")), (620, skip), (640, placed("c")))
-    assert meter.pace(StepDurations()).placing_s == 20.0
+    assert meter.durations(StepDurations()).placing_s == 20.0
     kept = ev.Answered(key="a/L1/snr", question="Keep?", answer=Answer())
     asked = told_by((0, started(1, 4)), *shot(1, "a1"), (300, kept), (301, ev.PlacementFinished(key="a")))
-    assert asked.pace(StepDurations()).finishing_s == StepDurations().finishing_s, (
+    assert asked.durations(StepDurations()).finishing_s == StepDurations().finishing_s, (
         "a limit that failed was asked about"
     )
     own = ev.StepStarted(procedure="p", index=1, step="ask", title="Which?", shots=0)
     answered = ev.Answered(key="p.1", question="Which?", answer=Answer(value="grey"))
     assert (
-        told_by((0, own), (30, answered), (30, finished(1))).pace(StepDurations()).without_shots_s["Which?"]
+        told_by((0, own), (30, answered), (30, finished(1)))
+        .durations(StepDurations())
+        .without_captures_s["Which?"]
         == 30.0
     )
 
@@ -371,8 +375,8 @@ def test_what_other_sessions_told_is_left_step_by_step() -> None:
     """One placing of 90 s does not make a session of half a minute each three times as long."""
     learned = StepDurations(placing_s=30.0, sessions=3)
     session: list[tuple[float, ev.Event]] = [(0, started(1, 4)), (90, placed("a"))]
-    assert told_by(*session).pace(learned).placing_s == pytest.approx((2 * 30 + 90) / 3)
-    assert told_by(*session).pace(StepDurations()).placing_s == 90.0, "a guess counts for nothing"
+    assert told_by(*session).durations(learned).placing_s == pytest.approx((2 * 30 + 90) / 3)
+    assert told_by(*session).durations(StepDurations()).placing_s == 90.0, "a guess counts for nothing"
 
 
 def test_the_forecast_counts_placements_and_what_is_left() -> None:
