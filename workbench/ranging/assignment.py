@@ -7,9 +7,9 @@ from functools import lru_cache
 from itertools import permutations
 
 import numpy as np
-from scipy.special import chdtrc
 
 from workbench.model.arrays import FloatArray, IndexArray
+from workbench.model.stats import chi2_sf
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
 MOST_MISFIT_SD = 6.0
@@ -86,7 +86,7 @@ def assign(pairs: Pairs, lasers: IndexArray) -> tuple[IndexArray, IndexArray] | 
     dealt = pairs.inverse_depth[to, columns]
     misfit2 = (pairs.misfit_sd[to, columns] ** 2).sum(axis=1)
     possible = (dealt > 0).all(axis=1) & (misfit2 < MOST_MISFIT_SD**2 * m)
-    possible[possible] = chdtrc(m, misfit2[possible]) > IMPROBABLE
+    possible[possible] = chi2_sf(misfit2[possible], m) > IMPROBABLE
     left = np.flatnonzero(possible)
     if len(left) == 0:
         return None

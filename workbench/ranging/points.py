@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc, ndtri
 
 from workbench.model.arrays import FloatArray
+from workbench.model.stats import chi2_sf, norm_ppf
 
 LEVEL = 0.95
 """Of every interval that the ranger states."""
-REACH = float(ndtri(0.5 + 0.5 * LEVEL))
+REACH = float(norm_ppf(0.5 + 0.5 * LEVEL))
 """Standard deviations on either side of the middle of a Gaussian that hold `LEVEL` of it."""
 
 
@@ -87,4 +87,4 @@ def interval_mm(range_mm: float, sigma_mm: float, offset_mm: float = 0.0) -> tup
 
 def probability(chi2: float, freedom: int) -> float | None:
     """Chance of a chi2 at least as large if the model is true; None where nothing is left to test it with."""
-    return float(chdtrc(freedom, chi2)) if freedom > 0 else None
+    return float(chi2_sf(chi2, freedom)) if freedom > 0 else None

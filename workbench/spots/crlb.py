@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import gammaln, ndtr, xlogy
+from scipy.special import gammaln, xlogy
 
 from workbench.model.arrays import FloatArray
+from workbench.model.stats import norm_cdf
 from workbench.spots.psf import FLUX, derivatives
 
 # Above this many electrons a Poisson count is Gaussian to 1e-3 of its information.
@@ -48,7 +49,7 @@ def pixel_information(electrons: float, camera: Camera) -> float:
     for phase in np.linspace(0.0, 1.0, 5)[:-1]:
         numbers = np.arange(np.floor((electrons - reach) / step), np.ceil((electrons + reach) / step)) + phase
         edges = (np.append(numbers, numbers[-1] + 1.0) - 0.5) * step
-        share = np.diff(ndtr((edges[:, None] - count) / read), axis=0)
+        share = np.diff(norm_cdf((edges[:, None] - count) / read), axis=0)
         chance = share @ mass
         seen = chance > 1e-12
         told.append(float((((share @ by_mean)[seen]) ** 2 / chance[seen]).sum()))

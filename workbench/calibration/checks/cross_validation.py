@@ -22,7 +22,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, fdtrc, ndtr, stdtr
 
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.problem import LeastSquaresProblem
@@ -36,6 +35,7 @@ from workbench.calibration.estimation.refit import (
     rows_of,
 )
 from workbench.model.arrays import BoolArray, FloatArray
+from workbench.model.stats import chi2_sf, f_sf, norm_cdf, t_cdf
 
 FALSE_ALARM = 1e-3
 """Of one fit whose priors and noise are as stated: the chance that any of its standoffs raises an alarm."""
@@ -79,15 +79,15 @@ class LeftOut:
     @property
     def range_p(self) -> float:
         """Chance of a range error as large."""
-        tail = ndtr(-abs(self.z)) if np.isinf(self.freedom) else stdtr(self.freedom, -abs(self.z))
+        tail = norm_cdf(-abs(self.z)) if np.isinf(self.freedom) else t_cdf(-abs(self.z), self.freedom)
         return float(2 * tail)
 
     @property
     def spots_p(self) -> float:
         """Chance of spots as far off."""
         if np.isinf(self.freedom):
-            return float(chdtrc(self.coordinates, self.chi2))
-        return float(fdtrc(self.coordinates, self.freedom, self.chi2 / self.coordinates))
+            return float(chi2_sf(self.chi2, self.coordinates))
+        return float(f_sf(self.chi2 / self.coordinates, self.coordinates, self.freedom))
 
 
 def leave_each_out(fit: CalibrationFit) -> tuple[LeftOut, ...]:

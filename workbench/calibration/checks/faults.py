@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.special import chdtrc
 
 from workbench.calibration.checks.cross_validation import LeftOut
 from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit
@@ -16,6 +15,7 @@ from workbench.calibration.checks.target_motion import TargetMotion, find_target
 from workbench.calibration.data.averaging import scatter_chi2, weighted_mean
 from workbench.calibration.data.observations import Observation, positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
+from workbench.model.stats import chi2_sf
 
 FaultName = Literal[
     "lasers_swapped",
@@ -84,7 +84,7 @@ def _suspects(fit: CalibrationFit, left_out: Sequence[LeftOut]) -> list[int]:
         apart, degrees = scatter_chi2(positions(members), cells.repeat_scale * stated_sd(members, noise))
         chi2[members[0].placement] += apart
         free[members[0].placement] += degrees
-    odd |= {key for key, count in free.items() if count and chdtrc(count, chi2[key]) < SUSPECT}
+    odd |= {key for key, count in free.items() if count and chi2_sf(chi2[key], count) < SUSPECT}
     return [index for index, info in enumerate(cells.placements) if info.key in odd]
 
 

@@ -16,13 +16,13 @@ from math import log
 from typing import Literal
 
 import numpy as np
-from scipy.special import chdtrc, fdtrc
 
 from workbench.calibration.checks.cross_validation import by_standoff, predictive, range_error, rows_at
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit, rows_of
 from workbench.model.arrays import BoolArray, FloatArray
+from workbench.model.stats import chi2_sf, f_sf
 
 Kind = Literal["lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "spot"]
 IMPROBABLE = 1e-4
@@ -116,7 +116,7 @@ def _is_needed(fit: CalibrationFit, state: Refit, h: Hypothesis) -> bool:
 
 def is_improbable(state: Refit) -> bool:
     """Whether data and priors together fit worse than by chance."""
-    return bool(chdtrc(state.used.sum(), state.cost) < IMPROBABLE)
+    return bool(chi2_sf(state.cost, state.used.sum()) < IMPROBABLE)
 
 
 def _excess(state: Refit) -> float:
@@ -323,6 +323,6 @@ def _without_spot(state: Refit, cell: int, count: int) -> Hypothesis:
     freedom, degrees = max(after.freedom, 1.0), int(state.used.sum() - used.sum())
     gain = state.cost - after.cost
     noise = max(1.0, after.chi2 / freedom)
-    chance = fdtrc(degrees, freedom, gain / degrees / noise) if noise > 1 else chdtrc(degrees, gain)
+    chance = f_sf(gain / degrees / noise, degrees, freedom) if noise > 1 else chi2_sf(gain, degrees)
     significant = bool(chance < FALSE_REJECTION / count)
     return Hypothesis("spot", (cell,), after, gain / noise - SPOT_COST, significant)

@@ -28,12 +28,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
-from scipy.special import chdtrc, gammainc, gammaincc, ndtr
 
 from workbench.calibration.data.observations import positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit
 from workbench.model.arrays import FloatArray, IndexArray
+from workbench.model.stats import chi2_sf, gamma_cdf, gamma_sf, norm_cdf
 
 FALSE_ALARM = 0.01
 """Of one sound fit: the chance that any of its residual tests raises an alarm."""
@@ -157,7 +157,7 @@ class _Spots:
         left, directions = np.linalg.eigh(trend.T @ self.covariance @ trend)
         seen = left > ABSORBED
         score = directions[:, seen].T @ (trend.T @ self.residual)
-        return float(chdtrc(seen.sum(), (score**2 / left[seen]).sum())) if seen.any() else float("nan")
+        return float(chi2_sf((score**2 / left[seen]).sum(), seen.sum())) if seen.any() else float("nan")
 
     def quadratic_p(self, weight: FloatArray) -> float:
         """Two-sided chance of r^T B r, B (n, n), whatever the size of the noise; NaN if it cannot vary."""
@@ -307,7 +307,7 @@ def _two_sided(value: float, mean: float, variance: float, third: float) -> floa
     """Chance of a value as far out by the gamma distribution of these moments."""
     z, skew = (value - mean) / variance**0.5, third / variance**1.5
     if abs(skew) < 1e-3:
-        return float(2 * ndtr(-abs(z)))
+        return float(2 * norm_cdf(-abs(z)))
     shape = 4 / skew**2
     x = max(shape + np.sign(skew) * z * shape**0.5, 0.0)
-    return float(2 * min(gammainc(shape, x), gammaincc(shape, x)))
+    return float(2 * min(gamma_cdf(x, shape), gamma_sf(x, shape)))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import chdtrc, chdtri
 
 from workbench.model.arrays import BoolArray, FloatArray
+from workbench.model.stats import chi2_isf, chi2_sf
 
 STRAY_SD = 6.0
 """A repeat this far from the median of its fellows is no repeat. Of honest Gaussian repeats 1 in 5e8 lies so
@@ -75,13 +75,13 @@ def usual_scale(scatter: Sequence[tuple[float, int]]) -> float:
     chi2, free = np.array([s for s in scatter if s[1] > 0]).reshape(-1, 2).T
     if len(chi2) < FEWEST_SPOTS:
         return float("nan")
-    return max(1.0, float(np.sqrt(np.median(chi2 / chdtri(free, 0.5)))))
+    return max(1.0, float(np.sqrt(np.median(chi2 / chi2_isf(0.5, free)))))
 
 
 def is_torn(scatter: tuple[float, int], usual: float) -> bool:
     """Whether the repeats of a spot scatter far more than those of others do."""
     chi2, free = scatter
-    return free > 0 and bool(chdtrc(free, chi2 / usual**2) < TORN)  # NaN: nothing to compare with
+    return free > 0 and bool(chi2_sf(chi2 / usual**2, free) < TORN)  # NaN: nothing to compare with
 
 
 def scatter_chi2(position: FloatArray, sd: FloatArray) -> tuple[float, int]:

@@ -16,7 +16,6 @@ from math import log
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc
 
 from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Observation, Rejected
@@ -30,6 +29,7 @@ from workbench.model.calibration import TermVerdict
 from workbench.model.errors import BadInputError
 from workbench.model.nested import TILTS, fix_parameters
 from workbench.model.rig import Prior, Rig
+from workbench.model.stats import chi2_sf
 
 STRONG = 1.0
 """log10 of a Bayes factor that is strong evidence (R. E. Kass and A. E. Raftery, JASA 90 (1995) 773)."""
@@ -200,7 +200,7 @@ def _p_value(score: FloatArray, information: FloatArray) -> float:
     values, vectors = np.linalg.eigh(information)
     known = values > KNOWN
     chi2 = ((vectors.T @ score)[known] ** 2 / values[known]).sum()
-    return float(chdtrc(known.sum(), chi2)) if known.any() else 1.0
+    return float(chi2_sf(chi2, known.sum())) if known.any() else 1.0
 
 
 def _effect_on_ranges(fitted: CalibrationFit, index: IndexArray) -> tuple[float, float]:
@@ -269,7 +269,7 @@ def _called_for(fitted: CalibrationFit) -> list[Term]:
         along = within.T @ column
         information = column @ column - along @ covariance @ along
         score = -column @ residual
-        p_value = float(chdtrc(1, score**2 / information)) if information > KNOWN else 1.0
+        p_value = float(chi2_sf(score**2 / information, 1)) if information > KNOWN else 1.0
         if p_value < CALLED_FOR_P:
             log_factor = 0.5 * (score**2 / (1 + information) - log(1 + information))
             found.append(Term(name, p_value, float(log_factor / log(10)), None, "called for"))

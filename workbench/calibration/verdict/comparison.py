@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
 
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import Calibration
 from workbench.model.errors import BadInputError
+from workbench.model.stats import chi2_sf
 from workbench.sensor.calibrated import CalibratedSensor
 
 Pairs = list[tuple[str, FloatArray]]
@@ -70,7 +70,7 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
     whiten = _whitener(_spot_covariance(sensor_a, pairs) + _spot_covariance(sensor_b, pairs))
     white = whiten @ shift_px
     chi2 = float(white @ white)
-    probability = float(chdtrc(len(white), chi2))
+    probability = float(chi2_sf(chi2, len(white)))
     moved = probability < SIGNIFICANCE
     return Comparison(
         differences=_differences(sensor_a, sensor_b, pairs),
@@ -160,7 +160,7 @@ def _explanations(a: CalibratedSensor, b: Calibration, pairs: Pairs, whiten: Flo
         if name in b.geometry():
             remaining[name] = _put_back(b, pairs, whiten, expected, column, value)
     best = min(remaining.values())
-    if chdtrc(len(whiten) - 1, best) < SIGNIFICANCE:
+    if chi2_sf(best, len(whiten) - 1) < SIGNIFICANCE:
         return ()
     likely = [name for name, chi2 in remaining.items() if chi2 < best + AS_LIKELY_CHI2]
     return tuple(sorted(likely, key=remaining.__getitem__))

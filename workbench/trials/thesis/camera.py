@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from workbench.model.arrays import BoolArray, FloatArray
+from workbench.model.stats import norm_cdf
 from workbench.trials.thesis.scene import Line
 
 Frame = NDArray[np.uint8]
@@ -56,12 +56,12 @@ def expose(
 
 def _peak_share(width_px: FloatArray) -> FloatArray:
     """Share of a spot's light in a pixel at its centre."""
-    return np.asarray((2 * ndtr(0.5 / width_px) - 1) ** 2)
+    return np.asarray((2 * norm_cdf(0.5 / width_px) - 1) ** 2)
 
 
 def _profile(centre_px: float, width_px: float, pixels: int) -> FloatArray:
     """(pixels,) share of a Gaussian's light in each pixel of a row."""
-    return np.diff(ndtr((np.arange(pixels + 1) - 0.5 - centre_px) / width_px))
+    return np.diff(norm_cdf((np.arange(pixels + 1) - 0.5 - centre_px) / width_px))
 
 
 def _digitise(light: FloatArray, noise: Generator | None) -> Frame:
