@@ -6,13 +6,16 @@ import csv
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationError, model_validator
 
 from workbench.model.contents import not_text
 from workbench.model.errors import BadInputError
-from workbench.model.problems import one_of, short
+from workbench.model.problems import one_of, problems, short
+from workbench.model.yamlfile import FileModel
 
 ALL_LASERS = "all"
 BOARD = "board"
@@ -25,35 +28,51 @@ LARGEST = 1e6
 """Of any millimetres or pixels: a kilometre, and beyond every camera."""
 NEAREST_MM = 1e-3
 SMALLEST_SD_PX = 1e-6
-LONGEST_REPEAT = 9
+MOST_REPEATS = 99_999_999
 SEPARATORS = {";": "semicolons (;)", "\t": "tabs", "|": "bars (|)"}
 """Of other tables, and what people call them."""
 COLUMNS = (*REQUIRED, *IMAGES, *POSITION, *OPTIONAL)
 
 
-@dataclass(frozen=True)
-class CaptureRow:
+Millimetres = Annotated[float, Field(le=LARGEST)]
+Pixels = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+PixelSd = Annotated[float, Field(ge=SMALLEST_SD_PX, le=LARGEST)]
+
+
+class CaptureRow(FileModel):
     """One row. NaN where a number was left empty; `on` is None for a row that gives the position itself."""
 
     row: int
     """Line of the file; the header is row 1."""
     laser_id: str
-    standoff_mm: float
-    repeat: int
-    on: Path | None
-    off: Path | None
-    u_px: float
-    v_px: float
-    scene: str
+    standoff_mm: Annotated[Millimetres, Field(ge=NEAREST_MM)] = nan
+    repeat: Annotated[int, Field(ge=0, le=MOST_REPEATS)]
+    on: Path | None = None
+    off: Path | None = None
+    u_px: Pixels = nan
+    v_px: Pixels = nan
+    scene: str = ""
     """Empty when not given."""
-    standoff_sd_mm: float
-    u_sd_px: float
-    v_sd_px: float
-    tilt_deg: float
-    exposure: float = nan
-    """Tells how a frame came about, nothing is computed from it."""
+    standoff_sd_mm: Annotated[Millimetres, Field(ge=0)] = nan
+    u_sd_px: PixelSd = nan
+    v_sd_px: PixelSd = nan
+    tilt_deg: Annotated[float, Field(gt=-90, lt=90)] = nan
+    exposure: Annotated[float, Field(gt=0, le=LARGEST)] = nan
+    """Records how a frame was made; nothing is computed from it."""
     exposure_unit: str = ""
     """Empty for the camera driver's own."""
+
+    @model_validator(mode="after")
+    def _has_an_image_or_a_position(self) -> CaptureRow:
+        measured = isfinite(self.u_px) or isfinite(self.v_px)
+        if (self.on is not None) == measured:
+            came = "both" if measured else "neither"
+            raise ValueError(f"on: expected either an image, or a position in u_px or v_px, got {came}")
+        if measured and self.laser_id in {ALL_LASERS, BOARD}:
+            raise ValueError(
+                f"laser_id: expected one laser's id where a position is given, got {self.laser_id}"
+            )
+        return self
 
 
 def load_captures(path: Path) -> tuple[CaptureRow, ...]:
@@ -94,16 +113,16 @@ def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
     try:
         reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""))
         _check_header(path, reader.fieldnames or [])
-        rows, problems = [], []
+        rows, mistakes = [], []
         for cells in reader:
             try:
-                rows.append(_Parser(path, reader.line_num, cells).row())
+                rows.append(_row(path, reader.line_num, cells))
             except BadInputError as error:
-                problems.append(str(error))
+                mistakes.append(str(error))
     except csv.Error as error:
         raise BadInputError(f"{path}: expected a captures file (CSV): {error}") from None
-    if problems:
-        raise BadInputError("\n".join(problems))
+    if mistakes:
+        raise BadInputError("\n".join(mistakes))
     if not rows:
         raise BadInputError(f"{path}: expected at least one row below the header, got none")
     return tuple(rows)
@@ -170,85 +189,21 @@ def _check_header(path: Path, names: object) -> None:
         raise BadInputError(f"{where}: expected either the column on (images) or u_px and v_px (positions)")
 
 
-class _Parser:
-    """One row's cells to a `CaptureRow`."""
+def _row(path: Path, number: int, cells: dict[str | None, Any]) -> CaptureRow:
+    """One row's cells as a `CaptureRow`.
 
-    def __init__(self, path: Path, number: int, cells: dict[str, str | None]) -> None:
-        self._path, self._number = path, number
-        if None in cells or None in cells.values():
-            raise self._error("row", "as many values as the header has columns", "another number")
-        self._cells = {name: (value or "").strip() for name, value in cells.items()}
-
-    def row(self) -> CaptureRow:
-        laser_id = self._cells["laser_id"]
-        if not laser_id:
-            raise self._error("laser_id", "a laser's id or 'all'", "nothing")
-        on, off = self._image("on"), self._image("off")
-        u, v = self._number_in("u_px"), self._number_in("v_px")
-        measured = isfinite(u) or isfinite(v)
-        if (on is not None) == measured:
-            came = "both" if measured else "neither"
-            raise self._error("on", "either an image, or a position in u_px or v_px", came)
-        if measured and laser_id in {ALL_LASERS, BOARD}:
-            raise self._error("laser_id", "one laser's id where a position is given", laser_id)
-        return CaptureRow(
-            row=self._number,
-            laser_id=laser_id,
-            standoff_mm=self._number_in("standoff_mm", at_least=NEAREST_MM),
-            repeat=self._repeat(),
-            on=on,
-            off=off,
-            u_px=u,
-            v_px=v,
-            scene=self._cells.get("scene", ""),
-            standoff_sd_mm=self._number_in("standoff_sd_mm", at_least=0.0),
-            u_sd_px=self._number_in("u_sd_px", at_least=SMALLEST_SD_PX),
-            v_sd_px=self._number_in("v_sd_px", at_least=SMALLEST_SD_PX),
-            tilt_deg=self._number_in("tilt_deg", above=-90.0, below=90.0),
-            exposure=self._number_in("exposure", above=0.0),
-            exposure_unit=self._cells.get("exposure_unit", ""),
-        )
-
-    def _image(self, column: str) -> Path | None:
-        name = self._cells.get(column, "")
-        if "\0" in name:
-            raise self._error(column, "the path of an image", "a path with a zero byte in it")
-        return self._path.parent / name if name else None
-
-    def _repeat(self) -> int:
-        text = self._cells["repeat"]
-        if not (text.isdecimal() and len(text) < LONGEST_REPEAT):
-            raise self._error("repeat", "a whole number from 0", text[:20] or "nothing")
-        return int(text)
-
-    def _number_in(
-        self,
-        column: str,
-        *,
-        above: float | None = None,
-        at_least: float | None = None,
-        below: float | None = None,
-    ) -> float:
-        text = self._cells.get(column, "")
-        if not text:
-            return nan
-        try:
-            value = float(text)
-        except ValueError:
-            raise self._error(column, "a number", text) from None
-        if not isfinite(value):
-            raise self._error(column, "a finite number", text)
-        if abs(value) > LARGEST:
-            raise self._error(column, f"a number up to {LARGEST:g}", text)
-        if above is not None and value <= above:
-            raise self._error(column, f"a number above {above:g}", text)
-        if at_least is not None and value < at_least:
-            raise self._error(column, f"a number of at least {at_least:g}", text)
-        if below is not None and value >= below:
-            raise self._error(column, f"a number below {below:g}", text)
-        return value
-
-    def _error(self, column: str, expected: str, came: str) -> BadInputError:
-        return BadInputError(
-            f"{self._path}: row {self._number}, column {column}: expected {expected}, got {came}"
-        )
+    Raises:
+        BadInputError: some are wrong; a line for each, with row and column.
+    """
+    where = f"{path}: row {number}"
+    if None in cells or None in cells.values():
+        raise BadInputError(f"{where}: expected as many values as the header has columns, got another number")
+    given = {str(name): value.strip() for name, value in cells.items() if value.strip()}
+    images = {name: path.parent / given[name] for name in IMAGES if name in given}
+    try:
+        return CaptureRow.model_validate(given | images | {"row": number})
+    except ValidationError as error:
+        found = problems(CaptureRow, given, error.errors())
+        # A rule about the whole row names its column itself.
+        lines = [one.told if one.location else one.text for one in found]
+        raise BadInputError("\n".join(f"{where}, column {line}" for line in lines)) from None

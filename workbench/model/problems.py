@@ -37,6 +37,7 @@ EXPECTED = {
     "tuple_type": LIST,
     "list_type": LIST,
     "dict_type": MAPPING,
+    "path_type": "the path of a file",
     "model_type": MAPPING,
     "model_attributes_type": MAPPING,
     "too_short": "a list of at least {min_length}, got {actual_length}",

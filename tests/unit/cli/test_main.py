@@ -210,7 +210,7 @@ class TestBadInput:
         captures = tmp_path / "c.csv"
         captures.write_text(WEBCAM.read_text().replace("1,400,0", "1,4oo,0"))
         outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
-        refused(outcome, 2, f"{captures}: row 4, column standoff_mm: expected a number, got 4oo")
+        refused(outcome, 2, f"{captures}: row 4, column standoff_mm: expected a number")
 
     @pytest.mark.parametrize("which", [0, 1])
     def test_an_output_that_is_an_input(self, workbench: Run, tmp_path: Path, which: int) -> None:
@@ -664,7 +664,7 @@ class TestNastyInput:
                 "expected at most 1000000, got 1e+300",
             ),
             (f"{{step: warm_up, frames: 1{'0' * 400}}}", "frames: expected at most 1000000, got 1000"),
-            ("{step: null}", "steps[0].step: expected one of message, "),
+            ("{step: null}", "steps[0].step: expected one of "),
             ("fit", "steps[0]: expected keys and values, got 'fit'"),
             ("{step: message, text: a: b}", "put text with a colon in it in quotes"),
         ],
