@@ -1,4 +1,4 @@
-"""The serial line to a laser controller that speaks docs/laser-controller.md. Only the guardian holds one."""
+"""The laser driver `serial`: a controller that speaks docs/laser-controller.md, on a serial line."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import select
 import termios
 import time
 from collections.abc import Callable
+from typing import Annotated, ClassVar
 
 import serial
+from pydantic import Field
 
+from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 
 REPLY_S = 1.0
@@ -21,17 +24,25 @@ LINE_FAILURES = (serial.SerialException, OSError, termios.error)
 """A line that hangs up shows as any of these, depending on the call under way."""
 
 
+class SerialBlock(DeviceBlock):
+    """The block `devices: lasers:` of the rig file."""
+
+    port: str
+    """Of the controller."""
+    baud: Annotated[int, Field(gt=0)] = 115_200
+
+
 class ControllerLine:
-    """Requests and replies."""
+    """Requests and replies; see `guarded_line.GuardedLine`."""
 
-    has_leases = True
-    """The controller puts off by itself what is not renewed."""
+    settings_type: ClassVar = SerialBlock
+    has_leases: ClassVar[bool] = True
 
-    def __init__(self, port: str, baud: int, alarm: Callable[[], bool]) -> None:
+    def __init__(self, settings: SerialBlock, lasers: int, alarm: Callable[[], bool]) -> None:
         """Open the port, exclusively.
 
         `alarm` is asked while the reply to a request that lights is waited for; when it says so, off is
-        sent at once.
+        sent at once. A controller with fewer lines than `lasers` refuses to light the last ones.
 
         Raises:
             RigNotReadyError: no such port, or another program holds it.
@@ -39,10 +50,12 @@ class ControllerLine:
         self._token = 0
         self._alarm = alarm
         try:
-            self._line = serial.Serial(port, baud, timeout=0, write_timeout=REPLY_S, exclusive=True)
+            self._line = serial.Serial(
+                settings.port, settings.baud, timeout=0, write_timeout=REPLY_S, exclusive=True
+            )
         except LINE_FAILURES as error:
             raise RigNotReadyError(
-                f"laser controller: expected a serial port at {port}, got: {error};"
+                f"laser controller: expected a serial port at {settings.port}, got: {error};"
                 " check the cable, and that no other program holds the port"
             ) from None
 

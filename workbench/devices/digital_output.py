@@ -1,35 +1,43 @@
-"""Lasers on the lines of a digital output board, by NI-DAQmx. Only the guardian holds one.
+"""The laser driver `nidaqmx`: lasers on the lines of a digital output board, by NI-DAQmx.
 
 The board has no lease of its own: what was written stays until something else is written. The guardian, which
-holds nothing longer than its lease, is all that puts the lasers off (docs/laser-controller.md). So whatever
-goes wrong in the driver is an answer to it, and never its end.
+holds nothing longer than its lease, is all that puts the lasers off (docs/laser-controller.md).
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, ClassVar
 
+from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError
 
 PACKAGE = "nidaqmx"
 
 
+class DigitalOutputBlock(DeviceBlock):
+    """The block `devices: lasers:` of the rig file."""
+
+    port: str
+    """The board's lines, as `Dev1/port0/line0:3`."""
+
+
 class DigitalOutputLine:
-    """Has the methods of `ControllerLine`; laser 1 is the first line."""
+    """See `guarded_line.GuardedLine`; laser 1 is the first line."""
 
-    has_leases = False
+    settings_type: ClassVar = DigitalOutputBlock
+    has_leases: ClassVar[bool] = False
 
-    def __init__(self, lines: str, lasers: int) -> None:
-        """Reserve the board's lines, as `Dev1/port0/line0:3`, and put them low.
+    def __init__(self, settings: DigitalOutputBlock, lasers: int, alarm: Callable[[], bool]) -> None:
+        """Reserve the board's lines and put them low.
 
         Raises:
             BadInputError: they are fewer than the rig's lasers.
             RigNotReadyError: the package or its driver is missing, or there are no such lines.
         """
-        self._lines = lines
+        self._lines = lines = settings.port
         try:
             package = importlib.import_module(PACKAGE)
             constants = importlib.import_module(f"{PACKAGE}.constants")

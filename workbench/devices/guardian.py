@@ -1,4 +1,7 @@
-"""The guardian: a process of its own that holds the laser controller's port for the workbench.
+"""The guardian: a process of its own that holds the lasers' device for the workbench.
+
+It is called with the laser driver (`module:name` of a `GuardedLine`) and its settings, and stays light: it
+imports that driver, the base of settings, and the errors.
 
 It takes commands on standard input, one a line, and answers on standard output, one JSON object a line, which
 repeats the command's number:
@@ -8,13 +11,13 @@ repeats the command's number:
     <n> STATE             what is lit, and the interlock
     BEAT                  the workbench is at work; no answer
 
-The first answer, number 0 and unasked, is who the controller is. A second descriptor brings the numbers of
+The first answer, number 0 and unasked, is the device's identity. A second descriptor brings the numbers of
 signals that the workbench got, one byte each, written by its C-level signal handler.
 
 It puts everything off when the workbench ends in whatever way, when it is told to end (SIGTERM, SIGHUP), and
-when no beat came for `hang_s` while something was lit. The last it leaves to nobody's clock but the
-controller's: that is never given a lease longer than `hang_s`, and each beat renews it. A digital output
-board has no lease: there it is the guardian's clock.
+when no beat came for `hang_s` while something was lit. The last is left to the
+device's clock: it never gets a lease longer than `hang_s`, and each beat renews that. For a device without
+leases, such as a digital output board, it is the guardian's clock.
 """
 
 from __future__ import annotations
@@ -31,9 +34,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.devices.controller_line import ControllerLine
-from workbench.devices.digital_output import DigitalOutputLine
-from workbench.devices.guardian_client import TRY_BOARD_S
+from workbench.devices.guarded_line import TRY_BOARD_S, CheckedLine, open_line
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError, WorkbenchError
 
 LOOK_S = 0.02
@@ -43,7 +44,6 @@ TRY_ALONE_S = 1.0
 """How long it goes on trying to put off when there is nobody left to tell: twice the longest lease."""
 RENEW = 5
 """A lease is renewed when a fifth of it has gone."""
-Line = ControllerLine | DigitalOutputLine
 AT_ONCE = {int(signal.SIGTERM), int(signal.SIGHUP)}
 STAT_FLAGS = 6
 """In /proc/PID/stat, counted from what comes after the process's name."""
@@ -128,10 +128,10 @@ class Lease:
 
 
 class Guardian:
-    """Serves one workbench on one controller."""
+    """Serves one workbench on one device."""
 
-    def __init__(self, workbench: Workbench, line: Line, hang_s: float) -> None:
-        self._workbench, self._line, self._hang_s = workbench, line, hang_s
+    def __init__(self, workbench: Workbench, line: CheckedLine, answers: int, hang_s: float) -> None:
+        self._workbench, self._line, self._answers, self._hang_s = workbench, line, answers, hang_s
         self._lease: Lease | None = None
         self._failure: WorkbenchError | None = None
         """Why lasers went off that the workbench takes for lit."""
@@ -171,11 +171,11 @@ class Guardian:
             case ["BEAT"]:
                 self._beat()
             case [number, "LIT", mask, lease_ms]:
-                answer(int(number), lambda: self._light(int(mask), int(lease_ms)))
+                answer(self._answers, int(number), lambda: self._light(int(mask), int(lease_ms)))
             case [number, "OFF"]:
-                answer(int(number), self._off)
+                answer(self._answers, int(number), self._off)
             case [number, "STATE"]:
-                answer(int(number), self._line.state)
+                answer(self._answers, int(number), self._line.state)
             case _:
                 raise ValueError(f"no such command: {command}")
 
@@ -258,8 +258,8 @@ class Guardian:
                 return 0
 
 
-def answer(number: int, act: Callable[[], object]) -> int:
-    """Do something and tell the workbench, which may be gone, what came of it; returns an exit code."""
+def answer(answers: int, number: int, act: Callable[[], object]) -> int:
+    """Do something and write the outcome to the workbench, which may be gone; returns an exit code."""
     code = 0
     try:
         said: dict[str, object] = {"to": number, "value": act()}
@@ -267,37 +267,47 @@ def answer(number: int, act: Callable[[], object]) -> int:
         said = {"to": number, "error": type(error).__name__, "text": str(error)}
         code = error.exit_code
     with suppress(OSError):
-        os.write(sys.stdout.fileno(), json.dumps(said).encode() + b"\n")
+        os.write(answers, json.dumps(said).encode() + b"\n")
     return code
 
 
-def main(driver: str, port: str, baud: int, lasers: int, boot_s: float, hang_s: float, signals: int) -> int:
-    """Hold the port, or the lines of a board, until the workbench is gone."""
+def main(line: str, settings: str, lasers: int, boot_s: float, hang_s: float, signals: int) -> int:
+    """Hold the device until the workbench is gone."""
     # What a terminal, or a system that goes down, sends to everybody. The workbench's end is what counts.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
         signal.signal(number, signal.SIG_IGN)
-    # Before all else that a busy computer runs, where it is allowed to. It sleeps nearly all the time.
-    with suppress(AttributeError, OSError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+    answers = _keep_answers()
     workbench = Workbench(sys.stdin.fileno(), signals)
-    opened: list[Line] = []
+    opened: list[CheckedLine] = []
 
     def connect() -> str:
-        if driver == "nidaqmx":
-            opened.append(DigitalOutputLine(port, lasers))
-        else:
-            opened.append(ControllerLine(port, baud, workbench.alarm))
+        opened.append(open_line(line, settings, lasers, workbench.alarm, _hurry))
         identity = opened[0].identify(boot_s)
         opened[0].all_off()
         return identity
 
-    code = answer(0, connect)
-    if code not in {0, LaserOffNotConfirmedError.exit_code}:
+    code = answer(answers, 0, connect)
+    if code not in {0, LaserOffNotConfirmedError.exit_code} or not opened:
         return code
-    guardian = Guardian(workbench, opened[0], hang_s)
+    guardian = Guardian(workbench, opened[0], answers, hang_s)
     return guardian.leave() if code else guardian.serve()
 
 
+def _hurry() -> None:
+    """Run before all else on a busy computer, where that is allowed: the guardian sleeps nearly always."""
+    with suppress(AttributeError, OSError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+
+
+def _keep_answers() -> int:
+    """Descriptor for answers. What a driver's libraries print goes nowhere: it would pass for an answer."""
+    answers = os.dup(sys.stdout.fileno())
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+    return answers
+
+
 if __name__ == "__main__":
-    _, driver, port, baud, lasers, boot_s, hang_s, signals = sys.argv
-    sys.exit(main(driver, port, int(baud), int(lasers), float(boot_s), float(hang_s), int(signals)))
+    _, line, settings, lasers, boot_s, hang_s, signals = sys.argv
+    sys.exit(main(line, settings, int(lasers), float(boot_s), float(hang_s), int(signals)))

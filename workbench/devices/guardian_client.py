@@ -12,21 +12,20 @@ import sys
 import threading
 import time
 
+from workbench.devices.guarded_line import TRY_BOARD_S, GuardedLine, line_reference
 from workbench.model import errors
+from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import (
     BadInputError,
     LaserOffNotConfirmedError,
     RigNotReadyError,
     WorkbenchError,
 )
-from workbench.model.rig import LaserDriver
 
 ANSWER_S = 10.0
 """Longer than the guardian takes for anything: twice two requests of a second, and a busy computer."""
 LET_GO_S = 3.0
 """For a guardian to end where an off is not confirmed and somebody has to be told soon."""
-TRY_BOARD_S = 60.0
-"""How long a guardian goes on trying to put off, without its workbench, what no lease would end."""
 DARK = {0, BadInputError.exit_code, RigNotReadyError.exit_code}
 """A guardian's exit codes that leave nothing to tell: all is off, or it never had the port."""
 
@@ -36,9 +35,8 @@ class GuardianClient:
 
     def __init__(
         self,
-        driver: LaserDriver,
-        port: str,
-        baud: int,
+        line_type: type[GuardedLine],
+        settings: DeviceBlock,
         lasers: int,
         boot_s: float,
         hang_s: float,
@@ -49,15 +47,16 @@ class GuardianClient:
         Where the lasers are `virtual` it has nothing to tell whoever sits at the terminal once we are gone.
 
         Raises:
-            BadInputError: a board's port names fewer lines than there are `lasers`.
-            RigNotReadyError: no such port, another program holds it, or nobody answers as expected.
-            LaserOffNotConfirmedError: the controller answers, but not that all are off.
+            BadInputError: the device has fewer outputs than there are `lasers`.
+            RigNotReadyError: no such device, another program holds it, or it does not answer as expected.
+            LaserOffNotConfirmedError: the device answers, but not that all are off.
         """
         commands, self._commands = os.pipe()
         self._answers, answers = os.pipe()
         signals, self._signals = os.pipe()
         os.set_blocking(self._signals, False)
-        call = [driver, port, str(baud), str(lasers), str(boot_s), str(hang_s), str(signals)]
+        line = [line_reference(line_type), settings.model_dump_json(exclude_unset=True)]
+        call = [*line, str(lasers), str(boot_s), str(hang_s), str(signals)]
         # -P: what lies in the current folder is not imported. A session of its own: no terminal reaches it.
         said = os.open(os.devnull, os.O_WRONLY) if virtual else _last_words()
         self._process = subprocess.Popen(  # noqa: S603 - this very program
@@ -70,7 +69,7 @@ class GuardianClient:
         )
         for theirs in (commands, answers, signals, said):
             os.close(theirs)
-        self._has_leases = driver != "nidaqmx"
+        self._has_leases = line_type.has_leases
         self.is_open = True
         self._heard = b""
         self._asked = 0

@@ -81,10 +81,22 @@ def settable(camera: Camera) -> tuple[ExposableCamera, tuple[float, float]] | No
     return camera, camera.exposure_limits
 
 
+@dataclass(frozen=True)
+class LaserState:
+    """State of the lasers' outputs and of the interlock, as the device reports it."""
+
+    lit: tuple[str, ...]
+    """Ids of the lasers that are on."""
+    interlock_closed: bool | None
+    """None where the driver does not know."""
+
+
 class LaserBank(Protocol):
     """The lasers. There is one way to switch one on, and it ends by itself."""
 
     ids: tuple[str, ...]
+    identity: str
+    """Name of the device that switches them, as it reports it."""
 
     def lit(self, ids: Sequence[str], for_s: float) -> AbstractContextManager[None]:
         """Hold the lasers `ids` lit inside the `with` block, `for_s` seconds at the most.
@@ -96,8 +108,18 @@ class LaserBank(Protocol):
             LaserOffNotConfirmedError: the controller did not confirm that all are off.
         """
 
+    def beat(self) -> None:
+        """Renew the lease of what is on. To be called by the thread that does the work."""
+
     def all_off(self) -> None:
         """Put every laser off and verify it; the errors of `lit`."""
+
+    def state(self) -> LaserState:
+        """What is on at this moment, and the interlock.
+
+        Raises:
+            RigNotReadyError: the device does not answer.
+        """
 
     def close(self) -> None:
         """All off, then release the device."""
@@ -132,7 +154,9 @@ class Bench:
     """Called with the key of the capture about to be taken. An emulated bench keys its noise by it, so that a
     capture taken again after a stop is the same to the bit; a real bench has no use for it."""
     operator: Operator | None = None
-    """An emulated bench has one of its own, who does what he is told; at a real one a person answers."""
+    """Operator of an emulated bench, who does what prompts ask for; None: a person answers."""
+    virtual: bool = False
+    """Whether the beams are simulated."""
 
     def __enter__(self) -> Bench:
         return self

@@ -83,14 +83,13 @@ def live(
 ) -> Iterator[Live]:
     before = {number: signal.getsignal(number) for number in SIGNALS}
     live = Live(calibration, monkeypatch, capsys)
-    really_open = emulator.open_bench
 
     def look(rig: Rig, folder: Path) -> EmulatedBench:
-        bench = really_open(rig, folder)
+        bench = emulator.open_bench(rig, folder)
         live.controllers.append(bench.controller)
         return bench
 
-    monkeypatch.setattr(emulator, "open_bench", look)
+    monkeypatch.setattr(emulator, "DRIVER", replace(emulator.DRIVER, open=look))
     yield live
     for number, handler in before.items():
         signal.signal(number, handler)

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.devices.protocols import Bench, Operator
-from workbench.devices.registry import check_driver, open_bench
+from workbench.devices.registry import check_driver, load_bench_rig, open_bench
 from workbench.model import event as ev
 from workbench.model.calibration import Provenance
 from workbench.model.errors import BadInputError, StoppedError, WorkbenchError
 from workbench.model.procedure import CaptureGridStep, FitStep, Procedure, Step, load_procedure
-from workbench.model.rig import Rig, load_rig
+from workbench.model.rig import Rig
 from workbench.procedure.engine.context import Context, UpcomingFit
 from workbench.procedure.engine.operator import NoOperator, operator_of_bench
 from workbench.procedure.engine.replay import ReplayingJournal
@@ -51,7 +51,7 @@ class Plan:
             BadInputError: one of them is wrong.
         """
         procedures = tuple(load_procedure(path) for path in procedure_paths)
-        return cls.of(load_rig(rig_path), rig_path, procedures, procedure_paths)
+        return cls.of(load_bench_rig(rig_path), rig_path, procedures, procedure_paths)
 
     @classmethod
     def of(
