@@ -54,7 +54,7 @@ class Lab:
         shown = 12.0 + u % 3  # no camera is as even as one number
         for lit, (spot_u, spot_v) in zip(self.lit(), SPOTS_PX, strict=True):
             shown += lit * 180 * np.exp(-((u - spot_u) ** 2 + (v - spot_v) ** 2) / (2 * 1.5**2))
-        return shown.astype(np.uint8)
+        return np.asarray(shown, np.uint8)
 
 
 @pytest.fixture(scope="module")

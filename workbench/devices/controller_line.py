@@ -16,12 +16,12 @@ from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 
 REPLY_S = 1.0
-"""A controller answers within milliseconds, a busy computer passes it on within this."""
+"""Longest wait for a reply, s: controllers answer within milliseconds, a busy computer passes it on later."""
 LONGEST_REPLY = 200
 LOOK_S = 0.02
-"""Between two looks at whether `alarm` wants the lasers off, while a reply is waited for."""
+"""Time between two calls of `alarm` while a reply is awaited, s."""
 LINE_FAILURES = (serial.SerialException, OSError, termios.error)
-"""A line that hangs up shows as any of these, depending on the call under way."""
+"""Errors of a line that hangs up, depending on the call under way."""
 
 
 class SerialBlock(DeviceBlock):
@@ -60,15 +60,15 @@ class ControllerLine:
             ) from None
 
     def identify(self, boot_s: float) -> str:
-        """Who answers. A controller that starts anew when its port is opened has `boot_s` to answer.
+        """Identity of the controller. One that boots when its port is opened has `boot_s` to answer.
 
         Raises:
-            RigNotReadyError: nobody answers as expected.
+            RigNotReadyError: nothing answers as expected.
         """
         deadline = time.monotonic() + boot_s
         while True:
             try:
-                # Off comes first: whoever answers, and whatever a program before this one left lit.
+                # Off first: another program may have left lasers on.
                 self._request("!", "OFF")
                 return self._request("*IDN?", "*IDN")
             except RigNotReadyError:
@@ -76,18 +76,18 @@ class ControllerLine:
                     raise
 
     def light(self, mask: int, lease_ms: int) -> None:
-        """The lasers of `mask` on and the others off, for a lease.
+        """Switch the lasers of `mask` on and the others off, for a lease.
 
         Raises:
-            RigNotReadyError: refused, not answered, or put off again by an alarm.
+            RigNotReadyError: refused, not answered, or switched off again by an alarm.
         """
         self._request(f"MASK {mask} {lease_ms}", f"ON {mask} {lease_ms}", self._alarm)
 
     def all_off(self) -> None:
-        """Put every laser off and ask the controller whether it did; tried twice.
+        """Switch every laser off and ask the controller whether it did; tried twice.
 
         Raises:
-            LaserOffNotConfirmedError: it did not say so.
+            LaserOffNotConfirmedError: it did not confirm that.
         """
         came = ""
         for _ in range(2):
@@ -103,7 +103,7 @@ class ControllerLine:
         )
 
     def state(self) -> tuple[int, bool]:
-        """Mask of what is lit now, and whether the interlock is closed.
+        """Mask of what is on now, and whether the interlock is closed.
 
         Raises:
             RigNotReadyError: not answered.
@@ -140,7 +140,7 @@ class ControllerLine:
         return reply.rstrip()[len(head) + 1 :]
 
     def _receive(self, alarm: Callable[[], bool]) -> bytes:
-        """One line; what came of it after `REPLY_S`. After an alarm all lines up to the answer to the off."""
+        """One line, or what came of it in `REPLY_S`; after an alarm all lines up to the answer to off."""
         came, end = b"", b"\n"
         deadline = time.monotonic() + REPLY_S
         while end not in came and len(came) < LONGEST_REPLY and time.monotonic() < deadline:

@@ -31,10 +31,10 @@ class DigitalOutputLine:
     has_leases: ClassVar[bool] = False
 
     def __init__(self, settings: DigitalOutputBlock, lasers: int, alarm: Callable[[], bool]) -> None:
-        """Reserve the board's lines and put them low.
+        """Reserve the board's lines and set them low.
 
         Raises:
-            BadInputError: they are fewer than the rig's lasers.
+            BadInputError: there are fewer of them than lasers.
             RigNotReadyError: the package or its driver is missing, or there are no such lines.
         """
         self._lines = lines = settings.port
@@ -58,7 +58,7 @@ class DigitalOutputLine:
             )
 
     def identify(self, boot_s: float) -> str:
-        """Which board; it needs no time to start.
+        """Product and name of the board; it needs no time to boot.
 
         Raises:
             RigNotReadyError: it does not answer.
@@ -68,16 +68,16 @@ class DigitalOutputLine:
         return f"{', '.join(boards)}, {self._count} lines"
 
     def light(self, mask: int, lease_ms: int) -> None:
-        """The lasers of `mask` on and the others off, until they are put off: the lease is the guardian's.
+        """Switch the lasers of `mask` on and the others off; the lease is the guardian's.
 
         Raises:
-            RigNotReadyError: the board does not take it.
+            RigNotReadyError: the board refuses.
         """
         with self._asked("set the lines"):
             self._write(mask)
 
     def all_off(self) -> None:
-        """Put every line low and read them back; tried twice.
+        """Set every line low and read them back; tried twice.
 
         Raises:
             LaserOffNotConfirmedError: they do not read low.
@@ -98,7 +98,7 @@ class DigitalOutputLine:
         )
 
     def state(self) -> tuple[int, bool | None]:
-        """Mask of the lines that are high; of an interlock the board knows nothing.
+        """Mask of the lines that are high; the board has no interlock.
 
         Raises:
             RigNotReadyError: it does not answer.
@@ -118,7 +118,7 @@ class DigitalOutputLine:
 
     @contextmanager
     def _asked(self, what: str) -> Iterator[None]:
-        """Whatever goes wrong while the board is asked to do it is one kind of error."""
+        """Turn any error of the board's package into a `RigNotReadyError`."""
         try:
             yield
         except Exception as error:

@@ -58,7 +58,7 @@ class GuardedLaserBank:
 
     @contextlib.contextmanager
     def lit(self, ids: Sequence[str], for_s: float) -> Iterator[None]:
-        """Hold `ids` lit inside the block, `for_s` seconds at the most; see `protocols.LaserBank`."""
+        """Hold `ids` lit inside the block, for at most `for_s` seconds; see `protocols.LaserBank`."""
         mask = self._mask(ids)
         if not 0 < for_s <= LONGEST_LEASE_S:
             raise BadInputError(
@@ -72,32 +72,32 @@ class GuardedLaserBank:
             self.all_off()
 
     def beat(self) -> None:
-        """Tell that the work goes on; to be called by the thread that does it. Nothing while all are off."""
+        """See `protocols.LaserBank`; without effect while all are off."""
         if self._lit:
             self._guardian.tell("BEAT")
 
     def all_off(self) -> None:
-        """Put every laser off and ask the controller whether it did; tried twice.
+        """Switch every laser off and verify it at the device.
 
         Raises:
-            LaserOffNotConfirmedError: it did not say so.
+            LaserOffNotConfirmedError: the device does not confirm it.
             RigNotReadyError, StoppedError: they are off, but went off before this was called.
         """
         self._lit = False
         self._guardian.ask("OFF")
 
     def state(self) -> LaserState:
-        """What is lit at this moment.
+        """What is on at this moment, and the interlock.
 
         Raises:
-            RigNotReadyError: the controller does not answer.
+            RigNotReadyError: the device does not answer.
         """
         mask, interlock_closed = cast("tuple[int, bool | None]", self._guardian.ask("STATE"))
         lit = tuple(name for bit, name in enumerate(self.ids) if mask >> bit & 1)
         return LaserState(lit, interlock_closed)
 
     def close(self) -> None:
-        """All off, then release the port; the errors of `all_off`."""
+        """All off, then release the device; the errors of `all_off`."""
         if not self._guardian.is_open:
             return
         try:

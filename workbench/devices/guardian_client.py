@@ -1,4 +1,4 @@
-"""The workbench's end of its guardian: starts it, talks to it, passes on what signals the workbench gets."""
+"""The workbench's end of the guardian: start it, exchange commands and answers, pass signals on to it."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from workbench.model.errors import (
 )
 
 ANSWER_S = 10.0
-"""Longer than the guardian takes for anything: twice two requests of a second, and a busy computer."""
+"""Longest time to wait for an answer, s: twice two requests of a second, and a busy computer."""
 LET_GO_S = 3.0
-"""For a guardian to end where an off is not confirmed and somebody has to be told soon."""
+"""Time for a guardian to end where no lease ends an emission and the off is not confirmed, s."""
 DARK = {0, BadInputError.exit_code, RigNotReadyError.exit_code}
-"""A guardian's exit codes that leave nothing to tell: all is off, or it never had the port."""
+"""A guardian's exit codes that need no warning: all is off, or it never held the device."""
 
 
 class GuardianClient:
-    """A guardian process, see `guardian.py`. It holds the port until this is closed, or its process ends."""
+    """A guardian process, see `guardian.py`. It holds the device until this is closed or its process ends."""
 
     def __init__(
         self,
@@ -44,7 +44,13 @@ class GuardianClient:
     ) -> None:
         """Start it, and wait until every laser is off.
 
-        Where the lasers are `virtual` it has nothing to tell whoever sits at the terminal once we are gone.
+        Args:
+            line_type: the laser driver.
+            settings: its block of the rig file.
+            lasers: number of lasers.
+            boot_s: time in which the device has to answer, s.
+            hang_s: time without a beat after which lasers go off, s.
+            virtual: whether the beams are simulated: the guardian then writes nothing to the terminal.
 
         Raises:
             BadInputError: the device has fewer outputs than there are `lasers`.
@@ -76,7 +82,7 @@ class GuardianClient:
         self._unconfirmed = (
             "the lasers may be on: it was not confirmed that they are off; treat the beams as on"
         )
-        """What the guardian told last of an off that was not confirmed, if it could."""
+        """Reason that the guardian gave last for an off that was not confirmed."""
         self._before: int | None = None
         try:
             self.identity = str(self._answer(0, ANSWER_S + boot_s))
@@ -94,7 +100,7 @@ class GuardianClient:
             WorkbenchError: what the guardian could not do, by its name.
             LaserOffNotConfirmedError: the guardian does not answer.
         """
-        # Numbered: a signal may have raised while an earlier answer was waited for, which is still to come.
+        # Numbered: a signal may have raised while an earlier answer was awaited, which is still to come.
         self._asked += 1
         self.tell(f"{self._asked} {command}")
         return self._answer(self._asked, ANSWER_S)
@@ -102,14 +108,14 @@ class GuardianClient:
     def tell(self, command: str) -> None:
         """A command without an answer. A guardian that is gone shows at the next `ask`."""
         if not self.is_open:
-            raise ValueError("the guardian was let go: its descriptors may be another's now")
+            raise ValueError("the guardian was let go: its descriptors may belong to another file now")
         with contextlib.suppress(BrokenPipeError):
             os.write(self._commands, f"{command}\n".encode())
 
     def close(self) -> None:
-        """Let it go: it puts everything off and ends.
+        """Let it go: it switches everything off and ends.
 
-        Where no lease of the hardware would end what is lit, one that does not come to its end is left at it.
+        Where no lease of the hardware ends an emission, a guardian that does not end is left trying.
 
         Raises:
             LaserOffNotConfirmedError: it is, or it ended without having confirmed that all are off.
@@ -126,7 +132,7 @@ class GuardianClient:
         except LaserOffNotConfirmedError:
             raise
         except BaseException:
-            # A stop that was asked for once more. What is still to be told counts more than that.
+            # Another stop was asked for. An off that is not confirmed counts more than that.
             self._wait_for_off()
             raise
 
@@ -135,7 +141,7 @@ class GuardianClient:
             code = self._process.wait(ANSWER_S if self._has_leases else LET_GO_S)
         except subprocess.TimeoutExpired:
             if not self._has_leases:
-                # Something has to wait for its end.
+                # Its exit status has to be collected.
                 threading.Thread(target=self._process.wait, daemon=True).start()
                 raise LaserOffNotConfirmedError(
                     f"{self._unconfirmed}. The guardian (process {self._process.pid}) goes on trying for some"
@@ -174,9 +180,9 @@ class GuardianClient:
 
 
 def _last_words() -> int:
-    """Where the guardian writes what comes too late for its pipe: the terminal, if there is one.
+    """Descriptor for what the guardian has to say after this process ended: the terminal, if there is one.
 
-    Not our standard error: it outlives us, and whoever reads that to its end would wait for it.
+    Not our standard error: the guardian outlives us, and a reader of that stream would wait for its end.
     """
     try:
         return os.open("/dev/tty", os.O_WRONLY | os.O_NOCTTY)

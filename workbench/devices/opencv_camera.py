@@ -21,17 +21,17 @@ from workbench.model.exposure import WIDEST
 from workbench.model.rig import CameraSpec, Name, PositiveFloat, Rig
 
 SILENT_S = 1.5
-"""A camera that has sent nothing for so long is not going to. It leaves time to say so within two seconds."""
+"""Time without a frame after which a camera counts as unplugged, s: it is reported within two seconds."""
 LOOK_S = 0.05
-"""Between two beats while a frame is waited for."""
+"""Time between two beats while a frame is awaited, s."""
 BACKLOG = 32
-"""Frames kept for whoever reads them one by one."""
+"""Number of frames kept for a caller that reads them one by one."""
 MANUAL_EXPOSURE = 1.0
-"""Of V4L2's `exposure_auto`."""
+"""Value of V4L2's `exposure_auto`."""
 COARSEST_STEP = 2.0
-"""Factor between an exposure that was asked for and the nearest that the camera has."""
+"""Largest factor between a requested exposure and the one that the camera sets."""
 SAME = 0.005
-"""Relative difference below which a setting was taken as asked."""
+"""Relative difference below which a setting counts as set as requested."""
 
 
 class OpenCvBlock(DeviceBlock):
@@ -78,7 +78,7 @@ class OpenCvBlock(DeviceBlock):
 class OpenCvCamera:
     """See `protocols.StreamingCamera` and `protocols.ExposableCamera`.
 
-    A thread of its own takes the frames as they come, so that none is older than it need be; from a file it
+    A thread of its own takes the frames as they come, so that none is older than necessary; from a file it
     takes one when the one before has been read.
     """
 

@@ -1,4 +1,4 @@
-"""What the procedures ask of a bench; nothing above a driver knows which one it talks to."""
+"""What procedures and ranging need of a bench, whatever its drivers."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ class Camera(Protocol):
 
 @runtime_checkable
 class StreamingCamera(Camera, Protocol):
-    """A camera that lets its stream be looked at, so that its latency can be measured."""
+    """A camera whose stream can be read, so that its latency can be measured."""
 
     discard_frames: int
-    """How many frames `grab` throws away as too old."""
+    """Number of frames that `grab` drops as too old."""
 
     def read(self) -> Frame:
         """The next frame of the stream, as old as it is.
@@ -99,9 +99,9 @@ class LaserBank(Protocol):
     """Name of the device that switches them, as it reports it."""
 
     def lit(self, ids: Sequence[str], for_s: float) -> AbstractContextManager[None]:
-        """Hold the lasers `ids` lit inside the `with` block, `for_s` seconds at the most.
+        """Hold the lasers `ids` lit inside the `with` block, for at most `for_s` seconds.
 
-        Leaving the block puts every laser off and asks the controller whether it did.
+        Leaving the block switches every laser off and verifies it at the device.
 
         Raises:
             RigNotReadyError: the controller refuses or does not answer.
@@ -112,7 +112,7 @@ class LaserBank(Protocol):
         """Renew the lease of what is on. To be called by the thread that does the work."""
 
     def all_off(self) -> None:
-        """Put every laser off and verify it; the errors of `lit`."""
+        """Switch every laser off and verify it; the errors of `lit`."""
 
     def state(self) -> LaserState:
         """What is on at this moment, and the interlock.
@@ -126,20 +126,20 @@ class LaserBank(Protocol):
 
 
 class Target(Protocol):
-    """Whatever puts the target in its place: a person, a rail, an emulated bench."""
+    """What places the target: a person, a rail, an emulated bench."""
 
     def place(self, placement: Placement) -> Placement:
-        """Put the target there; returns the placement as it was measured by the ruler."""
+        """Place the target; returns the placement as measured by the ruler."""
 
 
 class Operator(Protocol):
-    """Whoever answers a procedure's questions."""
+    """Who answers a procedure's prompts."""
 
     def ask(self, prompt: Prompt) -> Answer:
-        """Put one question and wait for its answer, which fits (`Prompt.refuse`).
+        """Ask one question and wait for its answer, which fits (`Prompt.refuse`).
 
         Raises:
-            AnswerNeededError: nobody is there to answer.
+            AnswerNeededError: there is nobody to answer.
         """
 
 
