@@ -10,6 +10,7 @@ REAL_TIME = {
     "tests/bench/test_unplugged.py",
     "tests/firmware/test_pins.py",
     "tests/unit/devices/test_digital_output.py",
+    "tests/unit/devices/test_guarded_line.py",
     "tests/unit/devices/test_guardian.py",
     "tests/unit/devices/test_real_bench.py",
 }

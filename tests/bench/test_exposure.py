@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -97,12 +98,11 @@ def test_live_ranging_says_that_it_sets_no_exposure(
     request = LiveRequest(tmp_path, tmp_path, readings=0, standoff_mm=500.0, stats=False)
     with open_bench(rig, tmp_path / "s") as bench:
         _read_all(
-            bench,
+            replace(bench, virtual=virtual),
             Ranger(calibration_of(rig)),
             request,
             False,
             cast(StopAfterShot, SimpleNamespace(reason=None)),
-            virtual,
         )
     assert ("exposure stays as the rig file sets it" in " ".join(capsys.readouterr().err.split())) != virtual
 

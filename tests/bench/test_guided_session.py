@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.crash.short import CALLER, RESUMER, go_on, results, story, write_files
-from workbench.devices.protocols import Bench, Frame, Operator, StreamingCamera
+from workbench.devices.protocols import Bench, Frame, LaserState, Operator, StreamingCamera
 from workbench.devices.registry import open_bench
 from workbench.emulator.camera import EmulatedCamera
 from workbench.model import event as ev
@@ -441,6 +441,13 @@ class Clocked:
 
     grab = grab_ambient = read
     ids: tuple[str, ...] = ("L1", "L4")
+    identity = "clocked"
+
+    def beat(self) -> None:
+        pass
+
+    def state(self) -> LaserState:
+        return LaserState((), None)
 
     def close(self) -> None:
         pass

@@ -10,7 +10,7 @@ import pytest
 from tests.bench.test_guided_session import GRID, HEAD, Says, events, session
 from tests.crash.short import write_files
 from workbench.cli.plan import print_plan
-from workbench.devices.serial_lasers import SerialLaserBank
+from workbench.devices.guarded_lasers import GuardedLaserBank
 from workbench.model import event as ev
 from workbench.model.prompt import Answer, Prompt
 from workbench.session.journal import Journal, read_journal
@@ -19,9 +19,9 @@ from workbench.session.journal import Journal, read_journal
 def test_lasers_are_put_off_before_every_question(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Verified off, since the last question: whatever was lit in between, the operator may step in."""
     told: list[str] = []
-    put_off = SerialLaserBank.all_off
+    put_off = GuardedLaserBank.all_off
 
-    def all_off(bank: SerialLaserBank) -> None:
+    def all_off(bank: GuardedLaserBank) -> None:
         put_off(bank)
         told.append("off")
 
@@ -30,7 +30,7 @@ def test_lasers_are_put_off_before_every_question(tmp_path: Path, monkeypatch: p
             told.append(f"ask {prompt.key}")
             return super().ask(prompt)
 
-    monkeypatch.setattr(SerialLaserBank, "all_off", all_off)
+    monkeypatch.setattr(GuardedLaserBank, "all_off", all_off)
     question = "  - {step: ask, text: Which card?, choices: [white, grey]}\n"
     session(tmp_path, GRID + question, Operator(("p.2", Answer(value="grey"))))
     asked = [n for n, what in enumerate(told) if what != "off"]
@@ -92,7 +92,7 @@ def test_frames_are_on_disk_before_the_record_that_names_them(
 def test_a_warm_up_runs_the_camera_in_the_dark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its frames are taken, nothing is lit or kept, nobody is asked."""
     lit: list[object] = []
-    monkeypatch.setattr(SerialLaserBank, "lit", lambda *told, **for_s: lit.append(told))
+    monkeypatch.setattr(GuardedLaserBank, "lit", lambda *told, **for_s: lit.append(told))
     operator = Says()
     grabbed: list[str] = []
     monkeypatch.setattr(

@@ -10,7 +10,7 @@ import pytest
 import serial
 
 from tests.firmware.parts import Running, build
-from workbench.devices.serial_lasers import SerialLaserBank
+from tests.support.lasers import serial_bank
 
 IDS = ("L1", "L2", "L3", "L4")
 
@@ -101,7 +101,7 @@ def test_a_reply_that_nobody_reads_does_not_hold_up_the_lease(
 
 
 def test_the_driver(controller: Running) -> None:
-    bank = SerialLaserBank(controller.port, IDS)
+    bank = serial_bank(controller.port, IDS)
     with bank.lit(["L2", "L3"], for_s=5.0):
         assert controller.lines() == 6
     assert controller.lines() == 0

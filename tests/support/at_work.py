@@ -1,8 +1,9 @@
 """A workbench process with lasers lit, for the tests that end it: lights, then works as an argument says.
 
-Call: at_work.py PORT WORK, WORK being `beats` (short pieces of Python), `computes` (0.1 s in C code that no
-signal interrupts, as long a rest, a beat), `terminal` (as `beats`, its standard input its terminal) or
-`loaded` (as `beats`, with the libraries of a session in memory, which take time to be given back).
+Call: python -m tests.support.at_work PORT WORK, WORK being `beats` (short pieces of Python), `computes`
+(0.1 s in C code that no signal interrupts, as long a rest, a beat), `terminal` (as `beats`, its standard
+input its terminal) or `loaded` (as `beats`, with the libraries of a session in memory, which take time to be
+given back).
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ import time
 
 import numpy as np
 
+from tests.support.lasers import serial_bank
 from workbench.cli.stopping import StopAfterShot
-from workbench.devices.serial_lasers import SerialLaserBank
 from workbench.model.arrays import FloatArray
 
 
@@ -43,7 +44,7 @@ def main(port: str, work: str) -> None:
     if work == "terminal":
         fcntl.ioctl(0, termios.TIOCSCTTY, 0)
     StopAfterShot()  # as `workbench run` does
-    bank = SerialLaserBank(port, ("L1", "L2", "L3", "L4"))
+    bank = serial_bank(port, ("L1", "L2", "L3", "L4"))
     with bank.lit(["L1", "L3"], for_s=60.0):
         print(bank._guardian._process.pid, flush=True)
         assert held is None or held.size

@@ -12,9 +12,8 @@ from rich.text import Text
 
 from workbench.cli.stopping import StopAfterShot
 from workbench.cli.terminal_operator import choose_operator
-from workbench.devices.registry import open_bench
+from workbench.devices.registry import load_bench_rig, open_bench
 from workbench.model.errors import RigNotReadyError
-from workbench.model.rig import load_rig
 from workbench.procedure.doctor import examine
 from workbench.procedure.engine.operator import operator_of_bench
 
@@ -26,7 +25,7 @@ def examine_rig(rig_path: Path, no_input: bool) -> None:
         RigNotReadyError: one of them is not well.
         WorkbenchError: the rig file is wrong, nobody answers, or a beam stays on.
     """
-    rig = load_rig(rig_path)
+    rig = load_bench_rig(rig_path)
     console = Console(stderr=True, highlight=False, soft_wrap=not sys.stderr.isatty())
     stopping = StopAfterShot()
     bad = []

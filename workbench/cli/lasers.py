@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from workbench.devices.real_bench import open_lasers
+from workbench.devices.registry import load_bench_rig, open_lasers, whole_bench
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
-from workbench.model.rig import Rig, load_rig
+from workbench.model.rig import Rig
 
 
 def lasers_off(rig_path: Path) -> str:
@@ -16,8 +16,8 @@ def lasers_off(rig_path: Path) -> str:
         BadInputError: the rig file is wrong, or names no controller.
         LaserOffNotConfirmedError: nobody confirmed it, for whatever reason.
     """
-    rig = load_rig(rig_path)
-    if rig.driver == "emulated":
+    rig = load_bench_rig(rig_path, kinds=("lasers",))
+    if _is_virtual(rig):
         return _virtual(rig)
     try:
         lasers = open_lasers(rig)
@@ -27,6 +27,11 @@ def lasers_off(rig_path: Path) -> str:
             f"the lasers may be on: {error}. Treat the beams as on, cut the lasers' supply"
         ) from None
     return f"all lasers are off, confirmed by {lasers.identity}"
+
+
+def _is_virtual(rig: Rig) -> bool:
+    whole = whole_bench(rig)
+    return whole is not None and whole.virtual
 
 
 def _virtual(rig: Rig) -> str:
@@ -39,8 +44,8 @@ def lasers_state(rig_path: Path) -> str:
     Raises:
         WorkbenchError: the rig file is wrong, or the controller does not answer.
     """
-    rig = load_rig(rig_path)
-    if rig.driver == "emulated":
+    rig = load_bench_rig(rig_path, kinds=("lasers",))
+    if _is_virtual(rig):
         return _virtual(rig)
     lasers = open_lasers(rig)
     try:

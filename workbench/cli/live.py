@@ -14,10 +14,9 @@ from workbench.cli.range import usable
 from workbench.cli.reading_json import plain
 from workbench.cli.stopping import StopAfterShot
 from workbench.devices.protocols import Bench
-from workbench.devices.registry import open_bench
+from workbench.devices.registry import load_bench_rig, open_bench
 from workbench.devices.watched import watched
 from workbench.model.errors import StoppedError
-from workbench.model.rig import load_rig
 from workbench.model.target import Placement
 from workbench.ranging.live import LiveRanger, check_same_sensor, latency_words
 from workbench.ranging.ranger import Ranger, Reading
@@ -52,7 +51,7 @@ def range_live(request: LiveRequest, as_json: bool) -> None:
         StoppedError: a signal came.
         LaserOffNotConfirmedError: a beam may be on.
     """
-    rig, calibration = load_rig(request.rig), usable(request.calibration)
+    rig, calibration = load_bench_rig(request.rig), usable(request.calibration)
     check_same_sensor(rig, calibration)
     stopping = StopAfterShot()
     # A bench keeps what it must beside its session; live ranging keeps none.
@@ -60,7 +59,7 @@ def range_live(request: LiveRequest, as_json: bool) -> None:
         tempfile.TemporaryDirectory(prefix="workbench-range-") as folder,
         watched(open_bench(rig, Path(folder) / "live")) as bench,
     ):
-        _read_all(bench, Ranger(calibration), request, as_json, stopping, rig.driver == "emulated")
+        _read_all(bench, Ranger(calibration), request, as_json, stopping)
 
 
 def _read_all(
@@ -69,11 +68,10 @@ def _read_all(
     request: LiveRequest,
     as_json: bool,
     stopping: StopAfterShot,
-    virtual: bool,
 ) -> None:
     live = LiveRanger(ranger, bench)
     live.warm_up()
-    if not virtual:
+    if not bench.virtual:
         say(f"note: {FIXED_EXPOSURE}")
     if request.standoff_mm is not None:
         bench.target.place(Placement(key="live", standoff_mm=request.standoff_mm))
@@ -87,7 +85,7 @@ def _read_all(
             reading = live.read(f"{number}")
             _show(reading, as_json)
             if number == 0 and reading.status == "no_points":
-                say(f"hint: {_why_nothing(request, virtual)}")
+                say(f"hint: {_why_nothing(request, bench.virtual)}")
     finally:
         if request.stats:
             say(latency_words(live.latencies_s, time.monotonic() - began))

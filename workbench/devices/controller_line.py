@@ -1,4 +1,4 @@
-"""The serial line to a laser controller that speaks docs/laser-controller.md. Only the guardian holds one."""
+"""The laser driver `serial`: a controller that speaks docs/laser-controller.md, on a serial line."""
 
 from __future__ import annotations
 
@@ -7,31 +7,42 @@ import select
 import termios
 import time
 from collections.abc import Callable
+from typing import Annotated, ClassVar
 
 import serial
+from pydantic import Field
 
+from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 
 REPLY_S = 1.0
-"""A controller answers within milliseconds, a busy computer passes it on within this."""
+"""Longest wait for a reply, s: controllers answer within milliseconds, a busy computer passes it on later."""
 LONGEST_REPLY = 200
 LOOK_S = 0.02
-"""Between two looks at whether `alarm` wants the lasers off, while a reply is waited for."""
+"""Time between two calls of `alarm` while a reply is awaited, s."""
 LINE_FAILURES = (serial.SerialException, OSError, termios.error)
-"""A line that hangs up shows as any of these, depending on the call under way."""
+"""Errors of a line that hangs up, depending on the call under way."""
+
+
+class SerialBlock(DeviceBlock):
+    """The block `devices: lasers:` of the rig file."""
+
+    port: str
+    """Of the controller."""
+    baud: Annotated[int, Field(gt=0)] = 115_200
 
 
 class ControllerLine:
-    """Requests and replies."""
+    """Requests and replies; see `guarded_line.GuardedLine`."""
 
-    has_leases = True
-    """The controller puts off by itself what is not renewed."""
+    settings_type: ClassVar = SerialBlock
+    has_leases: ClassVar[bool] = True
 
-    def __init__(self, port: str, baud: int, alarm: Callable[[], bool]) -> None:
+    def __init__(self, settings: SerialBlock, lasers: int, alarm: Callable[[], bool]) -> None:
         """Open the port, exclusively.
 
         `alarm` is asked while the reply to a request that lights is waited for; when it says so, off is
-        sent at once.
+        sent at once. A controller with fewer lines than `lasers` refuses to light the last ones.
 
         Raises:
             RigNotReadyError: no such port, or another program holds it.
@@ -39,23 +50,25 @@ class ControllerLine:
         self._token = 0
         self._alarm = alarm
         try:
-            self._line = serial.Serial(port, baud, timeout=0, write_timeout=REPLY_S, exclusive=True)
+            self._line = serial.Serial(
+                settings.port, settings.baud, timeout=0, write_timeout=REPLY_S, exclusive=True
+            )
         except LINE_FAILURES as error:
             raise RigNotReadyError(
-                f"laser controller: expected a serial port at {port}, got: {error};"
+                f"laser controller: expected a serial port at {settings.port}, got: {error};"
                 " check the cable, and that no other program holds the port"
             ) from None
 
     def identify(self, boot_s: float) -> str:
-        """Who answers. A controller that starts anew when its port is opened has `boot_s` to answer.
+        """Identity of the controller. One that boots when its port is opened has `boot_s` to answer.
 
         Raises:
-            RigNotReadyError: nobody answers as expected.
+            RigNotReadyError: nothing answers as expected.
         """
         deadline = time.monotonic() + boot_s
         while True:
             try:
-                # Off comes first: whoever answers, and whatever a program before this one left lit.
+                # Off first: another program may have left lasers on.
                 self._request("!", "OFF")
                 return self._request("*IDN?", "*IDN")
             except RigNotReadyError:
@@ -63,18 +76,18 @@ class ControllerLine:
                     raise
 
     def light(self, mask: int, lease_ms: int) -> None:
-        """The lasers of `mask` on and the others off, for a lease.
+        """Switch the lasers of `mask` on and the others off, for a lease.
 
         Raises:
-            RigNotReadyError: refused, not answered, or put off again by an alarm.
+            RigNotReadyError: refused, not answered, or switched off again by an alarm.
         """
         self._request(f"MASK {mask} {lease_ms}", f"ON {mask} {lease_ms}", self._alarm)
 
     def all_off(self) -> None:
-        """Put every laser off and ask the controller whether it did; tried twice.
+        """Switch every laser off and ask the controller whether it did; tried twice.
 
         Raises:
-            LaserOffNotConfirmedError: it did not say so.
+            LaserOffNotConfirmedError: it did not confirm that.
         """
         came = ""
         for _ in range(2):
@@ -90,7 +103,7 @@ class ControllerLine:
         )
 
     def state(self) -> tuple[int, bool]:
-        """Mask of what is lit now, and whether the interlock is closed.
+        """Mask of what is on now, and whether the interlock is closed.
 
         Raises:
             RigNotReadyError: not answered.
@@ -127,7 +140,7 @@ class ControllerLine:
         return reply.rstrip()[len(head) + 1 :]
 
     def _receive(self, alarm: Callable[[], bool]) -> bytes:
-        """One line; what came of it after `REPLY_S`. After an alarm all lines up to the answer to the off."""
+        """One line, or what came of it in `REPLY_S`; after an alarm all lines up to the answer to off."""
         came, end = b"", b"\n"
         deadline = time.monotonic() + REPLY_S
         while end not in came and len(came) < LONGEST_REPLY and time.monotonic() < deadline:

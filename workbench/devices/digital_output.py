@@ -1,35 +1,43 @@
-"""Lasers on the lines of a digital output board, by NI-DAQmx. Only the guardian holds one.
+"""The laser driver `nidaqmx`: lasers on the lines of a digital output board, by NI-DAQmx.
 
 The board has no lease of its own: what was written stays until something else is written. The guardian, which
-holds nothing longer than its lease, is all that puts the lasers off (docs/laser-controller.md). So whatever
-goes wrong in the driver is an answer to it, and never its end.
+holds nothing longer than its lease, is all that puts the lasers off (docs/laser-controller.md).
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, ClassVar
 
+from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError
 
 PACKAGE = "nidaqmx"
 
 
+class DigitalOutputBlock(DeviceBlock):
+    """The block `devices: lasers:` of the rig file."""
+
+    port: str
+    """The board's lines, as `Dev1/port0/line0:3`."""
+
+
 class DigitalOutputLine:
-    """Has the methods of `ControllerLine`; laser 1 is the first line."""
+    """See `guarded_line.GuardedLine`; laser 1 is the first line."""
 
-    has_leases = False
+    settings_type: ClassVar = DigitalOutputBlock
+    has_leases: ClassVar[bool] = False
 
-    def __init__(self, lines: str, lasers: int) -> None:
-        """Reserve the board's lines, as `Dev1/port0/line0:3`, and put them low.
+    def __init__(self, settings: DigitalOutputBlock, lasers: int, alarm: Callable[[], bool]) -> None:
+        """Reserve the board's lines and set them low.
 
         Raises:
-            BadInputError: they are fewer than the rig's lasers.
+            BadInputError: there are fewer of them than lasers.
             RigNotReadyError: the package or its driver is missing, or there are no such lines.
         """
-        self._lines = lines
+        self._lines = lines = settings.port
         try:
             package = importlib.import_module(PACKAGE)
             constants = importlib.import_module(f"{PACKAGE}.constants")
@@ -50,7 +58,7 @@ class DigitalOutputLine:
             )
 
     def identify(self, boot_s: float) -> str:
-        """Which board; it needs no time to start.
+        """Product and name of the board; it needs no time to boot.
 
         Raises:
             RigNotReadyError: it does not answer.
@@ -60,16 +68,16 @@ class DigitalOutputLine:
         return f"{', '.join(boards)}, {self._count} lines"
 
     def light(self, mask: int, lease_ms: int) -> None:
-        """The lasers of `mask` on and the others off, until they are put off: the lease is the guardian's.
+        """Switch the lasers of `mask` on and the others off; the lease is the guardian's.
 
         Raises:
-            RigNotReadyError: the board does not take it.
+            RigNotReadyError: the board refuses.
         """
         with self._asked("set the lines"):
             self._write(mask)
 
     def all_off(self) -> None:
-        """Put every line low and read them back; tried twice.
+        """Set every line low and read them back; tried twice.
 
         Raises:
             LaserOffNotConfirmedError: they do not read low.
@@ -90,7 +98,7 @@ class DigitalOutputLine:
         )
 
     def state(self) -> tuple[int, bool | None]:
-        """Mask of the lines that are high; of an interlock the board knows nothing.
+        """Mask of the lines that are high; the board has no interlock.
 
         Raises:
             RigNotReadyError: it does not answer.
@@ -110,7 +118,7 @@ class DigitalOutputLine:
 
     @contextmanager
     def _asked(self, what: str) -> Iterator[None]:
-        """Whatever goes wrong while the board is asked to do it is one kind of error."""
+        """Turn any error of the board's package into a `RigNotReadyError`."""
         try:
             yield
         except Exception as error:

@@ -1,20 +1,23 @@
-"""The guardian: a process of its own that holds the laser controller's port for the workbench.
+"""The guardian: a process of its own that holds the lasers' device for the workbench.
+
+It is called with the laser driver (`module:name` of a `GuardedLine`) and its settings, and stays light: it
+imports that driver, the base of settings, and the errors.
 
 It takes commands on standard input, one a line, and answers on standard output, one JSON object a line, which
 repeats the command's number:
 
     <n> LIT <mask> <ms>   light these lasers, for a lease
-    <n> OFF               all off, verified; tells what went wrong since LIT
+    <n> OFF               all off, verified; reports what went wrong since LIT
     <n> STATE             what is lit, and the interlock
     BEAT                  the workbench is at work; no answer
 
-The first answer, number 0 and unasked, is who the controller is. A second descriptor brings the numbers of
+The first answer, number 0 and unasked, is the device's identity. A second descriptor brings the numbers of
 signals that the workbench got, one byte each, written by its C-level signal handler.
 
-It puts everything off when the workbench ends in whatever way, when it is told to end (SIGTERM, SIGHUP), and
-when no beat came for `hang_s` while something was lit. The last it leaves to nobody's clock but the
-controller's: that is never given a lease longer than `hang_s`, and each beat renews it. A digital output
-board has no lease: there it is the guardian's clock.
+It switches everything off when the workbench ends in whatever way, when a signal ends it (SIGTERM, SIGHUP),
+and when no beat came for `hang_s` while something was lit. The last is left to the device's clock: it never
+gets a lease longer than `hang_s`, and each beat renews that. For a device without leases, such as a digital
+output board, it is the guardian's clock.
 """
 
 from __future__ import annotations
@@ -31,19 +34,16 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.devices.controller_line import ControllerLine
-from workbench.devices.digital_output import DigitalOutputLine
-from workbench.devices.guardian_client import TRY_BOARD_S
+from workbench.devices.guarded_line import TRY_BOARD_S, CheckedLine, open_line
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError, WorkbenchError
 
 LOOK_S = 0.02
-"""Between two looks at whether the workbench lives, while something is lit: it sees what a pipe that a stray
-child holds open does not, and an end that the workbench has had no turn to come to."""
+"""Time between two checks that the workbench is alive, while something is lit, s. They find an end that the
+pipe does not show: a stray child holds it open, or the workbench has had no turn to end."""
 TRY_ALONE_S = 1.0
-"""How long it goes on trying to put off when there is nobody left to tell: twice the longest lease."""
+"""Time for which the guardian tries to switch off once the workbench is gone, s: twice the longest lease."""
 RENEW = 5
-"""A lease is renewed when a fifth of it has gone."""
-Line = ControllerLine | DigitalOutputLine
+"""A lease is renewed when this fraction of it, 1/RENEW, has gone."""
 AT_ONCE = {int(signal.SIGTERM), int(signal.SIGHUP)}
 STAT_FLAGS = 6
 """In /proc/PID/stat, counted from what comes after the process's name."""
@@ -59,16 +59,16 @@ class Workbench:
         self._pid = os.getppid()
         self._heard = b""
         self.gone = False
-        self.told_to_end: str | None = None
-        """The signal that told it to."""
+        self.end_signal: str | None = None
+        """Name of the signal that ends it."""
 
     def alarm(self) -> bool:
         """Whether the lasers have to go off at once."""
         self._look(0.0)
-        return self.gone or self.told_to_end is not None
+        return self.gone or self.end_signal is not None
 
     def command(self, wait_s: float | None) -> str | None:
-        """The next command; None when something else came, or nothing in `wait_s` (None: however long)."""
+        """The next command; None when something else came, or nothing in `wait_s` (None: no limit)."""
         if b"\n" not in self._heard:
             self._look(wait_s)
         line, found, rest = self._heard.partition(b"\n")
@@ -81,21 +81,21 @@ class Workbench:
         ready, _, _ = select.select([self._commands, self._signals], [], [], wait_s)
         if self._signals in ready:
             for number in AT_ONCE & set(os.read(self._signals, 64)):
-                self.told_to_end = signal.Signals(number).name
+                self.end_signal = signal.Signals(number).name
         if self._commands in ready:
             came = os.read(self._commands, 4096)
             self._heard += came
             self.gone = self.gone or not came
-        gone, told = _end_to_come(self._pid)
-        self.told_to_end = self.told_to_end or told
+        gone, pending = _end_to_come(self._pid)
+        self.end_signal = self.end_signal or pending
         self.gone = self.gone or gone or os.getppid() != self._pid
 
 
 def _end_to_come(pid: int) -> tuple[bool, str | None]:
-    """What a process has not had a turn for: whether it is to end, and a signal that tells it to.
+    """Whether a process is about to end, and a signal that is pending for it.
 
     A process ends, and takes a signal, when the computer lets it run, and its pipes close after its core is
-    dumped and its memory given back. The kernel tells before (proc(5)); without a /proc of ours nobody does.
+    dumped and its memory given back. The kernel shows both before, in /proc (proc(5)).
     """
     try:
         if Path("/proc/self").readlink() != Path(str(os.getpid())):
@@ -111,35 +111,35 @@ def _end_to_come(pid: int) -> tuple[bool, str | None]:
             waiting |= int(mask, 16)
     pending = {number for number in (*AT_ONCE, signal.SIGKILL) if waiting >> (number - 1) & 1}
     flags = int(stat.rpartition(b")")[2].split()[STAT_FLAGS])
-    told = [signal.Signals(number).name for number in sorted(AT_ONCE & pending)]
-    return signal.SIGKILL in pending or bool(flags & ENDING), told[0] if told else None
+    names = [signal.Signals(number).name for number in sorted(AT_ONCE & pending)]
+    return signal.SIGKILL in pending or bool(flags & ENDING), names[0] if names else None
 
 
 @dataclass
 class Lease:
-    """What is lit. Times are of the monotonic clock, s."""
+    """What is lit, and until when. Times are of the monotonic clock, s."""
 
     mask: int
     ends: float
-    """As the workbench asked."""
+    """End that the workbench asked for."""
     renewed: float = 0.0
     held_until: float = 0.0
-    """The controller puts off by itself then."""
+    """End of the device's own lease."""
 
 
 class Guardian:
-    """Serves one workbench on one controller."""
+    """Serves one workbench on one device."""
 
-    def __init__(self, workbench: Workbench, line: Line, hang_s: float) -> None:
-        self._workbench, self._line, self._hang_s = workbench, line, hang_s
+    def __init__(self, workbench: Workbench, line: CheckedLine, answers: int, hang_s: float) -> None:
+        self._workbench, self._line, self._answers, self._hang_s = workbench, line, answers, hang_s
         self._lease: Lease | None = None
         self._failure: WorkbenchError | None = None
-        """Why lasers went off that the workbench takes for lit."""
+        """Why lasers went off that the workbench takes for lit; reported with the next OFF."""
         self._may_be_on = False
-        """Whether an off was not confirmed; tried again and again where no lease of the hardware ends it."""
+        """Whether an off was not confirmed that no lease of the hardware makes good: it is tried again."""
 
     def serve(self) -> int:
-        """Serve until the workbench is gone; returns the exit code. Whatever ends it, off comes first."""
+        """Serve until the workbench is gone, then switch off; returns the exit code."""
         try:
             self._serve()
         finally:
@@ -151,7 +151,7 @@ class Guardian:
             command = self._workbench.command(self._wait_s())
             if self._workbench.gone:
                 break  # what it asked for last is not done any more
-            if self._lease is not None and self._workbench.told_to_end is not None:
+            if self._lease is not None and self._workbench.end_signal is not None:
                 self._put_off(self._stopped())
             if command is not None:
                 self._obey(command)
@@ -161,7 +161,7 @@ class Guardian:
                 self._put_off(self._failure)
 
     def _wait_s(self) -> float | None:
-        """Until something has to be looked at; None: nothing is lit."""
+        """Time until something has to be checked, s; None: nothing is lit."""
         if self._lease is None:
             return LOOK_S if self._may_be_on else None
         return min(LOOK_S, max(0.0, self._lease.held_until - time.monotonic()))
@@ -171,22 +171,22 @@ class Guardian:
             case ["BEAT"]:
                 self._beat()
             case [number, "LIT", mask, lease_ms]:
-                answer(int(number), lambda: self._light(int(mask), int(lease_ms)))
+                answer(self._answers, int(number), lambda: self._light(int(mask), int(lease_ms)))
             case [number, "OFF"]:
-                answer(int(number), self._off)
+                answer(self._answers, int(number), self._off)
             case [number, "STATE"]:
-                answer(int(number), self._line.state)
+                answer(self._answers, int(number), self._line.state)
             case _:
                 raise ValueError(f"no such command: {command}")
 
     def _light(self, mask: int, lease_ms: int) -> None:
-        if self._workbench.told_to_end is not None:
+        if self._workbench.end_signal is not None:
             raise self._stopped()
         self._lease = Lease(mask, time.monotonic() + lease_ms / 1000)
         try:
             self._renew(self._lease)
         except RigNotReadyError:
-            if self._workbench.told_to_end is not None:
+            if self._workbench.end_signal is not None:
                 raise self._stopped() from None
             raise
 
@@ -200,7 +200,7 @@ class Guardian:
             try:
                 self._renew(lease)
             except RigNotReadyError as error:
-                self._put_off(error if self._workbench.told_to_end is None else self._stopped())
+                self._put_off(error if self._workbench.end_signal is None else self._stopped())
 
     def _renew(self, lease: Lease) -> None:
         lease.renewed = time.monotonic()
@@ -240,10 +240,10 @@ class Guardian:
         self._may_be_on = False
 
     def _stopped(self) -> StoppedError:
-        return StoppedError(f"stopped by {self._workbench.told_to_end}; the lasers were put off at once")
+        return StoppedError(f"stopped by {self._workbench.end_signal}; the lasers were put off at once")
 
     def leave(self) -> int:
-        """Off, and tried again for a while: there is nobody left who would."""
+        """Switch off, trying for a while: the workbench is gone. Returns the exit code."""
         deadline = time.monotonic() + (TRY_ALONE_S if self._line.has_leases else TRY_BOARD_S)
         while True:
             try:
@@ -258,8 +258,8 @@ class Guardian:
                 return 0
 
 
-def answer(number: int, act: Callable[[], object]) -> int:
-    """Do something and tell the workbench, which may be gone, what came of it; returns an exit code."""
+def answer(answers: int, number: int, act: Callable[[], object]) -> int:
+    """Do something and write the outcome to the workbench, which may be gone; returns an exit code."""
     code = 0
     try:
         said: dict[str, object] = {"to": number, "value": act()}
@@ -267,37 +267,47 @@ def answer(number: int, act: Callable[[], object]) -> int:
         said = {"to": number, "error": type(error).__name__, "text": str(error)}
         code = error.exit_code
     with suppress(OSError):
-        os.write(sys.stdout.fileno(), json.dumps(said).encode() + b"\n")
+        os.write(answers, json.dumps(said).encode() + b"\n")
     return code
 
 
-def main(driver: str, port: str, baud: int, lasers: int, boot_s: float, hang_s: float, signals: int) -> int:
-    """Hold the port, or the lines of a board, until the workbench is gone."""
+def main(line: str, settings: str, lasers: int, boot_s: float, hang_s: float, signals: int) -> int:
+    """Hold the device until the workbench is gone."""
     # What a terminal, or a system that goes down, sends to everybody. The workbench's end is what counts.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
         signal.signal(number, signal.SIG_IGN)
-    # Before all else that a busy computer runs, where it is allowed to. It sleeps nearly all the time.
-    with suppress(AttributeError, OSError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+    answers = _keep_answers()
     workbench = Workbench(sys.stdin.fileno(), signals)
-    opened: list[Line] = []
+    opened: list[CheckedLine] = []
 
     def connect() -> str:
-        if driver == "nidaqmx":
-            opened.append(DigitalOutputLine(port, lasers))
-        else:
-            opened.append(ControllerLine(port, baud, workbench.alarm))
+        opened.append(open_line(line, settings, lasers, workbench.alarm, _hurry))
         identity = opened[0].identify(boot_s)
         opened[0].all_off()
         return identity
 
-    code = answer(0, connect)
-    if code not in {0, LaserOffNotConfirmedError.exit_code}:
+    code = answer(answers, 0, connect)
+    if code not in {0, LaserOffNotConfirmedError.exit_code} or not opened:
         return code
-    guardian = Guardian(workbench, opened[0], hang_s)
+    guardian = Guardian(workbench, opened[0], answers, hang_s)
     return guardian.leave() if code else guardian.serve()
 
 
+def _hurry() -> None:
+    """Run before all else on a busy computer, where that is allowed: the guardian sleeps nearly always."""
+    with suppress(AttributeError, OSError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+
+
+def _keep_answers() -> int:
+    """Descriptor for answers. What a driver's libraries print goes nowhere: it would pass for an answer."""
+    answers = os.dup(sys.stdout.fileno())
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+    return answers
+
+
 if __name__ == "__main__":
-    _, driver, port, baud, lasers, boot_s, hang_s, signals = sys.argv
-    sys.exit(main(driver, port, int(baud), int(lasers), float(boot_s), float(hang_s), int(signals)))
+    _, line, settings, lasers, boot_s, hang_s, signals = sys.argv
+    sys.exit(main(line, settings, int(lasers), float(boot_s), float(hang_s), int(signals)))

@@ -1,4 +1,4 @@
-"""The workbench's end of its guardian: starts it, talks to it, passes on what signals the workbench gets."""
+"""The workbench's end of the guardian: start it, exchange commands and answers, pass signals on to it."""
 
 from __future__ import annotations
 
@@ -12,33 +12,31 @@ import sys
 import threading
 import time
 
+from workbench.devices.guarded_line import TRY_BOARD_S, GuardedLine, line_reference
 from workbench.model import errors
+from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import (
     BadInputError,
     LaserOffNotConfirmedError,
     RigNotReadyError,
     WorkbenchError,
 )
-from workbench.model.rig import LaserDriver
 
 ANSWER_S = 10.0
-"""Longer than the guardian takes for anything: twice two requests of a second, and a busy computer."""
+"""Longest time to wait for an answer, s: twice two requests of a second, and a busy computer."""
 LET_GO_S = 3.0
-"""For a guardian to end where an off is not confirmed and somebody has to be told soon."""
-TRY_BOARD_S = 60.0
-"""How long a guardian goes on trying to put off, without its workbench, what no lease would end."""
+"""Time for a guardian to end where no lease ends an emission and the off is not confirmed, s."""
 DARK = {0, BadInputError.exit_code, RigNotReadyError.exit_code}
-"""A guardian's exit codes that leave nothing to tell: all is off, or it never had the port."""
+"""A guardian's exit codes that need no warning: all is off, or it never held the device."""
 
 
 class GuardianClient:
-    """A guardian process, see `guardian.py`. It holds the port until this is closed, or its process ends."""
+    """A guardian process, see `guardian.py`. It holds the device until this is closed or its process ends."""
 
     def __init__(
         self,
-        driver: LaserDriver,
-        port: str,
-        baud: int,
+        line_type: type[GuardedLine],
+        settings: DeviceBlock,
         lasers: int,
         boot_s: float,
         hang_s: float,
@@ -46,18 +44,25 @@ class GuardianClient:
     ) -> None:
         """Start it, and wait until every laser is off.
 
-        Where the lasers are `virtual` it has nothing to tell whoever sits at the terminal once we are gone.
+        Args:
+            line_type: the laser driver.
+            settings: its block of the rig file.
+            lasers: number of lasers.
+            boot_s: time in which the device has to answer, s.
+            hang_s: time without a beat after which lasers go off, s.
+            virtual: whether the beams are simulated: the guardian then writes nothing to the terminal.
 
         Raises:
-            BadInputError: a board's port names fewer lines than there are `lasers`.
-            RigNotReadyError: no such port, another program holds it, or nobody answers as expected.
-            LaserOffNotConfirmedError: the controller answers, but not that all are off.
+            BadInputError: the device has fewer outputs than there are `lasers`.
+            RigNotReadyError: no such device, another program holds it, or it does not answer as expected.
+            LaserOffNotConfirmedError: the device answers, but not that all are off.
         """
         commands, self._commands = os.pipe()
         self._answers, answers = os.pipe()
         signals, self._signals = os.pipe()
         os.set_blocking(self._signals, False)
-        call = [driver, port, str(baud), str(lasers), str(boot_s), str(hang_s), str(signals)]
+        line = [line_reference(line_type), settings.model_dump_json(exclude_unset=True)]
+        call = [*line, str(lasers), str(boot_s), str(hang_s), str(signals)]
         # -P: what lies in the current folder is not imported. A session of its own: no terminal reaches it.
         said = os.open(os.devnull, os.O_WRONLY) if virtual else _last_words()
         self._process = subprocess.Popen(  # noqa: S603 - this very program
@@ -70,14 +75,14 @@ class GuardianClient:
         )
         for theirs in (commands, answers, signals, said):
             os.close(theirs)
-        self._has_leases = driver != "nidaqmx"
+        self._has_leases = line_type.has_leases
         self.is_open = True
         self._heard = b""
         self._asked = 0
         self._unconfirmed = (
             "the lasers may be on: it was not confirmed that they are off; treat the beams as on"
         )
-        """What the guardian told last of an off that was not confirmed, if it could."""
+        """Reason that the guardian gave last for an off that was not confirmed."""
         self._before: int | None = None
         try:
             self.identity = str(self._answer(0, ANSWER_S + boot_s))
@@ -95,7 +100,7 @@ class GuardianClient:
             WorkbenchError: what the guardian could not do, by its name.
             LaserOffNotConfirmedError: the guardian does not answer.
         """
-        # Numbered: a signal may have raised while an earlier answer was waited for, which is still to come.
+        # Numbered: a signal may have raised while an earlier answer was awaited, which is still to come.
         self._asked += 1
         self.tell(f"{self._asked} {command}")
         return self._answer(self._asked, ANSWER_S)
@@ -103,14 +108,14 @@ class GuardianClient:
     def tell(self, command: str) -> None:
         """A command without an answer. A guardian that is gone shows at the next `ask`."""
         if not self.is_open:
-            raise ValueError("the guardian was let go: its descriptors may be another's now")
+            raise ValueError("the guardian was let go: its descriptors may belong to another file now")
         with contextlib.suppress(BrokenPipeError):
             os.write(self._commands, f"{command}\n".encode())
 
     def close(self) -> None:
-        """Let it go: it puts everything off and ends.
+        """Let it go: it switches everything off and ends.
 
-        Where no lease of the hardware would end what is lit, one that does not come to its end is left at it.
+        Where no lease of the hardware ends an emission, a guardian that does not end is left trying.
 
         Raises:
             LaserOffNotConfirmedError: it is, or it ended without having confirmed that all are off.
@@ -127,7 +132,7 @@ class GuardianClient:
         except LaserOffNotConfirmedError:
             raise
         except BaseException:
-            # A stop that was asked for once more. What is still to be told counts more than that.
+            # Another stop was asked for. An off that is not confirmed counts more than that.
             self._wait_for_off()
             raise
 
@@ -136,7 +141,7 @@ class GuardianClient:
             code = self._process.wait(ANSWER_S if self._has_leases else LET_GO_S)
         except subprocess.TimeoutExpired:
             if not self._has_leases:
-                # Something has to wait for its end.
+                # Its exit status has to be collected.
                 threading.Thread(target=self._process.wait, daemon=True).start()
                 raise LaserOffNotConfirmedError(
                     f"{self._unconfirmed}. The guardian (process {self._process.pid}) goes on trying for some"
@@ -175,9 +180,9 @@ class GuardianClient:
 
 
 def _last_words() -> int:
-    """Where the guardian writes what comes too late for its pipe: the terminal, if there is one.
+    """Descriptor for what the guardian has to say after this process ended: the terminal, if there is one.
 
-    Not our standard error: it outlives us, and whoever reads that to its end would wait for it.
+    Not our standard error: the guardian outlives us, and a reader of that stream would wait for its end.
     """
     try:
         return os.open("/dev/tty", os.O_WRONLY | os.O_NOCTTY)

@@ -1,4 +1,4 @@
-"""A camera that OpenCV can open: a device, a network stream, or a file."""
+"""The camera driver `opencv`: a device, a network stream or a video file that OpenCV opens."""
 
 from __future__ import annotations
 
@@ -7,39 +7,90 @@ import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import cv2
 import numpy as np
+from pydantic import Field, model_validator
 
 from workbench.devices.protocols import Frame
 from workbench.model.arrays import Image
+from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import RigNotReadyError
-from workbench.model.rig import CameraDevice, CameraSpec
+from workbench.model.exposure import WIDEST
+from workbench.model.rig import CameraSpec, Name, PositiveFloat, Rig
 
 SILENT_S = 1.5
-"""A camera that has sent nothing for so long is not going to. It leaves time to say so within two seconds."""
+"""Time without a frame after which a camera counts as unplugged, s: it is reported within two seconds."""
 LOOK_S = 0.05
-"""Between two beats while a frame is waited for."""
+"""Time between two beats while a frame is awaited, s."""
 BACKLOG = 32
-"""Frames kept for whoever reads them one by one."""
+"""Number of frames kept for a caller that reads them one by one."""
 MANUAL_EXPOSURE = 1.0
-"""Of V4L2's `exposure_auto`."""
+"""Value of V4L2's `exposure_auto`."""
 COARSEST_STEP = 2.0
-"""Factor between an exposure that was asked for and the nearest that the camera has."""
+"""Largest factor between a requested exposure and the one that the camera sets."""
 SAME = 0.005
-"""Relative difference below which a setting was taken as asked."""
+"""Relative difference below which a setting counts as set as requested."""
+
+
+class OpenCvBlock(DeviceBlock):
+    """The block `devices: camera:` of the rig file. Settings are in the camera's units, and are read back."""
+
+    source: Name
+    """Number of a device, its path, the URL of a stream, or a video file."""
+    pixel_format: Annotated[str, Field(pattern=r"^[ -~]{4}$")] | None = None
+    """Four letters, as YUYV or GREY."""
+    exposure: float | None = None
+    exposure_limits: tuple[PositiveFloat, PositiveFloat] | None = None
+    """Shortest and longest to choose from at each placement, beginning with `exposure`; None: `exposure` is
+    kept."""
+    ambient_exposure: float | None = None
+    """For frames of room light alone, as of the printed board; None: exposed as all others."""
+    gain: float | None = None
+    buffer_frames: Annotated[int, Field(ge=1)] | None = None
+    latency_frames: Annotated[int, Field(ge=0)] = 2
+    """Number of frames under way, or being exposed, when a laser is switched: they are discarded."""
+
+    @model_validator(mode="after")
+    def _has_an_exposure_to_go_back_to(self) -> OpenCvBlock:
+        if self.ambient_exposure is not None and self.exposure is None:
+            raise ValueError("ambient_exposure needs an exposure to go back to")
+        return self
+
+    @model_validator(mode="after")
+    def _begins_within_its_limits(self) -> OpenCvBlock:
+        if self.exposure_limits is not None:
+            shortest, longest = self.exposure_limits
+            if self.exposure is None or not shortest <= self.exposure <= longest or shortest == longest:
+                raise ValueError(
+                    "exposure_limits: expected [shortest, longest], with an exposure to begin with between"
+                    f" them, got {list(self.exposure_limits)} and {self.exposure}"
+                )
+            if longest > WIDEST * shortest:
+                raise ValueError(
+                    f"exposure_limits: expected the longest to be at most {WIDEST:g} times the shortest, got"
+                    f" {list(self.exposure_limits)}; no camera's spots differ by more"
+                )
+        return self
 
 
 class OpenCvCamera:
     """See `protocols.StreamingCamera` and `protocols.ExposableCamera`.
 
-    A thread of its own takes the frames as they come, so that none is older than it need be; from a file it
+    A thread of its own takes the frames as they come, so that none is older than necessary; from a file it
     takes one when the one before has been read.
     """
 
+    settings_type: ClassVar = OpenCvBlock
+
+    @classmethod
+    def open(cls, settings: OpenCvBlock, rig: Rig, beat: Callable[[], None]) -> OpenCvCamera:
+        """Open it, see `drivers.CameraDriver`; the errors of the constructor."""
+        return cls(settings, rig.camera, beat)
+
     def __init__(
-        self, device: CameraDevice, camera: CameraSpec, beat: Callable[[], None] = lambda: None
+        self, device: OpenCvBlock, camera: CameraSpec, beat: Callable[[], None] = lambda: None
     ) -> None:
         """Open it, make its settings and check that they were taken, and look at a first frame.
 
@@ -201,7 +252,7 @@ class OpenCvCamera:
             )
 
 
-def _open(device: CameraDevice, camera: CameraSpec) -> cv2.VideoCapture:
+def _open(device: OpenCvBlock, camera: CameraSpec) -> cv2.VideoCapture:
     source = device.source
     is_device = source.isdigit() or source.startswith("/dev/")
     if is_device:
@@ -224,7 +275,7 @@ def _open(device: CameraDevice, camera: CameraSpec) -> cv2.VideoCapture:
 
 
 def _make_settings(
-    capture: cv2.VideoCapture, device: CameraDevice, camera: CameraSpec, is_device: bool
+    capture: cv2.VideoCapture, device: OpenCvBlock, camera: CameraSpec, is_device: bool
 ) -> None:
     """Every setting is read back. The picture's size is asked of a device; streams and files have one."""
     fourcc = device.pixel_format

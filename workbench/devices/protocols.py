@@ -1,4 +1,4 @@
-"""What the procedures ask of a bench; nothing above a driver knows which one it talks to."""
+"""What procedures and ranging need of a bench, whatever its drivers."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ class Camera(Protocol):
 
 @runtime_checkable
 class StreamingCamera(Camera, Protocol):
-    """A camera that lets its stream be looked at, so that its latency can be measured."""
+    """A camera whose stream can be read, so that its latency can be measured."""
 
     discard_frames: int
-    """How many frames `grab` throws away as too old."""
+    """Number of frames that `grab` drops as too old."""
 
     def read(self) -> Frame:
         """The next frame of the stream, as old as it is.
@@ -81,43 +81,65 @@ def settable(camera: Camera) -> tuple[ExposableCamera, tuple[float, float]] | No
     return camera, camera.exposure_limits
 
 
+@dataclass(frozen=True)
+class LaserState:
+    """State of the lasers' outputs and of the interlock, as the device reports it."""
+
+    lit: tuple[str, ...]
+    """Ids of the lasers that are on."""
+    interlock_closed: bool | None
+    """None where the driver does not know."""
+
+
 class LaserBank(Protocol):
     """The lasers. There is one way to switch one on, and it ends by itself."""
 
     ids: tuple[str, ...]
+    identity: str
+    """Name of the device that switches them, as it reports it."""
 
     def lit(self, ids: Sequence[str], for_s: float) -> AbstractContextManager[None]:
-        """Hold the lasers `ids` lit inside the `with` block, `for_s` seconds at the most.
+        """Hold the lasers `ids` lit inside the `with` block, for at most `for_s` seconds.
 
-        Leaving the block puts every laser off and asks the controller whether it did.
+        Leaving the block switches every laser off and verifies it at the device.
 
         Raises:
             RigNotReadyError: the controller refuses or does not answer.
             LaserOffNotConfirmedError: the controller did not confirm that all are off.
         """
 
+    def beat(self) -> None:
+        """Renew the lease of what is on. To be called by the thread that does the work."""
+
     def all_off(self) -> None:
-        """Put every laser off and verify it; the errors of `lit`."""
+        """Switch every laser off and verify it; the errors of `lit`."""
+
+    def state(self) -> LaserState:
+        """What is on at this moment, and the interlock.
+
+        Raises:
+            RigNotReadyError: the device does not answer.
+        """
 
     def close(self) -> None:
         """All off, then release the device."""
 
 
 class Target(Protocol):
-    """Whatever puts the target in its place: a person, a rail, an emulated bench."""
+    """What places the target: a person, a rail, an emulated bench."""
 
     def place(self, placement: Placement) -> Placement:
-        """Put the target there; returns the placement as it was measured by the ruler."""
+        """Place the target; returns the placement as measured by the ruler."""
 
 
 class Operator(Protocol):
-    """Whoever answers a procedure's questions."""
+    """Who answers a procedure's prompts."""
 
     def ask(self, prompt: Prompt) -> Answer:
-        """Put one question and wait for its answer, which fits (`Prompt.refuse`).
+        """Ask one question and wait for its answer, which fits (`Prompt.refuse`).
 
         Raises:
-            AnswerNeededError: nobody is there to answer.
+            AnswerNeededError: there is nobody to answer.
         """
 
 
@@ -132,7 +154,9 @@ class Bench:
     """Called with the key of the capture about to be taken. An emulated bench keys its noise by it, so that a
     capture taken again after a stop is the same to the bit; a real bench has no use for it."""
     operator: Operator | None = None
-    """An emulated bench has one of its own, who does what he is told; at a real one a person answers."""
+    """Operator of an emulated bench, who does what prompts ask for; None: a person answers."""
+    virtual: bool = False
+    """Whether the beams are simulated."""
 
     def __enter__(self) -> Bench:
         return self

@@ -1,58 +1,139 @@
-"""From the `driver` of a rig file to an opened bench."""
+"""From a rig file to an opened bench: of separate devices, or of devices that are opened as a whole."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from importlib import import_module
-from importlib.metadata import entry_points
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from workbench.devices.protocols import Bench
+from workbench.devices import real_bench
+from workbench.devices.drivers import BenchDriver, DriverUnusableError, installed, load_driver
+from workbench.devices.protocols import Bench, LaserBank
 from workbench.model.errors import BadInputError
-from workbench.model.rig import Rig
-from workbench.model.yamlfile import FileModel
+from workbench.model.problems import SchemaProblem
+from workbench.model.rig import Rig, load_rig
+from workbench.model.yamlfile import read_document, refuse, schema_problems
 
-GROUP = "workbench.benches"
+BENCHES = "workbench.benches"
+SEPARATE = "opencv+serial"
+"""`driver` of a rig whose devices are opened each by its own driver; also where there are `devices` alone."""
 
 
 def open_bench(rig: Rig, session_dir: Path) -> Bench:
     """Open the bench that the rig names.
 
-    A driver is an entry point in the group `workbench.benches`: a function (rig, session_dir) -> Bench.
+    Raises:
+        BadInputError: a driver is not installed, or its block of the rig file is wrong.
+        RigNotReadyError, LaserOffNotConfirmedError: a device does not answer as it should.
+    """
+    check_driver(rig)
+    whole = whole_bench(rig)
+    return real_bench.open_bench(rig) if whole is None else whole.open(rig, session_dir)
+
+
+def open_lasers(rig: Rig) -> LaserBank:
+    """Open the lasers of separate devices alone, all off.
 
     Raises:
-        BadInputError: the rig names no driver, or one that is not installed.
-        RigNotReadyError: a device does not answer.
+        BadInputError: the rig has none, or the driver is not installed or its block wrong.
+        RigNotReadyError, LaserOffNotConfirmedError: the device does not answer as it should.
     """
-    bench: Bench = entry_points(group=GROUP)[check_driver(rig)].load()(rig, session_dir)
-    return bench
+    if rig.devices is None:
+        check_driver(rig)
+    return real_bench.open_lasers(rig)
 
 
-def blocks_of(driver: str) -> Mapping[str, type[FileModel]]:
-    """Blocks of the rig file that an installed driver reads: `BLOCKS` of its module, where it has that."""
-    module = import_module(entry_points(group=GROUP)[driver].module)
-    blocks: Mapping[str, type[FileModel]] = getattr(module, "BLOCKS", {})
-    return blocks
-
-
-def check_driver(rig: Rig) -> str:
-    """Name of the rig's driver, which is installed.
-
-    Raises:
-        BadInputError: it names none, or one that is not.
-    """
-    driver = rig.driver or "none"
-    if (wrong := not_installed(driver)) is not None:
-        raise BadInputError(f"rig {rig.rig}: driver: {wrong}")
+def whole_bench(rig: Rig) -> BenchDriver | None:
+    """The driver that opens all devices of the rig together; None where each has its own."""
+    if rig.driver not in installed(BENCHES):
+        return None
+    driver: BenchDriver = load_driver(BENCHES, rig.driver)
     return driver
 
 
-def not_installed(driver: str) -> str | None:
-    """What is wrong with the name of a driver; None where it is installed."""
-    known = sorted(entry_points(group=GROUP).names)
-    if driver in known:
-        return None
-    return (
-        f"expected an installed bench driver ({', '.join(known) or 'there is none'}), got {driver};"
-        " a rig without a driver can be fitted but not run"
-    )
+def check_driver(rig: Rig) -> None:
+    """Refuse a rig that cannot be run.
+
+    Raises:
+        BadInputError: it has no devices, or names a driver that is not installed.
+    """
+    if not has_bench(rig.driver, rig.devices):
+        raise BadInputError(
+            f"rig {rig.rig}: expected `devices`, or a `driver` that opens a whole bench, got none; a rig"
+            " without them can be fitted but not run"
+        )
+    found = [one.told for one in _driver_problems(rig.driver)]
+    if found:
+        raise BadInputError("\n".join(f"rig {rig.rig}: {one}" for one in found))
+
+
+def load_bench_rig(path: Path, kinds: Sequence[str] = tuple(real_bench.KINDS)) -> Rig:
+    """Read the file of a rig that is to be run, and check the blocks that its drivers read.
+
+    Args:
+        path: the file.
+        kinds: of separate devices, those that are to be opened.
+
+    Raises:
+        BadInputError: see `load_yaml_model`.
+    """
+    rig, document = load_rig(path), read_document(path)
+    refuse(path, [document.mistake(one) for one in bench_problems(document.data, rig, kinds)])
+    return rig
+
+
+def has_bench(driver: object, devices: object) -> bool:
+    """Whether a rig file with these values says how its bench is reached."""
+    return driver is not None or devices is not None
+
+
+def bench_problems(
+    data: Mapping[str, Any], rig: Rig | None, kinds: Sequence[str] = tuple(real_bench.KINDS)
+) -> Iterator[SchemaProblem]:
+    """What is wrong with a rig file's `driver`, and with the blocks that its drivers read.
+
+    Args:
+        data: the file's.
+        rig: as it was read, where it could be.
+        kinds: of separate devices, those that are looked at.
+    """
+    driver, devices = data.get("driver"), data.get("devices")
+    if not has_bench(driver, devices) or not isinstance(driver, str | None):
+        return
+    unusable = list(_driver_problems(driver))
+    yield from unusable
+    if unusable:
+        return
+    if driver is None or driver == SEPARATE:
+        yield from _devices_problems(devices, rig, kinds)
+    else:
+        whole: BenchDriver = load_driver(BENCHES, driver)
+        for key, model in whole.blocks.items():
+            yield from schema_problems(model, data.get(key) or {}, (key,), rig)
+
+
+def _devices_problems(devices: object, rig: Rig | None, kinds: Sequence[str]) -> Iterator[SchemaProblem]:
+    blocks = {} if devices is None else devices
+    if not isinstance(blocks, dict):
+        return  # a mistake that the rig's own schema finds
+    for kind in kinds:
+        block = blocks.get(kind) or {}
+        if isinstance(block, dict):
+            yield from real_bench.block_problems(kind, block, rig)
+
+
+def _driver_problems(driver: str | None) -> Iterator[SchemaProblem]:
+    if driver is None or driver == SEPARATE:
+        return
+    if driver not in installed(BENCHES):
+        known = ", ".join(sorted([*installed(BENCHES), SEPARATE]))
+        yield SchemaProblem(
+            ("driver",),
+            f"expected an installed bench driver ({known}), got {driver}; a rig without a driver and without"
+            " devices can be fitted but not run",
+        )
+        return
+    try:
+        load_driver(BENCHES, driver)
+    except DriverUnusableError as error:
+        yield SchemaProblem(("driver",), str(error))

@@ -1,4 +1,4 @@
-"""A camera that is not waited for longer than agreed."""
+"""A camera with a time limit on every call."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from workbench.model.errors import RigNotReadyError
 T = TypeVar("T")
 B = TypeVar("B", bound=Bench)
 PATIENCE_S = 0.75
-"""For one frame: with what it takes to end, less than two seconds."""
+"""Longest wait for a frame, s: with the time that ending takes, less than two seconds."""
 FIRST_PATIENCE_S = 5.0
-"""For the first: cameras take their time to start."""
+"""Longest wait for the first frame, s: cameras are slow to start."""
 
 
 @dataclass
 class WatchedCamera:
-    """Asks the camera in a thread of its own and gives up on it when it does not answer.
+    """Calls the camera in a thread of its own and gives it up when it does not answer.
 
-    A driver that hangs cannot be called back; its thread is left behind and dies with the program.
+    A call that hangs cannot be interrupted; its thread is left behind and ends with the program.
     """
 
     camera: Camera
@@ -53,7 +53,7 @@ class WatchedCamera:
             self._ask(self.camera.close)
 
     def _ask(self, call: Callable[[], T]) -> T:
-        if self._gone:  # its late answer would be taken for that to this call
+        if self._gone:  # its late answer would be mistaken for the answer to this call
             raise RigNotReadyError("camera: it stopped delivering before; end this run, check its cable")
         self._asked.put(call)
         try:

@@ -1,9 +1,10 @@
 """The virtual bench, reached only by its name in a rig file."""
 
+from workbench.devices.drivers import BenchDriver
 from workbench.emulator.bench import EmulatedBench, open_bench
 from workbench.emulator.spec import EmulatorSpec
 
-BLOCKS = {"emulator": EmulatorSpec}
-"""Of a rig file, which nobody else reads; see `registry.blocks_of`."""
+DRIVER = BenchDriver(open=open_bench, blocks={"emulator": EmulatorSpec}, virtual=True)
+"""Entry point `emulated` in the group `workbench.benches`."""
 
-__all__ = ["BLOCKS", "EmulatedBench", "EmulatorSpec", "open_bench"]
+__all__ = ["DRIVER", "EmulatedBench", "EmulatorSpec", "open_bench"]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from workbench.devices.controller_line import ControllerLine, SerialBlock
+from workbench.devices.guarded_lasers import LONGEST_LEASE_S, GuardedLaserBank
 from workbench.devices.protocols import Bench
-from workbench.devices.serial_lasers import LONGEST_LEASE_S, SerialLaserBank
 from workbench.emulator.camera import EmulatedCamera
 from workbench.emulator.controller import Controller
 from workbench.emulator.operator import EmulatedOperator
@@ -24,7 +25,7 @@ class EmulatedBench(Bench):
     """A bench whose parts tests can reach: the camera, the controller behind the port, the port itself."""
 
     camera: EmulatedCamera
-    lasers: SerialLaserBank
+    lasers: GuardedLaserBank
     target: BenchScene
     controller: Controller
     server: PtyServer
@@ -55,8 +56,14 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
     camera = EmulatedCamera(spec, scene, sensor, controller.lit)
     server = PtyServer(controller.receive)
     try:
-        # A frame of this bench is computed, which takes as long as it takes. Nobody stands in its beams.
-        lasers = SerialLaserBank(server.port, rig.laser_ids, hang_s=LONGEST_LEASE_S, virtual=True)
+        # A frame of this bench is computed, however long that takes: no beats within half a second.
+        lasers = GuardedLaserBank(
+            ControllerLine,
+            SerialBlock(port=server.port),
+            rig.laser_ids,
+            hang_s=LONGEST_LEASE_S,
+            virtual=True,
+        )
     except BaseException:
         server.close()
         raise
@@ -66,6 +73,7 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
         target=scene,
         operator=EmulatedOperator() if spec.answers else None,
         mark=camera.mark,
+        virtual=True,
         controller=controller,
         server=server,
     )

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, field_validator, model_validator
 
 from workbench.model.board import Board
-from workbench.model.exposure import WIDEST
+from workbench.model.device_block import DeviceBlock
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 PositiveFloat = Annotated[float, Field(gt=0)]
@@ -129,65 +129,18 @@ class NoiseSpec(FileModel):
     """Shared by all repeats of one laser at one placement: the speckle pattern stands still."""
 
 
-class CameraDevice(FileModel):
-    """How the camera is reached. Settings are in its driver's own units, and are read back."""
+class AnyDeviceBlock(DeviceBlock):
+    """A device's block as it stands in the file: its settings are checked by its driver."""
 
-    source: Name
-    """Number of a device, its path, the URL of a stream, or a video file."""
-    pixel_format: Annotated[str, Field(pattern=r"^[ -~]{4}$")] | None = None
-    """Four letters, as YUYV or GREY."""
-    exposure: float | None = None
-    exposure_limits: tuple[PositiveFloat, PositiveFloat] | None = None
-    """Shortest and longest to choose from at each placement, beginning with `exposure`; without them that
-    one is kept."""
-    ambient_exposure: float | None = None
-    """For frames of room light alone, as of the printed board; without it they are exposed as all others."""
-    gain: float | None = None
-    buffer_frames: Annotated[int, Field(ge=1)] | None = None
-    latency_frames: Annotated[int, Field(ge=0)] = 2
-    """Frames that are under way, or being exposed, when something is switched: they are discarded."""
-
-    @model_validator(mode="after")
-    def _has_an_exposure_to_go_back_to(self) -> CameraDevice:
-        if self.ambient_exposure is not None and self.exposure is None:
-            raise ValueError("ambient_exposure needs an exposure to go back to")
-        return self
-
-    @model_validator(mode="after")
-    def _begins_within_its_limits(self) -> CameraDevice:
-        if self.exposure_limits is not None:
-            shortest, longest = self.exposure_limits
-            if self.exposure is None or not shortest <= self.exposure <= longest or shortest == longest:
-                raise ValueError(
-                    "exposure_limits: expected [shortest, longest], with an exposure to begin with between"
-                    f" them, got {list(self.exposure_limits)} and {self.exposure}"
-                )
-            if longest > WIDEST * shortest:
-                raise ValueError(
-                    f"exposure_limits: expected the longest to be at most {WIDEST:g} times the shortest, got"
-                    f" {list(self.exposure_limits)}; no camera's spots differ by more"
-                )
-        return self
-
-
-LaserDriver = Literal["serial", "nidaqmx"]
-
-
-class LaserDevice(FileModel):
-    """How the laser controller is reached."""
-
-    driver: LaserDriver = "serial"
-    """`nidaqmx`: no controller but a digital output board, a line for each laser."""
-    port: str
-    """Of the controller; or the board's lines, as `Dev1/port0/line0:3`."""
-    baud: Annotated[int, Field(gt=0)] = 115_200
+    model_config = ConfigDict(extra="allow")
 
 
 class DeviceSpec(FileModel):
-    """What the driver `opencv+serial` opens."""
+    """Separate devices of the bench: each block is read by the driver that it names."""
 
-    camera: CameraDevice
-    lasers: LaserDevice
+    camera: AnyDeviceBlock = AnyDeviceBlock()
+    lasers: AnyDeviceBlock = AnyDeviceBlock()
+    target: AnyDeviceBlock = AnyDeviceBlock()
 
 
 LaserClass = Annotated[
@@ -206,11 +159,12 @@ class Rig(FileModel):
     rig: str
     serial: Name = "unknown"
     driver: str | None = None
-    """Entry point in the group `workbench.benches`; without one the rig can be fitted but not run."""
+    """How the bench is reached: `opencv+serial`, or nothing, for separate `devices`; else an entry point in
+    the group `workbench.benches`. A rig without a driver and without devices can be fitted but not run."""
     laser_class: LaserClass | None = None
     """Of the most dangerous of its lasers; the operator is asked to protect against it."""
     devices: DeviceSpec | None = None
-    """Read by the driver `opencv+serial`."""
+    """Not read where the driver opens a whole bench."""
     camera: CameraSpec
     lasers: Annotated[tuple[LaserSpec, ...], Field(min_length=1)]
     bench: BenchSpec = BenchSpec()

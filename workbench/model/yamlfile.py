@@ -68,26 +68,29 @@ class Document:
         """A problem with its line."""
         return Mistake(line_of(self.data, problem.location), problem.told)
 
-    def mistakes(self, model: type[BaseModel], part: Location = (), context: object = None) -> list[Mistake]:
-        """All that keeps the part at the keys `part` (empty where it is not there) from being `model`.
+    def mistakes(self, model: type[BaseModel]) -> list[Mistake]:
+        """All that keeps the document from being `model`."""
+        return [self.mistake(problem) for problem in schema_problems(model, self.data)]
 
-        Args:
-            model: what it is to be.
-            part: keys that lead to it.
-            context: handed to the model's validators.
-        """
-        node = self.data
-        for key in part:
-            node = node.get(key) or {}
-        try:
-            model.model_validate(node, context=context)
-        except ValidationError as error:
-            found = [
-                SchemaProblem((*part, *one.location), one.text)
-                for one in problems(model, node, error.errors())
-            ]
-            return [self.mistake(problem) for problem in found]
-        return []
+
+def schema_problems(
+    model: type[BaseModel], data: object, part: Location = (), context: object = None
+) -> list[SchemaProblem]:
+    """All that keeps `data`, which stands at the keys `part` of a file, from being `model`.
+
+    Args:
+        model: what it is to be.
+        data: what was read.
+        part: keys that lead to it; the problems' locations begin with them.
+        context: handed to the model's validators.
+    """
+    try:
+        model.model_validate(data, context=context)
+    except ValidationError as error:
+        return [
+            SchemaProblem((*part, *one.location), one.text) for one in problems(model, data, error.errors())
+        ]
+    return []
 
 
 def refuse(path: Path, mistakes: Iterable[Mistake]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -37,16 +36,6 @@ class CheckResult:
     """What was found; where it is not well, what to do."""
 
 
-class _Interlocked(Protocol):
-    @property
-    def interlock_closed(self) -> bool | None: ...
-
-
-@runtime_checkable
-class _TellsState(Protocol):
-    def state(self) -> _Interlocked: ...
-
-
 def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[CheckResult]:
     """Try every part of an opened bench.
 
@@ -54,7 +43,7 @@ def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[CheckResult]
         AnswerNeededError, StoppedError: nobody puts the target there, or confirms that it is safe.
         LaserOffNotConfirmedError: a beam stays on.
     """
-    yield CheckResult("controller", True, f"answers, all lasers off{_identity(bench)}")
+    yield CheckResult("controller", True, f"answers, all lasers off, {bench.lasers.identity}")
     yield _interlock(bench)
     yield _tried("camera", partial(_camera, rig, bench))
     for prompt in (safety_prompt(rig), _target_prompt()):
@@ -78,13 +67,8 @@ def _tried(part: str, check: Callable[[], str]) -> CheckResult:
         return CheckResult(part, False, str(error))
 
 
-def _identity(bench: Bench) -> str:
-    told = getattr(bench.lasers, "identity", "")
-    return f", {told}" if told else ""
-
-
 def _interlock(bench: Bench) -> CheckResult:
-    closed = bench.lasers.state().interlock_closed if isinstance(bench.lasers, _TellsState) else None
+    closed = bench.lasers.state().interlock_closed
     if closed is None:
         return CheckResult("interlock", True, "not told by this driver; an open one refuses the lasers below")
     return CheckResult("interlock", closed, "closed" if closed else "open: close the door or the key switch")

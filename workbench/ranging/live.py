@@ -11,11 +11,11 @@ import numpy as np
 from workbench.devices.protocols import Bench
 from workbench.model.arrays import Image
 from workbench.model.calibration import Calibration
-from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
+from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
-from workbench.spots import Finding, Spot, SpotFinder, is_same_spot, persistent_spots
+from workbench.spots import Finding, Spot, SpotFinder, persistent_spots, position_text, refuse_stuck_beam
 
 LEASE_S = 2.0
 """Longest time that a laser stays lit for one frame."""
@@ -105,23 +105,15 @@ class LiveRanger:
         return self._find(ids, on.image, off.image)
 
     def _look_for_stuck_beam(self, reading: Reading) -> Reading:
-        """Look for a beam in the last frame with all lasers off: the difference of a pair does not show it.
-
-        A light that burned before anything was fired is told in the notes: most likely it is a lamp.
+        """Check the last frame with all lasers off; a light from before the first reading becomes a note.
 
         Raises:
-            LaserOffNotConfirmedError: a light shows that did not burn before.
+            LaserOffNotConfirmedError: see `refuse_stuck_beam`.
         """
         if self._dark is None:
             return reading
         lights = self._find(self.ranger.sensor.ids, self._dark, None).spots
-        known = [light for light in lights if any(is_same_spot(light, lamp) for lamp in self._lamps)]
-        if new := persistent_spots([light for light in lights if light not in known], self._look_again):
-            raise LaserOffNotConfirmedError(
-                f"reading {reading.scene}: the frame with all lasers off shows a spot at {_at(new[0])}. A"
-                " beam may be on although the controller says that it is off: cut the lasers' supply and keep"
-                " out of the beams. If a lamp stands there, cover it"
-            )
+        known = refuse_stuck_beam(f"reading {reading.scene}", lights, self._look_again, self._lamps)
         return replace(reading, notes=(*reading.notes, *map(_burned, known)))
 
     def _look_again(self) -> Sequence[Spot]:
@@ -141,12 +133,10 @@ class LiveRanger:
         return self._finders[ids].find(on, off)
 
 
-def _at(light: Spot) -> str:
-    return f"u = {light.u_px:.0f}, v = {light.v_px:.0f} px"
-
-
 def _burned(light: Spot) -> str:
-    return f"a light at {_at(light)} burned before any laser was fired: a lamp, or a beam that was on"
+    return (
+        f"a light at {position_text(light)} burned before any laser was fired: a lamp, or a beam that was on"
+    )
 
 
 def latency_words(latencies_s: Sequence[float], elapsed_s: float) -> str:

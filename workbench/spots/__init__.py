@@ -4,6 +4,7 @@ from workbench.model.arrays import Image
 from workbench.spots.explain import explain
 from workbench.spots.finder import SpotFinder, find_spots, is_compiled
 from workbench.spots.persistence import is_same_spot, persistent_spots
+from workbench.spots.stuck_beam import position_text, refuse_stuck_beam
 from workbench.spots.types import Failure, Finding, Scanline, Spot
 
 __all__ = [
@@ -18,4 +19,6 @@ __all__ = [
     "is_compiled",
     "is_same_spot",
     "persistent_spots",
+    "position_text",
+    "refuse_stuck_beam",
 ]

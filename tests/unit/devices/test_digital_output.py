@@ -18,11 +18,13 @@ import pytest
 
 from tests.firmware.parts import can_hurry, hurried, hurry
 from tests.support.fake_board import changes, write_package
-from workbench.devices.guardian_client import TRY_BOARD_S
-from workbench.devices.real_bench import open_lasers
-from workbench.devices.serial_lasers import LaserState, SerialLaserBank
+from tests.support.lasers import board_bank
+from workbench.devices.guarded_lasers import GuardedLaserBank
+from workbench.devices.guarded_line import TRY_BOARD_S
+from workbench.devices.protocols import LaserState
+from workbench.devices.registry import load_bench_rig, open_lasers
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError
-from workbench.model.rig import CameraDevice, DeviceSpec, LaserDevice, load_rig
+from workbench.model.rig import load_rig
 
 ROOT = Path(__file__).parents[3]
 SCRIPT = Path(sys.executable).with_name("workbench")
@@ -38,9 +40,9 @@ BUSY_S = 0.3
 LIGHT_AND_WAIT = f"""
 import time
 from workbench.cli.stopping import StopAfterShot
-from workbench.devices.serial_lasers import SerialLaserBank
+from tests.support.lasers import board_bank
 StopAfterShot()  # as `workbench run` does
-bank = SerialLaserBank({LINES!r}, {IDS!r}, driver="nidaqmx")
+bank = board_bank({LINES!r}, {IDS!r})
 with bank.lit(["L2"], for_s=30):
     print("lit", flush=True)
     while True:
@@ -61,8 +63,8 @@ def fail(log: Path, how: str) -> None:
     Path(f"{log}.fault").write_text(how)
 
 
-def bank(lines: str = LINES) -> SerialLaserBank:
-    return SerialLaserBank(lines, IDS, driver="nidaqmx")
+def bank(lines: str = LINES) -> GuardedLaserBank:
+    return board_bank(lines, IDS)
 
 
 def masks(log: Path) -> list[int]:
@@ -81,7 +83,7 @@ def test_lines_follow_the_lasers_and_end_low(log: Path) -> None:
 
 
 def test_a_board_of_one_line(log: Path) -> None:
-    lasers = SerialLaserBank("Dev1/port0/line2", ("L1",), driver="nidaqmx")
+    lasers = board_bank("Dev1/port0/line2", ("L1",))
     with lasers.lit(["L1"], for_s=2.0):
         assert masks(log)[-1] == 1
     assert lasers.state() == LaserState((), None)
@@ -328,10 +330,7 @@ def test_what_is_called_is_in_the_real_package() -> None:
     assert package.errors is errors
 
 
-def test_the_rig_file_takes_it() -> None:
-    spec = DeviceSpec(
-        camera=CameraDevice(source="0"),
-        lasers=LaserDevice.model_validate({"driver": "nidaqmx", "port": LINES}),
-    )
-    assert spec.lasers.driver == "nidaqmx"
-    assert LaserDevice(port="/dev/ttyACM0").driver == "serial"
+def test_the_rig_file_takes_it(tmp_path: Path) -> None:
+    rig = load_bench_rig(rig_file(tmp_path, LINES))
+    assert rig.devices is not None
+    assert rig.devices.lasers.driver == "nidaqmx"

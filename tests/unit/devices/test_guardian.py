@@ -20,10 +20,11 @@ import pytest
 
 from tests.conftest import REAL_TIME
 from tests.firmware.parts import KINDS, Kind, Running, build, hurried, hurry, is_there
-from workbench.devices.serial_lasers import SerialLaserBank
+from tests.support.lasers import serial_bank
+from workbench.devices.guarded_lasers import GuardedLaserBank
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError
 
-AT_WORK = Path(__file__).with_name("at_work.py")
+ROOT = Path(__file__).parents[3]
 IDS = ("L1", "L2", "L3", "L4")
 LIT = 0b0101
 END_MS = 50
@@ -48,7 +49,8 @@ class AtWork:
         self._controller = controller
         self.terminal, theirs = os.openpty()
         self.process = subprocess.Popen(
-            [sys.executable, AT_WORK, controller.port, work],
+            [sys.executable, "-m", "tests.support.at_work", controller.port, work],
+            cwd=ROOT,
             stdin=theirs if work == "terminal" else subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -151,14 +153,14 @@ def test_what_a_terminal_sends_does_not_end_the_guardian(controller: Running) ->
 
 
 @pytest.fixture
-def bank(controller: Running) -> Iterator[SerialLaserBank]:
-    bank = SerialLaserBank(controller.port, IDS)
+def bank(controller: Running) -> Iterator[GuardedLaserBank]:
+    bank = serial_bank(controller.port, IDS)
     with hurried():  # half a second without a turn is a hang, and here it would be no finding
         yield bank
     bank.close()
 
 
-def test_a_hang_is_told_when_it_is_over(controller: Running, bank: SerialLaserBank) -> None:
+def test_a_hang_is_told_when_it_is_over(controller: Running, bank: GuardedLaserBank) -> None:
     def hang() -> None:
         controller.wait_for(1)
         controller.wait_for(0)
@@ -172,7 +174,7 @@ def test_a_hang_is_told_when_it_is_over(controller: Running, bank: SerialLaserBa
         assert controller.lines() == 2
 
 
-def test_beats_hold_the_light_to_its_end_and_not_beyond(controller: Running, bank: SerialLaserBank) -> None:
+def test_beats_hold_the_light_to_its_end_and_not_beyond(controller: Running, bank: GuardedLaserBank) -> None:
     """The controller is given short leases; renewing them leaves no gap."""
     already = len(controller.changes())
     with bank.lit(["L3"], for_s=1.2):
@@ -187,7 +189,7 @@ def test_beats_hold_the_light_to_its_end_and_not_beyond(controller: Running, ban
     assert 1100 < lit_ms < 1450
 
 
-def test_beats_without_light_are_nothing(controller: Running, bank: SerialLaserBank) -> None:
+def test_beats_without_light_are_nothing(controller: Running, bank: GuardedLaserBank) -> None:
     already = len(controller.changes())
     bank.beat()
     with bank.lit(["L1"], for_s=1.0):
@@ -196,7 +198,7 @@ def test_beats_without_light_are_nothing(controller: Running, bank: SerialLaserB
     assert len(controller.changes()) == already + 2
 
 
-def test_after_a_signal_to_end_nothing_is_lit_any_more(controller: Running, bank: SerialLaserBank) -> None:
+def test_after_a_signal_to_end_nothing_is_lit_any_more(controller: Running, bank: GuardedLaserBank) -> None:
     def be_told() -> None:
         controller.wait_for(1)
         os.kill(os.getpid(), signal.SIGTERM)
@@ -214,7 +216,7 @@ def test_after_a_signal_to_end_nothing_is_lit_any_more(controller: Running, bank
 
 
 def test_a_guardian_that_is_gone_confirms_nothing(controller: Running) -> None:
-    bank = SerialLaserBank(controller.port, IDS)
+    bank = serial_bank(controller.port, IDS)
     with pytest.raises(LaserOffNotConfirmedError, match=r"guardian .* is gone"), bank.lit(["L1"], for_s=5.0):
         os.kill(bank._guardian._process.pid, signal.SIGKILL)
     with pytest.raises(LaserOffNotConfirmedError):
@@ -222,24 +224,23 @@ def test_a_guardian_that_is_gone_confirms_nothing(controller: Running) -> None:
     controller.wait_for(0)
 
 
-def test_the_port_is_the_guardians_alone(controller: Running, bank: SerialLaserBank) -> None:
+def test_the_port_is_the_guardians_alone(controller: Running, bank: GuardedLaserBank) -> None:
     ours = {str(path.resolve()) for path in Path("/proc/self/fd").iterdir()}
     assert controller.port not in ours
     with pytest.raises(RigNotReadyError, match="no other program holds"):
-        SerialLaserBank(controller.port, IDS)
+        serial_bank(controller.port, IDS)
 
 
 def test_files_with_real_time_priority_run_one_after_the_other() -> None:
-    root = Path(__file__).parents[3]
     users = {
-        path.relative_to(root).as_posix()
-        for path in root.glob("tests/**/test_*.py")
+        path.relative_to(ROOT).as_posix()
+        for path in ROOT.glob("tests/**/test_*.py")
         if re.search(r"import .*\b(hurry|hurried|Running)\b", path.read_text())
     }
     assert users == REAL_TIME
 
 
-def test_the_interlock_is_told(controller: Running, bank: SerialLaserBank) -> None:
+def test_the_interlock_is_told(controller: Running, bank: GuardedLaserBank) -> None:
     assert bank.state().interlock_closed
     with bank.lit(["L1", "L4"], for_s=5.0):
         assert bank.state().lit == ("L1", "L4")

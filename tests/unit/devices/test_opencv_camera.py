@@ -15,12 +15,12 @@ import pytest
 from pydantic import ValidationError
 
 from tests.support.mjpeg import Picture, Stream
-from workbench.devices.opencv_camera import OpenCvCamera
-from workbench.devices.protocols import Bench, Frame, StreamingCamera
-from workbench.devices.real_bench import PlacedByHand
+from workbench.devices.opencv_camera import OpenCvBlock, OpenCvCamera
+from workbench.devices.placed_by_hand import PlacedByHand
+from workbench.devices.protocols import Bench, Frame, LaserState, StreamingCamera
 from workbench.model.arrays import Image
 from workbench.model.errors import RigNotReadyError
-from workbench.model.rig import CameraDevice, CameraSpec, Rig, exactly
+from workbench.model.rig import CameraSpec, Rig, exactly
 from workbench.procedure.capture.exposure import set_exposure
 
 WIDTH, HEIGHT = 160, 120
@@ -59,7 +59,7 @@ def streams() -> Iterator[Callable[..., Stream]]:
 
 
 def camera_of(source: str, **settings: float | str | tuple[float, float]) -> OpenCvCamera:
-    return OpenCvCamera(CameraDevice.model_validate({"source": source, **settings}), FORMAT)
+    return OpenCvCamera(OpenCvBlock.model_validate({"source": source, **settings}), FORMAT)
 
 
 def level(image: Image) -> float:
@@ -117,7 +117,7 @@ def test_frames_are_grey_and_stamped_when_they_arrive(streams: Callable[..., Str
 def test_it_beats_while_it_waits(streams: Callable[..., Stream]) -> None:
     beats: list[float] = []
     stream = streams(Scene().picture)
-    camera = OpenCvCamera(CameraDevice(source=stream.url), FORMAT, lambda: beats.append(time.monotonic()))
+    camera = OpenCvCamera(OpenCvBlock(source=stream.url), FORMAT, lambda: beats.append(time.monotonic()))
     stream.goes_on.clear()
     time.sleep(0.2)
     beats.clear()
@@ -244,7 +244,7 @@ def test_room_light_has_an_exposure_of_its_own(monkeypatch: pytest.MonkeyPatch) 
 
 def test_an_ambient_exposure_needs_one_to_go_back_to() -> None:
     with pytest.raises(ValidationError, match="needs an exposure to go back to"):
-        CameraDevice(source="0", ambient_exposure=5.0)
+        OpenCvBlock(source="0", ambient_exposure=5.0)
 
 
 def test_an_exposure_is_set_as_near_as_the_camera_can(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -279,6 +279,7 @@ class Lasers:
     """Shine on it."""
 
     ids: tuple[str, ...] = ("L1",)
+    identity = "fake"
 
     @contextmanager
     def lit(self, ids: Sequence[str], for_s: float) -> Iterator[None]:
@@ -288,6 +289,12 @@ class Lasers:
 
     def all_off(self) -> None:
         Colours.lit = False
+
+    def beat(self) -> None:
+        pass
+
+    def state(self) -> LaserState:
+        return LaserState((), None)
 
     def close(self) -> None:
         pass
@@ -329,7 +336,7 @@ def test_a_pixel_that_is_clipped_in_one_colour_is_clipped(
 
     monkeypatch.setattr(cv2, "VideoCapture", Red)
     camera = OpenCvCamera(
-        CameraDevice(source="/dev/video0", exposure=16), FORMAT.model_copy(update={"bits": bits})
+        OpenCvBlock(source="/dev/video0", exposure=16), FORMAT.model_copy(update={"bits": bits})
     )
     image = camera.grab().image
     camera.close()
@@ -382,7 +389,7 @@ def test_without_limits_the_exposure_is_fixed(monkeypatch: pytest.MonkeyPatch) -
 )
 def test_limits_that_make_no_sense(exposure: float | None, limits: tuple[float, float]) -> None:
     with pytest.raises(ValidationError, match="exposure_limits: expected"):
-        CameraDevice(source="0", exposure=exposure, exposure_limits=limits)
+        OpenCvBlock(source="0", exposure=exposure, exposure_limits=limits)
 
 
 def test_a_camera_that_ends_while_its_exposure_is_set(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from workbench.devices.serial_lasers import SerialLaserBank
+from tests.support.lasers import serial_bank
 from workbench.emulator.controller import Controller
 from workbench.emulator.pty import PtyServer
 from workbench.emulator.spec import ControllerSpec
@@ -64,7 +64,7 @@ class BadLine:
 def test_what_is_said_to_be_off_is_off(seed: int) -> None:
     line = BadLine(np.random.default_rng(seed))
     server = PtyServer(line.receive)
-    bank = SerialLaserBank(server.port, IDS)
+    bank = serial_bank(server.port, IDS)
     outcomes: Counter[str] = Counter()
     for _ in range(12):
         line.spoils = True

@@ -22,7 +22,7 @@ from workbench.cli.main import main
 from workbench.cli.range import range_captures
 from workbench.cli.stopping import SIGNALS
 from workbench.devices.protocols import Frame
-from workbench.devices.watched import PATIENCE_S, WatchedCamera
+from workbench.devices.watched import PATIENCE_S
 from workbench.emulator.bench import EmulatedBench
 from workbench.emulator.camera import EmulatedCamera
 from workbench.emulator.controller import Controller
@@ -83,14 +83,13 @@ def live(
 ) -> Iterator[Live]:
     before = {number: signal.getsignal(number) for number in SIGNALS}
     live = Live(calibration, monkeypatch, capsys)
-    really_open = emulator.open_bench
 
     def look(rig: Rig, folder: Path) -> EmulatedBench:
-        bench = really_open(rig, folder)
+        bench = emulator.open_bench(rig, folder)
         live.controllers.append(bench.controller)
         return bench
 
-    monkeypatch.setattr(emulator, "open_bench", look)
+    monkeypatch.setattr(emulator, "DRIVER", replace(emulator.DRIVER, open=look))
     yield live
     for number, handler in before.items():
         signal.signal(number, handler)
@@ -317,26 +316,3 @@ def test_usage(live: Live, tmp_path: Path) -> None:
     for arguments in (["--readings", "0"], ["--standoff", "-3"]):
         assert live(*arguments).code == 2
     assert live.controllers == []
-
-
-def test_a_watched_camera_hands_on_what_the_camera_says() -> None:
-    class Camera:
-        closed = False
-
-        def grab(self) -> Frame:
-            raise RigNotReadyError("dark")
-
-        def grab_ambient(self) -> Frame:
-            raise KeyError("a defect")
-
-        def close(self) -> None:
-            self.closed = True
-
-    camera = Camera()
-    watched = WatchedCamera(camera)
-    with pytest.raises(RigNotReadyError, match="dark"):
-        watched.grab()
-    with pytest.raises(KeyError, match="defect"):
-        watched.grab_ambient()
-    watched.close()
-    assert camera.closed

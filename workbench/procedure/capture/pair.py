@@ -13,14 +13,14 @@ from workbench.devices.protocols import Bench
 from workbench.model import event as ev
 from workbench.model.arrays import Image
 from workbench.model.captures import ALL_LASERS, BOARD
-from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
+from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.capture.exposure import set_exposure
 from workbench.procedure.capture.latency import LEASE_S
 from workbench.session.frames import FrameStore, read_image
 from workbench.session.state import Group
-from workbench.spots import Finding, Scanline, Spot, find_spots, persistent_spots
+from workbench.spots import Finding, Scanline, Spot, find_spots, refuse_stuck_beam
 
 
 @dataclass
@@ -175,24 +175,12 @@ class PairSource:
         return image
 
     def _search(self, key: str, off: Image, scanlines: Sequence[Scanline]) -> None:
-        """Look for a beam that burns in both frames of a pair: it leaves no spot in their difference.
-
-        Raises:
-            LaserOffNotConfirmedError: there is a spot in it.
-        """
+        """Check a dark frame; the errors of `refuse_stuck_beam`."""
 
         def look_again() -> Sequence[Spot]:
             return find_spots(self.bench.camera.grab().image, scanlines=scanlines).spots
 
-        if stuck := persistent_spots(find_spots(off, scanlines=scanlines).spots, look_again):
-            at = f"u = {stuck[0].u_px:.0f}, v = {stuck[0].v_px:.0f} px"
-            raise LaserOffNotConfirmedError(
-                f"capture {key}: the frame with all lasers off shows a spot at {at}. A beam may be on"
-                " although the controller says that it is off: cut the lasers' supply, keep out of the"
-                " beams, then check the controller. If a lamp or its reflection stands there, cover it"
-                " and start anew; if the camera's latency was never measured, begin with a"
-                " measure_latency step: the frame may be an old one"
-            )
+        refuse_stuck_beam(f"capture {key}", find_spots(off, scanlines=scanlines).spots, look_again)
 
 
 def spots_found(key: str, finding: Finding, laser_ids: Sequence[str]) -> ev.SpotsFound:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from workbench.devices.registry import blocks_of, not_installed
+from workbench.devices.registry import bench_problems, has_bench
 from workbench.model.errors import BadInputError
-from workbench.model.problems import SchemaProblem
 from workbench.model.rig import Rig
 from workbench.model.yamlfile import Document, Mistake, kind_of, line_of, read_document, refuse
 from workbench.procedure.engine.procedure_file import Procedure
@@ -73,14 +72,8 @@ def _between_steps(document: Document, steps: list[Any]) -> Iterator[Mistake]:
 def _in_rig(document: Document) -> Iterator[Mistake]:
     of_rig = document.mistakes(Rig)
     yield from of_rig
-    driver = document.data.get("driver")
-    if driver is None:
-        yield _Note(1, "names no driver: it can be fitted but not run")
-    if not isinstance(driver, str):
-        return
-    if (wrong := not_installed(driver)) is not None:
-        yield document.mistake(SchemaProblem(("driver",), wrong))
-        return
+    if not has_bench(document.data.get("driver"), document.data.get("devices")):
+        yield _Note(1, "has no driver and no devices: it can be fitted but not run")
     rig = None if of_rig else Rig.model_validate(document.data)
-    for block, model in blocks_of(driver).items():
-        yield from (one for one in document.mistakes(model, (block,), context=rig) if one not in of_rig)
+    of_bench = map(document.mistake, bench_problems(document.data, rig))
+    yield from (one for one in of_bench if one not in of_rig)

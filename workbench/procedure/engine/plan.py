@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.devices.registry import check_driver
+from workbench.devices.registry import check_driver, load_bench_rig
 from workbench.model.errors import BadInputError
 from workbench.model.prompt import Prompt
-from workbench.model.rig import Rig, load_rig
+from workbench.model.rig import Rig
 from workbench.procedure.engine.procedure_file import Procedure, load_procedure
 from workbench.procedure.engine.prompts import safety_prompt
 
@@ -45,7 +45,7 @@ class Plan:
             BadInputError: one of them is wrong.
         """
         procedures = tuple(load_procedure(path) for path in procedure_paths)
-        return cls.of(load_rig(rig_path), rig_path, procedures, procedure_paths)
+        return cls.of(load_bench_rig(rig_path), rig_path, procedures, procedure_paths)
 
     @classmethod
     def of(

@@ -205,7 +205,10 @@ def test_a_rig_is_looked_through_with_its_driver_and_bench(tmp_path: Path) -> No
 
 def test_a_driver_without_what_it_needs(tmp_path: Path) -> None:
     told = wrong(tmp_path, changed(RIG, "driver: emulated", "driver: opencv+serial"))
-    assert told == ["f.yaml:1: devices.camera: is missing", "f.yaml:1: devices.lasers: is missing"]
+    assert told == [
+        "f.yaml:1: devices.camera.source: is missing",
+        "f.yaml:1: devices.lasers.port: is missing",
+    ]
     block = "devices:\n  camera: {source: 0, gain: loud}\n  lasers: {port: /dev/ttyACM0}\n"
     (line,) = wrong(tmp_path, changed(RIG, "driver: emulated", "driver: opencv+serial") + block)
     assert "devices.camera.gain: expected a number, such as 12.5, got 'loud'" in line

@@ -1,7 +1,7 @@
-"""Lasers behind a serial line: the driver of any controller that speaks docs/laser-controller.md.
+"""The lasers of a rig, whatever their driver.
 
-Or, with the driver `nidaqmx`, on a digital output board. It never touches port or board. A guardian process
-does, and puts the lasers off when this one no longer can.
+A guardian process holds the device, and switches the lasers off when this process no longer can
+(docs/laser-controller.md).
 """
 
 from __future__ import annotations
@@ -9,58 +9,56 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import cast
 
+from workbench.devices.guarded_line import GuardedLine
 from workbench.devices.guardian_client import GuardianClient
+from workbench.devices.protocols import LaserState
+from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import BadInputError
-from workbench.model.rig import LaserDriver
 
 HANG_S = 0.5
-"""After this time without a beat whatever is lit goes off."""
+"""Time without a beat after which whatever is lit goes off, s."""
+BOOT_S = 3.0
+"""Time for a controller that boots when its port is opened, as an Arduino does, s."""
 LONGEST_LEASE_S = 60.0
 
 
-@dataclass(frozen=True)
-class LaserState:
-    """What the controller tells of its outputs and its interlock."""
-
-    lit: tuple[str, ...]
-    interlock_closed: bool | None
-    """None where the driver knows nothing of one."""
-
-
-class SerialLaserBank:
-    """The lasers `ids`, in the order of the controller's lines 1, 2, ...; see `protocols.LaserBank`."""
+class GuardedLaserBank:
+    """The lasers `ids`, in the order of the device's lines 1, 2, ...; see `protocols.LaserBank`."""
 
     def __init__(
         self,
-        port: str,
+        line_type: type[GuardedLine],
+        settings: DeviceBlock,
         ids: Sequence[str],
-        baud: int = 115_200,
-        boot_s: float = 3.0,
+        boot_s: float = BOOT_S,
         hang_s: float = HANG_S,
-        driver: LaserDriver = "serial",
         virtual: bool = False,
     ) -> None:
-        """Open the port and put every laser off.
+        """Start the guardian, which opens the device and switches every laser off.
 
-        A controller that starts anew when its port is opened (an Arduino does) has `boot_s` to answer.
-        Nobody stands in the beams of `virtual` lasers.
+        Args:
+            line_type: the laser driver.
+            settings: its block of the rig file.
+            ids: lasers in the order of the lines.
+            boot_s: time in which the device has to answer, s.
+            hang_s: time without a beat after which lasers go off, s.
+            virtual: whether the beams are simulated.
 
         Raises:
-            BadInputError: a board's port names fewer lines than lasers.
-            RigNotReadyError: no such port, another program holds it, or nobody answers as expected.
-            LaserOffNotConfirmedError: the controller answers, but not that all are off.
+            BadInputError: the device has fewer outputs than there are lasers.
+            RigNotReadyError: no such device, another program holds it, or it does not answer as expected.
+            LaserOffNotConfirmedError: the device answers, but does not confirm that all are off.
         """
         self.ids = tuple(ids)
-        self._guardian = GuardianClient(driver, port, baud, len(ids), boot_s, hang_s, virtual)
+        self._guardian = GuardianClient(line_type, settings, len(ids), boot_s, hang_s, virtual)
         self.identity = self._guardian.identity
         self._lit = False
 
     @contextlib.contextmanager
     def lit(self, ids: Sequence[str], for_s: float) -> Iterator[None]:
-        """Hold `ids` lit inside the block, `for_s` seconds at the most; see `protocols.LaserBank`."""
+        """Hold `ids` lit inside the block, for at most `for_s` seconds; see `protocols.LaserBank`."""
         mask = self._mask(ids)
         if not 0 < for_s <= LONGEST_LEASE_S:
             raise BadInputError(
@@ -74,32 +72,32 @@ class SerialLaserBank:
             self.all_off()
 
     def beat(self) -> None:
-        """Tell that the work goes on; to be called by the thread that does it. Nothing while all are off."""
+        """See `protocols.LaserBank`; without effect while all are off."""
         if self._lit:
             self._guardian.tell("BEAT")
 
     def all_off(self) -> None:
-        """Put every laser off and ask the controller whether it did; tried twice.
+        """Switch every laser off and verify it at the device.
 
         Raises:
-            LaserOffNotConfirmedError: it did not say so.
+            LaserOffNotConfirmedError: the device does not confirm it.
             RigNotReadyError, StoppedError: they are off, but went off before this was called.
         """
         self._lit = False
         self._guardian.ask("OFF")
 
     def state(self) -> LaserState:
-        """What is lit at this moment.
+        """What is on at this moment, and the interlock.
 
         Raises:
-            RigNotReadyError: the controller does not answer.
+            RigNotReadyError: the device does not answer.
         """
         mask, interlock_closed = cast("tuple[int, bool | None]", self._guardian.ask("STATE"))
         lit = tuple(name for bit, name in enumerate(self.ids) if mask >> bit & 1)
         return LaserState(lit, interlock_closed)
 
     def close(self) -> None:
-        """All off, then release the port; the errors of `all_off`."""
+        """All off, then release the device; the errors of `all_off`."""
         if not self._guardian.is_open:
             return
         try:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from tests.support.lasers import serial_bank
+from workbench.devices.guarded_lasers import GuardedLaserBank
 from workbench.devices.protocols import LaserBank
-from workbench.devices.serial_lasers import SerialLaserBank
 from workbench.emulator.controller import IDENTITY, Controller
 from workbench.emulator.pty import PtyServer
 from workbench.emulator.spec import ControllerSpec, Fault
@@ -47,8 +48,8 @@ def wired() -> Iterator[Wired]:
 
 
 @pytest.fixture
-def bank(wired: Wired) -> Iterator[SerialLaserBank]:
-    bank = SerialLaserBank(wired.server.port, IDS)
+def bank(wired: Wired) -> Iterator[GuardedLaserBank]:
+    bank = serial_bank(wired.server.port, IDS)
     yield bank
     wired.controller.fault = "none"
     bank.close()
@@ -70,36 +71,36 @@ def answering() -> Iterator[Callable[[Callable[[bytes], bytes]], str]]:
 
 def test_off_at_connect(wired: Wired) -> None:
     wired.controller.receive(b"MASK 15 60000\n")
-    with_lasers: LaserBank = SerialLaserBank(wired.server.port, IDS)
+    with_lasers: LaserBank = serial_bank(wired.server.port, IDS)
     assert wired.controller.lit() == ()
     with_lasers.close()
 
 
-def test_it_knows_whom_it_talks_to(bank: SerialLaserBank) -> None:
+def test_it_knows_whom_it_talks_to(bank: GuardedLaserBank) -> None:
     assert bank.identity == IDENTITY
 
 
 @pytest.mark.parametrize("ids", [["L1"], ["L4", "L2"], list(IDS), ["L3", "L3"]])
-def test_lit_inside_the_block_and_off_after(wired: Wired, bank: SerialLaserBank, ids: list[str]) -> None:
+def test_lit_inside_the_block_and_off_after(wired: Wired, bank: GuardedLaserBank, ids: list[str]) -> None:
     with bank.lit(ids, for_s=5.0):
         assert set(wired.controller.lit()) == set(ids)
     assert wired.controller.lit() == ()
 
 
-def test_off_is_asked_for_and_asked_about(wired: Wired, bank: SerialLaserBank) -> None:
+def test_off_is_asked_for_and_asked_about(wired: Wired, bank: GuardedLaserBank) -> None:
     wired.heard.clear()
     with bank.lit(["L2"], for_s=0.1234):
         pass
     assert bytes(wired.heard) == b"MASK 2 124\n!STATE? 2\n"
 
 
-def test_off_after_an_error_in_the_block(wired: Wired, bank: SerialLaserBank) -> None:
+def test_off_after_an_error_in_the_block(wired: Wired, bank: GuardedLaserBank) -> None:
     with pytest.raises(ZeroDivisionError), bank.lit(["L1"], for_s=5.0):
         raise ZeroDivisionError
     assert wired.controller.lit() == ()
 
 
-def test_the_lease_ends_inside_a_block_that_lingers(wired: Wired, bank: SerialLaserBank) -> None:
+def test_the_lease_ends_inside_a_block_that_lingers(wired: Wired, bank: GuardedLaserBank) -> None:
     with bank.lit(["L1"], for_s=0.001):
         deadline = time.monotonic() + 5
         while wired.controller.lit() and time.monotonic() < deadline:
@@ -108,26 +109,26 @@ def test_the_lease_ends_inside_a_block_that_lingers(wired: Wired, bank: SerialLa
 
 
 @pytest.mark.parametrize("ids", [[], ["L9"], ["L1", "all"]])
-def test_lasers_that_are_not_there(wired: Wired, bank: SerialLaserBank, ids: list[str]) -> None:
+def test_lasers_that_are_not_there(wired: Wired, bank: GuardedLaserBank, ids: list[str]) -> None:
     with pytest.raises(BadInputError, match="expected some of L1, L2, L3, L4"), bank.lit(ids, for_s=1.0):
         pytest.fail("nothing was lit")
 
 
 @pytest.mark.parametrize("for_s", [0.0, -1.0, 61.0])
-def test_a_lease_that_no_controller_grants(wired: Wired, bank: SerialLaserBank, for_s: float) -> None:
+def test_a_lease_that_no_controller_grants(wired: Wired, bank: GuardedLaserBank, for_s: float) -> None:
     wired.heard.clear()
     with pytest.raises(BadInputError, match="at most 60 s, got"), bank.lit(["L1"], for_s=for_s):
         pytest.fail("nothing was lit")
     assert not wired.heard
 
 
-def test_open_interlock(wired: Wired, bank: SerialLaserBank) -> None:
+def test_open_interlock(wired: Wired, bank: GuardedLaserBank) -> None:
     wired.controller.interlock_closed = False
     with pytest.raises(RigNotReadyError, match="interlock open"), bank.lit(["L1"], for_s=1.0):
         pytest.fail("nothing was lit")
 
 
-def test_a_controller_that_says_ok_but_stays_on(wired: Wired, bank: SerialLaserBank) -> None:
+def test_a_controller_that_says_ok_but_stays_on(wired: Wired, bank: GuardedLaserBank) -> None:
     with pytest.raises(LaserOffNotConfirmedError, match="may be on"), bank.lit(["L1"], for_s=5.0):
         wired.controller.fault = "ignores_off"
     assert wired.heard.count(b"!") == 4  # connect and its verification, exit, and once more
@@ -137,14 +138,14 @@ def test_a_stuck_controller_is_not_connected_to(wired: Wired) -> None:
     wired.controller.receive(b"ON 1 60000\n")
     wired.controller.fault = "ignores_off"
     with pytest.raises(LaserOffNotConfirmedError):
-        SerialLaserBank(wired.server.port, IDS)
+        serial_bank(wired.server.port, IDS)
     wired.controller.fault = "none"
-    SerialLaserBank(wired.server.port, IDS).close()  # the port was released
+    serial_bank(wired.server.port, IDS).close()  # the port was released
 
 
 @pytest.mark.parametrize("fault", ["garbles", "silent", "stutters"])
 def test_a_controller_that_falls_ill_while_lit(wired: Wired, fault: Fault) -> None:
-    bank = SerialLaserBank(wired.server.port, IDS)
+    bank = serial_bank(wired.server.port, IDS)
     with pytest.raises(LaserOffNotConfirmedError, match="expected 'OK OFF'"), bank.lit(["L1"], for_s=5.0):
         wired.controller.fault = fault
     assert wired.controller.lit() == ()  # it did hear
@@ -152,7 +153,7 @@ def test_a_controller_that_falls_ill_while_lit(wired: Wired, fault: Fault) -> No
     bank.close()
 
 
-def test_one_lost_reply_is_forgiven_when_off_is_confirmed(wired: Wired, bank: SerialLaserBank) -> None:
+def test_one_lost_reply_is_forgiven_when_off_is_confirmed(wired: Wired, bank: GuardedLaserBank) -> None:
     with bank.lit(["L1"], for_s=5.0):
         wired.recoveries = 1
         wired.controller.fault = "garbles"
@@ -164,12 +165,12 @@ def test_one_lost_reply_is_forgiven_when_off_is_confirmed(wired: Wired, bank: Se
 def test_somebody_else_answers(answering: Callable[[Callable[[bytes], bytes]], str], reply: bytes) -> None:
     port = answering(lambda data: reply)
     with pytest.raises(RigNotReadyError, match="asked '!', expected 'OK OFF', got"):
-        SerialLaserBank(port, IDS, boot_s=0.0)
+        serial_bank(port, IDS, boot_s=0.0)
 
 
 def test_somebody_who_says_ok_to_anything(answering: Callable[[Callable[[bytes], bytes]], str]) -> None:
     with pytest.raises(RigNotReadyError, match=r"asked '\*IDN\?', expected 'OK \*IDN', got 'OK OFF"):
-        SerialLaserBank(answering(lambda data: b"OK OFF\n"), IDS, boot_s=0.0)
+        serial_bank(answering(lambda data: b"OK OFF\n"), IDS, boot_s=0.0)
 
 
 def test_a_controller_still_booting_is_waited_for(
@@ -182,7 +183,7 @@ def test_a_controller_still_booting_is_waited_for(
         requests.append(data)
         return controller.receive(data) if len(requests) > 3 else b"\x00boot\n"
 
-    SerialLaserBank(answering(boot), IDS, boot_s=5.0).close()
+    serial_bank(answering(boot), IDS, boot_s=5.0).close()
     assert len(requests) > 4
 
 
@@ -197,7 +198,7 @@ def test_the_answer_to_an_earlier_question_confirms_nothing(
         reply = controller.receive(data)
         return old if data.startswith(b"STATE?") else reply
 
-    bank = SerialLaserBank(answering(stale), IDS)  # its first question is number 1
+    bank = serial_bank(answering(stale), IDS)  # its first question is number 1
     with pytest.raises(LaserOffNotConfirmedError, match="expected 'OK STATE 3'"), bank.lit(["L1"], for_s=1.0):
         pass
     with pytest.raises(LaserOffNotConfirmedError):
@@ -205,7 +206,7 @@ def test_the_answer_to_an_earlier_question_confirms_nothing(
 
 
 def test_an_answer_that_was_not_waited_for_confirms_nothing(
-    wired: Wired, bank: SerialLaserBank, monkeypatch: pytest.MonkeyPatch
+    wired: Wired, bank: GuardedLaserBank, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A signal raises while the answer to lighting is waited for; it comes when off is asked for."""
     answer = bank._guardian._answer
@@ -221,7 +222,7 @@ def test_an_answer_that_was_not_waited_for_confirms_nothing(
 
 
 def test_disconnect_in_mid_lease(wired: Wired) -> None:
-    bank = SerialLaserBank(wired.server.port, IDS)
+    bank = serial_bank(wired.server.port, IDS)
     with pytest.raises(LaserOffNotConfirmedError, match="dead line"), bank.lit(["L1"], for_s=5.0):
         wired.server.close()
     with pytest.raises(LaserOffNotConfirmedError):
@@ -230,7 +231,7 @@ def test_disconnect_in_mid_lease(wired: Wired) -> None:
 
 
 def test_disconnect_before_lighting(wired: Wired) -> None:
-    bank = SerialLaserBank(wired.server.port, IDS)
+    bank = serial_bank(wired.server.port, IDS)
     wired.server.close()
     with pytest.raises(LaserOffNotConfirmedError) as caught, bank.lit(["L1"], for_s=5.0):
         pytest.fail("nothing was lit")
@@ -241,16 +242,16 @@ def test_disconnect_before_lighting(wired: Wired) -> None:
 
 def test_no_such_port() -> None:
     with pytest.raises(RigNotReadyError, match="expected a serial port at /dev/not-there"):
-        SerialLaserBank("/dev/not-there", IDS)
+        serial_bank("/dev/not-there", IDS)
 
 
-def test_a_port_has_one_holder(wired: Wired, bank: SerialLaserBank) -> None:
+def test_a_port_has_one_holder(wired: Wired, bank: GuardedLaserBank) -> None:
     with pytest.raises(RigNotReadyError, match="no other program holds"):
-        SerialLaserBank(wired.server.port, IDS)
+        serial_bank(wired.server.port, IDS)
 
 
 def test_close_puts_off(wired: Wired) -> None:
-    bank = SerialLaserBank(wired.server.port, IDS)
+    bank = serial_bank(wired.server.port, IDS)
     wired.controller.receive(b"ON 1 60000\n")
     bank.close()
     assert wired.controller.lit() == ()

@@ -1,0 +1,51 @@
+"""Frames with all lasers off: a beam is refused, a known lamp is returned, noise is neither."""
+
+from __future__ import annotations
+
+import pytest
+
+from workbench.model.errors import LaserOffNotConfirmedError
+from workbench.spots import Spot, position_text, refuse_stuck_beam
+from workbench.spots.persistence import CLEAR
+
+
+def light(u_px: float, clearness: float = 3 * CLEAR) -> Spot:
+    """A spot that is so many of its standard deviations bright."""
+    sd = 1.5 / clearness
+    return Spot(u_px, 50.0, sd, sd, 1000.0, 1.5, 100.0)
+
+
+BEAM, FAINT = light(100.0), light(100.0, clearness=0.6 * CLEAR)
+
+
+def nothing() -> list[Spot]:
+    return []
+
+
+def not_needed() -> list[Spot]:
+    pytest.fail("a clear light needs no second frame")
+
+
+def test_a_clear_light_is_a_beam() -> None:
+    with pytest.raises(LaserOffNotConfirmedError, match="k/00") as caught:
+        refuse_stuck_beam("capture k/00", [BEAM], not_needed)
+    assert position_text(BEAM) in str(caught.value)
+
+
+def test_a_faint_light_is_a_beam_if_it_is_there_again() -> None:
+    with pytest.raises(LaserOffNotConfirmedError):
+        refuse_stuck_beam("k", [FAINT], lambda: [FAINT])
+    assert refuse_stuck_beam("k", [FAINT], nothing) == []
+    assert refuse_stuck_beam("k", [FAINT], lambda: [light(140.0, 0.6 * CLEAR)]) == []
+
+
+def test_a_dark_frame_passes() -> None:
+    assert refuse_stuck_beam("k", [], not_needed) == []
+
+
+def test_a_known_lamp_passes_and_hides_no_beam() -> None:
+    lamp = light(200.0)
+    assert refuse_stuck_beam("k", [lamp], not_needed, lamps=[light(200.4)]) == [lamp]
+    with pytest.raises(LaserOffNotConfirmedError) as caught:
+        refuse_stuck_beam("k", [lamp, BEAM], not_needed, lamps=[lamp])
+    assert position_text(BEAM) in str(caught.value)
