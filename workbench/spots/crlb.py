@@ -13,7 +13,8 @@ from scipy.special import gammaln, xlogy
 
 from workbench.model.arrays import FloatArray
 from workbench.model.stats import norm_cdf
-from workbench.spots.psf import FLUX, derivatives
+from workbench.spots.kernels.columns import FLUX
+from workbench.spots.psf import derivatives
 
 # Above this many electrons a Poisson count is Gaussian to 1e-3 of its information.
 _MANY_ELECTRONS = 400.0

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray
-from workbench.spots.kernels.single import JUDGED, score
+from workbench.spots.kernels.columns import ACCEPTANCE_COLUMNS
+from workbench.spots.kernels.single import score
 from workbench.spots.noise import Noise
 
 
@@ -47,10 +48,7 @@ class SpotFit:
     slope_dn: FloatArray
     """(n,) measured photon-transfer slope."""
     judged: FloatArray
-    """(n, JUDGED): largest squared residual over its variance; the mean of these over the used pixels of the
-    window's rim; highest value of the signal, DN; its square over the variance, summed; standard deviation of
-    flux (DN), u and v (pixels); square of the score by a shear over its variance, 0 if the model has a shear;
-    number of the rim's used pixels."""
+    """(n, ACCEPTANCE_COLUMNS) what a window is accepted by; see `kernels.columns`."""
 
 
 def fit_spots(win: Windows, start: FloatArray, noise: Noise) -> SpotFit:
@@ -71,7 +69,7 @@ def fit_spots(win: Windows, start: FloatArray, noise: Noise) -> SpotFit:
         np.empty(shape),
         np.empty(n, bool),
         np.empty(n),
-        np.empty((n, JUDGED)),
+        np.empty((n, ACCEPTANCE_COLUMNS)),
     )
     score(
         win.data,

@@ -11,9 +11,9 @@ import math
 import numpy as np
 
 from workbench.model.arrays import FloatArray
+from workbench.spots.kernels.columns import LN_SU, LN_SV, SHEAR
 from workbench.spots.kernels.profiles import sheared_rows, upright_rows
 
-BACKGROUND, FLUX, U, V, LN_SU, LN_SV, SHEAR = range(7)
 """Order of a spot's parameters: DN per pixel, DN, pixels, pixels, ln(pixels) twice, pixels per pixel."""
 
 

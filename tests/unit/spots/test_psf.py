@@ -9,17 +9,10 @@ from scipy.stats import norm
 
 from tests.support.draw import Drawn, profile
 from workbench.spots.fit import Windows, fit_spots
+from workbench.spots.kernels.columns import BACKGROUND, FLUX, LN_SU, SHEAR, U
 from workbench.spots.kernels.profiles import profile as axis_profiles
 from workbench.spots.noise import Noise
-from workbench.spots.psf import (
-    BACKGROUND,
-    FLUX,
-    LN_SU,
-    SHEAR,
-    U,
-    derivatives,
-    principal_axes,
-)
+from workbench.spots.psf import derivatives, principal_axes
 
 SHAPE = (15, 15)
 ROUND = np.array([[0.0, 1.0, 7.3, 6.8, np.log(1.1), np.log(1.7)]])

@@ -16,11 +16,12 @@ from workbench.spots.deblending.clusters import TAIL_WIDTHS, mixes, stands_alone
 from workbench.spots.deblending.joint_fit import Joint, evidence, fit_joint, halves, hidden_spot
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.acceptance import without_outliers
+from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U
 from workbench.spots.kernels.windows import half_for, mark_light, mark_strip
 from workbench.spots.measure import FittedSpot, spot_flags
 from workbench.spots.noise import Noise
 from workbench.spots.pair import PairSignal
-from workbench.spots.psf import FLUX, LN_SU, SHEAR, U, principal_axes
+from workbench.spots.psf import principal_axes
 from workbench.spots.types import Failure, Spot
 
 # F statistic that a further spot must reach: with some hundred pixels, chance gives this once in 1e5.

@@ -9,10 +9,11 @@ import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.spots.fit import Windows
+from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U, V
 from workbench.spots.kernels.joint import score_together
 from workbench.spots.kernels.joint_sums import OWN, SHARED
 from workbench.spots.noise import Noise, photon_transfer_slope
-from workbench.spots.psf import FLUX, LN_SU, SHEAR, U, V, principal_axes
+from workbench.spots.psf import principal_axes
 
 _HIDDEN_SD = 5.0
 _AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)

@@ -8,8 +8,26 @@ from typing import Final
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
+from workbench.spots.kernels.columns import (
+    ACCEPTANCE_COLUMNS,
+    FLUX,
+    FLUX_DEVIATION,
+    INFORMATION,
+    LN_SU,
+    LN_SV,
+    PEAK_DN,
+    RIM_NOISE,
+    RIM_PIXELS,
+    SHEAR,
+    SHEAR_SCORE,
+    U_DEVIATION,
+    V_DEVIATION,
+    WORST_EXCESS,
+    U,
+    V,
+)
 from workbench.spots.kernels.compiled import compiled
-from workbench.spots.kernels.single import JUDGED, score
+from workbench.spots.kernels.single import score
 from workbench.spots.kernels.windows import half_for
 from workbench.spots.noise import ROUNDING_DN2
 
@@ -48,7 +66,7 @@ def without_outliers(
     """
     kept, changed = usable, False
     for i in range(len(usable)):
-        if judged[i, 0] <= _OUTLIER_SD**2:
+        if judged[i, WORST_EXCESS] <= _OUTLIER_SD**2:
             continue
         far = residual[i] * residual[i] * weight[i] > _OUTLIER_SD**2
         if far.sum() <= _MAX_OUTLIERS:
@@ -70,11 +88,11 @@ def _follow_rim(floor: FloatArray, judged: FloatArray) -> bool:
     """
     changed = False
     for i in range(len(floor)):
-        n = max(judged[i, 8], 1.0)
+        n = max(judged[i, RIM_PIXELS], 1.0)
         # The mean of n squares is far from Gaussian below 1: its cube root is not (Wilson and Hilferty).
         least = max(1.0 - 2.0 / (9.0 * n) - _RIM_SD * math.sqrt(2.0 / (9.0 * n)), 0.0) ** 3
-        if judged[i, 1] > 1.0 + _RIM_SD * math.sqrt(2.0 / n) or 0.0 < judged[i, 1] < least:
-            floor[i] = max(floor[i] * judged[i, 1], ROUNDING_DN2)
+        if judged[i, RIM_NOISE] > 1.0 + _RIM_SD * math.sqrt(2.0 / n) or 0.0 < judged[i, RIM_NOISE] < least:
+            floor[i] = max(floor[i] * judged[i, RIM_NOISE], ROUNDING_DN2)
             changed = True
     return changed
 
@@ -82,16 +100,16 @@ def _follow_rim(floor: FloatArray, judged: FloatArray) -> bool:
 @compiled
 def _is_spot(params: FloatArray, judged: FloatArray, shape: tuple[int, int]) -> bool:
     """Whether a fit that converged is a spot in the image; see `Fit` for `judged`."""
-    mean_width = math.exp(0.5 * (params[4] + params[5]))
+    mean_width = math.exp(0.5 * (params[LN_SU] + params[LN_SV]))
     return (
-        params[1] > 0.0
+        params[FLUX] > 0.0
         # Were place and shape known: whether anything is there is not a question of its width.
-        and judged[3] > _MIN_FLUX_SD**2 * max(judged[1], 1.0)
+        and judged[INFORMATION] > _MIN_FLUX_SD**2 * max(judged[RIM_NOISE], 1.0)
         # ... but a swelling of the background is not one: there flux and background cannot be told apart.
-        and params[1] > _MIN_TOLD_SD * judged[4]
+        and params[FLUX] > _MIN_TOLD_SD * judged[FLUX_DEVIATION]
         and _MIN_WIDTH_PX <= mean_width <= _MAX_WIDTH_PX
-        and -0.5 <= params[2] <= shape[1] - 0.5
-        and -0.5 <= params[3] <= shape[0] - 0.5
+        and -0.5 <= params[U] <= shape[1] - 0.5
+        and -0.5 <= params[V] <= shape[0] - 0.5
     )
 
 
@@ -109,8 +127,8 @@ def _fit_tilted(
 
     `start` (6,) is that of an upright one, `tilted` (1, 7) is filled.
     """
-    tilted[0, :6], tilted[0, 6] = start, 0.0
-    cov, judged, slope = np.empty((1, 7, 7)), np.empty((1, JUDGED)), np.empty(1)
+    tilted[0, :6], tilted[0, SHEAR] = start, 0.0
+    cov, judged, slope = np.empty((1, 7, 7)), np.empty((1, ACCEPTANCE_COLUMNS)), np.empty(1)
     signal, residual, weight = np.empty_like(data), np.empty_like(data), np.empty_like(data)
     converged = np.empty(1, np.bool_)
     score(data, usable, clip, floor, guess, tilted, cov, signal, residual, weight, converged, slope, judged)
@@ -120,11 +138,15 @@ def _fit_tilted(
 @compiled
 def _note(params: FloatArray, judged: FloatArray, slope: float, row: FloatArray) -> None:
     """Fill a spot's row of the table, all but the next window."""
-    row[6] = 0.0
+    row[SHEAR] = 0.0
     row[: params.size] = params
-    curved = math.sqrt(1.0 + _SECOND_ORDER / judged[3])
-    row[U_SD], row[V_SD], row[FLUX_SD] = judged[5] * curved, judged[6] * curved, judged[4]
-    row[PEAK], row[SLOPE], row[IS_SPOT] = judged[2], slope, 1.0
+    curved = math.sqrt(1.0 + _SECOND_ORDER / judged[INFORMATION])
+    row[U_SD], row[V_SD], row[FLUX_SD] = (
+        judged[U_DEVIATION] * curved,
+        judged[V_DEVIATION] * curved,
+        judged[FLUX_DEVIATION],
+    )
+    row[PEAK], row[SLOPE], row[IS_SPOT] = judged[PEAK_DN], slope, 1.0
 
 
 @compiled
@@ -132,11 +154,11 @@ def _ask_for_another_window(
     params: FloatArray, half: int, rows: FloatArray, cols: FloatArray, k: int, found: FloatArray
 ) -> None:
     """Note that spot k needs another window, and where, if it outgrows its own or lies off its middle."""
-    margin = _WIDTH_SD * found[k, FLUX_SD] / params[1]
-    wanted = half_for(_OUTGROWN * math.exp(max(params[4], params[5]) + margin))
-    if wanted > half or max(abs(params[2] - cols[k]), abs(params[3] - rows[k])) > _OFF_CENTRE_PX:
+    margin = _WIDTH_SD * found[k, FLUX_SD] / params[FLUX]
+    wanted = half_for(_OUTGROWN * math.exp(max(params[LN_SU], params[LN_SV]) + margin))
+    if wanted > half or max(abs(params[U] - cols[k]), abs(params[V] - rows[k])) > _OFF_CENTRE_PX:
         found[k, NEXT_HALF] = max(wanted, half)
-        rows[k], cols[k] = np.rint(params[3]), np.rint(params[2])
+        rows[k], cols[k] = np.rint(params[V]), np.rint(params[U])
 
 
 @compiled
@@ -171,9 +193,9 @@ def fit_group(
     n, half = len(data), data.shape[1] // 2
     origin, params, tilted = np.zeros((n, 7)), np.empty((n, 6)), np.empty((1, 7))
     for i in range(n):
-        origin[i, 2], origin[i, 3] = cols[group[i]] - half, rows[group[i]] - half
+        origin[i, U], origin[i, V] = cols[group[i]] - half, rows[group[i]] - half
         params[i] = start[group[i]] - origin[i, :6]
-    cov, judged, slope = np.empty((n, 6, 6)), np.empty((n, JUDGED)), np.empty(n)
+    cov, judged, slope = np.empty((n, 6, 6)), np.empty((n, ACCEPTANCE_COLUMNS)), np.empty(n)
     signal, residual, weight = np.empty_like(data), np.empty_like(data), np.empty_like(data)
     floor, guess, converged = np.full(n, variance), np.full(n, slope_dn), np.empty(n, np.bool_)
     asked = True
@@ -203,7 +225,7 @@ def fit_group(
         start[k] = params[i] + origin[i, :6]
         found[k, NEXT_HALF] = 0.0
         final, its_judged, its_slope, is_there = start[k], judged[i], slope[i], converged[i]
-        if judged[i, 7] > _SHEAR_SD**2:
+        if judged[i, SHEAR_SCORE] > _SHEAR_SD**2:
             fitted, tilted_judged, tilted_slope = _fit_tilted(
                 data[i : i + 1],
                 usable[i : i + 1],

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
+from workbench.spots.kernels.columns import BACKGROUND, FLUX, LN_SU, U
 from workbench.spots.kernels.compiled import compiled
 from workbench.spots.kernels.joint_sums import OWN, SHARED, add_pairs, leverages, profiles, sums_alone
 from workbench.spots.kernels.single_sums import invert
@@ -30,7 +31,7 @@ def _signal(
     out[:] = 0.0
     for i in range(len(params)):
         for y in range(box[i, 2], box[i, 3]):
-            height = params[i, 1] * along_v[i, 0, y]
+            height = params[i, FLUX] * along_v[i, 0, y]
             for x in range(box[i, 0], box[i, 1]):
                 out[y, x] += height * along_u[i, 0, x]
 
@@ -46,15 +47,15 @@ def _weigh(usable: BoolArray, signal: FloatArray, floor: float, slope: float, ou
 @compiled
 def _moved(params: FloatArray, delta: FloatArray) -> None:
     """A step, kept from jumping; after it all spots have one background and shape. `params` is changed."""
-    params[:, 0] = params[0, 0] + delta[0]
+    params[:, BACKGROUND] = params[0, BACKGROUND] + delta[0]
     for j in range(2):
-        stretched = params[0, 4 + j] + min(max(delta[1 + j], -_MAX_STRETCH), _MAX_STRETCH)
-        params[:, 4 + j] = min(max(stretched, _LN_WIDTH_RANGE[0]), _LN_WIDTH_RANGE[1])
+        stretched = params[0, LN_SU + j] + min(max(delta[1 + j], -_MAX_STRETCH), _MAX_STRETCH)
+        params[:, LN_SU + j] = min(max(stretched, _LN_WIDTH_RANGE[0]), _LN_WIDTH_RANGE[1])
     for i in range(len(params)):
         own = SHARED + OWN * i
-        params[i, 1] = max(params[i, 1] + delta[own], 0.1 * abs(params[i, 1]))
+        params[i, FLUX] = max(params[i, FLUX] + delta[own], 0.1 * abs(params[i, FLUX]))
         for j in range(2):
-            params[i, 2 + j] += min(max(delta[own + 1 + j], -_MAX_MOVE_PX), _MAX_MOVE_PX)
+            params[i, U + j] += min(max(delta[own + 1 + j], -_MAX_MOVE_PX), _MAX_MOVE_PX)
 
 
 @compiled
@@ -98,7 +99,7 @@ def score_together(
         before[:] = params
         profiles(params, along_u, along_v, box)
         _signal(params, along_u, along_v, box, signal)
-        residual[:] = data - signal - params[0, 0]
+        residual[:] = data - signal - params[0, BACKGROUND]
         if not fixed:
             _weigh(usable, signal, floor, slope, weight)
         sums_alone(params, along_u, along_v, box, weight, residual, information, gradient)

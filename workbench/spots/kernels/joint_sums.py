@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from workbench.model.arrays import FloatArray, IndexArray
+from workbench.spots.kernels.columns import FLUX, LN_SU, LN_SV, U, V
 from workbench.spots.kernels.compiled import compiled
 from workbench.spots.kernels.profiles import ALONG_U, ALONG_V, profile
 
@@ -29,12 +30,12 @@ def profiles(params: FloatArray, along_u: FloatArray, along_v: FloatArray, box: 
     A box has the first column, the one after the last, the first row and the one after the last.
     """
     for i in range(len(params)):
-        profile(params[i, 2], params[i, 4], along_u[i])
-        profile(params[i, 3], params[i, 5], along_v[i])
+        profile(params[i, U], params[i, LN_SU], along_u[i])
+        profile(params[i, V], params[i, LN_SV], along_v[i])
         for j, size in enumerate((along_u.shape[2], along_v.shape[2])):
-            reach = _REACH_WIDTHS * math.exp(params[i, 4 + j]) + 0.5
-            box[i, 2 * j] = min(max(math.floor(params[i, 2 + j] - reach), 0), size)
-            box[i, 2 * j + 1] = min(max(math.ceil(params[i, 2 + j] + reach) + 1, 0), size)
+            reach = _REACH_WIDTHS * math.exp(params[i, LN_SU + j]) + 0.5
+            box[i, 2 * j] = min(max(math.floor(params[i, U + j] - reach), 0), size)
+            box[i, 2 * j + 1] = min(max(math.ceil(params[i, U + j] + reach) + 1, 0), size)
 
 
 @compiled
@@ -80,7 +81,7 @@ def sums_alone(
                     told[a, x] += factor * weight[y, x]
                     pulled[a, x] += factor * weighted[y, x]
         for p in range(1, 6):
-            of_u, scale = along_u[i, ALONG_U[p]], 1.0 if p == 1 else params[i, 1]
+            of_u, scale = along_u[i, ALONG_U[p]], 1.0 if p == 1 else params[i, FLUX]
             one = other = 0.0
             for x in range(first, end):
                 one += of_u[x] * told[ALONG_V[p], x]
@@ -123,7 +124,7 @@ def add_pairs(
                     told = 0.0
                     for x in range(first, end):
                         told += of_i[x] * of_j[x] * sums[x]
-                    told *= (1.0 if p == 1 else params[i, 1]) * (1.0 if q == 1 else params[j, 1])
+                    told *= (1.0 if p == 1 else params[i, FLUX]) * (1.0 if q == 1 else params[j, 1])
                     information[_place(i, p), _place(j, q)] += told
                     if i != j:
                         information[_place(j, q), _place(i, p)] += told
@@ -144,7 +145,7 @@ def leverages(
     for i in range(len(params)):
         for y in range(box[i, 2], box[i, 3]):
             for p in range(1, 6):
-                factor = 2.0 * cov[0, _place(i, p)] * (1.0 if p == 1 else params[i, 1])
+                factor = 2.0 * cov[0, _place(i, p)] * (1.0 if p == 1 else params[i, FLUX])
                 factor *= along_v[i, ALONG_V[p], y]
                 for x in range(box[i, 0], box[i, 1]):
                     out[y, x] += factor * along_u[i, ALONG_U[p], x]
@@ -154,7 +155,7 @@ def leverages(
                 mixed[:] = 0.0
                 for p in range(1, 6):
                     for q in range(1, 6):
-                        factor = (1.0 if p == 1 else params[i, 1]) * (1.0 if q == 1 else params[j, 1])
+                        factor = (1.0 if p == 1 else params[i, FLUX]) * (1.0 if q == 1 else params[j, 1])
                         factor *= along_v[i, ALONG_V[p], y] * along_v[j, ALONG_V[q], y]
                         mixed[ALONG_U[p], ALONG_U[q]] += factor * cov[_place(i, p), _place(j, q)]
                 if i != j:

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from workbench.model.arrays import FloatArray
+from workbench.spots.kernels.columns import LN_SU, LN_SV, SHEAR, U, V
 from workbench.spots.kernels.compiled import compiled
 
 _INV_SQRT_2: Final = 1.0 / math.sqrt(2.0)
@@ -46,8 +47,8 @@ def profile(centre: float, ln_sd: float, out: FloatArray) -> None:
 def upright_rows(params: FloatArray, rows: FloatArray) -> None:
     """Fill (6, height, width): derivatives of the pixels of one upright ellipse (6,)."""
     along_u, along_v = np.empty((4, rows.shape[2])), np.empty((4, rows.shape[1]))
-    profile(params[2], params[4], along_u)
-    profile(params[3], params[5], along_v)
+    profile(params[U], params[LN_SU], along_u)
+    profile(params[V], params[LN_SV], along_v)
     for k in range(6):
         of_u, of_v = along_u[ALONG_U[k]], along_v[ALONG_V[k]]
         for y in range(rows.shape[1]):
@@ -61,16 +62,16 @@ def sheared_rows(params: FloatArray, rows: FloatArray) -> None:
 
     Rows are integrated by quadrature, columns exactly.
     """
-    sd_v, shear = math.exp(params[5]), params[6]
+    sd_v, shear = math.exp(params[LN_SV]), params[SHEAR]
     along_u = np.empty((4, rows.shape[2]))
     rows[:] = 0.0
     rows[0] = 1.0
     for y in range(rows.shape[1]):
         for node in range(3):
-            dv = y + _NODES[node] - params[3]
+            dv = y + _NODES[node] - params[V]
             z = dv / sd_v
             mass = _NODE_WEIGHTS[node] * _INV_SQRT_2PI / sd_v * math.exp(-0.5 * z * z)
-            profile(params[2] + shear * dv, params[4], along_u)
+            profile(params[U] + shear * dv, params[LN_SU], along_u)
             for x in range(rows.shape[2]):
                 share, by_u = mass * along_u[0, x], mass * along_u[1, x]
                 rows[1, y, x] += share

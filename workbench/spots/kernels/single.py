@@ -8,13 +8,28 @@ from typing import Final
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray
+from workbench.spots.kernels.columns import (
+    BACKGROUND,
+    FLUX,
+    FLUX_DEVIATION,
+    INFORMATION,
+    LN_SU,
+    LN_SV,
+    PEAK_DN,
+    RIM_NOISE,
+    RIM_PIXELS,
+    SHEAR_SCORE,
+    U_DEVIATION,
+    V_DEVIATION,
+    WORST_EXCESS,
+    U,
+    V,
+)
 from workbench.spots.kernels.compiled import compiled
 from workbench.spots.kernels.photon_transfer import transfer_slope
 from workbench.spots.kernels.profiles import profile, sheared_rows, upright_rows
 from workbench.spots.kernels.single_sums import dense_sums, fill_leverage, invert, separable_sums
 
-# Columns of `Fit.judged`.
-JUDGED: Final = 9
 _MAX_STEPS: Final = 20
 _MAX_STEP: Final = np.array([math.inf, math.inf, 1.0, 1.0, 0.4, 0.4, 0.4])
 # Of both logarithms of the width, and of the shear.
@@ -57,7 +72,7 @@ def _weigh(
 @compiled
 def _moved(params: FloatArray, delta: FloatArray) -> None:
     """Step of one window, kept from jumping out of it; `params` is changed."""
-    flux = max(abs(params[1]), 1e-9)
+    flux = max(abs(params[FLUX]), 1e-9)
     for j in range(params.size):
         step = delta[j] / flux if j > 1 else delta[j]
         params[j] += min(max(step, -_MAX_STEP[j]), _MAX_STEP[j])
@@ -91,14 +106,14 @@ def _evaluate(
     """Fill profiles or derivatives of one window, its signal and residual, at `params`."""
     if params.size == 7:
         sheared_rows(params, rows)
-        signal[:] = params[1] * rows[1]
+        signal[:] = params[FLUX] * rows[1]
     else:
-        profile(params[2], params[4], along_u)
-        profile(params[3], params[5], along_v)
+        profile(params[U], params[LN_SU], along_u)
+        profile(params[V], params[LN_SV], along_v)
         for y in range(signal.shape[0]):
             for x in range(signal.shape[1]):
-                signal[y, x] = params[1] * along_v[0, y] * along_u[0, x]
-    residual[:] = data - signal - params[0]
+                signal[y, x] = params[FLUX] * along_v[0, y] * along_u[0, x]
+    residual[:] = data - signal - params[BACKGROUND]
 
 
 @compiled
@@ -174,10 +189,11 @@ def _judge(
             if y == 0 or y == height - 1 or x == 0 or x == width - 1:
                 at_rim += excess
                 in_rim += weight[y, x] > 0.0
-    out[0], out[1], out[2], out[3], out[8] = worst, at_rim / max(in_rim, 1), peak, told, in_rim
-    out[4] = math.sqrt(max(cov[1, 1], 0.0))
-    out[5] = math.sqrt(max(cov[2, 2], 0.0)) / max(flux, 1e-12)
-    out[6] = math.sqrt(max(cov[3, 3], 0.0)) / max(flux, 1e-12)
+    out[WORST_EXCESS], out[PEAK_DN], out[INFORMATION] = worst, peak, told
+    out[RIM_NOISE], out[RIM_PIXELS] = at_rim / max(in_rim, 1), in_rim
+    out[FLUX_DEVIATION] = math.sqrt(max(cov[FLUX, FLUX], 0.0))
+    out[U_DEVIATION] = math.sqrt(max(cov[U, U], 0.0)) / max(flux, 1e-12)
+    out[V_DEVIATION] = math.sqrt(max(cov[V, V], 0.0)) / max(flux, 1e-12)
 
 
 @compiled
@@ -213,7 +229,7 @@ def score(
         while again:
             there = True
             for i in range(n):
-                _weigh(usable[i], clip[i], signal[i], params[i, 0], floor[i], slope[i], weight[i])
+                _weigh(usable[i], clip[i], signal[i], params[i, BACKGROUND], floor[i], slope[i], weight[i])
                 _solve(along_u[i], along_v[i], rows[i], weight[i], residual[i], cov[i], delta[i])
                 there = there and _within(delta[i], cov[i], 0.0)
             again = not measured and (there or step == _STEPS_TO_MEASURE)
@@ -225,10 +241,10 @@ def score(
             usable = weight > 0.0
             clip = np.full_like(clip, math.inf)
         for i in range(n):
-            last[i] = _within(delta[i], cov[i], max(_SMALL * abs(params[i, 1]), 1e-300))
+            last[i] = _within(delta[i], cov[i], max(_SMALL * abs(params[i, FLUX]), 1e-300))
             _moved(params[i], delta[i])
         if measured and last.all():
             break
     for i in range(n):
-        _judge(signal[i], residual[i], weight[i], cov[i], params[i, 1], judged[i])
-        judged[i, 7] = 0.0 if k == 7 else _tilt(along_u[i], along_v[i], weight[i], residual[i])
+        _judge(signal[i], residual[i], weight[i], cov[i], params[i, FLUX], judged[i])
+        judged[i, SHEAR_SCORE] = 0.0 if k == 7 else _tilt(along_u[i], along_v[i], weight[i], residual[i])

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray, Image, IndexArray
+from workbench.spots.kernels.columns import BACKGROUND, FLUX, LN_SU, LN_SV, U, V
 from workbench.spots.kernels.compiled import compiled
 
 _PER_HALF_HEIGHT: Final = 1.0 / (2.0 * math.pi * math.log(2.0))
@@ -103,18 +104,18 @@ def guess(data: FloatArray, usable: BoolArray, rows: FloatArray, cols: FloatArra
                     count += 1
                     mass, of_u, of_v = mass + above, of_u + above * x, of_v + above * y
         square = count * _PER_HALF_HEIGHT
-        start[i, 0], start[i, 1] = 0.0, height * (2.0 * math.pi) * (square + 0.08)
-        start[i, 2] = of_u / max(mass, 1e-9) + cols[i] - half
-        start[i, 3] = of_v / max(mass, 1e-9) + rows[i] - half
-        start[i, 4] = start[i, 5] = 0.5 * math.log(max(square, 0.1))
+        start[i, BACKGROUND], start[i, FLUX] = 0.0, height * (2.0 * math.pi) * (square + 0.08)
+        start[i, U] = of_u / max(mass, 1e-9) + cols[i] - half
+        start[i, V] = of_v / max(mass, 1e-9) + rows[i] - half
+        start[i, LN_SU] = start[i, LN_SV] = 0.5 * math.log(max(square, 0.1))
 
 
 @compiled
 def is_near_edge(params: FloatArray, height: int, width: int) -> bool:
     """Whether the border of the image cuts a spot (6 or more, in pixels of the image)."""
-    along_u, along_v = min(params[2], width - 1 - params[2]), min(params[3], height - 1 - params[3])
-    cut_off: bool = along_u < _EDGE_WIDTHS * math.exp(params[4]) or along_v < _EDGE_WIDTHS * math.exp(
-        params[5]
+    along_u, along_v = min(params[U], width - 1 - params[U]), min(params[V], height - 1 - params[V])
+    cut_off: bool = along_u < _EDGE_WIDTHS * math.exp(params[LN_SU]) or along_v < _EDGE_WIDTHS * math.exp(
+        params[LN_SV]
     )
     return cut_off
 
@@ -122,7 +123,7 @@ def is_near_edge(params: FloatArray, height: int, width: int) -> bool:
 @compiled
 def is_clipped(on: Image, clip_dn: float, params: FloatArray) -> bool:
     """Whether a pixel within two widths of a spot (6 or more, in pixels of the image) is clipped."""
-    u, v, reach_u, reach_v = params[2], params[3], 2 * math.exp(params[4]), 2 * math.exp(params[5])
+    u, v, reach_u, reach_v = params[U], params[V], 2 * math.exp(params[LN_SU]), 2 * math.exp(params[LN_SV])
     first_row, last_row = int(np.rint(v - reach_v)), int(np.rint(v + reach_v))
     first_col, last_col = int(np.rint(u - reach_u)), int(np.rint(u + reach_u))
     for y in range(max(first_row, 0), min(last_row + 1, on.shape[0])):
@@ -144,7 +145,7 @@ def flag_codes(on: Image, clip_dn: float, params: FloatArray, codes: IndexArray)
 def halves_for(params: FloatArray, scale: float, halves: IndexArray) -> None:
     """Fill (n,) half-widths of windows for spots (n, 6) whose widths are to be multiplied by `scale`."""
     for i in range(len(params)):
-        halves[i] = half_for(scale * math.exp(params[i, 4]))
+        halves[i] = half_for(scale * math.exp(params[i, LN_SU]))
 
 
 @compiled

@@ -8,10 +8,11 @@ from scipy.optimize import least_squares
 
 from workbench.spots.deblending.joint_fit import fit_joint
 from workbench.spots.fit import Windows
+from workbench.spots.kernels.columns import FLUX, LN_SU, LN_SV, SHEAR, U, V
 from workbench.spots.kernels.joint_sums import add_pairs, leverages, profiles, sums_alone
 from workbench.spots.kernels.single_sums import invert
 from workbench.spots.noise import Noise
-from workbench.spots.psf import FLUX, LN_SU, LN_SV, SHEAR, U, V, derivatives
+from workbench.spots.psf import derivatives
 
 WIDTH, HALF, APART, TOLD = 2.5, 12, 3.0, 400.0
 SHAPE = (2 * HALF + 1, 2 * HALF + 1)

@@ -9,7 +9,8 @@ from tests.support.draw import Drawn, Sensor, draw
 from workbench.model.arrays import FloatArray
 from workbench.spots import find_spots
 from workbench.spots.kernels.acceptance import _SECOND_ORDER
-from workbench.spots.psf import FLUX, U, derivatives
+from workbench.spots.kernels.columns import FLUX, U
+from workbench.spots.psf import derivatives
 
 WIDTH, HALF, NOISE_SD = 4.0, 19, 1.0
 SHAPE = (2 * HALF + 1, 2 * HALF + 1)
