@@ -30,7 +30,7 @@ from workbench.procedure.engine.plan import outline
 from workbench.procedure.engine.progress import TimeLeft
 from workbench.procedure.engine.resume import files_now, plan_of, resume
 from workbench.procedure.engine.run import NOBODY, Invocation, Plan, run
-from workbench.report.thesis_figures import FigureWriter
+from workbench.report.figure_writer import FigureWriter
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
