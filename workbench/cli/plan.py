@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
 from workbench.model.errors import BadInputError
+from workbench.model.number_text import duration
+from workbench.model.table import Column, Table
 from workbench.procedure.capture.exposure import LIT_FRAMES, MOST_TRIALS
 from workbench.procedure.capture.latency import LEASE_S
 from workbench.procedure.engine.check import check_file
 from workbench.procedure.engine.durations import StepDurations, learn_durations
 from workbench.procedure.engine.plan import PlannedStep, outline
 from workbench.procedure.engine.run import Plan
+from workbench.report.terminal_table import TerminalTable
 
 
 def check_files(files: list[Path]) -> None:
@@ -49,7 +52,7 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
     pace = learn_durations(sessions, plan.rig.rig)
     steps = outline(plan.procedures, plan.rig)
     console = Console(stderr=True, markup=False)
-    console.print(_table(steps, pace))
+    console.print(TerminalTable(plan_table(steps, pace)))
     total = sum(step.shots for step in steps)
     console.print(
         f"{total} shots, {emission(total, pace)}; {duration(sum(map(pace.seconds, steps)))} in all",
@@ -71,27 +74,27 @@ def emission(shots: int, pace: StepDurations, lit_frames: int = 1) -> str:
     return f"{lit_frames * shots * pace.lit_s:.1f} s of emission"
 
 
-def duration(seconds: float) -> str:
-    """For people: seconds below two minutes, then minutes, then hours."""
-    if seconds < 120:
-        return f"{seconds:.0f} s"
-    if seconds < 7200:
-        return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.1f} h"
+def plan_table(steps: Sequence[PlannedStep], durations: StepDurations) -> Table:
+    """A row for each step: target placements, captures, seconds of emission, and its duration."""
+    return Table(
+        name="plan",
+        title="Plan",
+        columns=(
+            Column(key="step", name="step"),
+            Column(key="title", name="title"),
+            Column(key="placements", name="placements"),
+            Column(key="captures", name="captures"),
+            Column(key="emission_s", name="emission", unit="s", format=".1f"),
+            Column(key="duration_s", name="duration", format="duration"),
+        ),
+        rows=tuple(_plan_row(step, durations) for step in steps),
+    )
 
 
-def _table(steps: list[PlannedStep], pace: StepDurations) -> Table:
-    table = Table(title="Plan", title_justify="left")
-    table.add_column("step", overflow="fold")
-    table.add_column("", overflow="fold")
-    for column in ("placements", "shots", "emission", "time"):
-        table.add_column(column, justify="right")
-    for step in steps:
-        lit_s = step.shots * (LEASE_S if pace.lit_s is None else pace.lit_s)
-        counts = [str(step.placements), str(step.shots), f"{lit_s:.1f} s"] if step.shots else ["", "", ""]
-        name = f"{step.procedure}.{step.index}"
-        table.add_row(name, step.title, *counts, duration(pace.seconds(step)))
-    return table
+def _plan_row(step: PlannedStep, durations: StepDurations) -> tuple[str | float | None, ...]:
+    emission_s = step.shots * (LEASE_S if durations.lit_s is None else durations.lit_s)
+    counts = (step.placements, step.shots, emission_s) if step.shots else (None, None, None)
+    return (f"{step.procedure}.{step.index}", step.title, *counts, durations.seconds(step))
 
 
 def _told_by(pace: StepDurations, rig: str) -> str:

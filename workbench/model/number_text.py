@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from math import floor, log10
 
+SECONDS_BELOW_S = 120
+MINUTES_BELOW_S = 7200
+
 
 def significant(value: float, sd: float) -> str:
     """`value` to the second significant digit of its standard deviation; as it is where `sd` is 0."""
     if sd <= 0:
         return f"{value:g}"
     digits = max(0, 1 - floor(log10(sd)))
-    return f"{value:.{digits}f}"
+    # Adding zero turns a rounded -0.0 into 0.0.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def with_sd(value: float, sd: float) -> str:
@@ -21,3 +25,12 @@ def with_sd(value: float, sd: float) -> str:
 def two_digits(sd: float) -> str:
     """Two significant digits, without an exponent for what a person would write out."""
     return f"{float(f'{sd:.2g}'):g}"
+
+
+def duration(seconds: float) -> str:
+    """Seconds below two minutes, minutes below two hours, else hours: `45 s`, `12 min`, `3.5 h`."""
+    if seconds < SECONDS_BELOW_S:
+        return f"{seconds:.0f} s"
+    if seconds < MINUTES_BELOW_S:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"

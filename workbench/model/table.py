@@ -10,19 +10,20 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from workbench.model.number_text import significant, two_digits
+from workbench.model.number_text import duration, significant, two_digits
 from workbench.model.yamlfile import FileModel
 
 Cell = float | int | bool | str | None
 """None: there is no such number. A bool is an alarm."""
 MISSING = "-"
 ALARM = "!"
+DIGITS_OF = "digits of "
 
 
 class Column(FileModel):
     """One column of a table."""
 
-    key: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.]*$")]
+    key: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     """Name in CSV and JSON, with the unit as its suffix: `mean_error_mm`."""
     name: str
     """Heading for people, without the unit: `mean error`."""
@@ -31,12 +32,17 @@ class Column(FileModel):
     """Python's format specification of a number: `+.2f`. Empty: the shortest text.
 
     `sd`: two significant digits. `digits of KEY`: as many decimals as two significant digits of the column
-    KEY of the same row, its standard deviation, need.
+    KEY of the same row, its standard deviation, need. `duration`: seconds as `45 s`, `12 min` or `3.5 h`.
     """
     scale: float = 1.0
     """A number is multiplied by it for people: 100 with the unit `%`. CSV and JSON have it unscaled."""
     meaning: str = ""
     """One sentence for the legend and the documentation."""
+
+    @property
+    def sd_key(self) -> str:
+        """Key of the column with this one's standard deviation; empty where the format names none."""
+        return self.format.removeprefix(DIGITS_OF) if self.format.startswith(DIGITS_OF) else ""
 
     @property
     def heading(self) -> str:
@@ -47,7 +53,7 @@ class Column(FileModel):
 class Table(FileModel):
     """Rows of cells under described columns."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")]
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     """Names the table's file and its place in the recording."""
     title: str
     columns: tuple[Column, ...]
@@ -58,8 +64,11 @@ class Table(FileModel):
     def _is_rectangular(self) -> Table:
         if wrong := [row for row in self.rows if len(row) != len(self.columns)]:
             raise ValueError(f"table {self.name}: expected {len(self.columns)} cells a row, got {wrong[0]}")
-        if len({column.key for column in self.columns}) != len(self.columns):
+        keys = {column.key for column in self.columns}
+        if len(keys) != len(self.columns):
             raise ValueError(f"table {self.name}: expected columns of different keys")
+        if unknown := {c.sd_key for c in self.columns if c.sd_key} - keys:
+            raise ValueError(f"table {self.name}: expected a column of the key {min(unknown)}, there is none")
         return self
 
     def text(self, row: int, column: int) -> str:
@@ -76,21 +85,33 @@ class Table(FileModel):
         cells = [row[column] for row in self.rows if row[column] is not None]
         return bool(cells) and not any(isinstance(cell, str | bool) for cell in cells)
 
+    def to_csv(self) -> str:
+        """The records as CSV, the columns' keys as the header; lines end with a line feed."""
+        import pandas as pd  # only where a file is written: it takes longer to load than most commands run
+
+        keys = [column.key for column in self.columns]
+        return pd.DataFrame(self.records(), columns=keys).to_csv(index=False, lineterminator="\n")
+
 
 def cell_text(table: Table, row: tuple[Cell, ...], index: int) -> str:
     """A cell as people read it: by its column's format and scale, without the unit."""
-    cell, column = row[index], table.columns[index]
+    cell = row[index]
     if cell is None:
         return MISSING
     if isinstance(cell, bool):
         return ALARM if cell else ""
     if isinstance(cell, str):
         return cell
-    value = cell * column.scale
+    return _number_text(table, row, table.columns[index], cell)
+
+
+def _number_text(table: Table, row: tuple[Cell, ...], column: Column, number: float) -> str:
+    value = number * column.scale
     if column.format == "sd":
         return two_digits(value)
-    if column.format.startswith("digits of "):
-        keys = [each.key for each in table.columns]
-        sd = row[keys.index(column.format.removeprefix("digits of "))]
+    if column.format == "duration":
+        return duration(value)
+    if column.sd_key:
+        sd = row[[each.key for each in table.columns].index(column.sd_key)]
         return significant(value, float(sd) * column.scale) if isinstance(sd, float | int) else f"{value:g}"
     return format(value, column.format or "g")

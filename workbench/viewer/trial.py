@@ -8,10 +8,11 @@ from math import hypot
 
 import rerun as rr
 
+from workbench.model.chart import Axis, Chart, Series
 from workbench.model.event import ReadingTaken, TrialFinished
 from workbench.viewer import documents
 from workbench.viewer import entities as at
-from workbench.viewer.chart import Chart, Mark, log_chart
+from workbench.viewer.chart import log_chart
 from workbench.viewer.stream import Stream
 
 PERCENT = 100.0
@@ -52,8 +53,8 @@ class TrialView:
 
     def _log_chart(self, reference_sd_mm: Mapping[float, float] | None = None) -> None:
         colors = {**self.colors, at.SENSOR: at.WHITE}
-        marks = error_marks(self.readings, reference_sd_mm or {})
-        log_chart(self.stream, at.TRIAL_CHART, Chart("%", marks, colors), "no trial yet")
+        chart = error_chart(self.readings, reference_sd_mm or {})
+        log_chart(self.stream, at.TRIAL_CHART, chart, colors, "no trial yet")
 
     def _document(self, text: str) -> None:
         self.stream.log(at.TRIAL_SUMMARY, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
@@ -74,28 +75,47 @@ def _log_error(stream: Stream, who: str, error_mm: float, sigma_mm: float | None
     stream.log(at.under(at.TRIAL_ERRORS, who), error)
 
 
-def error_marks(readings: Sequence[ReadingTaken], reference_sd_mm: Mapping[float, float]) -> list[Mark]:
+def error_chart(readings: Sequence[ReadingTaken], reference_sd_mm: Mapping[float, float]) -> Chart:
     """Relative errors of all readings and of their lasers, in percent of the true range.
 
-    `reference_sd_mm` says for each standoff how well its true range is known. That is part of the error but
-    not of what the sensor states, so only where it is known can an error be called too large.
+    `reference_sd_mm` is the reference uncertainty of each standoff. That is part of the error but not of what
+    the sensor states, so only where it is known can an error be an outlier.
     """
-    return [mark for reading in readings for mark in _marks_of(reading, reference_sd_mm)]
+    names = [*dict.fromkeys(one.laser_id for reading in readings for one in reading.lasers), at.SENSOR]
+    points = [(reading, *one) for reading in readings for one in _ranges(reading)]
+    return Chart(
+        name="trial_errors",
+        title="Error of every reading, bars stated 1 sigma",
+        x=Axis(label="standoff", unit="mm", scale="log"),
+        y=Axis(label="error", unit="%"),
+        series=tuple(
+            _series(name, [(r, mm, sd) for r, who, mm, sd in points if who == name], reference_sd_mm)
+            for name in names
+        ),
+    )
 
 
-def _marks_of(reading: ReadingTaken, reference_sd_mm: Mapping[float, float]) -> list[Mark]:
-    true_mm = reading.standoff_mm
-    reference = reference_sd_mm.get(true_mm)
+def _ranges(reading: ReadingTaken) -> list[tuple[str, float, float]]:
+    """Name, range and stated sd (mm) of every laser and of the sensor itself."""
     ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in reading.lasers]
     if reading.range_mm is not None and reading.sigma_mm is not None:
         ranges.append((at.SENSOR, reading.range_mm, reading.sigma_mm))
-    return [
-        Mark(
-            series=who,
-            standoff_mm=true_mm,
-            y=PERCENT * (range_mm / true_mm - 1),
-            sd=PERCENT * sigma_mm / true_mm,
-            expected_sd=None if reference is None else PERCENT * hypot(sigma_mm, reference) / true_mm,
-        )
-        for who, range_mm, sigma_mm in ranges
-    ]
+    return ranges
+
+
+def _series(
+    name: str, ranges: Sequence[tuple[ReadingTaken, float, float]], reference_sd_mm: Mapping[float, float]
+) -> Series:
+    true_mm = [reading.standoff_mm for reading, _, _ in ranges]
+    reference = [reference_sd_mm.get(true) for true in true_mm]
+    sd_mm = [sd for _, _, sd in ranges]
+    return Series(
+        name=name,
+        x=tuple(true_mm),
+        y=tuple(PERCENT * (mm / true - 1) for true, (_, mm, _) in zip(true_mm, ranges, strict=True)),
+        sd=tuple(PERCENT * sd / true for true, sd in zip(true_mm, sd_mm, strict=True)),
+        expected_sd=tuple(
+            None if other is None else PERCENT * hypot(sd, other) / true
+            for true, sd, other in zip(true_mm, sd_mm, reference, strict=True)
+        ),
+    )
