@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from workbench.model.finite import finite_or_none
 from workbench.model.yamlfile import FileModel
 
-Number = float | None
-"""None makes a gap."""
+Number = Annotated[float | None, BeforeValidator(finite_or_none)]
+"""None makes a gap, as does a number that is not finite."""
 OUTLIER_SIGMA = 3.0
 PALETTE = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00", "#0072b2")
 """Okabe and Ito's colours, which people with any colour vision can tell apart, without their black."""

@@ -48,14 +48,17 @@ def y_scale(chart: Chart) -> Scale:
     return _scale(chart.y, values)
 
 
-def x_ticks(chart: Chart, scale: Scale, least_distance: float) -> list[float]:
-    """Values of x to label: the data's own where they are few, else round numbers.
+def x_ticks(chart: Chart, scale: Scale, least_distance: float) -> tuple[list[float], list[float]]:
+    """Values of x to label, in two rows: the data's own where they are few, else round numbers.
 
-    Neighbours are at least `least_distance` apart (a share of the axis), and the first and last are kept.
+    Neighbours in a row are at least `least_distance` apart (a share of the axis). The first row has the first
+    and the last value; the second one, below it, has values between for which the first has no room.
     """
     own = [x for x in chart.x_values() if 0 <= scale.share(x) <= 1]
-    candidates = own if 0 < len(own) <= MOST_LABELLED else scale.round_ticks()
-    return _thinned(candidates, scale, least_distance)
+    if not 0 < len(own) <= MOST_LABELLED:
+        return _thinned(scale.round_ticks(), scale, least_distance), []
+    first = _thinned(own, scale, least_distance)
+    return first, _thinned([x for x in own if x not in first], scale, least_distance)
 
 
 def linear_ticks(low: float, high: float) -> list[float]:
@@ -96,12 +99,10 @@ def _log_ticks(low: float, high: float) -> list[float]:
 
 def _thinned(values: Sequence[float], scale: Scale, least_distance: float) -> list[float]:
     """Values at least `least_distance` apart, with the first and the last among them."""
-    if len(values) < 2:
-        return list(values)
-    last = values[-1]
-    kept = [values[0]]
-    for value in values[1:-1]:
-        room = min(scale.share(value) - scale.share(kept[-1]), scale.share(last) - scale.share(value))
-        if room >= least_distance:
+    kept = list(values[:1])
+    for value in values[1:]:
+        if scale.share(value) - scale.share(kept[-1]) >= least_distance:
             kept.append(value)
-    return [*kept, last]
+        elif value == values[-1]:  # it takes the place of its neighbour, unless that is the first
+            kept[max(1, len(kept) - 1) :] = [value]
+    return kept

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from workbench.model.finite import finite_or_none
 from workbench.model.number_text import duration, significant, two_digits
 from workbench.model.yamlfile import FileModel
 
-Cell = float | int | bool | str | None
-"""None: there is no such number. A bool is an alarm."""
+Cell = Annotated[float | int | bool | str | None, BeforeValidator(finite_or_none)]
+"""None: there is no such number; so is one that is not finite. A bool is an alarm."""
 MISSING = "-"
 ALARM = "!"
 DIGITS_OF = "digits of "

@@ -53,8 +53,8 @@ def _draw_axes(axes: Axes, chart: Chart) -> None:
     axes.set(xscale=chart.x.scale, yscale=chart.y.scale, ylabel=chart.y.text)
     axes.set_xlabel("\n".join(line for line in (chart.x.text, chart.caption) if line))
     axes.set(xlim=(x.low, x.high), ylim=(y.low, y.high))
-    ticks = x_ticks(chart, x, TICK_DISTANCE)
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    above, below = x_ticks(chart, x, TICK_DISTANCE)
+    axes.set_xticks([*above, *below], [*(f"{tick:g}" for tick in above), *(f"\n{tick:g}" for tick in below)])
     axes.set_yticks(y.round_ticks(), [f"{tick:g}" for tick in y.round_ticks()])
     for one in (axes.xaxis, axes.yaxis):
         one.set_minor_locator(NullLocator())

@@ -17,7 +17,7 @@ from workbench.viewer import entities as at
 from workbench.viewer.stream import Stream
 
 WIDTH, HEIGHT = 1000.0, 420.0
-BOUNDS_X, BOUNDS_Y = (-110.0, 1060.0), (-95.0, 505.0)
+BOUNDS_X, BOUNDS_Y = (-110.0, 1060.0), (-95.0, 550.0)
 """What a view of a chart shows: the plot, the tick labels, and the title and legend above."""
 _DODGE = 7.0
 """Sideways shift from one series to the next, so that their bars do not cover each other."""
@@ -25,7 +25,8 @@ _LEAST_TICK_DISTANCE = 0.055
 """Of two labels of x, as a share of the plot's width."""
 _LABEL_RISE = 17.0
 """The viewer hangs a label below its point; raised by this, it stands beside a line of the grid."""
-_TITLE_Y, _LEGEND_Y, _X_LABEL_Y = -92.0, -42.0, HEIGHT + 40.0
+_TITLE_Y, _LEGEND_Y, _X_LABEL_Y = -92.0, -42.0, HEIGHT + 84.0
+_TICK_ROWS_Y = (HEIGHT + 10.0, HEIGHT + 46.0)
 _LEGEND_STEP = 130.0
 _THIN = rr.Radius.ui_points(0.7)
 _BAR = rr.Radius.ui_points(1.2)
@@ -107,13 +108,15 @@ def log_note(stream: Stream, entity: str, text: str) -> None:
 def _log_axes(stream: Stream, entity: str, plot: Plot) -> None:
     chart, low = plot.chart, plot.y.low
     rows = plot.y.round_ticks()
-    columns = x_ticks(chart, plot.x, _LEAST_TICK_DISTANCE)
+    above, below = x_ticks(chart, plot.x, _LEAST_TICK_DISTANCE)
+    columns = [*above, *below]
     lines: list[Strip] = [[plot.at(plot.x.low, y), plot.at(plot.x.high, y)] for y in rows]
     lines += [[plot.at(x, low), plot.at(x, plot.y.high)] for x in columns]
     colors = [at.GREY if y == 0 else _GRID for y in rows] + [_GRID] * len(columns)
     stream.log(f"{entity}/grid", rr.LineStrips2D(lines, colors=colors, radii=_THIN, draw_order=-10.0))
     labels = {(-55.0, plot.at(plot.x.low, y)[1] - _LABEL_RISE): _y_text(y, chart.y.unit) for y in rows}
-    labels |= {(plot.at(x, low)[0], HEIGHT + 10.0): f"{x:g}" for x in columns}
+    for row_y, ticks in zip(_TICK_ROWS_Y, (above, below), strict=True):
+        labels |= {(plot.at(x, low)[0], row_y): f"{x:g}" for x in ticks}
     labels[WIDTH / 2, _TITLE_Y] = chart.title
     labels[WIDTH / 2, _X_LABEL_Y] = f"{chart.y.text} against {chart.x.text}"
     _log_labels(stream, f"{entity}/ticks", labels)

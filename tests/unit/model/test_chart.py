@@ -47,6 +47,11 @@ def test_a_chart_of_gaps_is_empty() -> None:
     assert not chart(Series(name="a", x=(1.0,), y=(0.0,))).is_empty
 
 
+def test_a_number_that_is_not_finite_makes_a_gap() -> None:
+    one = Series(name="a", x=(1.0, 2.0), y=(float("nan"), 1.0), sd=(0.1, float("inf")))
+    assert (one.y, one.sd) == ((None, 1.0), (0.1, None))
+
+
 def test_an_axis_has_its_unit() -> None:
     assert Axis(label="standoff", unit="mm").text == "standoff [mm]"
     assert Axis(label="share").text == "share"
