@@ -29,7 +29,7 @@ def test_sessions_are_listed_with_whole_names(
         SessionStatus(Path("sessions") / names[1], "failed", ("p",), 12, LONG_WHY),
     ]
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(sessions, "standings", lambda folder: found)
+    monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
     list_sessions(Path("sessions"), as_json=False)
     told = capsys.readouterr().err.splitlines()
     assert max(map(len, told[:-1])) <= 80
@@ -45,7 +45,7 @@ def test_a_session_with_a_name_as_long_as_the_line_has_two(
     names = ["20261122-214141-calibrate-flat", "20261122-214142-" + "calibrate-" * 6 + "x"]
     found = [SessionStatus(Path("sessions") / name, "finished", ("p",), 440, "done") for name in names]
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(sessions, "standings", lambda folder: found)
+    monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
     list_sessions(Path("sessions"), as_json=False)
     told = capsys.readouterr().err.splitlines()
     assert max(map(len, told)) <= 80
@@ -73,7 +73,7 @@ def test_how_a_session_ended_takes_two_lines_at_most(
     why = "the calibration is refused: " + "; ".join(f"laser L{n} was seen at 2 standoffs" for n in range(9))
     found = [SessionStatus(Path("sessions/a"), "failed", ("p",), 12, why)]
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(sessions, "standings", lambda folder: found)
+    monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
     list_sessions(Path("sessions"), as_json=False)
     told = capsys.readouterr().err.splitlines()
     assert len(told) == 4
