@@ -55,7 +55,7 @@ class SpreadTrialStep(StepModel):
 
         def work(placement: Placement) -> Row:
             readings = take_readings(context, ranger, name, placement, self.readings)
-            ranges = [reading.flat_mm for reading in readings if reading.flat_mm is not None]
+            ranges = [reading.range_mm for reading in readings if reading.range_mm is not None]
             return placement.standoff_mm, len(ranges), stdev(ranges) if len(ranges) > 1 else None
 
         rows = visit_placements(context, self.placements(name, context.rig), work)

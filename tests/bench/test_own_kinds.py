@@ -117,7 +117,7 @@ class OwnTrialStep(StepModel):
             self.placements(name, context.rig),
             lambda placed: take_readings(context, ranger, name, placed, 3),
         )
-        ranges = tuple(reading.flat_mm for reading in readings)
+        ranges = tuple(reading.range_mm for reading in readings)
         columns = (
             Column(key="reading", name="reading"),
             Column(key="range_mm", name="range", unit="mm", format=".3f"),

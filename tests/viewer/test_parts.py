@@ -1,70 +1,15 @@
-"""Charts, words and geometry on their own."""
+"""Geometry, colours and names on their own."""
 
 from __future__ import annotations
 
 from math import radians, tan
 
 import numpy as np
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tests.viewer.session import a_fit, a_rig
 from workbench.model.target import FlatTarget
-from workbench.viewer.chart import HEIGHT, WIDTH, Chart, Mark, y_ticks
-from workbench.viewer.documents import plus_minus
 from workbench.viewer.entities import laser_colors, under
 from workbench.viewer.geometry import Geometry
-
-
-@given(limit=st.floats(1e-6, 1e6))
-def test_ticks_are_few_symmetric_and_within(limit: float) -> None:
-    ticks = y_ticks(limit)
-    assert 3 <= len(ticks) <= 11
-    assert 0.0 in ticks
-    assert ticks == [-tick for tick in reversed(ticks)]
-    assert max(ticks) <= limit * (1 + 1e-9)
-
-
-@given(
-    marks=st.lists(
-        st.builds(
-            Mark,
-            series=st.sampled_from(["L1", "stranger"]),
-            standoff_mm=st.floats(10.0, 1e4),
-            y=st.floats(-1e3, 1e3),
-            sd=st.none() | st.floats(0.0, 1e3),
-        ),
-        min_size=1,
-    )
-)
-def test_every_mark_lies_on_the_plot(marks: list[Mark]) -> None:
-    chart = Chart("px", marks, {"L1": (1, 2, 3)})
-    for mark in marks:
-        x, y = chart.place(mark)
-        assert 0 < x < WIDTH
-        assert 0 < y < HEIGHT
-
-
-@pytest.mark.parametrize(
-    ("y", "sd", "outlier"), [(0.31, 0.1, True), (-0.31, 0.1, True), (0.29, 0.1, False), (9.0, None, False)]
-)
-def test_outliers_are_beyond_three_sigma(y: float, sd: float | None, outlier: bool) -> None:
-    assert Mark("L1", 500.0, y, 0.01, expected_sd=sd).is_outlier is outlier
-
-
-@pytest.mark.parametrize(
-    ("value", "sd", "text"),
-    [
-        (541.234, 22.0, "541 ± 22"),
-        (358.21, 2.14, "358.2 ± 2.1"),
-        (0.00112, 0.0008, "0.00112 ± 0.00080"),
-        (-60.0, 0.0, "-60 (fixed)"),
-        (-0.001, 0.5, "0.00 ± 0.50"),
-    ],
-)
-def test_values_are_written_to_the_second_digit_of_their_sd(value: float, sd: float, text: str) -> None:
-    assert plus_minus(value, sd) == text
 
 
 def test_sight_and_ray_meet_on_the_target() -> None:

@@ -19,14 +19,14 @@ from workbench.viewer.entities import laser_colors
 VIEWS_OF_TAB = {
     "Live": {PICTURE_VIEW, "Standoff [mm]", "Spot position u [px]", "Peak brightness [DN]", "Steps", "Log"},
     "Fit": {
-        "Residual u against standoff [mm], bars 1 sigma",
-        "Residual v against standoff [mm], bars 1 sigma",
+        "Residuals u",
+        "Residuals v",
         "Verdict",
         "Checks",
         "Parameters",
     },
     "Trial": {
-        "Error of every reading against true range [mm], bars stated 1 sigma",
+        "Errors of the readings",
         "Error of the sensor [mm] as the trial went",
         "Table",
     },

@@ -23,7 +23,9 @@ from tests.viewer.session import (
 )
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
+from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
 from workbench.viewer.recording import RecordingConsumer, _OpenRecording, rebuild
+from workbench.viewer.table_text import table_text
 
 CAPTURES = len(LASERS) * len(STANDOFFS) * REPEATS + len(TRIAL_STANDOFFS) * READINGS
 
@@ -128,14 +130,28 @@ def test_residuals_have_a_standoff_timeline_and_the_bad_one_is_named(contents: C
 
 def test_the_fit_is_summed_up_in_words(contents: Contents) -> None:
     texts = [text for _, (text,) in contents.values("/fit/summary", "TextDocument:text")]
-    assert texts[0].startswith("# No fit yet")
-    assert texts[-1].startswith("# Calibration accepted")
+    assert texts[0] == "No fit yet"
+    assert texts[-1].startswith("**Calibration accepted**")
     assert "f_px is determined by the prior" in texts[-1]
     table = contents.values("/fit/parameter_table", "TextDocument:text")[-1][1][0]
-    assert "| cx_px | 358.2 ± 2.1 | px | 320 ± 40 | 100 % | data |" in table
+    assert table == table_text(parameter_table(a_fit().parameters))
     checks = contents.values("/fit/checks", "TextDocument:text")[-1][1][0]
-    assert f"| {BAD[1]:g} | +2.50 | 0.50 | +5.0 | **farther off than promised** | +4.25 |" in checks
-    assert "| k2 | 0.91 | -0.9 | 0.02 | kept: the data cannot tell |" in checks
+    fit = a_fit()
+    for part in (cross_validation_table(fit.left_out), term_table(fit.terms)):
+        assert table_text(part) in checks
+
+
+@pytest.mark.parametrize(
+    ("entity", "standoffs", "unit"), [("fit/chart/u", STANDOFFS, "px"), ("trial/chart", TRIAL_STANDOFFS, "%")]
+)
+def test_a_chart_labels_every_standoff_and_says_its_units(
+    contents: Contents, entity: str, standoffs: tuple[float, ...], unit: str
+) -> None:
+    labels = contents.values(f"/{entity}/ticks", "Points2D:labels")[-1][1]
+    assert {f"{standoff:g}" for standoff in standoffs} <= set(labels)
+    assert sum(label.endswith(f" {unit}") for label in labels) >= 4
+    (title,) = [label for label in labels if "against" in label]
+    assert f"[{unit}] against standoff [mm]" in title
 
 
 def test_readings_and_the_trial_table(recorded: Recorded, contents: Contents) -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 from rich.console import Console
 
 from workbench.calibration.verdict.comparison import Comparison, compare
+from workbench.calibration.verdict.tables import difference_table
 from workbench.model.calibration import Calibration, load_calibration
-from workbench.report.tables import difference_table
+from workbench.report.terminal_table import TerminalTable
 
 
 def compare_calibrations(a: Path, b: Path, as_json: bool) -> None:
@@ -24,7 +25,7 @@ def compare_calibrations(a: Path, b: Path, as_json: bool) -> None:
     if as_json:
         print(json.dumps(asdict(result)))
     console = Console(stderr=True, markup=False)
-    console.print(difference_table(result.differences))
+    console.print(TerminalTable(difference_table(result.differences)))
     console.print(verdict(result), highlight=False)
     for note in _notes(of_a, of_b, result.identical):
         console.print(f"note: {note}", highlight=False)

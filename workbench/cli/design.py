@@ -10,10 +10,11 @@ from rich.console import Console
 
 from workbench.calibration.design.forecast import CalibrationForecast, forecast
 from workbench.calibration.design.standoffs import best_standoffs
+from workbench.calibration.design.tables import parameter_forecast_table, range_forecast_table
 from workbench.calibration.verdict.observability import direction_lines
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig, load_rig
-from workbench.report.forecast_tables import parameter_forecast_table, range_forecast_table
+from workbench.report.terminal_table import TerminalTable
 
 COUNT = 11
 """As many as procedures/calibrate-flat.yaml has."""
@@ -72,8 +73,8 @@ def _print(rig: Rig, result: CalibrationForecast, proposed: bool) -> None:
         f" {result.repeats} readings of each laser",
         highlight=False,
     )
-    console.print(parameter_forecast_table(result.parameters))
-    console.print(range_forecast_table(rig.laser_ids, result.ranges))
+    console.print(TerminalTable(parameter_forecast_table(result.parameters)))
+    console.print(TerminalTable(range_forecast_table(rig.laser_ids, result.ranges)))
     console.print(
         f"worst range from 0.1 to 5 m: {100 * result.worst_relative_sd:.2f} %,"
         f" {100 * result.worst_relative_sd_of_calibration:.2f} % by the calibration alone (1 sigma)",

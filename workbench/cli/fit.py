@@ -20,14 +20,17 @@ from workbench.calibration.selection.model_terms import fit_chosen
 from workbench.calibration.verdict.assessment import Assessment, derive
 from workbench.calibration.verdict.export import accept_with_reason, calibrate, write_calibration
 from workbench.calibration.verdict.records import left_out_records, parameter_records, term_summaries
+from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.invocation import command_line, now, operator
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
 from workbench.model.captures import CaptureRow, check_images, of_file, parse_captures, read_captures_file
 from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
 from workbench.model.nested import fix_parameters
 from workbench.model.rig import Rig, load_rig
-from workbench.report.tables import derived_table, left_out_table, parameter_table, rejected_lines, term_table
+from workbench.report.rejected_lines import rejected_lines
+from workbench.report.terminal_table import TerminalTable
 from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.files import check_output
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
@@ -198,16 +201,16 @@ def _wrapped(label: str, text: str) -> list[str]:
 
 def _print_tables(fitted: CalibrationFit, assessment: Assessment) -> None:
     console = Console(stderr=True, markup=False)
-    console.print(parameter_table(parameter_records(fitted)))
-    console.print(derived_table(derive(fitted)))
+    console.print(TerminalTable(parameter_table(parameter_records(fitted))))
+    console.print(TerminalTable(derived_table(derive(fitted))))
     if fitted.terms:
-        console.print(term_table(term_summaries(fitted)))
+        console.print(TerminalTable(term_table(term_summaries(fitted))))
     console.print(f"residual rms {fitted.rms_px:.2f} px over {len(fitted.used)} observations")
     if fitted.boards:
         count, views = len(fitted.corner_residual_px), len(fitted.boards)
         console.print(f"board: {fitted.corner_rms_px:.3f} px over {count} corners in {views} views")
     if assessment.left_out:
-        console.print(left_out_table(left_out_records(assessment)))
+        console.print(TerminalTable(cross_validation_table(left_out_records(assessment))))
     for line in rejected_lines(fitted.rejected):
         console.print(f"not used: {line}", highlight=False)
     for warning in assessment.warnings:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
 from workbench.model.errors import BadInputError
+from workbench.model.number_text import duration
+from workbench.model.table import Column, Table
 from workbench.procedure.capture.exposure import LIT_FRAMES, MOST_TRIALS
 from workbench.procedure.capture.latency import LEASE_S
 from workbench.procedure.engine.check import check_file
 from workbench.procedure.engine.durations import StepDurations, learn_durations
 from workbench.procedure.engine.plan import Plan, PlannedStep
+from workbench.report.terminal_table import TerminalTable
 
 
 def check_files(files: list[Path]) -> None:
@@ -37,7 +40,7 @@ def check_files(files: list[Path]) -> None:
 
 
 def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
-    """Print every step, its shots, their emission, and the time it will take.
+    """Print every step, its captures, their emission, and the time it will take.
 
     Raises:
         BadInputError: a file is wrong.
@@ -48,10 +51,10 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
     pace = learn_durations(sessions, plan.rig.rig)
     steps = plan.steps()
     console = Console(stderr=True, markup=False)
-    console.print(_table(steps, pace))
+    console.print(TerminalTable(plan_table(steps, pace)))
     total = sum(step.captures for step in steps)
     console.print(
-        f"{total} shots, {emission(total, pace)}; {duration(sum(map(pace.seconds, steps)))} in all",
+        f"{total} captures, {emission(total, pace)}; {duration(sum(map(pace.seconds, steps)))} in all",
         highlight=False,
     )
     if trials := MOST_TRIALS * sum(step.placements for step in steps):
@@ -60,46 +63,44 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
             f" all lasers at once: at most {trials}, {emission(trials, pace, LIT_FRAMES)}.",
             highlight=False,
         )
-    console.print(_told_by(pace, plan.rig.rig), highlight=False)
+    console.print(_source_of_times(pace, plan.rig.rig), highlight=False)
 
 
-def emission(shots: int, pace: StepDurations, lit_frames: int = 1) -> str:
+def emission(captures: int, pace: StepDurations, lit_frames: int = 1) -> str:
     """Seconds of emission, as measured before or as the lease bounds them."""
     if pace.lit_s is None:
-        return f"at most {shots * LEASE_S:.0f} s of emission (leases of {LEASE_S:g} s)"
-    return f"{lit_frames * shots * pace.lit_s:.1f} s of emission"
+        return f"at most {captures * LEASE_S:.0f} s of emission (leases of {LEASE_S:g} s)"
+    return f"{lit_frames * captures * pace.lit_s:.1f} s of emission"
 
 
-def duration(seconds: float) -> str:
-    """For people: seconds below two minutes, then minutes, then hours."""
-    if seconds < 120:
-        return f"{seconds:.0f} s"
-    if seconds < 7200:
-        return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.1f} h"
+def plan_table(steps: Sequence[PlannedStep], durations: StepDurations) -> Table:
+    """A row for each step: target placements, captures, seconds of emission, and its duration."""
+    return Table(
+        name="plan",
+        title="Plan",
+        columns=(
+            Column(key="step", name="step"),
+            Column(key="title", name="title"),
+            Column(key="placements", name="placements"),
+            Column(key="captures", name="captures"),
+            Column(key="emission_s", name="emission", unit="s", format=".1f"),
+            Column(key="duration_s", name="duration", format="duration"),
+        ),
+        rows=tuple(_plan_row(step, durations) for step in steps),
+    )
 
 
-def _table(steps: list[PlannedStep], pace: StepDurations) -> Table:
-    table = Table(title="Plan", title_justify="left")
-    table.add_column("step", overflow="fold")
-    table.add_column("", overflow="fold")
-    for column in ("placements", "shots", "emission", "time"):
-        table.add_column(column, justify="right")
-    for step in steps:
-        lit_s = step.captures * (LEASE_S if pace.lit_s is None else pace.lit_s)
-        counts = (
-            [str(step.placements), str(step.captures), f"{lit_s:.1f} s"] if step.captures else ["", "", ""]
-        )
-        name = f"{step.procedure}.{step.index}"
-        table.add_row(name, step.title, *counts, duration(pace.seconds(step)))
-    return table
+def _plan_row(step: PlannedStep, durations: StepDurations) -> tuple[str | float | None, ...]:
+    emission_s = step.captures * (LEASE_S if durations.lit_s is None else durations.lit_s)
+    counts = (step.placements, step.captures, emission_s) if step.captures else (None, None, None)
+    return (f"{step.procedure}.{step.index}", step.title, *counts, durations.seconds(step))
 
 
-def _told_by(pace: StepDurations, rig: str) -> str:
+def _source_of_times(pace: StepDurations, rig: str) -> str:
     if pace.sessions == 0:
         return (
-            f"Times are guesses: {pace.placing_s:g} s to place the target, {pace.exposing_s:g} s for the"
-            f" exposure, {pace.capture_s:g} s a shot; no session of {rig} has told them yet."
+            f"Times are defaults: {pace.placing_s:g} s to place the target, {pace.exposing_s:g} s for the"
+            f" exposure, {pace.capture_s:g} s a capture; no session of {rig} has measured them yet."
         )
     sessions = "the last session" if pace.sessions == 1 else f"the last {pace.sessions} sessions"
-    return f"Times as {sessions} of {rig} told them, in the mean, without breaks while placing the target."
+    return f"Times are means of {sessions} of {rig}, without breaks while the target was placed."

@@ -29,6 +29,7 @@ from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.progress import TimeLeft
 from workbench.procedure.engine.resume import files_now, plan_of, resume
 from workbench.procedure.engine.run import NOBODY, Invocation, run
+from workbench.report.figure_writer import FigureWriter
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
@@ -92,7 +93,8 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
         person = choose_operator(answers.no_input, console, lambda: asked.reason, terminal.quiet)
         operator = person if script is None else replace(script, other=person)
-        consumers = (FaultTolerantConsumer(terminal, "the progress", console), beside)
+        figures = FaultTolerantConsumer(FigureWriter(session_dir), "drawing figures", console)
+        consumers = (FaultTolerantConsumer(terminal, "the progress", console), figures, beside)
         try:
             yield Screen(consumers, lambda: asked.reason, operator)
         except (RigNotReadyError, StoppedError, AnswerNeededError, LaserOffNotConfirmedError):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from workbench.model.board import Board
 from workbench.model.rig import load_rig
-from workbench.report.target_pdf import ruler_mm, target_pdf
+from workbench.report.board_page import board_page, ruler_mm
 from workbench.session.files import write_output
 
 
@@ -17,7 +17,7 @@ def write_target(pdf: Path, rig: Path | None) -> str:
         BadInputError: the rig file is wrong, or the file cannot be written.
     """
     board = Board() if rig is None else load_rig(rig).board
-    write_output(pdf, target_pdf(board))
+    write_output(pdf, board_page(board))
     width, height = board.page_mm
     page = f"{pdf}: {width:g} x {height:g} mm"
     return f"{page}. Print it at 100 % and measure the ruler of {ruler_mm(board)} mm on it"

@@ -14,14 +14,10 @@ from rich.text import Text
 
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
+from workbench.model.fit_tables import fit_tables
 from workbench.procedure.capture.quality import Quality, quality_of
 from workbench.procedure.engine.progress import TimeLeft
-from workbench.report.tables import (
-    left_out_table,
-    parameter_table,
-    rejected_lines,
-    term_table,
-)
+from workbench.report.rejected_lines import rejected_lines
 from workbench.report.terminal_table import TerminalTable
 
 
@@ -97,11 +93,8 @@ class Terminal:
             case ev.StepFinished() as e:
                 self._end_step(e.outcome)
             case ev.FitFinished() as e:
-                self._console.print(parameter_table(e.parameters))
-                if e.terms:
-                    self._console.print(term_table(e.terms))
-                if e.left_out:
-                    self._console.print(left_out_table(e.left_out))
+                for table in fit_tables(e):
+                    self._console.print(TerminalTable(table))
                 for line in rejected_lines(e.rejected):
                     self._print(f"not used: {line}")
                 for warning in e.warnings:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from workbench.model.finite import finite_or_none
 from workbench.model.yamlfile import FileModel
 
-Number = float | None
-"""None makes a gap."""
+Number = Annotated[float | None, BeforeValidator(finite_or_none)]
+"""None makes a gap, as does a number that is not finite."""
+OUTLIER_SIGMA = 3.0
+PALETTE = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00", "#0072b2")
+"""Okabe and Ito's colours, which people with any colour vision can tell apart, without their black."""
 
 
 class Axis(FileModel):
@@ -54,6 +58,25 @@ class Series(FileModel):
                 )
         return self
 
+    def bar(self, index: int) -> tuple[float, ...]:
+        """Lower and upper end of a point's bar; the point itself without a bar, nothing at a gap."""
+        y = self.y[index]
+        if y is None:
+            return ()
+        sd = self.sd[index] if self.sd else None
+        return (y,) if sd is None else (y - sd, y + sd)
+
+    def sigmas(self, index: int) -> float | None:
+        """Distance of a point from zero in its expected standard deviations; None where it is not known."""
+        y = self.y[index]
+        expected = self.expected_sd[index] if self.expected_sd else None
+        return abs(y) / expected if y is not None and expected else None
+
+    def is_outlier(self, index: int) -> bool:
+        """Whether a point lies farther from zero than its expected standard deviation explains."""
+        sigmas = self.sigmas(index)
+        return sigmas is not None and sigmas > OUTLIER_SIGMA
+
 
 class Band(FileModel):
     """An area between two curves: an interval, or what is tolerated."""
@@ -74,7 +97,7 @@ class Limit(FileModel):
 class Chart(FileModel):
     """What is drawn over two axes."""
 
-    name: str
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     """Names the chart's file and its place in the recording."""
     title: str
     x: Axis
@@ -83,3 +106,21 @@ class Chart(FileModel):
     bands: tuple[Band, ...] = ()
     limits: tuple[Limit, ...] = ()
     caption: str = ""
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no series has a point."""
+        return all(y is None for series in self.series for y in series.y)
+
+    def x_values(self) -> list[float]:
+        """Where series have points; ascending, each once."""
+        return sorted({x for s in self.series for x, y in zip(s.x, s.y, strict=True) if y is not None})
+
+    def y_values(self) -> list[float]:
+        """Everything that is drawn: points, ends of their bars, bands, limits; ascending, each once."""
+        values = {limit.y for limit in self.limits}
+        for band in self.bands:
+            values.update(band.low, band.high)
+        for series in self.series:
+            values.update(end for i in range(len(series.x)) for end in series.bar(i))
+        return sorted(values)

@@ -6,13 +6,16 @@ single one of them.
 
 from __future__ import annotations
 
-from pydantic import model_validator
+from typing import Annotated
 
+from pydantic import BeforeValidator, Field, model_validator
+
+from workbench.model.finite import finite_or_none
 from workbench.model.number_text import duration, significant, two_digits
 from workbench.model.yamlfile import FileModel
 
-Cell = float | int | bool | str | None
-"""None: there is no such number. A bool is an alarm."""
+Cell = Annotated[float | int | bool | str | None, BeforeValidator(finite_or_none)]
+"""None: there is no such number; so is one that is not finite. A bool is an alarm."""
 MISSING = "-"
 ALARM = "!"
 DIGITS_OF = "digits of "
@@ -21,7 +24,7 @@ DIGITS_OF = "digits of "
 class Column(FileModel):
     """One column of a table."""
 
-    key: str
+    key: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     """Name in CSV and JSON, with the unit as its suffix: `mean_error_mm`."""
     name: str
     """Heading for people, without the unit: `mean error`."""
@@ -51,7 +54,7 @@ class Column(FileModel):
 class Table(FileModel):
     """Rows of cells under described columns."""
 
-    name: str
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     """Names the table's file and its place in the recording."""
     title: str
     columns: tuple[Column, ...]

@@ -32,7 +32,11 @@ class ReadingTaken(FileModel):
     reading: int
     status: Literal["done", "not_enough_points", "no_points"]
     range_mm: float | None
+    """Mean of the lasers, weighted by their spots: the range of a flat target."""
     sigma_mm: float | None
+    """Stated standard uncertainty of `range_mm`."""
+    reference_sd_mm: float | None = None
+    """Reference uncertainty of `standoff_mm`, where it is known."""
     lasers: tuple[LaserRange, ...]
 
 

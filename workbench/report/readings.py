@@ -12,7 +12,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from workbench.report.tables import with_sd
+from workbench.model.number_text import with_sd
 
 if TYPE_CHECKING:  # what is printed of them is made without the rest
     from workbench.ranging.ranger import Reading

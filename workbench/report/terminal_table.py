@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import ceil
 
 from rich import box
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -13,7 +14,7 @@ from rich.text import Text
 from workbench.model.table import Table
 from workbench.model.table_layout import TextColumn, text_columns
 
-GAP = 1
+GAP = 2
 """Characters between columns."""
 NARROWEST_TEXT = 12
 """Characters that a column of words keeps before columns are moved to a block of their own below."""
@@ -31,7 +32,7 @@ class TerminalTable:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
         """Title, blocks and caption, each in lines of the terminal's width."""
-        yield Text(self.table.title, style="bold")
+        yield Text(f"\n{self.table.title}", style="bold")
         for block in blocks(text_columns(self.table), options.max_width):
             yield _rich_table(block)
         if self.table.caption:
@@ -39,32 +40,42 @@ class TerminalTable:
 
 
 def blocks(columns: Sequence[TextColumn], width: int) -> list[list[TextColumn]]:
-    """Columns in blocks that are at most `width` characters wide, each with the first column."""
+    """Columns in as few blocks of equally many as are at most `width` characters wide, if any are.
+
+    Each block begins with the first column.
+    """
     first, *others = columns
-    found = [[first]]
-    for column in others:
-        if sum(_least_width(c) + GAP for c in (*found[-1], column)) > width + GAP and len(found[-1]) > 1:
-            found.append([first])
-        found[-1].append(column)
-    return found
+    for size in range(len(others), 0, -1):
+        parts = [[first, *others[i : i + size]] for i in range(0, len(others), size)]
+        if all(_least_width(part) <= width for part in parts):
+            # As many blocks, with the columns spread evenly over them.
+            even = ceil(len(others) / len(parts))
+            return [[first, *others[i : i + even]] for i in range(0, len(others), even)]
+    return [[first, other] for other in others] or [[first]]
 
 
-def _least_width(column: TextColumn) -> int:
+def _least_width(columns: Sequence[TextColumn]) -> int:
+    return sum(map(_least_column_width, columns)) + GAP * (len(columns) - 1)
+
+
+def _least_column_width(column: TextColumn) -> int:
     if column.is_number:
         return column.width
     return min(column.width, max(NARROWEST_TEXT, *map(len, column.heading)))
 
 
 def _rich_table(columns: Sequence[TextColumn]) -> RichTable:
-    table = RichTable(box=box.SIMPLE_HEAD, padding=(0, GAP, 0, 0), pad_edge=False, show_edge=False)
+    # The box draws blanks between columns, and a rule below the headings.
+    table = RichTable(box=box.SIMPLE_HEAD, padding=(0, GAP - 1, 0, 0), pad_edge=False, show_edge=False)
+    height = max(len(column.heading) for column in columns)
     for column in columns:
+        lines = [""] * (height - len(column.heading)) + list(column.heading)
         # Text, not markup: names may have brackets in them.
         table.add_column(
-            Text("\n".join(column.heading)),
+            Text("\n".join(lines)),
             justify="right" if column.is_number else "left",
             no_wrap=column.is_number,
             overflow="fold",
-            vertical="bottom" if column.is_number else "top",
         )
     for cells in zip(*(column.cells for column in columns), strict=True):
         table.add_row(*map(Text, cells))

@@ -9,7 +9,7 @@ from workbench.model.event import ReadingTaken
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.ranging.acquire import acquire
-from workbench.ranging.ranger import Ranger, Reading
+from workbench.ranging.ranger import Ranger
 from workbench.spots import Finding
 
 
@@ -29,8 +29,8 @@ def session_ranger(context: Context, name: str) -> Ranger:
 
 def take_readings(
     context: Context, ranger: Ranger, name: str, placement: Placement, count: int
-) -> list[Reading]:
-    """Take `count` readings at a placement, and journal each.
+) -> list[ReadingTaken]:
+    """Take `count` readings at a placement, journal each, and return them.
 
     Args:
         context: the session.
@@ -45,22 +45,25 @@ def take_readings(
     return [_take_reading(context, ranger, name, placement, number) for number in range(count)]
 
 
-def _take_reading(context: Context, ranger: Ranger, name: str, placement: Placement, number: int) -> Reading:
+def _take_reading(
+    context: Context, ranger: Ranger, name: str, placement: Placement, number: int
+) -> ReadingTaken:
     scene = f"{placement.key}/{number:02d}"
     reading = acquire(ranger, scene, _shoot(context, ranger, placement, scene, number))
-    context.emit(
-        ReadingTaken(
-            trial=name,
-            scene=scene,
-            standoff_mm=placement.standoff_mm,
-            reading=number,
-            status=reading.status,
-            range_mm=reading.flat_mm,
-            sigma_mm=reading.flat_sigma_mm,
-            lasers=reading.lasers,
-        )
+    stated = placement.standoff_sd_mm
+    taken = ReadingTaken(
+        trial=name,
+        scene=scene,
+        standoff_mm=placement.standoff_mm,
+        reading=number,
+        status=reading.status,
+        range_mm=reading.flat_mm,
+        sigma_mm=reading.flat_sigma_mm,
+        reference_sd_mm=context.rig.bench.placement_sd_mm if stated is None else stated,
+        lasers=reading.lasers,
     )
-    return reading
+    context.emit(taken)
+    return taken
 
 
 def _shoot(

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
+from workbench.model.reading_chart import SENSOR
 from workbench.model.rig import Rig
 from workbench.viewer import entities as at
 from workbench.viewer.chart import BOUNDS_X, BOUNDS_Y
 
 PICTURE_VIEW = "Picture, lasers on"
 """Name of the view with the frames, by which a test finds it."""
+TABLE_FORMAT = rrb.archetypes.TextDocumentFormat(monospace=True, word_wrap=False)
+"""Of the views whose documents are tables in plain text."""
 
 
 def blueprint(rig: Rig) -> rrb.Blueprint:
@@ -47,13 +50,13 @@ def _live(rig: Rig) -> rrb.Container:
 
 def _fit() -> rrb.Container:
     charts = rrb.Vertical(
-        _chart(f"{at.FIT_CHART}/u", "Residual u against standoff [mm], bars 1 sigma"),
-        _chart(f"{at.FIT_CHART}/v", "Residual v against standoff [mm], bars 1 sigma"),
+        _chart(f"{at.FIT_CHART}/u", "Residuals u"),
+        _chart(f"{at.FIT_CHART}/v", "Residuals v"),
     )
     words = rrb.Vertical(
         rrb.TextDocumentView(origin=at.FIT_SUMMARY, name="Verdict"),
-        rrb.TextDocumentView(origin=at.FIT_CHECKS, name="Checks"),
-        rrb.TextDocumentView(origin=at.FIT_TABLE, name="Parameters"),
+        rrb.TextDocumentView(origin=at.FIT_CHECKS, name="Checks", format_options=TABLE_FORMAT),
+        rrb.TextDocumentView(origin=at.FIT_TABLE, name="Parameters", format_options=TABLE_FORMAT),
         row_shares=[2, 3, 3],
     )
     return rrb.Horizontal(charts, words, column_shares=[3, 2], name="Fit")
@@ -61,13 +64,13 @@ def _fit() -> rrb.Container:
 
 def _trial() -> rrb.Container:
     curves = rrb.Vertical(
-        _chart(at.TRIAL_CHART, "Error of every reading against true range [mm], bars stated 1 sigma"),
+        _chart(at.TRIAL_CHART, "Results"),
         rrb.TimeSeriesView(
-            origin=f"{at.TRIAL_ERRORS}/{at.SENSOR}", name="Error of the sensor [mm] as the trial went"
+            origin=f"{at.TRIAL_ERRORS}/{SENSOR}", name="Error of the sensor [mm] as the trial went"
         ),
         row_shares=[3, 2],
     )
-    table = rrb.TextDocumentView(origin=at.TRIAL_SUMMARY, name="Table")
+    table = rrb.TextDocumentView(origin=at.TRIAL_SUMMARY, name="Tables", format_options=TABLE_FORMAT)
     return rrb.Horizontal(curves, table, column_shares=[3, 2], name="Trial")
 
 

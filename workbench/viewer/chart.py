@@ -1,30 +1,33 @@
-"""A chart against standoff, drawn with lines and points in a 2D view.
+"""A chart drawn with lines and points in a 2D view.
 
 Rerun plots against time only. Residuals against standoff are not a course of time: drawn, they stay visible
-wherever the time cursor stands after the fit. x is logarithmic, because a bench's standoffs are.
+wherever the time cursor stands after the fit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import floor, log10
 
 import rerun as rr
 
+from workbench.model.chart import Chart, Series
+from workbench.model.chart_scale import Scale, x_scale, x_ticks, y_scale
 from workbench.viewer import entities as at
 from workbench.viewer.stream import Stream
 
 WIDTH, HEIGHT = 1000.0, 420.0
-BOUNDS_X, BOUNDS_Y = (-110.0, 1040.0), (-60.0, 490.0)
-"""What a view of a chart shows: the plot, room for the tick labels, and the legend above."""
-OUTLIER_SIGMA = 3.0
+BOUNDS_X, BOUNDS_Y = (-110.0, 1060.0), (-95.0, 550.0)
+"""What a view of a chart shows: the plot, the tick labels, and the title and legend above."""
 _DODGE = 7.0
 """Sideways shift from one series to the next, so that their bars do not cover each other."""
-_MIN_TICK_DISTANCE = 55.0
+_LEAST_TICK_DISTANCE = 0.055
+"""Of two labels of x, as a share of the plot's width."""
 _LABEL_RISE = 17.0
 """The viewer hangs a label below its point; raised by this, it stands beside a line of the grid."""
-_LEGEND_Y = -42.0
+_TITLE_Y, _LEGEND_Y, _X_LABEL_Y = -92.0, -42.0, HEIGHT + 84.0
+_TICK_ROWS_Y = (HEIGHT + 10.0, HEIGHT + 46.0)
+_LEGEND_STEP = 130.0
 _THIN = rr.Radius.ui_points(0.7)
 _BAR = rr.Radius.ui_points(1.2)
 _DOT = rr.Radius.ui_points(4.0)
@@ -32,149 +35,170 @@ _RING = rr.Radius.ui_points(8.0)
 _NONE = rr.Radius.ui_points(0.0)
 _GRID: at.Rgb = (70, 70, 75)
 
-Strip = list[tuple[float, float]]
+Point = tuple[float, float]
+Strip = list[Point]
 
 
 @dataclass(frozen=True)
-class Mark:
-    """One point of a chart with its standard deviation (1 sigma, unit of y), None where it is not known."""
+class Plot:
+    """A chart with the scales that bring it onto the plot, `WIDTH` x `HEIGHT` with y down."""
 
-    series: str
-    standoff_mm: float
-    y: float
-    sd: float | None
-    """Drawn as a bar."""
-    expected_sd: float | None = None
-    """Of y itself, with everything that moves it, by which outliers are told; None where it is not known."""
+    chart: Chart
+    x: Scale
+    y: Scale
 
-    @property
-    def sigmas(self) -> float:
-        """Distance from zero in standard deviations, 0 where they are not known."""
-        return abs(self.y) / self.expected_sd if self.expected_sd else 0.0
+    @classmethod
+    def of(cls, chart: Chart) -> Plot:
+        """The plot of a chart."""
+        return cls(chart, x_scale(chart), y_scale(chart))
 
-    @property
-    def is_outlier(self) -> bool:
-        """Farther from zero than its standard deviation explains."""
-        return self.sigmas > OUTLIER_SIGMA
+    def at(self, x: float, y: float) -> Point:
+        """Place of a pair of values; what lies beyond the axes' limits is drawn on the plot's edge."""
+        across, up = (min(max(share, 0.0), 1.0) for share in (self.x.share(x), self.y.share(y)))
+        return WIDTH * across, HEIGHT * (1 - up)
 
+    def strip(self, position: int, index: int) -> Strip:
+        """A point of a series, or its bar of one sigma, aside of those of other series."""
+        series = self.chart.series[position]
+        places = [self.at(series.x[index], y) for y in series.bar(index)]
+        return [(x + self._shift(position), y) for x, y in places]
 
-@dataclass(frozen=True)
-class Chart:
-    """Marks, and the scales that bring them onto the plot."""
+    def point(self, position: int, index: int) -> Point:
+        """Place of a point of a series; the series must have it."""
+        series = self.chart.series[position]
+        x, y = self.at(series.x[index], series.y[index] or 0.0)
+        return x + self._shift(position), y
 
-    unit: str
-    marks: Sequence[Mark]
-    colors: Mapping[str, at.Rgb]
-    """Series in the order of the legend, with their colours."""
-
-    @property
-    def series(self) -> dict[str, at.Rgb]:
-        """Series with their colours; one that nobody gave a colour to is white."""
-        return {**self.colors, **{m.series: at.WHITE for m in self.marks if m.series not in self.colors}}
-
-    @property
-    def standoffs(self) -> list[float]:
-        """Standoffs with a mark, ascending."""
-        return sorted({mark.standoff_mm for mark in self.marks})
-
-    @property
-    def y_limit(self) -> float:
-        """Half height of the plot, in the unit of y."""
-        return 1.1 * max((abs(mark.y) + (mark.sd or 0.0) for mark in self.marks), default=1.0) or 1.0
-
-    def x(self, standoff_mm: float) -> float:
-        """Place of a standoff along the plot; a single standoff stands in the middle."""
-        low, high = log10(self.standoffs[0]), log10(self.standoffs[-1])
-        share = 0.5 if high == low else (log10(standoff_mm) - low) / (high - low)
-        return WIDTH * (0.05 + 0.9 * share)
-
-    def y(self, value: float) -> float:
-        """Place of a value; y grows downwards in a picture."""
-        return HEIGHT * (0.5 - 0.5 * value / self.y_limit)
-
-    def place(self, mark: Mark) -> tuple[float, float]:
-        """Where a mark is drawn."""
-        series = list(self.series)
-        shift = (series.index(mark.series) - (len(series) - 1) / 2) * _DODGE
-        return (self.x(mark.standoff_mm) + shift, self.y(mark.y))
+    def _shift(self, position: int) -> float:
+        """Sideways shift of a series' points; lines stay where they are."""
+        dodged = [i for i, series in enumerate(self.chart.series) if series.style == "points"]
+        return (dodged.index(position) - (len(dodged) - 1) / 2) * _DODGE if position in dodged else 0.0
 
 
-def log_chart(stream: Stream, entity: str, chart: Chart, empty: str) -> None:
-    """Draw a chart at `entity`, in place of the one before; without marks it says `empty`."""
-    stream.log(entity, rr.Clear(recursive=True))
-    if not chart.marks:
-        note = rr.Points2D([(WIDTH / 2, HEIGHT / 2)], labels=[empty], colors=at.WHITE, radii=_NONE)
-        stream.log(f"{entity}/note", note)
+def log_chart(stream: Stream, entity: str, chart: Chart, colors: Mapping[str, at.Rgb], empty: str) -> None:
+    """Draw a chart at `entity`, in place of the one before; without points it says `empty`.
+
+    Args:
+        stream: the recording.
+        entity: where to draw.
+        chart: what to draw.
+        colors: of series by name, such as lasers; for those that have no colour of their own.
+        empty: text in place of a chart without points.
+    """
+    if chart.is_empty:
+        log_note(stream, entity, empty)
         return
-    _log_axes(stream, entity, chart)
+    stream.log(entity, rr.Clear(recursive=True))
+    plot = Plot.of(chart)
+    _log_axes(stream, entity, plot)
+    _log_limits(stream, entity, plot)
     for position, series in enumerate(chart.series):
-        _log_series(stream, at.under(f"{entity}/series", series), chart, series, position)
-    _log_outliers(stream, f"{entity}/outliers", chart)
+        color = at.from_hex(series.color) if series.color else colors.get(series.name, at.WHITE)
+        _log_series(stream, at.under(f"{entity}/series", series.name), plot, position, color)
+    _log_outliers(stream, f"{entity}/outliers", plot)
 
 
-def _log_axes(stream: Stream, entity: str, chart: Chart) -> None:
-    values = y_ticks(chart.y_limit)
-    columns = _thinned([(chart.x(standoff), standoff) for standoff in chart.standoffs])
-    rows: list[Strip] = [[(0.0, chart.y(value)), (WIDTH, chart.y(value))] for value in values]
-    lines: list[Strip] = [[(chart.x(s), 0.0), (chart.x(s), HEIGHT)] for s in chart.standoffs]
-    colors = [at.GREY if value == 0 else _GRID for value in values] + [_GRID] * len(lines)
-    stream.log(f"{entity}/grid", rr.LineStrips2D(rows + lines, colors=colors, radii=_THIN, draw_order=-10.0))
-    places = [(-55.0, chart.y(value) - _LABEL_RISE) for value in values] + [
-        (x, HEIGHT + 10.0) for x, _ in columns
+def log_note(stream: Stream, entity: str, text: str) -> None:
+    """A line of text in place of a chart."""
+    stream.log(entity, rr.Clear(recursive=True))
+    note = rr.Points2D([(WIDTH / 2, HEIGHT / 2)], labels=[text], colors=at.WHITE, radii=_NONE)
+    stream.log(f"{entity}/note", note)
+
+
+def _log_axes(stream: Stream, entity: str, plot: Plot) -> None:
+    chart, low = plot.chart, plot.y.low
+    rows = plot.y.round_ticks()
+    above, below = x_ticks(chart, plot.x, _LEAST_TICK_DISTANCE)
+    columns = [*above, *below]
+    lines: list[Strip] = [[plot.at(plot.x.low, y), plot.at(plot.x.high, y)] for y in rows]
+    lines += [[plot.at(x, low), plot.at(x, plot.y.high)] for x in columns]
+    colors = [at.GREY if y == 0 else _GRID for y in rows] + [_GRID] * len(columns)
+    stream.log(f"{entity}/grid", rr.LineStrips2D(lines, colors=colors, radii=_THIN, draw_order=-10.0))
+    labels = {(-55.0, plot.at(plot.x.low, y)[1] - _LABEL_RISE): _y_text(y, chart.y.unit) for y in rows}
+    for row_y, ticks in zip(_TICK_ROWS_Y, (above, below), strict=True):
+        labels |= {(plot.at(x, low)[0], row_y): f"{x:g}" for x in ticks}
+    labels[WIDTH / 2, _TITLE_Y] = chart.title
+    labels[WIDTH / 2, _X_LABEL_Y] = f"{chart.y.text} against {chart.x.text}"
+    _log_labels(stream, f"{entity}/ticks", labels)
+
+
+def _y_text(value: float, unit: str) -> str:
+    return f"{value:+.3g} {unit}".rstrip() if value else "0"
+
+
+def _log_labels(stream: Stream, entity: str, labels: Mapping[Point, str]) -> None:
+    texts = list(labels.values())
+    points = rr.Points2D(list(labels), labels=texts, colors=at.GREY, radii=_NONE, show_labels=True)
+    stream.log(entity, points)
+
+
+def _log_limits(stream: Stream, entity: str, plot: Plot) -> None:
+    """Limits and the edges of bands, each with its name at its right end."""
+    edges: list[tuple[str, Strip]] = [
+        (one.name, [plot.at(plot.x.low, one.y), plot.at(plot.x.high, one.y)]) for one in plot.chart.limits
     ]
-    texts = [f"{value:+.3g} {chart.unit}" if value else "0" for value in values]
-    texts += [f"{standoff:g}" for _, standoff in columns]
-    labels = rr.Points2D(places, labels=texts, colors=at.GREY, radii=_NONE, show_labels=True)
-    stream.log(f"{entity}/ticks", labels)
+    for band in plot.chart.bands:
+        edges += [
+            (band.name, [plot.at(x, y) for x, y in zip(band.x, side, strict=True)])
+            for side in (band.low, band.high)
+        ]
+    if edges:
+        strips = [strip for _, strip in edges]
+        names = [name for name, _ in edges]
+        lines = rr.LineStrips2D(strips, colors=at.GREY, radii=_BAR, labels=names, show_labels=True)
+        stream.log(f"{entity}/limits", lines)
 
 
-def _log_series(stream: Stream, entity: str, chart: Chart, series: str, position: int) -> None:
-    color = chart.series[series]
-    marks = [mark for mark in chart.marks if mark.series == series]
-    legend = (40.0 + 130.0 * position, _LEGEND_Y)
-    labels = [series] + [""] * len(marks)
-    points = [legend, *(chart.place(mark) for mark in marks)]
+def _log_series(stream: Stream, entity: str, plot: Plot, position: int, color: at.Rgb) -> None:
+    series = plot.chart.series[position]
+    there = [i for i, y in enumerate(series.y) if y is not None]
+    points = [(40.0 + _LEGEND_STEP * position, _LEGEND_Y)]
+    if series.style == "line":
+        runs = [[plot.point(position, i) for i in run] for run in _runs(series)]
+        stream.log(f"{entity}/line", rr.LineStrips2D(runs, colors=color, radii=_BAR))
+    else:
+        points += [plot.point(position, i) for i in there]
+    labels = [series.name] + [""] * (len(points) - 1)
     stream.log(entity, rr.Points2D(points, colors=color, radii=_DOT, labels=labels, show_labels=True))
-    bars = [_bar(chart, mark) for mark in marks if mark.sd is not None]
+    bars = [bar for i in there if len(bar := plot.strip(position, i)) > 1]
     if bars:
         stream.log(f"{entity}/one_sigma", rr.LineStrips2D(bars, colors=color, radii=_BAR))
 
 
-def _bar(chart: Chart, mark: Mark) -> Strip:
-    x, _ = chart.place(mark)
-    sd = mark.sd or 0.0
-    return [(x, chart.y(mark.y - sd)), (x, chart.y(mark.y + sd))]
+def _runs(series: Series) -> Iterator[list[int]]:
+    """Indices of the points between gaps."""
+    run: list[int] = []
+    for i, y in enumerate(series.y):
+        if y is not None:
+            run.append(i)
+        elif run:
+            yield run
+            run = []
+    if run:
+        yield run
 
 
-def _log_outliers(stream: Stream, entity: str, chart: Chart) -> None:
+def _log_outliers(stream: Stream, entity: str, plot: Plot) -> None:
     """Red rings around what the standard deviation does not explain: a bad standoff is seen at once."""
-    marks = [mark for mark in chart.marks if mark.is_outlier]
-    if not marks:
+    found = [
+        (series.sigmas(i) or 0.0, position, i)
+        for position, series in enumerate(plot.chart.series)
+        for i in range(len(series.x))
+        if series.is_outlier(i)
+    ]
+    if not found:
         return
-    worst = {mark.standoff_mm: mark for mark in sorted(marks, key=lambda mark: mark.sigmas)}
-    # One label a standoff: with more of them none can be read.
-    labels = [_outlier(mark) if mark is worst[mark.standoff_mm] else "" for mark in marks]
-    places = [chart.place(mark) for mark in marks]
+    # One label for each x: with more of them none can be read.
+    worst = {plot.chart.series[position].x[i]: (position, i) for _, position, i in sorted(found)}
+    labels = [
+        _outlier(plot.chart, position, i, sigmas) if (position, i) in worst.values() else ""
+        for sigmas, position, i in found
+    ]
+    places = [plot.point(position, i) for _, position, i in found]
     rings = rr.Points2D(places, colors=at.RED, radii=_RING, labels=labels, show_labels=True, draw_order=-5.0)
     stream.log(entity, rings)
 
 
-def _outlier(mark: Mark) -> str:
-    return f"{mark.series} at {mark.standoff_mm:g} mm: {mark.sigmas:.1f} sigma"
-
-
-def y_ticks(limit: float) -> list[float]:
-    """Round values from -limit to limit with zero among them, three to nine."""
-    power = 10.0 ** floor(log10(limit / 2))
-    step = next(power * factor for factor in (5.0, 2.0, 1.0) if power * factor <= limit / 2)
-    count = floor(limit / step)
-    return [round(i * step, 12) for i in range(-count, count + 1)]
-
-
-def _thinned(columns: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Tick labels that have room, from the left."""
-    kept: list[tuple[float, float]] = []
-    for column in columns:
-        if not kept or column[0] - kept[-1][0] >= _MIN_TICK_DISTANCE:
-            kept.append(column)
-    return kept
+def _outlier(chart: Chart, position: int, index: int, sigmas: float) -> str:
+    series = chart.series[position]
+    return f"{series.name} at {series.x[index]:g} {chart.x.unit}: {sigmas:.1f} sigma"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from workbench.model.chart import PALETTE
+
 APPLICATION = "workbench"
 
 CAPTURE = "capture"
@@ -45,23 +47,11 @@ FIT_CHART = "fit/chart"
 TRIAL_SUMMARY = "trial/summary"
 TRIAL_ERRORS = "trial/errors"
 TRIAL_CHART = "trial/chart"
-SIMULATION = "simulation"
-"""Below it a series for each scene and chain."""
-SENSOR = "sensor"
-"""Series of the readings themselves, beside those of the single lasers."""
+TRIAL_CHARTS = "trial/charts"
+"""Below it the charts of a trial's results but for the first."""
 
 Rgb = tuple[int, int, int]
 
-# Okabe and Ito's palette, which people with any colour vision can tell apart, without its black.
-_PALETTE: tuple[Rgb, ...] = (
-    (86, 180, 233),
-    (230, 159, 0),
-    (0, 158, 115),
-    (204, 121, 167),
-    (240, 228, 66),
-    (213, 94, 0),
-    (0, 114, 178),
-)
 GREY: Rgb = (150, 150, 150)
 WHITE: Rgb = (235, 235, 235)
 RED: Rgb = (255, 70, 70)
@@ -69,7 +59,13 @@ RED: Rgb = (255, 70, 70)
 
 def laser_colors(laser_ids: Sequence[str]) -> dict[str, Rgb]:
     """One colour a laser, in the order of the rig file; they repeat after seven."""
-    return {laser: _PALETTE[i % len(_PALETTE)] for i, laser in enumerate(laser_ids)}
+    return {laser: from_hex(PALETTE[i % len(PALETTE)]) for i, laser in enumerate(laser_ids)}
+
+
+def from_hex(color: str) -> Rgb:
+    """Red, green, blue of `#rrggbb`."""
+    red, green, blue = bytes.fromhex(color.removeprefix("#"))
+    return red, green, blue
 
 
 def under(parent: str, *parts: str) -> str:

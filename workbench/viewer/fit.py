@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import get_args
 
 import rerun as rr
 
 from workbench.model.event import FitFinished, ParameterRecord, ResidualRecord
+from workbench.model.fit_charts import ImageAxis, residual_chart
+from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
+from workbench.model.table import Table
 from workbench.viewer import documents
 from workbench.viewer import entities as at
-from workbench.viewer.chart import Chart, Mark, log_chart
+from workbench.viewer.chart import log_chart, log_note
 from workbench.viewer.stream import Moment, Stream
+from workbench.viewer.table_text import table_text
 
-Axis = Literal["u", "v"]
-AXES: tuple[Axis, ...] = ("u", "v")
+AXES: tuple[ImageAxis, ...] = get_args(ImageAxis)
 
 
-def log_no_fit_yet(stream: Stream, colors: Mapping[str, at.Rgb]) -> None:
+def log_no_fit_yet(stream: Stream) -> None:
     """Say so where the fit will be shown: an empty view tells nobody whether it is broken."""
     for axis in AXES:
-        log_chart(stream, f"{at.FIT_CHART}/{axis}", Chart("px", (), colors), "no fit yet")
-    _document(stream, at.FIT_SUMMARY, "# No fit yet")
-    _document(stream, at.FIT_CHECKS, "# Nothing to check yet")
-    _document(stream, at.FIT_TABLE, "# No parameters yet")
+        log_note(stream, f"{at.FIT_CHART}/{axis}", "no fit yet")
+    for entity in (at.FIT_SUMMARY, at.FIT_CHECKS, at.FIT_TABLE):
+        _log_text(stream, entity, "No fit yet")
 
 
 def log_fit(stream: Stream, fit: FitFinished, moment: Moment, colors: Mapping[str, at.Rgb]) -> None:
@@ -31,25 +33,16 @@ def log_fit(stream: Stream, fit: FitFinished, moment: Moment, colors: Mapping[st
     for parameter in fit.parameters:
         _log_parameter(stream, parameter)
     for axis in AXES:
-        chart = Chart("px", residual_marks(fit, axis), colors)
-        log_chart(stream, f"{at.FIT_CHART}/{axis}", chart, f"{axis} was not measured")
-    _document(stream, at.FIT_SUMMARY, documents.fit_summary(fit))
-    _document(stream, at.FIT_CHECKS, documents.checks(fit))
-    _document(stream, at.FIT_TABLE, documents.parameter_table(fit.parameters))
+        chart = residual_chart(fit, axis)
+        log_chart(stream, f"{at.FIT_CHART}/{axis}", chart, colors, f"{axis} was not measured")
+    summary = rr.TextDocument(documents.fit_summary(fit), media_type=rr.MediaType.MARKDOWN)
+    stream.log(at.FIT_SUMMARY, summary)
+    _log_tables(stream, at.FIT_CHECKS, cross_validation_table(fit.left_out), term_table(fit.terms))
+    _log_tables(stream, at.FIT_TABLE, parameter_table(fit.parameters))
     for residual in fit.residuals:
         stream.at(Moment(moment.capture, moment.step, moment.time_ns, residual.standoff_mm))
         _log_residual(stream, residual)
     stream.at(moment)
-
-
-def residual_marks(fit: FitFinished, axis: Axis) -> list[Mark]:
-    """The residuals along one image axis that were measured."""
-    marks = []
-    for one in fit.residuals:
-        value, sd = (one.u_px, one.u_sd_px) if axis == "u" else (one.v_px, one.v_sd_px)
-        if value is not None:
-            marks.append(Mark(one.laser_id, one.standoff_mm, value, sd, expected_sd=sd))
-    return marks
 
 
 def _log_parameter(stream: Stream, one: ParameterRecord) -> None:
@@ -72,5 +65,11 @@ def _log_residual(stream: Stream, one: ResidualRecord) -> None:
             stream.log(at.under(at.FIT_RESIDUALS, name, one.laser_id), rr.Scalars(value))
 
 
-def _document(stream: Stream, entity: str, text: str) -> None:
-    stream.log(entity, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+def _log_tables(stream: Stream, entity: str, *tables: Table) -> None:
+    """Tables that have rows, one below the other."""
+    texts = [table_text(table) for table in tables if table.rows]
+    _log_text(stream, entity, "\n\n\n".join(texts) or "Nothing was checked")
+
+
+def _log_text(stream: Stream, entity: str, text: str) -> None:
+    stream.log(entity, rr.TextDocument(text, media_type=rr.MediaType.TEXT))

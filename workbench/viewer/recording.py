@@ -131,7 +131,7 @@ class _OpenRecording:
         scene.log_styles(self.stream)
         scene.log_sensor(self.stream, rig.camera, self._geometry, self._colors)
         camera.log_series_styles(self.stream, self._colors)
-        fit.log_no_fit_yet(self.stream, self._colors)
+        fit.log_no_fit_yet(self.stream)
         self._trial.log_none_yet()
         steps.say(self.stream, f"Session {event.session} on {event.rig}: {', '.join(event.procedures)}")
 
@@ -248,6 +248,7 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.TrialProgress, moment: Moment) -> None:
+        self._trial.progress(event)
         steps.say(self.stream, event.text)
 
     @_log.register

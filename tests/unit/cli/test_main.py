@@ -16,16 +16,21 @@ import cv2
 import numpy as np
 import pytest
 
+from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.main import main
 from workbench.cli.stopping import SIGNALS
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, StoppedError
+from workbench.model.fit_tables import parameter_table
 from workbench.session.journal import Journal
 
 ROOT = Path(__file__).parents[3]
 WEBCAM = ROOT / "data/webcam-laser-rows.csv"
 WEBCAM_RIG = ROOT / "rigs/webcam-laser.yaml"
-HEAVY = ("jax", "numpy", "scipy", "cv2", "pandas", "rerun", "optimistix", "serial", "pydantic", "ruamel")
+HEAVY = (
+    *("jax", "matplotlib", "numpy", "scipy", "cv2", "pandas", "rerun", "optimistix", "serial", "pydantic"),
+    *("ruamel", "rich.table"),
+)
 
 
 @dataclass(frozen=True)
@@ -109,8 +114,11 @@ def test_fit_prints_one_object_and_writes_the_calibration(workbench: Run, tmp_pa
         "terms",
     ]
     assert set(result["parameters"][0]) >= {"name", "unit", "value", "sd", "prior_sd", "data_share"}
+    parameter_keys = {column.key for column in parameter_table(()).columns}
+    assert set(result["parameters"][0]) <= parameter_keys, "the tables' names"
     (derived,) = result["derived"]
     assert set(derived) == {"laser", "f_b_px_mm", "f_b_sd", "infinity_px", "infinity_sd"}
+    assert set(derived) == {column.key for column in derived_table(()).columns}
     assert derived["laser"] == "1"
     assert (result["observations"], result["rejected"], result["verdict"]) == (9, [], "accepted")
     assert "(f_px) and the baseline cannot be known apart" in " ".join(result["warnings"])
@@ -198,7 +206,7 @@ class TestBadInput:
     def test_a_rig_without_a_driver(self, workbench: Run, tmp_path: Path) -> None:
         procedure = ROOT / "procedures/calibrate-flat.yaml"
         outcome = workbench("run", procedure, "--rig", WEBCAM_RIG, "--sessions", tmp_path)
-        refused(outcome, 2, "driver: expected an installed bench driver")
+        refused(outcome, 2, "webcam-laser: expected `devices`, or a `driver`")
 
     def test_one_procedure_twice(self, workbench: Run, tmp_path: Path) -> None:
         procedure = ROOT / "procedures/calibrate-flat.yaml"
@@ -464,6 +472,7 @@ class Late:
         write(1, b"late")
         kill(me, number)
 late = Late()
+from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.main import main
 main()
 """

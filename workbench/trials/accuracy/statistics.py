@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.model.event import ReadingTaken
 from workbench.model.rig import BenchSpec
-from workbench.ranging.ranger import Reading
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class AccuracyRow:
     """Standard uncertainty of the true range itself: the placement's, by the ruler."""
 
 
-def accuracy_row(standoff_mm: float, readings: Sequence[Reading], bench: BenchSpec) -> AccuracyRow:
+def accuracy_row(readings: Sequence[ReadingTaken], bench: BenchSpec) -> AccuracyRow:
     """Statistics of the readings at one standoff; errors are measured - true, mm, 1 sigma.
 
     The standard deviation over the readings shows what differs between them. What they share (calibration,
@@ -38,12 +38,12 @@ def accuracy_row(standoff_mm: float, readings: Sequence[Reading], bench: BenchSp
     contains the ruler's scale, which cancels where the calibration was made with the same ruler.
 
     Args:
-        standoff_mm: true range, by the ruler.
-        readings: every reading taken there; those without a range count as missing.
+        readings: every reading taken there, at least one; those without a range count as missing.
         bench: how well the standoff is known.
     """
-    ranges = np.array([r.flat_mm for r in readings if r.flat_mm is not None])
-    stated = np.array([r.flat_sigma_mm for r in readings if r.flat_sigma_mm is not None])
+    standoff_mm = readings[0].standoff_mm
+    ranges = np.array([r.range_mm for r in readings if r.range_mm is not None])
+    stated = np.array([r.sigma_mm for r in readings if r.sigma_mm is not None])
     if not len(ranges):
         return AccuracyRow(
             standoff_mm=standoff_mm, readings=0, missing=len(readings), reference_sd_mm=bench.placement_sd_mm

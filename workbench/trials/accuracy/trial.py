@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
 
-from workbench.model.chart import Axis, Chart, Series
+from workbench.model.event import ReadingTaken
+from workbench.model.reading_chart import error_chart
 from workbench.model.table import Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.placements import visit_placements
-from workbench.ranging.ranger import Reading
 from workbench.trials.accuracy.statistics import AccuracyRow, accuracy_row
 from workbench.trials.readings import session_ranger, take_readings
 from workbench.trials.results import finish_trial
 
-SENSOR = "sensor"
-"""Series of the readings themselves, beside those of the single lasers."""
-PERCENT = 100.0
 COLUMNS = (
     Column(key="standoff_mm", name="true", unit="mm", meaning="Standoff by the ruler."),
     Column(key="readings", name="n", meaning="Readings with a range; the statistics are of these."),
@@ -52,13 +48,12 @@ def run_trial(context: Context, name: str, placements: Sequence[Placement], coun
     """
     ranger = session_ranger(context, name)
 
-    def work(placement: Placement) -> tuple[Placement, list[Reading]]:
-        return placement, take_readings(context, ranger, name, placement, count)
+    def work(placement: Placement) -> list[ReadingTaken]:
+        return take_readings(context, ranger, name, placement, count)
 
     taken = visit_placements(context, placements, work)
-    bench = context.rig.bench
-    rows = [accuracy_row(placement.standoff_mm, readings, bench) for placement, readings in taken]
-    chart = error_chart(name, taken, bench.placement_sd_mm)
+    rows = [accuracy_row(readings, context.rig.bench) for readings in taken]
+    chart = error_chart(f"{name}-errors", [reading for readings in taken for reading in readings])
     finish_trial(context, name, [accuracy_table(name, rows)], [chart])
     return f"{sum(row.readings for row in rows)} readings, table in {name}.csv"
 
@@ -72,40 +67,3 @@ def accuracy_table(name: str, rows: Sequence[AccuracyRow]) -> Table:
         rows=tuple(tuple(getattr(row, column.key) for column in COLUMNS) for row in rows),
         caption="a reading is the mean of the lasers; u: standard uncertainty",
     )
-
-
-def error_chart(
-    name: str, taken: Sequence[tuple[Placement, Sequence[Reading]]], reference_sd_mm: float
-) -> Chart:
-    """Relative errors of every reading and of its lasers over the true range.
-
-    An error is expected to be as large as the stated uncertainty and the reference's together.
-    """
-    points: dict[str, list[tuple[float, float, float, float]]] = {}
-    for placement, readings in taken:
-        true_mm = placement.standoff_mm
-        for reading in readings:
-            for who, range_mm, sigma_mm in _ranges(reading):
-                percent = PERCENT / true_mm
-                expected_mm = hypot(sigma_mm, reference_sd_mm)
-                error, sd = percent * (range_mm - true_mm), percent * sigma_mm
-                points.setdefault(who, []).append((true_mm, error, sd, percent * expected_mm))
-    return Chart(
-        name=f"{name}-errors",
-        title="Error of every reading, bars stated u",
-        x=Axis(label="true range", unit="mm", scale="log"),
-        y=Axis(label="error", unit="%"),
-        series=tuple(_series(who, points[who]) for who in sorted(points, key=lambda who: who == SENSOR)),
-    )
-
-
-def _ranges(reading: Reading) -> list[tuple[str, float, float]]:
-    ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in reading.lasers]
-    if reading.flat_mm is not None and reading.flat_sigma_mm is not None:
-        ranges.append((SENSOR, reading.flat_mm, reading.flat_sigma_mm))
-    return ranges
-
-
-def _series(name: str, points: Sequence[tuple[float, float, float, float]]) -> Series:
-    x, y, sd, expected_sd = zip(*points, strict=True)
-    return Series(name=name, x=x, y=y, sd=sd, expected_sd=expected_sd)

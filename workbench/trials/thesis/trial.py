@@ -12,6 +12,7 @@ from workbench.model.table import Column, Table
 from workbench.procedure.engine.context import Context
 from workbench.session.files import write_record
 from workbench.trials.results import finish_trial
+from workbench.trials.thesis.figures import figures
 from workbench.trials.thesis.schema import ClaimRow, Quantity, SimulatedScene
 from workbench.trials.thesis.simulation import claim_rows, claims_csv, readings_csv, simulate
 
@@ -45,7 +46,8 @@ def run_trial(context: Context, name: str, scenes: Sequence[SimulatedScene], poi
         context.emit(TrialProgress(trial=name, text=text))
     write_record(context.session_dir / f"{name}.csv", claims_csv(rows).encode())
     write_record(context.session_dir / f"{name}-readings.csv", readings_csv(simulated).encode())
-    finish_trial(context, name, claim_tables(name, rows))
+    charts = figures({one.scene.name: one for one in simulated})
+    finish_trial(context, name, claim_tables(name, rows), charts)
     stated = [row for row in rows if row.reproduced is not None]
     return (
         f"as in the thesis: {sum(row.reproduced is True for row in stated)} of {len(stated)} claims kept;"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from workbench.emulator.spec import BeamSpec, LensSpec, SensorSpec, StreamSpec
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig, load_rig
 from workbench.procedure.engine.procedure_file import load_procedure
-from workbench.report.line_chart import LineChart, Series, ticks
 from workbench.spots import find_spots
 from workbench.spots.threshold_centroid import thesis_centres
 from workbench.trials.thesis import ThesisSimulationStep, camera, thesis_chain
@@ -263,21 +261,3 @@ def test_the_procedure_has_every_shape_seen_in_part_and_not_at_all_on_both_lines
     for line in ("horizontal", "vertical"):
         for shape in ("flat", "incline", "round"):
             assert {((line,), shape, seen) for seen in ("all", "some", "none")} <= have
-
-
-def test_a_chart_is_drawn_to_scale() -> None:
-    line = Series("a & b", [(0.0, 1.0), (5.0, None), (6.0, -1.0), (10.0, 0.0)], "red")
-    chart = LineChart("t", "x", "y", [line], (0.0, 10.0), (-1.0, 1.0))
-    root = ET.fromstring(chart.svg())  # noqa: S314 - our own
-    lines = [e.get("points") for e in root.iter() if e.tag.endswith("polyline")]
-    # 664 x 324 px from (76, 64) for 10 x 2 units.
-    assert lines == ["76.00,64.00", "474.40,388.00 740.00,226.00"]
-    assert "a & b" in "".join(root.itertext())
-
-
-@pytest.mark.parametrize(("low", "high"), [(0, 5000), (-0.06, 0.06), (-0.1, 0.2), (3.2, 3.9), (0, 120)])
-def test_ticks_are_round_and_inside(low: float, high: float) -> None:
-    found = ticks(low, high)
-    assert 3 <= len(found) <= 10
-    assert low - 1e-9 <= found[0] <= found[-1] <= high + 1e-9
-    assert np.allclose(np.diff(found), found[1] - found[0])

@@ -1,0 +1,65 @@
+"""Charts as data: outliers, bars, what is drawn."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from workbench.model.chart import Axis, Band, Chart, Limit, Series
+
+
+def chart(*series: Series, bands: tuple[Band, ...] = (), limits: tuple[Limit, ...] = ()) -> Chart:
+    x, y = Axis(label="standoff", unit="mm"), Axis(label="error", unit="%")
+    return Chart(name="c", title="C", x=x, y=y, series=series, bands=bands, limits=limits)
+
+
+@pytest.mark.parametrize(
+    ("y", "sd", "outlier"),
+    [(0.31, 0.1, True), (-0.31, 0.1, True), (0.29, 0.1, False), (9.0, None, False), (None, 0.1, False)],
+)
+def test_outliers_are_beyond_three_sigma(y: float | None, sd: float | None, outlier: bool) -> None:
+    assert Series(name="L1", x=(500.0,), y=(y,), sd=(0.01,), expected_sd=(sd,)).is_outlier(0) is outlier
+
+
+def test_nothing_is_an_outlier_without_expectation() -> None:
+    assert not Series(name="L1", x=(500.0,), y=(1e6,), sd=(0.01,)).is_outlier(0)
+
+
+def test_a_bar_is_one_sigma_to_each_side() -> None:
+    one = Series(name="a", x=(1.0, 2.0, 3.0), y=(5.0, 5.0, None), sd=(2.0, None, 1.0))
+    assert [one.bar(i) for i in range(3)] == [(3.0, 7.0), (5.0,), ()]
+    assert Series(name="a", x=(1.0,), y=(5.0,)).bar(0) == (5.0,)
+
+
+def test_everything_drawn_counts_for_the_axes() -> None:
+    one = chart(
+        Series(name="a", x=(3.0, 1.0, 9.0), y=(1.0, 2.0, None), sd=(0.5, None, None)),
+        bands=(Band(name="b", x=(1.0, 5.0), low=(-4.0, -1.0), high=(4.0, 1.0)),),
+        limits=(Limit(name="MPE", y=8.0),),
+    )
+    assert one.x_values() == [1.0, 3.0]
+    assert one.y_values() == [-4.0, -1.0, 0.5, 1.0, 1.5, 2.0, 4.0, 8.0]
+
+
+def test_a_chart_of_gaps_is_empty() -> None:
+    assert chart().is_empty
+    assert chart(Series(name="a", x=(1.0,), y=(None,))).is_empty
+    assert not chart(Series(name="a", x=(1.0,), y=(0.0,))).is_empty
+
+
+def test_a_number_that_is_not_finite_makes_a_gap() -> None:
+    one = Series(name="a", x=(1.0, 2.0), y=(float("nan"), 1.0), sd=(0.1, float("inf")))
+    assert (one.y, one.sd) == ((None, 1.0), (0.1, None))
+
+
+def test_an_axis_has_its_unit() -> None:
+    assert Axis(label="standoff", unit="mm").text == "standoff [mm]"
+    assert Axis(label="share").text == "share"
+
+
+@pytest.mark.parametrize(
+    "values", [{"y": (1.0,)}, {"y": (1.0, 2.0), "sd": (1.0,)}, {"y": (1.0, 2.0), "expected_sd": (1.0,)}]
+)
+def test_lengths_of_a_series_agree(values: dict[str, tuple[float, ...]]) -> None:
+    with pytest.raises(ValidationError):
+        Series.model_validate({"name": "a", "x": (1.0, 2.0)} | values)

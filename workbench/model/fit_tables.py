@@ -1,0 +1,95 @@
+"""Tables of a fit: parameters, cross-validation and the evidence on terms of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from workbench.model.calibration import TERM_VERDICTS, TermSummary
+from workbench.model.fit_event import FitFinished, LeftOutRecord, ParameterRecord
+from workbench.model.table import Column, Table
+
+DETERMINED_BY = "joint: the data tie the parameter to others, whose priors do the rest"
+
+
+def parameter_table(parameters: Sequence[ParameterRecord]) -> Table:
+    """Fitted parameters with their priors, 1 sigma; the caption lists the fixed ones."""
+    fitted = [p for p in parameters if p.prior_sd > 0]
+    fixed = ", ".join(f"{p.name} {p.value:g}" for p in parameters if p.prior_sd == 0)
+    return Table(
+        name="parameters",
+        title="Parameters (sd: 1 sigma)",
+        columns=(
+            Column(key="name", name="parameter"),
+            Column(key="value", name="value", format="digits of sd"),
+            Column(key="sd", name="sd", format="sd"),
+            Column(key="unit", name="unit"),
+            Column(key="prior_value", name="prior", format="g"),
+            Column(key="prior_sd", name="prior sd", format="g"),
+            Column(key="data_share", name="information share", unit="%", scale=100, format=".0f"),
+            Column(key="determined_by", name="determined by"),
+        ),
+        rows=tuple(
+            (p.name, p.value, p.sd, p.unit, p.prior_value, p.prior_sd, p.data_share, p.determined_by)
+            for p in fitted
+        ),
+        caption=f"{DETERMINED_BY}. Fixed: {fixed}" if fixed else DETERMINED_BY,
+    )
+
+
+def cross_validation_table(placements: Sequence[LeftOutRecord]) -> Table:
+    """Error of each placement, ranged by the fit without it, against its stated uncertainty."""
+    ids = list(dict.fromkeys(laser.laser_id for one in placements for laser in one.lasers))
+    return Table(
+        name="cross_validation",
+        title="Cross-validation: each placement ranged by the fit without it",
+        columns=(
+            Column(key="standoff_mm", name="standoff", unit="mm", format="g"),
+            Column(key="error_mm", name="error", unit="mm", format="+.2f"),
+            Column(key="sd_mm", name="stated u", unit="mm", format="sd"),
+            Column(key="normalised_error", name="error / u", format="+.1f"),
+            Column(key="alarm", name="alarm"),
+            *(Column(key=f"relative_error.{i}", name=i, unit="%", scale=100, format="+.2f") for i in ids),
+        ),
+        rows=tuple(_placement_row(one, ids) for one in placements),
+        caption=(
+            "error: range - standoff; u: 1 sigma; %: relative error of each laser alone;"
+            " !: farther off than u explains"
+        ),
+    )
+
+
+def _placement_row(one: LeftOutRecord, ids: Sequence[str]) -> tuple[float | bool | None, ...]:
+    relative = {laser.laser_id: laser.error_mm / one.standoff_mm for laser in one.lasers}
+    normalised = one.error_mm / one.sd_mm
+    return (one.standoff_mm, one.error_mm, one.sd_mm, normalised, one.alarm, *(relative.get(i) for i in ids))
+
+
+def term_table(terms: Sequence[TermSummary]) -> Table:
+    """Evidence on each term of the model against its absence."""
+    return Table(
+        name="terms",
+        title="Model terms, each against its absence",
+        columns=(
+            Column(key="name", name="term"),
+            Column(key="p_value", name="p", format=".2g"),
+            Column(key="log10_bayes_factor", name="log10 Bayes factor", format="+.1f"),
+            Column(key="range_shift_sd", name="range shift", unit="sd", format=".2g"),
+            Column(key="verdict", name="verdict"),
+        ),
+        rows=tuple(map(_term_row, terms)),
+        caption=(
+            "p: probability of such data without the term; Bayes factor: for the term; range shift: largest"
+            " change of a range without it"
+        ),
+    )
+
+
+def _term_row(term: TermSummary) -> tuple[str | float | None, ...]:
+    shift, verdict = term.range_shift_sd, TERM_VERDICTS[term.verdict]
+    return (term.name, term.p_value, term.log10_bayes_factor, shift, verdict)
+
+
+def fit_tables(fit: FitFinished) -> tuple[Table, ...]:
+    """All tables of a fit that have rows: parameters, terms, cross-validation."""
+    tables = (parameter_table(fit.parameters), term_table(fit.terms), cross_validation_table(fit.left_out))
+    return tuple(table for table in tables if table.rows)

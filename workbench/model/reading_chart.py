@@ -1,0 +1,60 @@
+"""Chart of the errors of readings: live in the recording, and among the results of a trial."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot
+
+from workbench.model.chart import Axis, Chart, Series
+from workbench.model.trial_event import ReadingTaken
+
+SENSOR = "sensor"
+"""Series of the readings themselves, beside those of the single lasers."""
+PERCENT = 100.0
+
+
+def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
+    """Errors (measured - true) of readings and of their lasers, in percent of the true range.
+
+    An error is expected to be as large as the stated uncertainty of the range and the reference uncertainty
+    of the standoff together; where the latter is not known, no error can be an outlier.
+
+    Args:
+        name: of the chart.
+        readings: in the order in which they were taken.
+    """
+    names = [*dict.fromkeys(one.laser_id for reading in readings for one in reading.lasers), SENSOR]
+    points = [(reading, *one) for reading in readings for one in _ranges(reading)]
+    return Chart(
+        name=name,
+        title="Error of every reading, bars stated u",
+        x=Axis(label="true range", unit="mm", scale="log"),
+        y=Axis(label="error", unit="%"),
+        series=tuple(_series(who, [(r, mm, sd) for r, by, mm, sd in points if by == who]) for who in names),
+    )
+
+
+def _ranges(reading: ReadingTaken) -> list[tuple[str, float, float]]:
+    """Name, range and stated standard uncertainty (mm) of every laser and of the sensor itself."""
+    ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in reading.lasers]
+    if reading.range_mm is not None and reading.sigma_mm is not None:
+        ranges.append((SENSOR, reading.range_mm, reading.sigma_mm))
+    return ranges
+
+
+def _series(name: str, ranges: Sequence[tuple[ReadingTaken, float, float]]) -> Series:
+    percents = [PERCENT / reading.standoff_mm for reading, _, _ in ranges]
+    errors = [mm - reading.standoff_mm for reading, mm, _ in ranges]
+    expected_mm = [
+        None if reading.reference_sd_mm is None else hypot(sd, reading.reference_sd_mm)
+        for reading, _, sd in ranges
+    ]
+    return Series(
+        name=name,
+        x=tuple(reading.standoff_mm for reading, _, _ in ranges),
+        y=tuple(percent * error for percent, error in zip(percents, errors, strict=True)),
+        sd=tuple(percent * sd for percent, (_, _, sd) in zip(percents, ranges, strict=True)),
+        expected_sd=tuple(
+            None if sd is None else percent * sd for percent, sd in zip(percents, expected_mm, strict=True)
+        ),
+    )

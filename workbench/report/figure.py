@@ -1,0 +1,78 @@
+"""A chart as an SVG picture, drawn by matplotlib: the same bytes for the same chart."""
+
+from __future__ import annotations
+
+from io import BytesIO
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from workbench.model.chart import PALETTE, Chart, Series
+from workbench.model.chart_scale import x_scale, x_ticks, y_scale
+from workbench.report.plot_style import own_style
+
+SIZE_IN = (7.6, 4.4)
+TICK_DISTANCE = 0.07
+"""Least distance of two labels of x, as a share of the axis."""
+LEGEND_CHARACTERS, SYMBOL_CHARACTERS = 100, 8
+"""Width of a line of the legend, and of a symbol with the gaps beside it."""
+OUTLIER_COLOR = "#d00000"
+
+
+def svg(chart: Chart) -> bytes:
+    """The chart as an SVG file: text as outlines, so that it looks alike whatever fonts there are."""
+    file = BytesIO()
+    with own_style():
+        draw(chart).savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+    return file.getvalue()
+
+
+def draw(chart: Chart) -> Figure:
+    """The chart as a figure, without pyplot: nothing is kept between two of them. Call it in `own_style`."""
+    figure = Figure(figsize=SIZE_IN, layout="constrained")
+    axes = figure.add_subplot()
+    _draw_axes(axes, chart)
+    for band in chart.bands:
+        axes.fill_between(band.x, band.low, band.high, alpha=0.2, label=band.name, linewidth=0)
+    for limit in chart.limits:
+        axes.axhline(limit.y, color=OUTLIER_COLOR, linestyle="--", linewidth=1, label=limit.name)
+    for number, series in enumerate(chart.series):
+        _draw_series(axes, series, series.color or PALETTE[number % len(PALETTE)])
+    axes.set_title(chart.title, loc="left", fontsize=11, fontweight="bold")
+    names = [series.name for series in chart.series] + [band.name for band in chart.bands]
+    names += [limit.name for limit in chart.limits]
+    if len(names) > 1:
+        columns = max(1, LEGEND_CHARACTERS // (max(map(len, names)) + SYMBOL_CHARACTERS))
+        figure.legend(loc="outside lower left", ncols=columns, frameon=False)
+    return figure
+
+
+def _draw_axes(axes: Axes, chart: Chart) -> None:
+    x, y = x_scale(chart), y_scale(chart)
+    axes.set(xscale=chart.x.scale, yscale=chart.y.scale, ylabel=chart.y.text)
+    axes.set_xlabel("\n".join(line for line in (chart.x.text, chart.caption) if line))
+    axes.set(xlim=(x.low, x.high), ylim=(y.low, y.high))
+    above, below = x_ticks(chart, x, TICK_DISTANCE)
+    axes.set_xticks([*above, *below], [*(f"{tick:g}" for tick in above), *(f"\n{tick:g}" for tick in below)])
+    axes.set_yticks(y.round_ticks(), [f"{tick:g}" for tick in y.round_ticks()])
+    for one in (axes.xaxis, axes.yaxis):
+        one.set_minor_locator(NullLocator())
+    axes.grid(color="#dddddd", linewidth=0.7)
+    axes.set_axisbelow(True)
+    if y.low < 0 < y.high:
+        axes.axhline(0, color="#888888", linewidth=0.8)
+
+
+def _draw_series(axes: Axes, series: Series, color: str) -> None:
+    y = [float("nan") if value is None else value for value in series.y]
+    if series.style == "line":
+        dash = "--" if series.dashed else "-"
+        axes.plot(series.x, y, color=color, linestyle=dash, linewidth=1.3, label=series.name)
+    else:
+        sd = [float("nan") if value is None else value for value in series.sd] or None
+        axes.errorbar(series.x, y, sd, color=color, fmt="o", markersize=4, label=series.name)
+    outliers = [i for i in range(len(series.x)) if series.is_outlier(i)]
+    if outliers:
+        at = [series.x[i] for i in outliers], [y[i] for i in outliers]
+        axes.plot(*at, "o", color=OUTLIER_COLOR, fillstyle="none", markersize=10)

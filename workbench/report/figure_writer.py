@@ -1,0 +1,24 @@
+"""Writes the charts of finished trials into the session folder, as SVG pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from workbench.model.event import Record, TrialFinished
+from workbench.session.files import write_record
+
+
+@dataclass
+class FigureWriter:
+    """A consumer of records that writes `<chart name>.svg` for each chart of a trial."""
+
+    session_dir: Path
+
+    def __call__(self, record: Record) -> None:
+        """Take one record."""
+        if isinstance(record.event, TrialFinished) and record.event.charts:
+            from workbench.report.figure import svg  # loads matplotlib, which most sessions do not need
+
+            for chart in record.event.charts:
+                write_record(self.session_dir / f"{chart.name}.svg", svg(chart))
