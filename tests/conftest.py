@@ -7,6 +7,7 @@ from xdist.scheduler import LoadFileScheduling  # type: ignore[import-untyped]
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 REAL_TIME = {
+    "tests/bench/test_example_laser_driver.py",
     "tests/bench/test_unplugged.py",
     "tests/firmware/test_pins.py",
     "tests/unit/devices/test_digital_output.py",

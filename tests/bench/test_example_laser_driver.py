@@ -14,6 +14,7 @@ import pytest
 
 from tests.bench.test_guided_session import Says
 from tests.crash.short import CALLER
+from tests.firmware.parts import hurried
 from tests.support.driver_package import install_example, put_on_path
 from tests.support.foreign_drivers import write_rig
 from tests.support.mjpeg import Picture, Stream
@@ -68,9 +69,10 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def lab(installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
     put_on_path(installed, monkeypatch)
-    lab = Lab(tmp_path)
-    yield lab
-    lab.stream.close()
+    with hurried():  # half a second without a turn is a hang, and here it would be no finding
+        lab = Lab(tmp_path)
+        yield lab
+        lab.stream.close()
 
 
 def wait_until_off(lab: Lab) -> None:

@@ -101,6 +101,7 @@ def test_the_session_folder_holds_everything(demo: Demo) -> None:
         "calibration.yaml",
         "trial-captures.csv",
         "accuracy-flat.1.csv",
+        "accuracy-flat.1-errors.svg",
         "recording.rrd",
     }
     manifest = pyyaml.safe_load((demo.folder / "session.yaml").read_text())

@@ -29,7 +29,8 @@ class GuardedLine(Protocol):
     """
 
     settings_type: ClassVar[Any]
-    """The block `devices: lasers:` of the rig file, a `DeviceBlock`."""
+    """The block `devices: lasers:` of the rig file, a `DeviceBlock`. Its validators find the `Rig` as their
+    context in the workbench, and no context in the guardian."""
     has_leases: ClassVar[bool]
     """Whether the hardware switches off by itself when a lease ends. Where it does not, the guardian's clock
     is all that ends an emission, and an off that is not confirmed is tried again for `TRY_BOARD_S`."""

@@ -61,7 +61,7 @@ class GuardianClient:
         self._answers, answers = os.pipe()
         signals, self._signals = os.pipe()
         os.set_blocking(self._signals, False)
-        line = [line_reference(line_type), settings.model_dump_json(exclude_unset=True)]
+        line = [line_reference(line_type), settings.model_dump_json(by_alias=True, exclude_unset=True)]
         call = [*line, str(lasers), str(boot_s), str(hang_s), str(signals)]
         # -P: what lies in the current folder is not imported. A session of its own: no terminal reaches it.
         said = os.open(os.devnull, os.O_WRONLY) if virtual else _last_words()

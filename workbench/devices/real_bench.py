@@ -91,9 +91,11 @@ def block_problems(kind: str, block: Mapping[str, Any], rig: Rig | None) -> Iter
         rig: the whole rig, where that is right: the context of the block's validators.
     """
     name = block.get("driver") or KINDS[kind].default
+    if not isinstance(name, str):
+        return  # a mistake that the rig's own schema finds
     place = ("devices", kind)
     try:
-        driver = load_driver(KINDS[kind].group, str(name))
+        driver = load_driver(KINDS[kind].group, name)
     except DriverUnusableError as error:
         yield SchemaProblem((*place, "driver"), str(error))
     else:

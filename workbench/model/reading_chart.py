@@ -28,7 +28,7 @@ def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
     return Chart(
         name=name,
         title="Error of every reading, bars stated u",
-        x=Axis(label="true range", unit="mm", scale="log"),
+        x=Axis(label="standoff", unit="mm", scale="log"),
         y=Axis(label="error", unit="%"),
         series=tuple(_series(who, [(r, mm, sd) for r, by, mm, sd in points if by == who]) for who in names),
     )

@@ -141,7 +141,7 @@ def test_lasers_off_needs_no_other_device(lab: Path) -> None:
         assert "lab lasers" in done.stdout
 
 
-@pytest.mark.parametrize("devices", ["[]", "3", "{camera: 3}", "{beamer: {}}"])
+@pytest.mark.parametrize("devices", ["[]", "3", "{camera: 3}", "{beamer: {}}", "{camera: {driver: 7}}"])
 def test_devices_that_are_no_blocks(tmp_path: Path, devices: str) -> None:
     path = write_rig(tmp_path / "rig.yaml", [], "opencv+serial")
     path.write_text(path.read_text().replace("rig: lab\n", f"rig: lab\ndevices: {devices}\n"))

@@ -85,7 +85,7 @@ def _claim_table(name: str, quantity: Quantity, rows: Sequence[ClaimRow]) -> Tab
         value("noisy", "noise", "The workbench's chain, with noise."),
     )
     return Table(
-        name=f"{name}-{quantity}",
+        name=f"{name}-claims-{quantity}",
         title=TITLES[quantity],
         columns=columns,
         rows=tuple(
