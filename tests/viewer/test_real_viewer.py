@@ -26,9 +26,9 @@ VIEWS_OF_TAB = {
         "Parameters",
     },
     "Trial": {
-        "Errors of the readings",
+        "Results",
         "Error of the sensor [mm] as the trial went",
-        "Table",
+        "Tables",
     },
     "3D": {"Bench: rays, target, spots"},
 }
