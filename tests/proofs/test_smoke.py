@@ -31,7 +31,9 @@ def test_many_ranges_are_those_of_the_sensor() -> None:
     spots = np.stack([sensor.spot_px(i, at) for i in sensor.ids], axis=1) + 0.05
     spots[0, 1] = np.nan
 
-    many = ranges(batch.sensor, batch.sensor_covariance, spots[None], np.array([np.hypot(0.03, 0.04)]))
+    many = ranges(
+        world.rig, batch.sensor, batch.sensor_covariance, spots[None], np.array([np.hypot(0.03, 0.04)])
+    )
     flat, flat_sd = many.flat(batch.sensor_covariance)
     for k in range(len(at)):
         seen = [n for n in range(4) if np.isfinite(spots[k, n]).all()]
@@ -48,7 +50,8 @@ def test_the_simulator_is_the_unit_tests_world() -> None:
     world = World(thesis_rig(), 7)
     sensor = np.array([[world.values[name] for name in simulate.names(world.rig)]])
     yaw, pitch = 0.02, -0.03
-    spots = simulate.spots(sensor, np.array([[300.0, 2000.0]]), np.tan([[[yaw, pitch]] * 2]).reshape(1, 2, 2))
+    slopes = np.tan([[[yaw, pitch]] * 2]).reshape(1, 2, 2)
+    spots = simulate.spots(world.rig, sensor, np.array([[300.0, 2000.0]]), slopes)
     for k, z0 in enumerate((300.0, 2000.0)):
         for n, laser in enumerate(world.rig.laser_ids):
             np.testing.assert_allclose(spots[0, k, n], world.pixel(laser, z0, yaw, pitch), atol=1e-9)
