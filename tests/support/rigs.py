@@ -69,6 +69,29 @@ def thesis_rig(noise_px: float = 0.03, speckle_px: float = 0.04) -> Rig:
     )
 
 
+FISHEYE_STANDOFFS_MM = (40.0, 50.0, 65.0, 85.0, 115.0, 160.0, 230.0, 350.0, 600.0, 1000.0, 1800.0)
+"""The nearest spots of `fisheye_rig` lie 56 degrees off its axis."""
+
+
+def fisheye_rig() -> Rig:
+    """The lasers of the design before a fisheye of 120 degrees from the left edge to the right."""
+    rig = thesis_rig()
+    camera = CameraSpec(
+        width_px=640,
+        height_px=480,
+        lens="equidistant",
+        f_px=prior(305.6, 15.0),
+        cx_px=prior(319.5, 10.0),
+        cy_px=prior(239.5, 10.0),
+        k1=prior(0.0, 0.05),
+        k2=prior(0.0, 0.02),
+        k3=prior(0.0, 0.01),
+        k4=prior(0.0, 0.005),
+    )
+    bench = rig.bench.model_copy(update={"reach_mm": (40.0, 2000.0)})
+    return rig.model_copy(update={"rig": "fisheye", "camera": camera, "bench": bench})
+
+
 def draw(rng: np.random.Generator, spread: Prior) -> float:
     return float(rng.normal(spread.value, spread.sd)) if spread.sd else spread.value
 
