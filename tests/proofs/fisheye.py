@@ -1,7 +1,7 @@
 """`python -m tests.proofs.fisheye`: calibrations of a fisheye of 120 degrees against what is stated of them.
 
-Sensors drawn from the tolerances of `tests.support.rigs.fisheye_rig`, images by OpenCV's fisheye. A minute;
-the table goes to docs/benchmarks.
+Sensors drawn from the tolerances of `tests.support.rigs.fisheye_rig`, images by OpenCV's fisheye. Takes some
+minutes; the table goes to docs/benchmarks.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ def _lines(how: str, found: list[Score], unsolved: int) -> list[str]:
 def main() -> int:
     """Run, print, keep; 1 where a figure is missed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--calibrations", type=int, default=2000, help="fitted at once")
-    parser.add_argument("--chosen", type=int, default=500, help="fitted one by one, as by workbench fit")
+    parser.add_argument("--calibrations", type=int, default=4000, help="fitted at once")
+    parser.add_argument("--chosen", type=int, default=2000, help="fitted one by one, as by workbench fit")
     asked = parser.parse_args()
     rig = fisheye_rig()
     lines = [

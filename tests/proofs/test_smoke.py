@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.proofs import bound, report, sessions, shapes, simulate, study
+from tests.proofs import bound, fisheye, report, sessions, shapes, simulate, study
 from tests.proofs.ranging import ranges
 from tests.proofs.solve import at_once, one_by_one
-from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, thesis_rig
+from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, fisheye_rig, thesis_rig
 from workbench.calibration.estimation.batch import as_grid, fit_batch
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
@@ -78,6 +78,16 @@ def test_a_small_proof_makes_its_tables() -> None:
     assert any(line.startswith("not determined") and "ruler_scale" in line for line in lines)
     assert np.isfinite(outcome.parameter).all()
     assert not outcome.unsolved.any()
+
+
+def test_a_small_proof_of_the_fisheye_scores_every_range() -> None:
+    scores, unsolved = fisheye.scores(fisheye_rig(), 24, 7)
+    assert unsolved == 0
+    assert len(scores) == 4 * len(fisheye.RANGES_MM)
+    # Errors of one calibration are alike at all ranges: 24 calibrations, four deviations.
+    assert np.mean([one.coverage for one in scores]) > 0.95 - 4 * np.sqrt(0.05 * 0.95 / 24)
+    rms = np.sqrt(np.mean([one.rms_over_bound**2 for one in scores]))
+    assert rms == pytest.approx(1.0, abs=4 * np.sqrt(0.5 / 24))
 
 
 def test_one_by_one_is_at_once_where_every_term_stays() -> None:
