@@ -132,7 +132,8 @@ class SpotCurves:
 
     def _at(self, table: FloatArray, s: FloatArray) -> FloatArray:
         """(n, m) of tables (n, terms, m), each at its own s (n,)."""
-        return np.asarray(np.matmul(self._by.basis(s)[:, None, :], table)[:, 0])
+        values: FloatArray = np.matmul(self._by.basis(s)[:, None, :], table)[:, 0]
+        return values
 
 
 def _all_from_the_middle(true: BoolArray) -> BoolArray:
@@ -146,7 +147,8 @@ def _all_from_the_middle(true: BoolArray) -> BoolArray:
 
 def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
     """(n,) of rows of two."""
-    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1])
+    products: FloatArray = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]
+    return products
 
 
 def _model(model: LensModel, lens: FloatArray, rays: FloatArray, inverse_depth: FloatArray) -> FloatArray:
