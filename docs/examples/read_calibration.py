@@ -22,6 +22,7 @@ class Sensor:
         own = document["laser_ranger"]
         if own["fit"]["verdict"] == "refused":
             raise SystemExit(f"{path}: this calibration was refused: {own['fit'].get('reasons')}")
+        self.model = document["distortion_model"]
         k = document["camera_matrix"]["data"]
         self.lens = np.array([k[0], k[2], k[5], *document["distortion_coefficients"]["data"]])
         self.rays = {
@@ -42,19 +43,20 @@ class Sensor:
         w = 0.0
         for _ in range(30):
             m = self._slope(ray, w) / sd
-            w -= m @ ((spot(self.lens, ray, w) - seen) / sd) / (m @ m)
+            w -= m @ ((spot(self.model, self.lens, ray, w) - seen) / sd) / (m @ m)
         if w <= 0:
             return None
         m = self._slope(ray, w) / sd
         to_range = np.zeros(len(self.names))
         to_range[self.names.index("offset_mm")] = -1.0
-        lens_names = ["f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"]
+        lens_names = ["f_px", "cx_px", "cy_px", *COEFFICIENTS[self.model]]
+        size = len(lens_names)
         ray_names = [f"{laser_id}.{name}" for name in ("x_mm", "y_mm", "tx", "ty")]
         for i, name in enumerate([*lens_names, *ray_names]):
-            step = np.zeros(12)
+            step = np.zeros(size + 4)
             step[i] = 1e-6 * max(1.0, abs([*self.lens, *ray][i]))
-            ahead = spot(self.lens + step[:8], ray + step[8:], w)
-            back = spot(self.lens - step[:8], ray - step[8:], w)
+            ahead = spot(self.model, self.lens + step[:size], ray + step[size:], w)
+            back = spot(self.model, self.lens - step[:size], ray - step[size:], w)
             g = (ahead - back) / (2 * step[i]) / sd
             to_range[self.names.index(name)] = (m @ g) / (m @ m) / w**2
         return 1 / w - self.offset_mm, to_range, 1 / (w**4 * (m @ m))
@@ -65,18 +67,36 @@ class Sensor:
 
     def _slope(self, ray, w):
         step = 1e-7
-        return (spot(self.lens, ray, w + step) - spot(self.lens, ray, w - step)) / (2 * step)
+        ahead = spot(self.model, self.lens, ray, w + step)
+        return (ahead - spot(self.model, self.lens, ray, w - step)) / (2 * step)
 
 
-def spot(lens, ray, w):
-    """Where the ray's point at depth 1 / w appears, pixels."""
-    f, cx, cy, k1, k2, p1, p2, k3 = lens
-    x, y = ray[2] + ray[0] * w, ray[3] + ray[1] * w
+def spot(model, lens, ray, w):
+    """Pixels at which the ray's point at depth 1 / w appears."""
+    f, cx, cy = lens[:3]
+    x, y = DISTORT[model](lens[3:], ray[2] + ray[0] * w, ray[3] + ray[1] * w)
+    return np.array([cx + f * x, cy + f * y])
+
+
+def plumb_bob(coefficients, x, y):
+    """Brown-Conrady."""
+    k1, k2, p1, p2, k3 = coefficients
     r2 = x * x + y * y
     d = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
-    u = cx + f * (x * d + 2 * p1 * x * y + p2 * (r2 + 2 * x * x))
-    v = cy + f * (y * d + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y)
-    return np.array([u, v])
+    return x * d + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * d + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+
+
+def equidistant(coefficients, x, y):
+    """Fisheye: the radius is a polynomial in the angle."""
+    k1, k2, k3, k4 = coefficients
+    r = np.hypot(x, y)
+    a = np.arctan(r)
+    d = (a / r if r > 0 else 1.0) * (1 + k1 * a**2 + k2 * a**4 + k3 * a**6 + k4 * a**8)
+    return x * d, y * d
+
+
+DISTORT = {"plumb_bob": plumb_bob, "equidistant": equidistant}
+COEFFICIENTS = {"plumb_bob": ["k1", "k2", "p1", "p2", "k3"], "equidistant": ["k1", "k2", "k3", "k4"]}
 
 
 def main(calibration, spots):

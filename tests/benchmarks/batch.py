@@ -41,13 +41,14 @@ def residuals_of(batch: BatchFit, rig: Rig, position: FloatArray, sd: FloatArray
     lasers = len(rig.lasers)
     seen = np.isfinite(position)
     measured, weight = position[seen], 1.0 / (scale * sd[seen])
-    sensor = simulate.COMMON + 4 * lasers
+    common = simulate.lens_size(rig) + len(simulate.BENCH)
+    sensor = common + 4 * lasers
 
     def residuals(y: FloatArray) -> FloatArray:
         values = mean.astype(y.dtype)
         values[free] += prior_sd[free] * y
-        f, cx, cy, k1, k2, p1, p2, k3, offset, scale = values[: simulate.COMMON]
-        x, y0, tx, ty = values[simulate.COMMON : sensor].reshape(lasers, 4).T
+        f, cx, cy, k1, k2, p1, p2, k3, offset, scale = values[:common]
+        x, y0, tx, ty = values[common:sensor].reshape(lasers, 4).T
         error, slope_x, slope_y = values[sensor:].reshape(-1, 3, 1).swapaxes(0, 1)
         z0 = STANDOFFS_MM[:, None] * (1.0 + scale) + error + offset
         w = (1.0 - slope_x * tx - slope_y * ty) / (z0 + slope_x * x + slope_y * y0)

@@ -25,8 +25,8 @@ def parameter_covariance(rig: Rig, standoffs_mm: FloatArray, data: Calibrations)
     error_sd = np.array([rig.bench.placement_sd_mm, tilt, tilt])
 
     def seen(truth: FloatArray, errors: FloatArray) -> FloatArray:
-        z0 = simulate.depths(truth, standoffs_mm, errors[..., 0])
-        return simulate.spots(truth, z0, errors[..., 1:]) / data.sd_px
+        z0 = simulate.depths(rig, truth, standoffs_mm, errors[..., 0])
+        return simulate.spots(rig, truth, z0, errors[..., 1:]) / data.sd_px
 
     def difference(sensor_step: FloatArray, error_step: FloatArray) -> FloatArray:
         ahead = seen(data.truth + STEP_SD * sensor_step, data.errors + STEP_SD * error_step)
@@ -50,8 +50,8 @@ def range_variance(
     sd = np.array([p.sd for p in simulate.priors(rig)])
 
     def seen(sensors: FloatArray, step_mm: float = 0.0) -> FloatArray:
-        z0 = range_mm + sensors[:, 8][:, None] + step_mm
-        return simulate.spots(sensors, z0, np.zeros((*z0.shape, 2)))
+        z0 = range_mm + sensors[:, simulate.lens_size(rig)][:, None] + step_mm
+        return simulate.spots(rig, sensors, z0, np.zeros((*z0.shape, 2)))
 
     by_range = (seen(truth, 1e-3) - seen(truth, -1e-3)) / 2e-3
     information = (by_range**2).sum(axis=-1)

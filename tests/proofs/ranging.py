@@ -1,17 +1,19 @@
-"""The ranges of `workbench.sensor.calibrated.Sensor`, for many calibrations at once."""
+"""The ranges of `workbench.sensor.calibrated.CalibratedSensor`, for many calibrations at once."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from tests.proofs.simulate import COMMON, LENS, RAY
+from workbench.calibration.model.layout import Layout
 from workbench.model.arrays import FloatArray
-from workbench.optics.lens import Lens
+from workbench.model.rig import Rig
+from workbench.optics.lens import LensModel
 from workbench.optics.rays import Ray
 from workbench.optics.triangulate import MeasuredSpot, estimate_depth
 
@@ -38,35 +40,41 @@ class Ranged:
         return np.asarray(mean), np.sqrt(shared + own.sum(axis=-1))
 
 
-def ranges(sensor: FloatArray, covariance: FloatArray, position_px: FloatArray, sd_px: FloatArray) -> Ranged:
+def ranges(
+    rig: Rig, sensor: FloatArray, covariance: FloatArray, position_px: FloatArray, sd_px: FloatArray
+) -> Ranged:
     """Range the spots of N sensors.
 
     Args:
+        rig: kind of lens.
         sensor: (N, S) fitted values.
         covariance: (N, S, S) of them.
         position_px: (N, K, L, 2); NaN where not seen: the range is NaN.
         sd_px: (N,) 1 sigma of a spot in either coordinate, speckle included.
     """
     seen = np.asarray(np.isfinite(position_px).all(axis=-1))
-    rays = sensor[:, COMMON:].reshape(len(sensor), -1, len(RAY))
-    found = _depths(sensor[:, : len(LENS)], rays, np.where(seen[..., None], position_px, 0.0), sd_px)
+    layout = Layout(rig.camera.lens, len(rig.lasers))
+    rays = sensor[:, layout.rays].reshape(len(sensor), layout.lasers, -1)
+    position = np.where(seen[..., None], position_px, 0.0)
+    found = _depths(layout.model, sensor[:, layout.lens], rays, position, sd_px)
     w, spot_sd, by_lens, by_ray = (np.asarray(part) for part in found)
     with np.errstate(divide="ignore"):
-        range_mm = np.where(w > 0, 1.0 / w, np.inf) - sensor[:, len(LENS), None, None]
+        range_mm = np.where(w > 0, 1.0 / w, np.inf) - sensor[:, layout.offset, None, None]
     gradient = np.zeros((*w.shape, sensor.shape[1]))
-    gradient[..., : len(LENS)], gradient[..., len(LENS)] = by_lens, -1.0
+    gradient[..., layout.lens], gradient[..., layout.offset] = by_lens, -1.0
     for laser in range(w.shape[2]):
-        start = COMMON + len(RAY) * laser
-        gradient[:, :, laser, start : start + len(RAY)] = by_ray[:, :, laser]
+        gradient[:, :, laser, layout.ray(laser)] = by_ray[:, :, laser]
     shared = np.einsum("nkls,nst,nklt->nkl", gradient, covariance, gradient, optimize=True)
     sd = np.where(seen, np.sqrt(shared + spot_sd**2), np.nan)
     return Ranged(np.where(seen, range_mm, np.nan), sd, spot_sd, gradient)
 
 
-@jax.jit
-def _depths(lens: Array, rays: Array, position_px: Array, sd_px: Array) -> tuple[Array, ...]:
+@partial(jax.jit, static_argnums=0)
+def _depths(
+    model: LensModel, lens: Array, rays: Array, position_px: Array, sd_px: Array
+) -> tuple[Array, ...]:
     def one(lens: Array, ray: Array, position: Array, sd: Array) -> tuple[Array, ...]:
-        found = estimate_depth(Lens(*lens), Ray(*ray), MeasuredSpot(position[0], position[1], sd, sd))
+        found = estimate_depth(model, lens, Ray(*ray), MeasuredSpot(position[0], position[1], sd, sd))
         return found.inverse_depth_per_mm, found.z_sd_of_spot_mm, found.dz_dlens, found.dz_dray
 
     by_laser = jax.vmap(one, in_axes=(None, 0, 0, None))

@@ -86,8 +86,8 @@ def outcome(rig: Rig, calibration_file: Path, truth_file: Path) -> Outcome:
     error, covariance = np.array(stated.values) - truth, stated.covariance_array
     sd = np.sqrt(np.diag(covariance))
     determined = (sd > 0) & (sd <= PRIOR_UNMOVED * np.array(stated.prior_sd))
-    z0 = (RANGES_MM + truth[len(simulate.LENS)])[None]
-    seen = simulate.spots(truth[None], z0, np.zeros((*z0.shape, 2)))[0]
+    z0 = (RANGES_MM + truth[simulate.lens_size(rig)])[None]
+    seen = simulate.spots(rig, truth[None], z0, np.zeros((*z0.shape, 2)))[0]
     seen[~simulate.in_frame(rig, seen)] = np.nan
     found, range_sd = _ranged(sensor, seen)
     free = sd > 0
@@ -188,7 +188,7 @@ def _ranged(sensor: CalibratedSensor, seen: FloatArray) -> tuple[FloatArray, Flo
 def _truth(rig: Rig, path: Path) -> FloatArray:
     """(S,) in the order of `simulate.names`."""
     told = YAML(typ="safe").load(path)
-    common = [float(told[name]) for name in (*simulate.LENS, *simulate.BENCH)]
+    common = [float(told[name]) for name in (*simulate.LENSES[rig.camera.lens], *simulate.BENCH)]
     rays = [float(told["lasers"][laser][name]) for laser in rig.laser_ids for name in simulate.RAY]
     return np.array([*common, *rays])
 

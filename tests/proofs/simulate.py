@@ -1,4 +1,4 @@
-"""Sensors drawn from a rig's tolerances and what they see: linear algebra and OpenCV's lens, nothing of ours.
+"""Sensors drawn from a rig's tolerances and their images: linear algebra and OpenCV's lens, nothing of ours.
 
 Pixels, millimetres; camera frame as in OpenCV. N sensors, J placements, L lasers, S parameters of the sensor:
 lens, bench, four a laser.
@@ -8,16 +8,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
+from tests.support.rigs import opencv_pixels
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.rig import Prior, Rig
 
-LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
+LENSES: dict[str, tuple[str, ...]] = {
+    "plumb_bob": ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"),
+    "equidistant": ("f_px", "cx_px", "cy_px", "k1", "k2", "k3", "k4"),
+}
 BENCH = ("offset_mm", "ruler_scale")
 RAY = ("x_mm", "y_mm", "tx", "ty")
-COMMON = len(LENS) + len(BENCH)
 
 
 @dataclass(frozen=True)
@@ -36,14 +38,19 @@ class Calibrations:
 
 def priors(rig: Rig) -> list[Prior]:
     """(S) priors of the sensor's parameters."""
-    lens = [getattr(rig.camera, name) for name in LENS]
+    lens = [getattr(rig.camera, name) for name in LENSES[rig.camera.lens]]
     bench = [getattr(rig.bench, name) for name in BENCH]
     return [*lens, *bench, *(getattr(laser, name) for laser in rig.lasers for name in RAY)]
 
 
 def names(rig: Rig) -> list[str]:
     """(S) names of the sensor's parameters."""
-    return [*LENS, *BENCH, *(f"{laser.id}.{name}" for laser in rig.lasers for name in RAY)]
+    return [*LENSES[rig.camera.lens], *BENCH, *(f"{laser.id}.{name}" for laser in rig.lasers for name in RAY)]
+
+
+def lens_size(rig: Rig) -> int:
+    """Number of the lens's parameters; the offset comes next, then the ruler's scale."""
+    return len(LENSES[rig.camera.lens])
 
 
 def draw_truths(rig: Rig, n: int, rng: np.random.Generator) -> FloatArray:
@@ -51,18 +58,20 @@ def draw_truths(rig: Rig, n: int, rng: np.random.Generator) -> FloatArray:
     return np.stack([rng.normal(p.value, p.sd, n) for p in priors(rig)], axis=1)
 
 
-def spots(sensors: FloatArray, z0_mm: FloatArray, slopes: FloatArray) -> FloatArray:
+def spots(rig: Rig, sensors: FloatArray, z0_mm: FloatArray, slopes: FloatArray) -> FloatArray:
     """(N, J, L, 2) where the lasers' spots on planes appear; NaN beyond the fold of the drawn lens.
 
     k1 and k2 drawn from wide tolerances can make a polynomial that folds over within the picture, so that one
     pixel belongs to two ranges. No lens does that: beyond its fold a model shows nothing.
 
     Args:
+        rig: kind of lens.
         sensors: (N, S).
         z0_mm: (N, J) depth of each plane on the camera's axis.
         slopes: (N, J, 2) tangents of its tilts.
     """
-    rays = sensors[:, None, COMMON:].reshape(len(sensors), 1, -1, len(RAY))
+    lens = lens_size(rig)
+    rays = sensors[:, None, lens + len(BENCH) :].reshape(len(sensors), 1, -1, len(RAY))
     shape = (*z0_mm.shape, rays.shape[2])
     x, y, tx, ty = (np.broadcast_to(part, shape) for part in np.moveaxis(rays, -1, 0))
     system = np.zeros((*shape, 3, 3))
@@ -71,15 +80,20 @@ def spots(sensors: FloatArray, z0_mm: FloatArray, slopes: FloatArray) -> FloatAr
     system[..., 2, :2] = -slopes[:, :, None, :]
     depth = np.broadcast_to(z0_mm[:, :, None], shape)
     points = np.linalg.solve(system, np.stack([x, y, depth], axis=-1)[..., None])[..., 0]
-    seen = [_project(sensor, p.reshape(-1, 3)) for sensor, p in zip(sensors, points, strict=True)]
-    return np.where(
-        _unfolded(sensors, np.asarray(points, float))[..., None], np.stack(seen).reshape(*shape, 2), np.nan
-    )
+    name = rig.camera.lens
+    seen = [
+        opencv_pixels(name, sensor[:lens], p.reshape(-1, 3))
+        for sensor, p in zip(sensors, points, strict=True)
+    ]
+    unfolded = UNFOLDED[name](sensors[:, 3:lens, None, None], np.asarray(points, float))
+    return np.where(unfolded[..., None], np.stack(seen).reshape(*shape, 2), np.nan)
 
 
-def depths(sensors: FloatArray, standoff_mm: FloatArray, error_mm: FloatArray | float = 0.0) -> FloatArray:
+def depths(
+    rig: Rig, sensors: FloatArray, standoff_mm: FloatArray, error_mm: FloatArray | float = 0.0
+) -> FloatArray:
     """(N, J) depths of planes at standoffs (J,) by the ruler."""
-    offset, scale = sensors[:, len(LENS)], sensors[:, len(LENS) + 1]
+    offset, scale = sensors[:, lens_size(rig)], sensors[:, lens_size(rig) + 1]
     return standoff_mm * (1.0 + scale[:, None]) + offset[:, None] + error_mm
 
 
@@ -96,7 +110,7 @@ def calibrations(
     truth = draw_truths(rig, n, rng)
     error = rng.normal(0.0, rig.bench.placement_sd_mm, (n, len(standoffs_mm)))
     slopes = np.tan(np.radians(rng.normal(0.0, rig.bench.tilt_sd_deg, (*error.shape, 2))))
-    centre = spots(truth, depths(truth, standoffs_mm, error), slopes)
+    centre = spots(rig, truth, depths(rig, truth, standoffs_mm, error), slopes)
     centre = centre + rng.normal(0.0, rig.noise.speckle_sd_px, centre.shape)
     single = centre[..., None, :] + rng.normal(0.0, rig.noise.spot_sd_px, (*centre.shape[:-1], repeats, 2))
     seen = in_frame(rig, single)
@@ -108,15 +122,22 @@ def calibrations(
     return Calibrations(truth, np.concatenate([error[..., None], slopes], axis=-1), mean, sd)
 
 
-def _unfolded(sensors: FloatArray, points: FloatArray) -> BoolArray:
-    """(N, J, L) whether the distorted radius still grows with the radius."""
-    k1, k2, k3 = (sensors[:, LENS.index(name), None, None] for name in ("k1", "k2", "k3"))
+def _plumb_bob_unfolded(coefficients: FloatArray, points: FloatArray) -> BoolArray:
+    """(N, J, L) whether the distorted radius still grows with the radius; coefficients (N, 5, 1, 1)."""
+    k1, k2, _, _, k3 = np.moveaxis(coefficients, 1, 0)
     r2 = (points[..., 0] ** 2 + points[..., 1] ** 2) / points[..., 2] ** 2
     return np.asarray(1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3)) > 0)
 
 
-def _project(sensor: FloatArray, points: FloatArray) -> FloatArray:
-    f, cx, cy = sensor[:3]
-    camera = np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
-    pixels, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera, sensor[3:8])
-    return np.asarray(pixels, np.float64).reshape(-1, 2)
+def _equidistant_unfolded(coefficients: FloatArray, points: FloatArray) -> BoolArray:
+    """(N, J, L) whether the distorted radius grows with the angle up to there; coefficients (N, 4, 1, 1)."""
+    angle = np.arctan2(np.hypot(points[..., 0], points[..., 1]), points[..., 2])
+    grows = np.ones(angle.shape, bool)
+    for part in np.linspace(0.0, 1.0, 50):
+        a2 = (part * angle) ** 2
+        slope = 1.0 + sum((2 * n + 3) * coefficients[:, n] * a2 ** (n + 1) for n in range(4))
+        grows &= slope > 0
+    return grows
+
+
+UNFOLDED = {"plumb_bob": _plumb_bob_unfolded, "equidistant": _equidistant_unfolded}

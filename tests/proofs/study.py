@@ -54,8 +54,8 @@ def run(
     spot_sd = float(np.hypot(rig.noise.spot_sd_px, rig.noise.speckle_sd_px))
     stated = spot_sd * fitted.noise_scale
 
-    far = ranges(fitted.sensor, fitted.covariance, _read(rig, data.truth, RANGES_MM, rng), stated)
-    held = ranges(fitted.sensor, fitted.covariance, _read(rig, data.truth, HELD_MM, rng), stated)
+    far = ranges(rig, fitted.sensor, fitted.covariance, _read(rig, data.truth, RANGES_MM, rng), stated)
+    held = ranges(rig, fitted.sensor, fitted.covariance, _read(rig, data.truth, HELD_MM, rng), stated)
     flat, _ = held.flat(fitted.covariance)
     return Outcome(
         parameter=fitted.sensor - data.truth,
@@ -87,8 +87,8 @@ def joined(parts: list[Outcome]) -> Outcome:
 
 def _read(rig: Rig, truth: FloatArray, range_mm: FloatArray, rng: np.random.Generator) -> FloatArray:
     """(N, K, L, 2) one spot of each laser on a square target at true ranges; NaN out of the frame."""
-    z0 = range_mm + truth[:, len(simulate.LENS)][:, None]
-    seen = simulate.spots(truth, z0, np.zeros((*z0.shape, 2)))
+    z0 = range_mm + truth[:, simulate.lens_size(rig)][:, None]
+    seen = simulate.spots(rig, truth, z0, np.zeros((*z0.shape, 2)))
     for sd in (rig.noise.speckle_sd_px, rig.noise.spot_sd_px):
         seen = seen + rng.normal(0.0, sd, seen.shape)
     return np.where(simulate.in_frame(rig, seen)[..., None], seen, np.nan)

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.proofs import bound, report, sessions, shapes, simulate, study
+from tests.proofs import bound, fisheye, report, sessions, shapes, simulate, study
 from tests.proofs.ranging import ranges
 from tests.proofs.solve import at_once, one_by_one
-from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, thesis_rig
+from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, fisheye_rig, thesis_rig
 from workbench.calibration.estimation.batch import as_grid, fit_batch
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
@@ -31,7 +31,9 @@ def test_many_ranges_are_those_of_the_sensor() -> None:
     spots = np.stack([sensor.spot_px(i, at) for i in sensor.ids], axis=1) + 0.05
     spots[0, 1] = np.nan
 
-    many = ranges(batch.sensor, batch.sensor_covariance, spots[None], np.array([np.hypot(0.03, 0.04)]))
+    many = ranges(
+        world.rig, batch.sensor, batch.sensor_covariance, spots[None], np.array([np.hypot(0.03, 0.04)])
+    )
     flat, flat_sd = many.flat(batch.sensor_covariance)
     for k in range(len(at)):
         seen = [n for n in range(4) if np.isfinite(spots[k, n]).all()]
@@ -48,7 +50,8 @@ def test_the_simulator_is_the_unit_tests_world() -> None:
     world = World(thesis_rig(), 7)
     sensor = np.array([[world.values[name] for name in simulate.names(world.rig)]])
     yaw, pitch = 0.02, -0.03
-    spots = simulate.spots(sensor, np.array([[300.0, 2000.0]]), np.tan([[[yaw, pitch]] * 2]).reshape(1, 2, 2))
+    slopes = np.tan([[[yaw, pitch]] * 2]).reshape(1, 2, 2)
+    spots = simulate.spots(world.rig, sensor, np.array([[300.0, 2000.0]]), slopes)
     for k, z0 in enumerate((300.0, 2000.0)):
         for n, laser in enumerate(world.rig.laser_ids):
             np.testing.assert_allclose(spots[0, k, n], world.pixel(laser, z0, yaw, pitch), atol=1e-9)
@@ -75,6 +78,16 @@ def test_a_small_proof_makes_its_tables() -> None:
     assert any(line.startswith("not determined") and "ruler_scale" in line for line in lines)
     assert np.isfinite(outcome.parameter).all()
     assert not outcome.unsolved.any()
+
+
+def test_a_small_proof_of_the_fisheye_scores_every_range() -> None:
+    scores, unsolved = fisheye.scores(fisheye_rig(), 24, 7)
+    assert unsolved == 0
+    assert len(scores) == 4 * len(fisheye.RANGES_MM)
+    # Errors of one calibration are alike at all ranges: 24 calibrations, four deviations.
+    assert np.mean([one.coverage for one in scores]) > 0.95 - 4 * np.sqrt(0.05 * 0.95 / 24)
+    rms = np.sqrt(np.mean([one.rms_over_bound**2 for one in scores]))
+    assert rms == pytest.approx(1.0, abs=4 * np.sqrt(0.5 / 24))
 
 
 def test_one_by_one_is_at_once_where_every_term_stays() -> None:

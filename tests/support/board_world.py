@@ -95,12 +95,8 @@ class BoardWorld:
         printed = board.corners_mm
         sag = sag_mm(np.array([values[n] for n in ("bow_x_mm", "bow_y_mm", "bow_xy_mm")]), printed)
         on_board = np.column_stack([printed * (1 + values["print_scale"]), sag])
-        camera = np.array(
-            [[values["f_px"], 0, values["cx_px"]], [0, values["f_px"], values["cy_px"]], [0, 0, 1]]
-        )
-        lens = np.array([values[k] for k in ("k1", "k2", "p1", "p2", "k3")])
         points = middle + on_board @ (turn @ roll).T
-        pixels = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera, lens)[0].reshape(-1, 2)
+        pixels = self.world.pixels(points)
         seen = np.flatnonzero(((pixels > 6) & (pixels < [633, 473])).all(axis=1))
         noisy = pixels[seen] + rng.normal(0.0, CORNER_SD_PX, (len(seen), 2))
         return BoardCorners(seen, noisy, np.full((len(seen), 2), CORNER_SD_PX), 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -10,6 +11,7 @@ import numpy as np
 from workbench.calibration.data.observations import Observation
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import Provenance
+from workbench.model.lens import LensName
 from workbench.model.rig import BenchSpec, CameraSpec, LaserSpec, NoiseSpec, Prior, Rig
 
 STANDOFFS_MM = (125.0, 160.0, 210.0, 280.0, 400.0, 600.0, 900.0, 1400.0, 2200.0, 3200.0, 4500.0)
@@ -67,8 +69,44 @@ def thesis_rig(noise_px: float = 0.03, speckle_px: float = 0.04) -> Rig:
     )
 
 
+FISHEYE_STANDOFFS_MM = (40.0, 50.0, 65.0, 85.0, 115.0, 160.0, 230.0, 350.0, 600.0, 1000.0, 1800.0)
+"""The nearest spots of `fisheye_rig` lie 56 degrees off its axis."""
+
+
+def fisheye_rig() -> Rig:
+    """The lasers of the design before a fisheye of 120 degrees from the left edge to the right."""
+    rig = thesis_rig()
+    camera = CameraSpec(
+        width_px=640,
+        height_px=480,
+        lens="equidistant",
+        f_px=prior(305.6, 15.0),
+        cx_px=prior(319.5, 10.0),
+        cy_px=prior(239.5, 10.0),
+        k1=prior(0.0, 0.05),
+        k2=prior(0.0, 0.02),
+        k3=prior(0.0, 0.01),
+        k4=prior(0.0, 0.005),
+    )
+    bench = rig.bench.model_copy(update={"reach_mm": (40.0, 2000.0)})
+    return rig.model_copy(update={"rig": "fisheye", "camera": camera, "bench": bench})
+
+
 def draw(rng: np.random.Generator, spread: Prior) -> float:
     return float(rng.normal(spread.value, spread.sd)) if spread.sd else spread.value
+
+
+def opencv_pixels(lens: LensName, values: Sequence[float], points_mm: FloatArray) -> FloatArray:
+    """(n, 2) pixels of points (n, 3), by OpenCV; of a lens with f, cx, cy and coefficients `values`."""
+    f, cx, cy = values[:3]
+    camera = np.array([[f, 0, cx], [0, f, cy], [0, 0, 1.0]])
+    points = np.ascontiguousarray(points_mm, np.float64).reshape(-1, 1, 3)
+    still, coefficients = np.zeros(3), np.array(values[3:], float)
+    if lens == "equidistant":
+        pixels, _ = cv2.fisheye.projectPoints(points, still, still, camera, coefficients)
+    else:
+        pixels, _ = cv2.projectPoints(points, still, still, camera, coefficients)
+    return np.asarray(pixels, np.float64).reshape(-1, 2)
 
 
 @dataclass
@@ -81,8 +119,8 @@ class World:
 
     def __post_init__(self) -> None:
         rng = np.random.default_rng(self.seed)
-        for name in ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"):
-            self.values[name] = draw(rng, getattr(self.rig.camera, name))
+        for name, spread in self.rig.camera.lens_priors.items():
+            self.values[name] = draw(rng, spread)
         self.values["offset_mm"] = draw(rng, self.rig.bench.offset_mm)
         self.values["ruler_scale"] = draw(rng, self.rig.bench.ruler_scale)
         for laser in self.rig.lasers:
@@ -94,11 +132,12 @@ class World:
         x, y, tx, ty = (self.values[f"{laser_id}.{name}"] for name in ("x_mm", "y_mm", "tx", "ty"))
         system = np.array([[1, 0, -tx], [0, 1, -ty], [-np.tan(yaw), -np.tan(pitch), 1.0]])
         point = np.linalg.solve(system, [x, y, z0_mm])
-        v = self.values
-        camera = np.array([[v["f_px"], 0, v["cx_px"]], [0, v["f_px"], v["cy_px"]], [0, 0, 1]])
-        lens = np.array([v[k] for k in ("k1", "k2", "p1", "p2", "k3")])
-        pixel, _ = cv2.projectPoints(point, np.zeros(3), np.zeros(3), camera, lens)
-        return np.asarray(pixel, np.float64).reshape(2)
+        return np.asarray(self.pixels(point[None])[0])
+
+    def pixels(self, points_mm: FloatArray) -> FloatArray:
+        """(n, 2) where points (n, 3) in the camera frame appear, by OpenCV's lens."""
+        camera = self.rig.camera
+        return opencv_pixels(camera.lens, [self.values[name] for name in camera.lens_priors], points_mm)
 
     def observations(
         self, standoffs_mm: tuple[float, ...] = STANDOFFS_MM, repeats: int = 5, session: int = 1
@@ -115,7 +154,7 @@ class World:
                 centre = self.pixel(laser.id, z0, yaw, pitch) + rng.normal(0, noise.speckle_sd_px, 2)
                 for repeat in range(repeats):
                     u, v = centre + rng.normal(0.0, noise.spot_sd_px, 2)
-                    if 0 <= u <= 639 and 0 <= v <= 479:
+                    if 0 <= u <= self.rig.camera.width_px - 1 and 0 <= v <= self.rig.camera.height_px - 1:
                         source = f"{laser.id} {standoff:g} {repeat}"
                         found.append(
                             Observation(

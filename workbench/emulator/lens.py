@@ -1,8 +1,10 @@
-"""The lens: OpenCV's pinhole with Brown-Conrady distortion, forward by OpenCV, backward by Newton."""
+"""The lens: forward by OpenCV's pinhole with Brown-Conrady distortion or its fisheye, backward by Newton."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,10 +13,16 @@ from scipy.interpolate import RectBivariateSpline
 from workbench.emulator.truth import Truth
 from workbench.model.arrays import FloatArray
 from workbench.model.errors import BadInputError
+from workbench.model.lens import COEFFICIENTS, LensName
 
 NEWTON_STEPS = 30
 NEWTON_PX = 1e-7
 ZERO = np.zeros(3)
+FORWARD: dict[LensName, tuple[Callable[..., Any], int]] = {
+    "plumb_bob": (cv2.projectPoints, 3),
+    "equidistant": (cv2.fisheye.projectPoints, 11),
+}
+"""OpenCV's projection, and the first column of the translation in its Jacobian."""
 
 
 @dataclass(frozen=True)
@@ -32,12 +40,12 @@ class Lens:
     def __init__(self, truth: Truth, f_scale: float = 1.0) -> None:
         f = truth.f_px * f_scale
         self._matrix = np.array([[f, 0, truth.cx_px], [0, f, truth.cy_px], [0, 0, 1]])
-        self._distortion = np.array([truth.k1, truth.k2, truth.p1, truth.p2, truth.k3])
+        self._coefficients = {name: getattr(truth, name) for name in COEFFICIENTS[truth.lens]}
+        self._forward = FORWARD[truth.lens]
 
     def project(self, points_mm: FloatArray) -> FloatArray:
         """Pixels (n, 2) of points (n, 3), mm, all in front of the camera."""
-        pixels, _ = cv2.projectPoints(points_mm.reshape(-1, 1, 3), ZERO, ZERO, self._matrix, self._distortion)
-        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        return self._derived(points_mm)[0]
 
     def back_project(self, u_px: FloatArray, v_px: FloatArray) -> LinesOfSight:
         """Lines of sight of pixels (n,), by Newton's method on OpenCV's projection.
@@ -62,7 +70,8 @@ class Lens:
             xy = xy + np.stack([d * du - b * dv, a * dv - c * du], axis=1) / area[:, None]
         raise BadInputError(
             "emulated lens: expected distortion with one line of sight for every pixel of the image, got"
-            f" k1, k2, p1, p2, k3 = {self._distortion.tolist()}; check the rig's camera and emulator.truth"
+            f" {', '.join(self._coefficients)} = {list(self._coefficients.values())}; check the rig's camera"
+            " and emulator.truth"
         )
 
     def back_project_grid(
@@ -83,9 +92,16 @@ class Lens:
 
     def _miss(self, xy: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Target minus projection, u and v, and the projection's Jacobian d(u, v)/d(x, y), (2, 2, n)."""
-        points = np.column_stack([xy, np.ones(len(xy))]).reshape(-1, 1, 3)
-        pixels, derivatives = cv2.projectPoints(points, ZERO, ZERO, self._matrix, self._distortion)
-        miss = target - pixels.reshape(-1, 2)
-        # OpenCV's columns: rotation (3), translation (3), ...; at depth 1 a translation is a step of (x, y).
-        jacobian = np.asarray(derivatives, dtype=np.float64).reshape(len(xy), 2, -1)[:, :, 3:5]
-        return miss[:, 0], miss[:, 1], jacobian.transpose(1, 2, 0)
+        # At depth 1 a translation is a step of (x, y).
+        pixels, by_translation = self._derived(np.column_stack([xy, np.ones(len(xy))]))
+        miss = target - pixels
+        return miss[:, 0], miss[:, 1], by_translation[:, :, :2].transpose(1, 2, 0)
+
+    def _derived(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Pixels (n, 2) of points (n, 3), and their derivatives (n, 2, 3) by a translation of the points."""
+        coefficients = np.array(list(self._coefficients.values()))
+        forward, column = self._forward
+        pixels, jacobian = forward(points.reshape(-1, 1, 3), ZERO, ZERO, self._matrix, coefficients)
+        derivatives = np.asarray(jacobian, dtype=np.float64).reshape(len(points), 2, -1)
+        found = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        return found, derivatives[:, :, column : column + 3]

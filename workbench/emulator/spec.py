@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
 from workbench.model.errors import BadInputError
+from workbench.model.lens import COEFFICIENTS
 from workbench.model.problems import problems
 from workbench.model.rig import NonNegativeFloat, PositiveFloat, Rig
 from workbench.model.yamlfile import FileModel
@@ -142,6 +144,7 @@ class TruthSpec(FileModel):
     p1: float | None = None
     p2: float | None = None
     k3: float | None = None
+    k4: float | None = None
     offset_mm: float | None = None
     ruler_scale: float | None = None
     print_scale: float | None = None
@@ -181,6 +184,20 @@ class EmulatorSpec(FileModel):
         known = info.context.laser_ids if isinstance(info.context, Rig) else truth.lasers
         if unknown := [name for name in truth.lasers if name not in known]:
             raise ValueError(f"lasers.{unknown[0]}: expected a laser of the rig ({', '.join(known)})")
+        return truth
+
+    @field_validator("truth")
+    @classmethod
+    def _is_of_the_rigs_lens(cls, truth: TruthSpec, info: ValidationInfo) -> TruthSpec:
+        if not isinstance(info.context, Rig):
+            return truth
+        lens = info.context.camera.lens
+        others = set(chain(*COEFFICIENTS.values())).difference(COEFFICIENTS[lens])
+        if wrong := sorted(others & truth.model_fields_set):
+            raise ValueError(
+                f"{wrong[0]}: expected coefficients of the rig's lens {lens}"
+                f" ({', '.join(COEFFICIENTS[lens])})"
+            )
         return truth
 
 

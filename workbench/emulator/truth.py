@@ -6,6 +6,7 @@ import json
 import os
 from dataclasses import asdict, dataclass
 from io import StringIO
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +17,20 @@ from workbench.emulator.keyed import generator
 from workbench.emulator.spec import EmulatorSpec, LaserTruth, PlacementTruth
 from workbench.model.board import BOW
 from workbench.model.errors import BadInputError
+from workbench.model.lens import COEFFICIENTS, LensName
 from workbench.model.rig import CameraSpec, Prior, Rig
 from workbench.model.yamlfile import FileModel
 
 BOARD_SHIFT_SD_MM = 2.0
 BOARD_ROLL_SD_DEG = 1.0
 """How well a hand puts the blank band on the spots. 1 sigma."""
-LENS_NAMES = ("k1", "k2", "p1", "p2", "k3")
+RADIAL: dict[LensName, tuple[str, ...]] = {
+    "plumb_bob": ("k1", "k2", "k3"),
+    "equidistant": ("k1", "k2", "k3", "k4"),
+}
+"""Coefficients of the radial polynomial, of powers 2, 4, ... beside 1."""
+WIDEST_RAD = np.radians(88.0)
+"""Widest angle off the axis at which the bench's fisheye can see anything."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +63,7 @@ class BoardError:
 
 @dataclass(frozen=True)
 class Truth:
-    """What the bench really is. Units and frames as in the rig file."""
+    """True values of the bench. Units and frames as in the rig file; what the lens has not is 0."""
 
     f_px: float
     cx_px: float
@@ -68,6 +76,8 @@ class Truth:
     offset_mm: float
     ruler_scale: float
     lasers: dict[str, Ray]
+    lens: LensName = "plumb_bob"
+    k4: float = 0.0
     print_scale: float = 0.0
     bow_x_mm: float = 0.0
     """This and the next two: sag of the board's paper, see `workbench.model.board.sag_mm`."""
@@ -92,7 +102,8 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
     }
     return Truth(
         **focal,
-        **_draw_lens(camera, spec, focal),
+        **dict.fromkeys(chain(*COEFFICIENTS.values()), 0.0) | _draw_lens(camera, spec, focal),
+        lens=camera.lens,
         offset_mm=_value(spec.seed, "offset_mm", rig.bench.offset_mm, pins),
         ruler_scale=_value(spec.seed, "ruler_scale", rig.bench.ruler_scale, pins),
         print_scale=_value(spec.seed, "print_scale", rig.bench.print_scale, pins),
@@ -185,18 +196,20 @@ def _replace(path: Path, text: str) -> None:
 
 
 def _draw_lens(camera: CameraSpec, spec: EmulatorSpec, focal: dict[str, float]) -> dict[str, float]:
-    rngs = {name: generator(spec.seed, "truth", name) for name in LENS_NAMES}
+    names = COEFFICIENTS[camera.lens]
+    rngs = {name: generator(spec.seed, "truth", name) for name in names}
     corner = _corner_radius(camera, focal)
     for _ in range(1000):
         lens = {
             name: _pinned(getattr(spec.truth, name), _drawn(rngs[name], getattr(camera, name)))
-            for name in LENS_NAMES
+            for name in names
         }
-        if _reaches_corner(lens, corner):
+        if _reaches_corner(camera.lens, lens, corner):
             return lens
     raise BadInputError(
-        "emulator.truth: expected lens coefficients k1, k2, k3 (pinned, or drawn from the rig's camera) whose"
-        f" radial curve climbs to the image corner at {corner:.3g} focal lengths; none of 1000 draws does"
+        f"emulator.truth: expected lens coefficients {', '.join(RADIAL[camera.lens])} (pinned, or drawn from"
+        " the rig's camera) whose radial curve climbs to the image corner at"
+        f" {corner:.3g} focal lengths; none of 1000 draws does"
     )
 
 
@@ -207,12 +220,15 @@ def _corner_radius(camera: CameraSpec, focal: dict[str, float]) -> float:
     return float(np.hypot(du, dv)) / focal["f_px"]
 
 
-def _reaches_corner(lens: dict[str, float], corner: float) -> bool:
-    """Whether r (1 + k1 r^2 + k2 r^4 + k3 r^6) climbs, at a slope of 0.3 or more, to the corner."""
-    r = np.linspace(0.0, 3.0 * corner, 3001)
-    k1, k2, k3 = lens["k1"], lens["k2"], lens["k3"]
-    slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
-    height = r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+def _reaches_corner(name: LensName, lens: dict[str, float], corner: float) -> bool:
+    """Whether a (1 + k1 a^2 + k2 a^4 + ...) climbs, at a slope of 0.3 or more, to the corner.
+
+    The argument a is the undistorted radius of a pinhole, and the angle of a fisheye, up to 88 degrees.
+    """
+    a = np.linspace(0.0, 3.0 * corner if name == "plumb_bob" else WIDEST_RAD, 3001)
+    powers = [(2 * n, lens[coefficient]) for n, coefficient in enumerate(RADIAL[name], start=1)]
+    slope = 1 + sum((n + 1) * k * a**n for n, k in powers)
+    height = a * (1 + sum(k * a**n for n, k in powers))
     climbing = np.logical_and.accumulate(slope >= 0.3)
     return bool(np.any(climbing & (height >= corner)))
 

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from workbench.model.arrays import FloatArray
+from workbench.model.lens import COEFFICIENTS, LensName
 from workbench.model.rig import LARGEST, MOST_PX, LaserId, NonNegativeFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
@@ -194,7 +195,7 @@ class Calibration(FileModel):
     image_height: Annotated[int, Field(gt=0, le=MOST_PX)]
     camera_name: str
     camera_matrix: Matrix
-    distortion_model: Literal["plumb_bob"]
+    distortion_model: LensName
     distortion_coefficients: Matrix
     rectification_matrix: Matrix
     projection_matrix: Matrix
@@ -223,12 +224,15 @@ class Calibration(FileModel):
     def geometry(self) -> dict[str, float]:
         """Every number that a range depends on, by the name of its parameter."""
         k, d = self.camera_matrix.data, self.distortion_coefficients.data
-        if len(k) != 9 or len(d) != 5:
-            raise ValueError("expected a camera_matrix of 3 x 3 and 5 distortion_coefficients")
+        coefficients = COEFFICIENTS[self.distortion_model]
+        if len(k) != 9 or len(d) != len(coefficients):
+            raise ValueError(
+                f"expected a camera_matrix of 3 x 3 and {len(coefficients)} distortion_coefficients"
+            )
         if k[0] != k[4]:
             raise ValueError(f"camera_matrix: expected square pixels (fx = fy), got {k[0]!r} and {k[4]!r}")
         lens = dict(zip(("f_px", "cx_px", "cy_px"), (k[0], k[2], k[5]), strict=True))
-        distortion = dict(zip(("k1", "k2", "p1", "p2", "k3"), d, strict=True))
+        distortion = dict(zip(coefficients, d, strict=True))
         rays = {
             f"{laser.id}.{name}": value
             for laser in self.laser_ranger.lasers

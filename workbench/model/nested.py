@@ -33,12 +33,12 @@ def _hold_one(rig: Rig, name: str) -> Rig:
         index = rig.laser_ids.index(laser_id)
         laser = _constant(rig.lasers[index], of_ray)
         return rig.model_copy(update={"lasers": (*rig.lasers[:index], laser, *rig.lasers[index + 1 :])})
-    if name in _priors(rig.camera):
+    if name in rig.camera.lens_priors:
         return rig.model_copy(update={"camera": _constant(rig.camera, name)})
     if name in _priors(rig.bench):
         return rig.model_copy(update={"bench": _constant(rig.bench, name)})
     rays = [f"{i}.{p}" for i in rig.laser_ids for p in _priors(rig.lasers[0])]
-    known = ", ".join([*_priors(rig.camera), *_priors(rig.bench), TILTS, *rays])
+    known = ", ".join([*rig.camera.lens_priors, *_priors(rig.bench), TILTS, *rays])
     raise BadInputError(f"parameter {name}: expected one of {known}")
 
 

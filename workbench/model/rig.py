@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from workbench.model.board import Board
 from workbench.model.device_block import DeviceBlock
+from workbench.model.lens import COEFFICIENTS, LensName, lens_parameters
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 PositiveFloat = Annotated[float, Field(gt=0)]
@@ -50,11 +51,13 @@ def exactly(value: float) -> Prior:
 
 
 class CameraSpec(FileModel):
-    """Camera: image format, and the lens as the data sheet tells it (OpenCV's pinhole and Brown-Conrady)."""
+    """Camera: image format, and the lens as its data sheet states it."""
 
     width_px: Annotated[int, Field(gt=0, le=MOST_PX)]
     height_px: Annotated[int, Field(gt=0, le=MOST_PX)]
     bits: Annotated[int, Field(ge=8, le=16)] = 8
+    lens: LensName = "plumb_bob"
+    """Lens model. It chooses the distortion coefficients below: the others are refused, and stay 0."""
     f_px: Prior
     cx_px: Prior
     cy_px: Prior
@@ -63,6 +66,18 @@ class CameraSpec(FileModel):
     p1: Prior = exactly(0.0)
     p2: Prior = exactly(0.0)
     k3: Prior = exactly(0.0)
+    k4: Prior = exactly(0.0)
+
+    @field_validator("k1", "k2", "p1", "p2", "k3", "k4")
+    @classmethod
+    def _is_of_the_lens(cls, prior: Prior, info: ValidationInfo) -> Prior:
+        lens: LensName | None = info.data.get("lens")  # None: the lens itself is refused
+        if lens is not None and info.field_name not in COEFFICIENTS[lens]:
+            raise ValueError(
+                f"expected coefficients of the lens {lens} ({', '.join(COEFFICIENTS[lens])}), got"
+                f" {info.field_name}; remove it, or name another lens in camera.lens"
+            )
+        return prior
 
     @field_validator("f_px")
     @classmethod
@@ -70,6 +85,11 @@ class CameraSpec(FileModel):
         if f_px.value <= 0:
             raise ValueError(f"expected a focal length above 0, got {f_px.value:g}")
         return f_px
+
+    @property
+    def lens_priors(self) -> dict[str, Prior]:
+        """Priors of the lens model's parameters by name, in the model's order."""
+        return {name: getattr(self, name) for name in lens_parameters(self.lens)}
 
 
 class LaserSpec(FileModel):

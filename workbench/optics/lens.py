@@ -1,8 +1,10 @@
-"""Pinhole and Brown-Conrady lens, in OpenCV's convention (`plumb_bob`: k1 k2 p1 p2 k3)."""
+"""A lens model: what every kind of lens has to state of itself."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,55 +12,63 @@ from jax import Array
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-from workbench.model.arrays import FloatArray
+from workbench.model.lens import COEFFICIENTS, PINHOLE, LensName, lens_parameters
 
-Numbers = TypeVar("Numbers", float, Array, FloatArray)
 EitherArray = Array | NDArray[Any]
 """JAX's, or numpy's where all inputs are numpy's arrays."""
+Numbers = Sequence[ArrayLike] | EitherArray
+"""A vector of parameters; each may itself be an array, and all broadcast against each other."""
+Distort = Callable[[Numbers, EitherArray, EitherArray], tuple[EitherArray, EitherArray]]
+RadialSlope = Callable[[Numbers, EitherArray, EitherArray], EitherArray]
 
 
-class Lens(NamedTuple):
-    """Intrinsic parameters. f, cx, cy in pixels (square pixels), the others without unit."""
+@dataclass(frozen=True, eq=False)
+class LensModel:
+    """A kind of lens: its parameters and its projection. There is one object of each kind.
 
-    f_px: ArrayLike
-    cx_px: ArrayLike
-    cy_px: ArrayLike
-    k1: ArrayLike = 0.0
-    k2: ArrayLike = 0.0
-    p1: ArrayLike = 0.0
-    p2: ArrayLike = 0.0
-    k3: ArrayLike = 0.0
+    A lens of this kind is a vector of numbers in the order of `parameters`: f, cx, cy in pixels (square
+    pixels), then the distortion coefficients, which have no unit and are all 0 for the undistorted lens.
+    """
+
+    name: LensName
+    """In rig files, and ROS's `distortion_model`."""
+    distort: Distort
+    """Distorted normalised coordinates by coefficients and undistorted x = X/Z, y = Y/Z; shapes broadcast."""
+    radial_slope: RadialSlope
+    """Derivative of the distorted radius by the undistorted, likewise. Up to the radius where it is no longer
+    positive, each direction has an image point of its own; beyond, the model folds over."""
+    trial_sd: Mapping[str, float]
+    """Prior standard deviation (1 sigma) of each coefficient that a rig file holds constant, where a fit
+    tests whether the data need it."""
+    removal_order: tuple[str, ...]
+    """Terms that may be absent, the first to go first; a term of several coefficients has spaces between."""
+    radial_orders: tuple[str, ...]
+    """Coefficients of the radial polynomial by rising order: none is absent below one that stays."""
+    polynomial_degree: int | None = None
+    """Degree of the distorted coordinates as polynomials in undistorted ones that move along a straight line;
+    None if they are no polynomials."""
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """Names of the distortion coefficients, in the order of OpenCV and ROS."""
+        return COEFFICIENTS[self.name]
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of all parameters, in the order of every vector of them."""
+        return lens_parameters(self.name)
+
+    def project(self, lens: Numbers, x: ArrayLike, y: ArrayLike) -> tuple[EitherArray, EitherArray]:
+        """Pixel position (u, v) of the undistorted normalised coordinates x = X/Z, y = Y/Z."""
+        f_px, cx_px, cy_px = (as_array(lens[i]) for i in range(len(PINHOLE)))
+        x_distorted, y_distorted = self.distort(lens[len(PINHOLE) :], as_array(x), as_array(y))
+        return cx_px + f_px * x_distorted, cy_px + f_px * y_distorted
+
+    def is_unfolded(self, lens: Numbers, x: ArrayLike, y: ArrayLike) -> EitherArray:
+        """Whether the model has not folded over at (x, y)."""
+        return self.radial_slope(lens[len(PINHOLE) :], as_array(x), as_array(y)) > 0
 
 
 def as_array(x: ArrayLike) -> EitherArray:
-    """JAX's, but for numpy's, which stays: so the same maths is done on complex numbers without a program."""
+    """A JAX array, except that numpy's stay: the same maths then runs on complex numbers uncompiled."""
     return x if isinstance(x, np.ndarray) else jnp.asarray(x)
-
-
-def distort(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[EitherArray, EitherArray]:
-    """Distorted normalised coordinates of the undistorted (x, y); shapes broadcast.
-
-    Source: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37 (1971), with
-    OpenCV's order of coefficients.
-    """
-    x, y = as_array(x), as_array(y)
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3))
-    x_distorted = x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x)
-    y_distorted = y * radial + lens.p1 * (r2 + 2.0 * y * y) + 2.0 * lens.p2 * x * y
-    return x_distorted, y_distorted
-
-
-def project(lens: Lens, x: ArrayLike, y: ArrayLike) -> tuple[EitherArray, EitherArray]:
-    """Pixel position (u, v) of the undistorted normalised coordinates x = X/Z, y = Y/Z."""
-    x_distorted, y_distorted = distort(lens, x, y)
-    f_px = as_array(lens.f_px)
-    return as_array(lens.cx_px) + f_px * x_distorted, as_array(lens.cy_px) + f_px * y_distorted
-
-
-def radial_slope(lens: Lens, x: Numbers, y: Numbers) -> Numbers:
-    """d(distorted radius) / d(radius) at (x, y): where it is not positive the lens model folds over."""
-    r2 = x * x + y * y
-    # A lens of numbers may meet arrays: the type checker, which takes one kind at a time, does not see it.
-    slope: Numbers = 1.0 + r2 * (3.0 * lens.k1 + r2 * (5.0 * lens.k2 + r2 * 7.0 * lens.k3))  # type: ignore[assignment]
-    return slope

@@ -1,4 +1,4 @@
-"""Laser rays, and where they meet a plane. Camera frame: x right, y down, z forward, millimetres."""
+"""Laser rays, and the image of their points. Camera frame: x right, y down, z forward, millimetres."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from workbench.optics.lens import EitherArray, Lens, as_array, project
+from workbench.optics.lens import EitherArray, LensModel, Numbers, as_array
+
+RAY = ("x_mm", "y_mm", "tx", "ty")
+"""Names of a ray's parameters, in the order of `Ray`."""
 
 
 class Ray(NamedTuple):
@@ -35,19 +38,25 @@ def depth_on_plane(ray: Ray, plane: Plane) -> Array:
 
 
 def spot_at_inverse_depth(
-    lens: Lens, ray: Ray, inverse_depth_per_mm: ArrayLike
+    model: LensModel, lens: Numbers, ray: Ray, inverse_depth_per_mm: ArrayLike
 ) -> tuple[EitherArray, EitherArray]:
     """Pixel position (u, v) of the ray's point at depth z = 1 / inverse_depth; 0 is the point at infinity.
 
     In inverse depth the undistorted image point moves along a straight line at constant speed, which is why
     the ranger solves for it rather than for z.
+
+    Args:
+        model: kind of lens.
+        lens: its parameters, in the model's order.
+        ray: the laser.
+        inverse_depth_per_mm: 1 / z; shapes broadcast.
     """
     x = ray.tx + ray.x_mm * as_array(inverse_depth_per_mm)
     y = ray.ty + ray.y_mm * as_array(inverse_depth_per_mm)
-    return project(lens, x, y)
+    return model.project(lens, x, y)
 
 
-def spot_on_plane(lens: Lens, ray: Ray, plane: Plane) -> tuple[Array, Array]:
+def spot_on_plane(model: LensModel, lens: Numbers, ray: Ray, plane: Plane) -> tuple[Array, Array]:
     """Pixel position (u, v) of the laser's spot on the plane."""
-    u, v = spot_at_inverse_depth(lens, ray, 1.0 / depth_on_plane(ray, plane))
+    u, v = spot_at_inverse_depth(model, lens, ray, 1.0 / depth_on_plane(ray, plane))
     return jnp.asarray(u), jnp.asarray(v)

@@ -1,4 +1,4 @@
-"""A calibrated sensor: the numbers of a calibration, ready to turn spots into ranges and back."""
+"""A calibrated sensor: the numbers of a calibration, as arrays that turn spots into ranges and back."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from workbench.calibration.model.parameters import LENS, RAY
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.calibration import Calibration
-from workbench.optics.lens import Lens, radial_slope
+from workbench.optics.lens import LensModel
+from workbench.optics.lens_models import lens_model
+from workbench.optics.rays import RAY
 from workbench.sensor.curves import SpotCurves
 
 
@@ -65,8 +66,13 @@ class CalibratedSensor:
         return self.calibration.geometry() | dict(self.moved)
 
     @cached_property
+    def _model(self) -> LensModel:
+        return lens_model(self.calibration.distortion_model)
+
+    @cached_property
     def _lens(self) -> FloatArray:
-        return np.array([self._geometry[name] for name in LENS])
+        """Parameters of the lens, in the model's order."""
+        return np.array([self._geometry[name] for name in self._model.parameters])
 
     @cached_property
     def _rays(self) -> FloatArray:
@@ -79,8 +85,8 @@ class CalibratedSensor:
 
     @cached_property
     def _own_columns(self) -> IndexArray:
-        """(lasers, 12) columns of the lens and of each laser's ray."""
-        lens = [self._columns[name] for name in LENS]
+        """(lasers, C) columns of the lens and of each laser's ray."""
+        lens = [self._columns[name] for name in self._model.parameters]
         return np.array([[*lens, *(self._columns[f"{i}.{name}"] for name in RAY)] for i in self.ids])
 
     @cached_property
@@ -100,7 +106,7 @@ class CalibratedSensor:
 
     @cached_property
     def _curves(self) -> SpotCurves:
-        return SpotCurves(self._lens, self._rays)
+        return SpotCurves(self._model, self._lens, self._rays)
 
     @property
     def offset_mm(self) -> float:
@@ -108,7 +114,7 @@ class CalibratedSensor:
         return self._geometry["offset_mm"]
 
     def spot_px(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
-        """(n, 2) where the laser's spot appears at ranges (n,); infinity allowed."""
+        """(n, 2) position of the laser's spot at ranges (n,); infinity allowed."""
         return self._curves.spots(*self._points(laser_id, range_mm))
 
     def spot_gradient(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
@@ -124,7 +130,7 @@ class CalibratedSensor:
         """Ranges of n spots with known lasers.
 
         Args:
-            laser_ids: which laser made each spot, n of them.
+            laser_ids: the laser of each spot, n of them.
             position_px: (n, 2) u, v; NaN where a coordinate was not measured.
             sd_px: (n, 2) 1 sigma of the spot's own noise; NaN where not known: the calibration's is used.
                 The speckle's is added here.
@@ -153,10 +159,10 @@ class CalibratedSensor:
     def places(
         self, laser_ids: Sequence[str], axis: Literal["u", "v"], ranges: RangeEstimates
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Where n spots lie along x (axis u) or y (axis v), origin + tangent x depth.
+        """Positions of n spots along x (axis u) or y (axis v), origin + tangent x depth.
 
         Returns:
-            (n,) places, mm; (n, P) their derivatives by the parameters of the calibration; (n,) tangents,
+            (n,) positions, mm; (n, P) their derivatives by the parameters of the calibration; (n,) tangents,
             which are their derivatives by range.
         """
         names = ("x_mm", "tx") if axis == "u" else ("y_mm", "ty")
@@ -177,7 +183,7 @@ class CalibratedSensor:
         return np.asarray(self.typical_ranges(laser_id, range_mm).sigma_mm / range_mm)
 
     def typical_ranges(self, laser_id: str, range_mm: FloatArray) -> RangeEstimates:
-        """What spots of the calibration's typical noise at (n,) ranges would give."""
+        """Estimates from spots of the calibration's typical noise at (n,) ranges."""
         typical = np.full((len(range_mm), 2), np.nan)
         return self.ranges([laser_id] * len(range_mm), self.spot_px(laser_id, range_mm), typical)
 
@@ -186,7 +192,7 @@ class CalibratedSensor:
         u, v = self.spot_px(laser_id, range_mm).T
         laser, w = self._points(laser_id, range_mm)
         x, y, tx, ty = self._rays[laser].T
-        unfolded = radial_slope(Lens(*self._lens), tx + x * w, ty + y * w) > 0
+        unfolded = np.asarray(self._model.is_unfolded(self._lens, tx + x * w, ty + y * w))
         width, height = self.calibration.image_width, self.calibration.image_height
         inside = (u > -0.5) & (u < width - 0.5) & (v > -0.5) & (v < height - 0.5) & unfolded
         return np.asarray(inside, bool)
@@ -197,7 +203,7 @@ class CalibratedSensor:
         return index, 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
 
     def _by_parameter(self, laser: IndexArray, own: FloatArray) -> FloatArray:
-        """(n, P) from (n, 12) derivatives by lens and own ray; those by other lasers' rays are 0."""
+        """(n, P) from (n, C) derivatives by lens and own ray; those by other lasers' rays are 0."""
         gradient = np.zeros((len(laser), len(self._columns)))
         gradient[np.arange(len(laser))[:, None], self._own_columns[laser]] = own
         return gradient

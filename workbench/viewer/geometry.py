@@ -1,4 +1,4 @@
-"""The sensor as it is believed to be: from the rig file at first, from the fit once there is one.
+"""Geometry of the sensor by its current parameters: the rig file's at first, the fit's once there is one.
 
 For drawing only. Camera frame, millimetres: x right, y down, z forward, origin in the pinhole.
 """
@@ -9,32 +9,35 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import radians, tan
 
-import cv2
 import numpy as np
 
 from workbench.model.arrays import FloatArray
 from workbench.model.event import ParameterRecord
+from workbench.model.lens import LensName
 from workbench.model.rig import Rig
 from workbench.model.target import BoardTarget, FlatTarget
-
-_LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
-_RAY = ("x_mm", "y_mm", "tx", "ty")
+from workbench.optics.lens_models import lens_model
+from workbench.optics.rays import RAY
+from workbench.optics.undistort import undistort
 
 
 @dataclass(frozen=True)
 class Geometry:
     """Lens, laser rays and the pinhole's distance behind the reference plane."""
 
+    lens_name: LensName
     lens: Mapping[str, float]
+    """The lens model's parameters by name, in its order."""
     offset_mm: float
     rays: Mapping[str, tuple[float, float, float, float]]
     """(x_mm, y_mm, tx, ty) of each laser."""
 
     @classmethod
     def of_rig(cls, rig: Rig) -> Geometry:
-        """What the rig file says, before any measurement."""
+        """By the rig file, before any measurement."""
         return cls(
-            lens={name: getattr(rig.camera, name).value for name in _LENS},
+            lens_name=rig.camera.lens,
+            lens={name: prior.value for name, prior in rig.camera.lens_priors.items()},
             offset_mm=rig.bench.offset_mm.value,
             rays={
                 laser.id: (laser.x_mm.value, laser.y_mm.value, laser.tx.value, laser.ty.value)
@@ -47,9 +50,10 @@ class Geometry:
         fit = {parameter.name: parameter.value for parameter in parameters}
         rays = {}
         for laser, (x, y, tx, ty) in self.rays.items():
-            old = dict(zip(_RAY, (x, y, tx, ty), strict=True))
-            rays[laser] = tuple(fit.get(f"{laser}.{name}", old[name]) for name in _RAY)
+            old = dict(zip(RAY, (x, y, tx, ty), strict=True))
+            rays[laser] = tuple(fit.get(f"{laser}.{name}", old[name]) for name in RAY)
         return Geometry(
+            lens_name=self.lens_name,
             lens={name: fit.get(name, value) for name, value in self.lens.items()},
             offset_mm=fit.get("offset_mm", self.offset_mm),
             rays={laser: (ray[0], ray[1], ray[2], ray[3]) for laser, ray in rays.items()},
@@ -67,18 +71,9 @@ class Geometry:
         return (x + tx * z_mm, y + ty * z_mm, z_mm)
 
     def seen_on(self, target: FlatTarget | BoardTarget, standoff_mm: float, pixels: FloatArray) -> FloatArray:
-        """Where the lines of sight of `pixels`, (N, 2), meet a flat target: (N, 3) mm."""
+        """Points where the lines of sight of `pixels`, (N, 2), meet a flat target: (N, 3) mm."""
         slope_x, slope_y = tan(radians(target.yaw_deg)), tan(radians(target.pitch_deg))
-        sight = self._directions(pixels)
+        sight = undistort(lens_model(self.lens_name), np.array(list(self.lens.values())), pixels)
         facing = 1.0 - slope_x * sight[:, 0] - slope_y * sight[:, 1]
         depth = (standoff_mm + self.offset_mm) / facing
         return np.column_stack([sight * depth[:, None], depth])
-
-    def _directions(self, pixels: FloatArray) -> FloatArray:
-        """Undistorted (x/z, y/z) of `pixels`, both (N, 2)."""
-        if not len(pixels):
-            return np.zeros((0, 2))
-        distortion = np.array([self.lens[name] for name in ("k1", "k2", "p1", "p2", "k3")])
-        points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
-        seen = cv2.undistortPoints(points, self.camera_matrix, distortion)
-        return np.asarray(seen, dtype=np.float64).reshape(-1, 2)

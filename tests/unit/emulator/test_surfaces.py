@@ -55,8 +55,47 @@ def test_every_pixel_of_a_drawn_lens_has_its_line_of_sight(seed: int) -> None:
     assert back == pytest.approx(np.column_stack([u, v]), abs=1e-6)
 
 
-def test_area_of_a_pixel_is_the_area_between_its_corners() -> None:
-    lens = Lens(Truth(F, CX, CY, -0.25, 0.1, 0.002, 0.001, 0.0, 0.0, 0.0, {}))
+FISHEYE = {"lens": "equidistant", "f_px": {"value": 305.6, "sd": 0.0}}
+LENSES = {
+    "plumb_bob": Truth(F, CX, CY, -0.25, 0.1, 0.002, 0.001, 0.0, 0.0, 0.0, {}),
+    "equidistant": Truth(305.6, CX, CY, 0.04, -0.02, 0.0, 0.0, 0.01, 0.0, 0.0, {}, "equidistant", -0.003),
+}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_pixel_of_a_drawn_fisheye_has_its_line_of_sight(seed: int) -> None:
+    """To the corners, 75 degrees off the axis."""
+    sd = {"k1": 0.05, "k2": 0.02, "k3": 0.01, "k4": 0.005}
+    rig = ideal_rig(camera=FISHEYE | {k: {"value": 0.0, "sd": s} for k, s in sd.items()}, seed=seed)
+    truth = draw_truth(rig, emulator_spec(rig))
+    assert truth.lens == "equidistant"
+    assert all(getattr(truth, name) != 0 for name in sd)
+    assert truth.p1 == truth.p2 == 0
+    u, v = (a.ravel().astype(float) for a in np.meshgrid(np.linspace(0, 639, 10), np.linspace(0, 479, 10)))
+    sight = Lens(truth).back_project(u, v)
+    back = Lens(truth).project(np.column_stack([sight.x, sight.y, np.ones(len(u))]))
+    assert back == pytest.approx(np.column_stack([u, v]), abs=1e-6)
+    # By hand: the angle's polynomial is the distance from the centre, in focal lengths.
+    angle = np.arctan(np.hypot(sight.x, sight.y))
+    radius = angle * (1 + sum(getattr(truth, name) * angle ** (2 * n + 2) for n, name in enumerate(sd)))
+    assert radius * 305.6 == pytest.approx(np.hypot(u - CX, v - CY), abs=1e-6)
+
+
+def test_a_pin_of_another_lens_is_refused() -> None:
+    with pytest.raises(BadInputError, match=r"emulator\.truth: p1"):
+        emulator_spec(ideal_rig(camera=FISHEYE, truth={"p1": 0.001}))
+    assert emulator_spec(ideal_rig(camera=FISHEYE, truth={"k4": 0.001})).truth.k4 == 0.001
+
+
+def test_a_fisheye_that_does_not_reach_the_corner_is_refused() -> None:
+    rig = ideal_rig(camera=FISHEYE, truth={"k1": -0.4})
+    with pytest.raises(BadInputError, match="k1, k2, k3, k4"):
+        draw_truth(rig, emulator_spec(rig))
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_area_of_a_pixel_is_the_area_between_its_corners(name: str) -> None:
+    lens = Lens(LENSES[name])
     corners = lens.back_project(
         np.array([599.5, 600.5, 600.5, 599.5]), np.array([419.5, 419.5, 420.5, 420.5])
     )
@@ -66,8 +105,9 @@ def test_area_of_a_pixel_is_the_area_between_its_corners() -> None:
     assert middle.area[0] == pytest.approx(shoelace, rel=1e-4)
 
 
-def test_splines_between_pixels_agree_with_newton() -> None:
-    lens = Lens(Truth(F, CX, CY, -0.25, 0.1, 0.002, 0.001, 0.0, 0.0, 0.0, {}))
+@pytest.mark.parametrize("name", LENSES)
+def test_splines_between_pixels_agree_with_newton(name: str) -> None:
+    lens = Lens(LENSES[name])
     whole_u, whole_v = np.arange(560.0, 580.0), np.arange(400.0, 421.0)
     u, v = np.linspace(562, 577, 40), np.linspace(402, 418, 30)
     fine = lens.back_project_grid(whole_u, whole_v, u, v)

@@ -1,4 +1,4 @@
-"""Why a spot was not seen: a fit knows where it should have been."""
+"""Spots that were not seen because they lie outside the picture, by the fit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from workbench.calibration.data.observations import Rejected
-from workbench.calibration.model.parameters import LENS, RAY, REFERENCE
+from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.prediction import predict_cell
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
@@ -27,11 +27,11 @@ def _renamed(rig: Rig, values: FloatArray, rejected: Rejected) -> Rejected:
     observation = rejected.missing
     if observation is None:
         return rejected
-    common = len(LENS) + len(REFERENCE)
-    start = common + len(RAY) * rig.laser_ids.index(observation.laser_id)
+    layout = Layout(rig.camera.lens, len(rig.lasers))
+    ray = layout.ray(rig.laser_ids.index(observation.laser_id))
     square = (0.0, 0.0, 0.0)  # no error of placement, no tilt
-    inputs = (*values[:common], *values[start : start + len(RAY)], *square)
-    u, v = (float(c) for c in predict_cell(inputs, observation.standoff_mm))
+    inputs = (*values[layout.common], *values[ray], *square)
+    u, v = (float(c) for c in predict_cell(layout.lens_name, inputs, observation.standoff_mm))
     width, height = rig.camera.width_px, rig.camera.height_px
     if -0.5 <= u < width - 0.5 and -0.5 <= v < height - 0.5:
         return rejected

@@ -84,10 +84,10 @@ _WORDS = {
     " ruler_scale) and that the target stood square",
     "laser": "residuals follow the standoff differently for each laser: check that no laser moved in its"
     " mount and that the target is flat",
-    "u": "residuals follow the place in the picture, left to right: the lens needs another term (camera.k3,"
-    " p1, p2), or the image is scaled",
-    "v": "residuals follow the place in the picture, top to bottom: the lens needs another term (camera.k3,"
-    " p1, p2), or the image is scaled",
+    "u": "residuals follow the place in the picture, left to right: the lens needs another distortion"
+    " coefficient (camera.k3 or another one that the rig file holds constant), or the image is scaled",
+    "v": "residuals follow the place in the picture, top to bottom: the lens needs another distortion"
+    " coefficient (camera.k3 or another one that the rig file holds constant), or the image is scaled",
     "order": "residuals of successive captures are alike: something drifted; let sensor and lasers warm up,"
     " and repeat with the standoffs in another order",
     "variance over standoff": "residuals scatter more at one end of the standoffs than the other: state spot"

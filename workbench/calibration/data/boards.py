@@ -1,4 +1,4 @@
-"""The printed board at a placement: what was seen of it, and a first guess of how it stood."""
+"""The printed board at a placement: its corners in the image, and a first guess of its pose."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ from workbench.calibration.data.observations import MeanObservations, Observatio
 from workbench.model.board import Board
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
+from workbench.optics.lens_models import lens_model
+from workbench.optics.undistort import undistort
 
 # OpenCV is imported where there is a board: a fit of spots alone starts without it.
 if TYPE_CHECKING:
     from workbench.corners.board import BoardCorners
     from workbench.model.arrays import Image
 
+FEWEST_CORNERS = 4
+"""That determine a pose."""
 BAND_EDGE_MM = 3.0
 """A spot's middle must lie this far inside the band: beams are some 2.5 mm wide where a board is read."""
 
@@ -128,22 +132,21 @@ def guess_pose(rig: Rig, view: BoardView) -> PoseGuess:
     """
     import cv2
 
-    camera = rig.camera
-    matrix = np.array(
-        [[camera.f_px.value, 0, camera.cx_px.value], [0, camera.f_px.value, camera.cy_px.value], [0, 0, 1]]
-    )
-    distortion = np.array([p.value for p in (camera.k1, camera.k2, camera.p1, camera.p2, camera.k3)])
-    printed = rig.board.corners_mm[view.corners.ids]
+    lens = np.array([prior.value for prior in rig.camera.lens_priors.values()])
+    sight = undistort(lens_model(rig.camera.lens), lens, view.corners.position_px)
+    shown = np.isfinite(sight).all(axis=1)
+    printed = rig.board.corners_mm[view.corners.ids][shown]
     points = np.column_stack([printed, np.zeros(len(printed))])
-    found, turn, shift = cv2.solvePnP(
-        points, view.corners.position_px, matrix, distortion, flags=cv2.SOLVEPNP_IPPE
+    mistake = BadInputError(
+        f"{view.placement.source}: the board's corners fit no pose; is the image mirrored, or the board"
+        " not the one of the rig file?"
     )
+    if shown.sum() < FEWEST_CORNERS:
+        raise mistake
+    found, turn, shift = cv2.solvePnP(points, sight[shown], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
     axes = cv2.Rodrigues(turn)[0]
     if not found or axes[2, 2] <= 0:
-        raise BadInputError(
-            f"{view.placement.source}: the board's corners fit no pose; is the image mirrored, or the board"
-            " not the one of the rig file?"
-        )
+        raise mistake
     slope_x, slope_y = float(-axes[0, 2] / axes[2, 2]), float(-axes[1, 2] / axes[2, 2])
     across = np.array([1.0, 0.0, slope_x]) / np.hypot(1.0, slope_x)
     roll = atan2(float(axes[:, 0] @ np.cross(axes[:, 2], across)), float(axes[:, 0] @ across))

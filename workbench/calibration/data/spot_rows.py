@@ -1,6 +1,6 @@
-"""From captures to observations: which spot of which laser, at which standoff, and what was left out.
+"""From captures to observations: the spot of a laser at a standoff, or why it is rejected.
 
-What finds spots in images is imported where there are images: positions need none of it.
+The search for spots is imported where there are images: positions need none of it.
 """
 
 from __future__ import annotations
@@ -11,10 +11,14 @@ from dataclasses import replace
 from math import isnan
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from workbench.calibration.data.boards import BoardView, on_boards, see_board
 from workbench.calibration.data.observations import Observation, PlacementInfo, Rejected
 from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
 from workbench.model.rig import LaserSpec, Rig
+from workbench.optics.lens_models import lens_model
+from workbench.optics.rays import RAY, Ray, spot_at_inverse_depth
 
 if TYPE_CHECKING:
     from workbench.spots import Finding, Scanline
@@ -22,6 +26,9 @@ if TYPE_CHECKING:
 NO_STANDOFF = "standoff_mm is empty: a calibration needs known standoffs"
 PRIOR_REACH_SD = 4.0
 BEAM_HALF_WIDTH_PX = 8.0
+STRAIGHT_PX = 1.0
+"""A laser's line that bends by less counts as straight."""
+BEND_POINTS = 17
 
 
 def observations_of_rows(
@@ -78,7 +85,7 @@ def _in_picture(rig: Rig, observation: Observation) -> Observation | Rejected:
 
 
 def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
-    """Where the rig file lets the laser's spots lie: along the projection of its baseline."""
+    """Band in which the rig file lets the laser's spots lie: along the projection of its baseline."""
     from workbench.spots import Scanline
 
     camera = rig.camera
@@ -94,7 +101,30 @@ def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
     reach = PRIOR_REACH_SD * sum(part**2 for part in across) ** 0.5
     u = camera.cx_px.value + camera.f_px.value * laser.tx.value
     v = camera.cy_px.value + camera.f_px.value * laser.ty.value
-    return Scanline(u, v, du, dv, BEAM_HALF_WIDTH_PX + reach)
+    bend = _bend_px(rig, laser, (u, v), (du, dv))
+    return Scanline(u, v, du, dv, BEAM_HALF_WIDTH_PX + reach + (bend if bend > STRAIGHT_PX else 0.0))
+
+
+def _bend_px(rig: Rig, laser: LaserSpec, point_px: tuple[float, float], along: tuple[float, float]) -> float:
+    """Largest distance of the laser's expected spots in the picture from a line, within the rig's reach.
+
+    Args:
+        rig: lens, reach and size of the picture.
+        laser: whose spots.
+        point_px: a point of the line.
+        along: its direction, of length 1.
+    """
+    camera = rig.camera
+    model, lens = lens_model(camera.lens), np.array([[p.value] for p in camera.lens_priors.values()])
+    ray = Ray(*(getattr(laser, name).value for name in RAY))
+    nearest_mm = max(rig.bench.reach_mm[0] + rig.bench.offset_mm.value, 1.0)
+    inverse_depth = np.linspace(0.0, 1.0 / nearest_mm, BEND_POINTS)
+    u, v = (np.asarray(part) for part in spot_at_inverse_depth(model, lens, ray, inverse_depth))
+    x, y = ray.tx + ray.x_mm * inverse_depth, ray.ty + ray.y_mm * inverse_depth
+    seen = np.asarray(model.is_unfolded(lens, x, y)) & (u > -0.5) & (u < camera.width_px - 0.5)
+    seen &= (v > -0.5) & (v < camera.height_px - 0.5)
+    away = np.abs((u - point_px[0]) * along[1] - (v - point_px[1]) * along[0])
+    return float(away[seen].max(initial=0.0))
 
 
 def _see_boards(rig: Rig, rows: Sequence[CaptureRow]) -> dict[str, BoardView | Rejected]:

@@ -1,4 +1,4 @@
-"""What spots at a standoff, and ranges, will tell of a sensor's parameters: first-order, before any data.
+"""Information of spots on a sensor's parameters, and of these on ranges: first-order, before any data.
 
 Parameters are counted in units of their prior sd, so that the prior's information is the unit matrix.
 """
@@ -14,24 +14,16 @@ import numpy as np
 from jax import Array
 
 from workbench.calibration.estimation.jit_cache import jit_cached
-from workbench.calibration.model.parameters import (
-    LENS,
-    PLACEMENT,
-    RAY,
-    REFERENCE,
-    ParameterTable,
-    sensor_parameters,
-)
+from workbench.calibration.model.layout import Layout
+from workbench.calibration.model.parameters import PLACEMENT, ParameterTable, sensor_parameters
 from workbench.calibration.model.prediction import predict_cell
 from workbench.model.arrays import BoolArray, FloatArray
+from workbench.model.lens import LensName
 from workbench.model.rig import Rig
-from workbench.optics.lens import Lens, radial_slope
+from workbench.optics.rays import RAY
 
-COMMON = len(LENS) + len(REFERENCE)
-SENSOR_INPUTS = COMMON + len(RAY)
 BLOCK = 4096
-RULER = COMMON - 1
-"""Input of `predict_cell` that a ranger does not have: it reads no ruler."""
+"""Cells that one call of the compiled program evaluates."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +37,11 @@ class Expectation:
     def table(self) -> ParameterTable:
         """The S parameters."""
         return ParameterTable(sensor_parameters(self.rig))
+
+    @property
+    def cell(self) -> Layout:
+        """Layout of the inputs of `predict_cell`."""
+        return Layout(self.rig.camera.lens)
 
     def spot_rows(self, standoff_mm: FloatArray, sd_px: float) -> FloatArray:
         """(N, J, 2 L, S) derivatives of spots on a target at standoffs (J,), whitened; 0 if out of frame.
@@ -61,9 +58,9 @@ class Expectation:
         tilt = radians(self.rig.bench.tilt_sd_deg)
         error_sd = np.array([self.rig.bench.placement_sd_mm, tilt, tilt])
         shape = (*slopes.shape[:2], slopes.shape[2] * slopes.shape[3])
-        by_error = (slopes[..., SENSOR_INPUTS:] * error_sd).reshape(*shape, len(PLACEMENT))
+        by_error = (slopes[..., self.cell.errors] * error_sd).reshape(*shape, len(PLACEMENT))
         noise = np.linalg.cholesky(np.eye(shape[2]) + by_error @ np.swapaxes(by_error, 2, 3))
-        by_sensor = self._spread(slopes[..., :SENSOR_INPUTS]).reshape(*shape, self.sensors.shape[1])
+        by_sensor = self._spread(slopes[..., self.cell.sensor]).reshape(*shape, self.sensors.shape[1])
         return np.asarray(np.linalg.solve(noise, by_sensor), float)
 
     def range_rows(self, range_mm: FloatArray, sd_px: float) -> tuple[FloatArray, FloatArray]:
@@ -78,10 +75,11 @@ class Expectation:
             where the spot is out of frame.
         """
         _, slopes, seen = self._cells(range_mm, ranging=True)
-        by_range = slopes[..., SENSOR_INPUTS]
+        cell = self.cell
+        by_range = slopes[..., cell.errors.start]
         strength = (by_range**2).sum(axis=-1)
-        gradient = -(by_range[..., None] * slopes[..., :SENSOR_INPUTS]).sum(axis=-2) / strength[..., None]
-        gradient[..., RULER] = 0.0
+        gradient = -(by_range[..., None] * slopes[..., cell.sensor]).sum(axis=-2) / strength[..., None]
+        gradient[..., cell.ruler_scale] = 0.0  # a ranger reads no ruler
         rows = self._spread(gradient[..., None, :])[..., 0, :]
         at = range_mm[:, None]
         own = sd_px / np.sqrt(strength) / at
@@ -100,17 +98,18 @@ class Expectation:
         """
         spot, slopes, _ = self._cells(standoff_mm)
         tilt = radians(self.rig.bench.tilt_sd_deg)
-        by_error = slopes[..., SENSOR_INPUTS:] * np.array([self.rig.bench.placement_sd_mm, tilt, tilt])
-        return spot, self._spread(slopes[..., :SENSOR_INPUTS]), np.sqrt((by_error**2).sum(axis=-1))
+        by_error = slopes[..., self.cell.errors] * np.array([self.rig.bench.placement_sd_mm, tilt, tilt])
+        return spot, self._spread(slopes[..., self.cell.sensor]), np.sqrt((by_error**2).sum(axis=-1))
 
     def _cells(
         self, standoff_mm: FloatArray, ranging: bool = False
     ) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """(N, J, L, 2) spots, (N, J, L, 2, 17) their derivatives by the inputs, (N, J, L) in frame."""
-        common = np.array(self.sensors[:, :COMMON])
+        """(N, J, L, 2) spots, (N, J, L, 2, I) their derivatives by the I inputs, (N, J, L) in frame."""
+        cell = self.cell
+        common = np.array(self.sensors[:, cell.common])
         if ranging:
-            common[:, RULER] = 0.0
-        rays = self.sensors[:, COMMON:].reshape(len(common), -1, len(RAY))
+            common[:, cell.ruler_scale] = 0.0
+        rays = self.sensors[:, cell.common.stop :].reshape(len(common), -1, len(RAY))
         shape = (len(common), len(standoff_mm), rays.shape[1])
         parts = [
             *common.T[:, :, None, None],
@@ -119,41 +118,49 @@ class Expectation:
         ]
         inputs = np.stack([np.broadcast_to(p, shape) for p in parts], axis=-1)
         standoff = np.broadcast_to(standoff_mm[:, None], shape)
-        spot, slopes, unfolded = _in_blocks(inputs.reshape(-1, inputs.shape[-1]), standoff.ravel())
+        spot, slopes, unfolded = _in_blocks(
+            inputs.reshape(-1, inputs.shape[-1]), standoff.ravel(), cell.lens_name
+        )
         size = np.array([self.rig.camera.width_px, self.rig.camera.height_px])
         inside = ((spot > -0.5) & (spot < size - 0.5)).all(axis=-1) & unfolded
         return spot.reshape(*shape, 2), slopes.reshape(*shape, 2, -1), inside.reshape(shape)
 
     def _spread(self, by_input: FloatArray) -> FloatArray:
-        """(N, J, L, C, 14) derivatives by a laser's inputs as (..., S) by all parameters, in prior sd."""
-        lasers = by_input.shape[2]
+        """(N, J, L, C, I) derivatives by a cell's inputs as (..., S) by all parameters, in prior sd.
+
+        Of the inputs those of the sensor alone: lens, reference, ray.
+        """
+        layout, cell = Layout(self.rig.camera.lens, by_input.shape[2]), self.cell
         whole = np.zeros((*by_input.shape[:-1], self.sensors.shape[1]))
-        whole[..., :COMMON] = by_input[..., :COMMON]
-        for laser in range(lasers):
-            start = COMMON + len(RAY) * laser
-            whole[:, :, laser, :, start : start + len(RAY)] = by_input[:, :, laser, :, COMMON:]
+        whole[..., layout.common] = by_input[..., cell.common]
+        for laser in range(layout.lasers):
+            whole[:, :, laser, :, layout.ray(laser)] = by_input[:, :, laser, :, cell.rays]
         return whole * self.table.prior_sd
 
 
-def _in_blocks(inputs: FloatArray, standoff_mm: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+def _in_blocks(
+    inputs: FloatArray, standoff_mm: FloatArray, lens_name: LensName
+) -> tuple[FloatArray, FloatArray, BoolArray]:
     """`_slopes` of any number of cells by one compiled program; the last block is filled up."""
     count = len(inputs)
     indices = np.arange(-(-count // BLOCK) * BLOCK) % count
-    blocks = [_slopes(inputs[i], standoff_mm[i]) for i in np.split(indices, len(indices) // BLOCK)]
+    chosen = np.split(indices, len(indices) // BLOCK)
+    blocks = [_slopes(inputs[i], standoff_mm[i], lens_name) for i in chosen]
     spot, slopes, unfolded = (np.concatenate([np.asarray(b) for b in p]) for p in zip(*blocks, strict=True))
     return spot[:count], slopes[:count], unfolded[:count]
 
 
-@jit_cached()
-def _slopes(inputs: Array, standoff_mm: Array) -> tuple[Array, Array, Array]:
-    """(n, 2) spots, (n, 2, 17) their derivatives by the inputs, (n,) whether the lens is unfolded there."""
+@jit_cached(static=1)
+def _slopes(inputs: Array, standoff_mm: Array, lens_name: LensName) -> tuple[Array, Array, Array]:
+    """(n, 2) spots, (n, 2, I) their derivatives by the inputs, (n,) whether the lens is unfolded there."""
 
     def spot(inputs: Array) -> Array:
-        return jnp.stack(predict_cell(tuple(inputs.T), standoff_mm), axis=1)
+        return jnp.stack(predict_cell(lens_name, tuple(inputs.T), standoff_mm), axis=1)
 
     directions = jnp.eye(inputs.shape[1])
     slopes = jax.vmap(lambda d: jax.jvp(spot, (inputs,), (jnp.broadcast_to(d, inputs.shape),))[1])(directions)
-    x, y, tx, ty = inputs.T[COMMON:SENSOR_INPUTS]
-    depth = standoff_mm * (1.0 + inputs[:, RULER]) + inputs[:, RULER - 1]
-    unfolded = (depth > 0) & (radial_slope(Lens(*inputs.T[: len(LENS)]), tx + x / depth, ty + y / depth) > 0)
-    return spot(inputs), jnp.moveaxis(slopes, 0, -1), unfolded
+    cell = Layout(lens_name)
+    x, y, tx, ty = inputs.T[cell.rays]
+    depth = standoff_mm * (1.0 + inputs[:, cell.ruler_scale]) + inputs[:, cell.offset]
+    unfolded = cell.model.is_unfolded(inputs.T[cell.lens], tx + x / depth, ty + y / depth)
+    return spot(inputs), jnp.moveaxis(slopes, 0, -1), (depth > 0) & jnp.asarray(unfolded)

@@ -99,7 +99,7 @@ def _fit(rig: Rig, cells: MeanObservations, planned: int) -> _Fitted | None:
     """As `fit`, the noise scaled to the residuals where they are too large; None: no finite result."""
     whole = _with_room(cells, len(rig.lasers), planned)
     table = table_of(rig, whole.placements)
-    problem = LeastSquaresProblem.of(len(rig.lasers), table, whole, (), rig.board)
+    problem = LeastSquaresProblem.of(rig, table, whole, ())
     with np.errstate(over="ignore", invalid="ignore"):
         found = refit(problem, measured(problem), np.zeros(len(table.prior_mean)))
         for _ in range(SCALE_ROUNDS):

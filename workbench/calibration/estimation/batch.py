@@ -21,14 +21,15 @@ from jax import Array
 from workbench.calibration.data.observations import MeanObservations, PlacementInfo
 from workbench.calibration.estimation.fit import table_of
 from workbench.calibration.estimation.noise_scale import scale_called_for
-from workbench.calibration.model.parameters import LENS, PLACEMENT, RAY, REFERENCE, ParameterTable
+from workbench.calibration.model.layout import Layout
+from workbench.calibration.model.parameters import PLACEMENT, ParameterTable
 from workbench.calibration.model.prediction import predict_cell
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.rig import Rig
+from workbench.optics.rays import RAY
 
 CHUNK = 16
 """Fits solved in step: enough to fill the vector units, few enough not to wait long for the slowest one."""
-COMMON = len(LENS) + len(REFERENCE)
 MAX_STEPS = 60
 STEP_TOLERANCE_SD = 1e-7
 """Of the last step, in posterior standard deviations; each is smaller than the one before by 0.3 or less."""
@@ -92,10 +93,12 @@ def fit_batch(
     measured = np.isfinite(position_px)
     position = np.where(measured, position_px, 0.0)
     inverse_sd = np.where(measured, 1.0 / np.where(measured, sd_px, 1.0), 0.0)
-    varied = tuple(np.flatnonzero(table.prior_sd[:COMMON]).tolist())
-    layout = (varied, table.prior_mean, table.prior_sd, np.array([p.standoff_mm for p in placements]))
+    layout = Layout(rig.camera.lens, len(rig.lasers), len(placements))
+    varied = tuple(np.flatnonzero(table.prior_sd[layout.common]).tolist())
+    standoff_mm = np.array([p.standoff_mm for p in placements])
+    shared = (layout, varied, table.prior_mean, table.prior_sd, standoff_mm)
     scale = np.ones(len(position))
-    solved = _in_chunks(layout, np.zeros((len(position), len(table.prior_mean))), position, inverse_sd)
+    solved = _in_chunks(shared, np.zeros((len(position), len(table.prior_mean))), position, inverse_sd)
     for _ in range(SCALE_ROUNDS):
         called_for = scale_called_for(solved.chi2 * scale**2, solved.freedom)
         again = np.flatnonzero(called_for > scale * SCALE_TOLERANCE)
@@ -103,16 +106,15 @@ def fit_batch(
             break
         scale[again] = called_for[again]
         scaled = inverse_sd[again] / scale[again, None, None, None]
-        better = _in_chunks(layout, solved.y[again], position[again], scaled)
+        better = _in_chunks(shared, solved.y[again], position[again], scaled)
         for whole, part in zip(solved, better, strict=True):
             whole[again] = part
-    sd = table.prior_sd
-    sensor = COMMON + len(RAY) * len(rig.lasers)
-    by_placement = sd[sensor:].reshape(-1, len(PLACEMENT))
+    sd, of_sensor = table.prior_sd, table.prior_sd[layout.sensor]
+    by_placement = sd[layout.errors].reshape(-1, len(PLACEMENT))
     return BatchFit(
         table=table,
         values=table.prior_mean + sd * solved.y,
-        sensor_covariance=solved.sensor_covariance * np.outer(sd[:sensor], sd[:sensor]),
+        sensor_covariance=solved.sensor_covariance * np.outer(of_sensor, of_sensor),
         placement_covariance=solved.placement_covariance * by_placement[:, :, None] * by_placement[:, None],
         noise_scale=scale,
         chi2=solved.chi2 * scale**2,
@@ -142,25 +144,27 @@ class _Solved(NamedTuple):
 
 
 def _in_chunks(
-    layout: tuple[Any, ...], start: FloatArray, position: FloatArray, inverse_sd: FloatArray
+    shared: tuple[Any, ...], start: FloatArray, position: FloatArray, inverse_sd: FloatArray
 ) -> _Solved:
     """Solve CHUNK fits after CHUNK fits; the last ones are filled up with the first of theirs."""
     parts = []
     for first in range(0, len(position), CHUNK):
         chosen = np.arange(first, first + CHUNK)
         chosen = np.where(chosen < len(position), chosen, first)
-        solved = _solve_chunk(*layout, start[chosen], position[chosen], inverse_sd[chosen])
+        solved = _solve_chunk(*shared, start[chosen], position[chosen], inverse_sd[chosen])
         parts.append([np.asarray(part)[: len(position) - first] for part in solved])
     return _Solved(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
-class _Layout(NamedTuple):
+class _Shared(NamedTuple):
     """What the fits of a batch share. P and S count what is solved for: no constants of lens and bench."""
 
+    cell: Layout
+    """Of the inputs of a cell."""
     varied: tuple[int, ...]
-    """Which of LENS and REFERENCE are no constants: the compiler knows, and leaves the others out."""
+    """Which parameters of lens and reference are no constants: the compiler leaves the others out."""
     common: Array
-    """(10,) values of LENS and REFERENCE; those of the constants count."""
+    """Values of lens and reference; those of the constants count."""
     mean: Array
     """(P,)"""
     sd: Array
@@ -169,7 +173,7 @@ class _Layout(NamedTuple):
     """(J,)"""
 
     def inputs(self, y: Array) -> list[Array]:
-        """The 17 inputs of every cell: scalars for all, (L,) by the laser, (J, 1) by the placement."""
+        """The inputs of every cell: scalars for all, (L,) by the laser, (J, 1) by the placement."""
         values = self.mean + self.sd * y
         common = list(self.common)
         for place, index in enumerate(self.varied):
@@ -182,6 +186,10 @@ class _Layout(NamedTuple):
         rays = values[shared:sensor].reshape(-1, len(RAY))
         errors = values[sensor:].reshape(-1, len(PLACEMENT))
         return [*values[:shared], *rays.T, *(errors[:, i : i + 1] for i in range(len(PLACEMENT)))]
+
+    def predict(self, inputs: list[Array]) -> tuple[Array, Array]:
+        """Pixel positions (u, v) of every cell, (J, L)."""
+        return predict_cell(self.cell.lens_name, tuple(inputs), self.standoff_mm[:, None])
 
 
 class _State(NamedTuple):
@@ -207,8 +215,9 @@ class _Normal(NamedTuple):
     """(P,)"""
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=(0, 1))
 def _solve_chunk(
+    layout: Layout,
     varied: tuple[int, ...],
     mean: Array,
     sd: Array,
@@ -217,20 +226,20 @@ def _solve_chunk(
     position: Array,
     inverse_sd: Array,
 ) -> tuple[Array, ...]:
-    kept = np.array([*varied, *range(COMMON, mean.size)])
-    layout = _Layout(varied, mean[:COMMON], mean[kept], sd[kept], standoff_mm)
+    kept = np.array([*varied, *range(layout.common.stop, mean.size)])
+    shared = _Shared(Layout(layout.lens_name), varied, mean[layout.common], mean[kept], sd[kept], standoff_mm)
 
     def one(start: Array, position: Array, inverse_sd: Array) -> tuple[Array, ...]:
-        y, sensor, *others = _solve_one(layout, start[kept], position, inverse_sd)
-        whole = COMMON + len(sensor) - len(varied)
+        y, sensor, *others = _solve_one(shared, start[kept], position, inverse_sd)
+        whole = layout.sensor.stop
         among = np.ix_(kept[: len(sensor)], kept[: len(sensor)])
         return start.at[kept].set(y), jnp.eye(whole).at[among].set(sensor), *others
 
     return jax.vmap(one)(start, position, inverse_sd)
 
 
-def _solve_one(layout: _Layout, start: Array, position: Array, inverse_sd: Array) -> tuple[Array, ...]:
-    data = (layout, position, inverse_sd)
+def _solve_one(shared: _Shared, start: Array, position: Array, inverse_sd: Array) -> tuple[Array, ...]:
+    data = (shared, position, inverse_sd)
     state = _State(start, _cost(start, *data), jnp.zeros(()), jnp.full((), jnp.inf), jnp.zeros((), int))
     state = _descend(state, NEAR_SD, *data)
     state = _close_in(state, *data)
@@ -250,22 +259,22 @@ def _solve_one(layout: _Layout, start: Array, position: Array, inverse_sd: Array
 
 
 def _descend(
-    state: _State, tolerance_sd: float, layout: _Layout, position: Array, inverse_sd: Array
+    state: _State, tolerance_sd: float, shared: _Shared, position: Array, inverse_sd: Array
 ) -> _State:
     """Steps until one is shorter than the tolerance."""
 
     def unfinished(state: _State) -> Array:
         return (state.step_sd > tolerance_sd) & (state.steps < MAX_STEPS)
 
-    return jax.lax.while_loop(unfinished, lambda s: _step(s, layout, position, inverse_sd), state)
+    return jax.lax.while_loop(unfinished, lambda s: _step(s, shared, position, inverse_sd), state)
 
 
-def _close_in(state: _State, layout: _Layout, position: Array, inverse_sd: Array) -> _State:
+def _close_in(state: _State, shared: _Shared, position: Array, inverse_sd: Array) -> _State:
     """Near the optimum: steps with the normal equations kept and the gradient alone renewed.
 
     Gauss-Newton converges linearly there anyway, and a gradient is far cheaper than the equations.
     """
-    data = (layout, position, inverse_sd)
+    data = (shared, position, inverse_sd)
     normal = _normal(state.y, *data, jnp.zeros(()))
     factor = jnp.linalg.cholesky(normal.schur)
 
@@ -289,13 +298,13 @@ def _close_in(state: _State, layout: _Layout, position: Array, inverse_sd: Array
     )
 
 
-def _step(state: _State, layout: _Layout, position: Array, inverse_sd: Array) -> _State:
+def _step(state: _State, shared: _Shared, position: Array, inverse_sd: Array) -> _State:
     """One step, taken if it descends; else the damping grows."""
-    normal = _normal(state.y, layout, position, inverse_sd, state.damping)
+    normal = _normal(state.y, shared, position, inverse_sd, state.damping)
     factor = jnp.linalg.cholesky(normal.schur)
     step = _newton_step(normal, factor, normal.gradient)
     trial = state.y + step
-    cost = _cost(trial, layout, position, inverse_sd)
+    cost = _cost(trial, shared, position, inverse_sd)
     # At the optimum costs differ by rounding alone: a step of no size may not be refused for that.
     descends = cost <= state.cost * (1.0 + 1e-12)
     return _State(
@@ -323,38 +332,37 @@ def _relaxed(damping: Array) -> Array:
     return jnp.where(damping > LEAST_DAMPING, damping / 30.0, 0.0)
 
 
-def _cost(y: Array, layout: _Layout, position: Array, inverse_sd: Array) -> Array:
-    u, v = predict_cell(tuple(layout.inputs(y)), layout.standoff_mm[:, None])
+def _cost(y: Array, shared: _Shared, position: Array, inverse_sd: Array) -> Array:
+    u, v = shared.predict(shared.inputs(y))
     residual = (jnp.stack([u, v], axis=-1) - position) * inverse_sd
     return (residual**2).sum() + y @ y
 
 
-def _linearise(y: Array, layout: _Layout, position: Array, inverse_sd: Array) -> tuple[Array, Array]:
+def _linearise(y: Array, shared: _Shared, position: Array, inverse_sd: Array) -> tuple[Array, Array]:
     """Residuals (J, L, 2) and their derivatives (varied inputs, J, L, 2), in sd and units of the priors."""
-    standoff = layout.standoff_mm[:, None]
-    inputs = layout.inputs(y)
-    varied = [*layout.varied, *range(COMMON, len(inputs))]
+    inputs = shared.inputs(y)
+    varied = [*shared.varied, *range(shared.cell.common.stop, len(inputs))]
 
     def by(index: int, scale: Array) -> Array:
         """Derivative by one input: all others have none, and the compiler need not work on zeros."""
 
         def moved(value: Array) -> tuple[Array, Array]:
-            return predict_cell((*inputs[:index], value, *inputs[index + 1 :]), standoff)
+            return shared.predict([*inputs[:index], value, *inputs[index + 1 :]])
 
         _, tangent = jax.jvp(moved, (inputs[index],), (scale,))
         return jnp.stack([jnp.broadcast_to(part, inverse_sd.shape[:2]) for part in tangent], axis=-1)
 
-    slopes = [by(i, s) * inverse_sd for i, s in zip(varied, layout.by_cell(layout.sd), strict=True)]
-    u, v = predict_cell(tuple(inputs), standoff)
+    slopes = [by(i, s) * inverse_sd for i, s in zip(varied, shared.by_cell(shared.sd), strict=True)]
+    u, v = shared.predict(inputs)
     residual = (jnp.stack([u, v], axis=-1) - position) * inverse_sd
     return residual, jnp.stack(slopes)
 
 
-def _normal(y: Array, layout: _Layout, position: Array, inverse_sd: Array, damping: Array) -> _Normal:
-    residual, slopes = _linearise(y, layout, position, inverse_sd)
+def _normal(y: Array, shared: _Shared, position: Array, inverse_sd: Array, damping: Array) -> _Normal:
+    residual, slopes = _linearise(y, shared, position, inverse_sd)
     lasers = residual.shape[1]
-    shared = len(layout.varied)
-    common, ray, error = jnp.split(slopes, (shared, shared + len(RAY)))
+    count = len(shared.varied)
+    common, ray, error = jnp.split(slopes, (count, count + len(RAY)))
     own = ray * jnp.eye(lasers)[:, None, None, :, None]
     sensor = jnp.concatenate([common, own.reshape(-1, *residual.shape)])
 

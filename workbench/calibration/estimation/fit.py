@@ -19,13 +19,11 @@ from workbench.calibration.data.observations import (
     group,
     positions,
 )
-from workbench.calibration.estimation.problem import LeastSquaresProblem
+from workbench.calibration.estimation.problem import LeastSquaresProblem, layout_of
+from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.parameters import (
-    LENS,
     POSE,
     PRINT,
-    RAY,
-    REFERENCE,
     Parameter,
     ParameterTable,
     board_parameters,
@@ -85,12 +83,16 @@ class CalibrationFit:
         return np.sqrt(np.diag(self.covariance))
 
     @cached_property
+    def layout(self) -> Layout:
+        """Where the parameters stand among all P."""
+        return layout_of(self.rig, self.cells, self.boards)
+
+    @cached_property
     def curves(self) -> SpotCurves:
-        """Where the lasers' spots lie, by the fitted lens and rays."""
-        sensor = self.values[self.sensor]
-        start = len(LENS) + len(REFERENCE)
-        rays = sensor[start : start + len(RAY) * len(self.rig.lasers)]
-        return SpotCurves(sensor[: len(LENS)], rays.reshape(-1, len(RAY)))
+        """Positions of the lasers' spots, by the fitted lens and rays."""
+        layout = self.layout
+        rays = self.values[layout.rays].reshape(layout.lasers, -1)
+        return SpotCurves(layout.model, self.values[layout.lens], rays)
 
     @property
     def corner_rms_px(self) -> float:
@@ -106,7 +108,7 @@ class CalibrationFit:
     @property
     def sensor(self) -> slice:
         """Where the sensor's parameters stand among all."""
-        return slice(0, int(self.table.is_sensor.sum()))
+        return self.layout.sensor
 
 
 def fit(
@@ -147,7 +149,7 @@ def fit_cells(
         LimitFailedError: the fit does not come to a finite result.
     """
     table = table_of(rig, cells.placements, boards)
-    problem = LeastSquaresProblem.of(len(rig.lasers), table, cells, boards, rig.board)
+    problem = LeastSquaresProblem.of(rig, table, cells, boards)
     scale = 1.0
     with np.errstate(over="ignore", invalid="ignore"):  # a result that is not finite is refused by name
         for _ in range(10):
@@ -213,7 +215,7 @@ def share_of(information: FloatArray) -> FloatArray:
 def table_of(
     rig: Rig, placements: Sequence[PlacementInfo], boards: Sequence[BoardView] = ()
 ) -> ParameterTable:
-    """All parameters of a fit, in the order of `prediction.Layout`: what the rig says, then the captures."""
+    """All parameters of a fit, in the order of `Layout`: the rig's priors, then the captures'."""
     nuisances = placement_parameters(rig, [p.key for p in placements])
     told = {p.key: p for p in placements}
     flat = tuple(_as_told(n, told) for n in nuisances)

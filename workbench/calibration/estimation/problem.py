@@ -16,16 +16,17 @@ from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import MeanObservations
 from workbench.calibration.estimation.jit_cache import jit_cached
 from workbench.calibration.estimation.noise_scale import scale_called_for
+from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.parameters import ParameterTable
 from workbench.calibration.model.prediction import (
     CornerData,
-    Layout,
     SpotData,
     predict_corners,
     predict_spots,
 )
 from workbench.model.arrays import FloatArray
 from workbench.model.board import Board
+from workbench.model.rig import Rig
 
 
 @dataclass(frozen=True)
@@ -71,11 +72,10 @@ class LeastSquaresProblem:
     @classmethod
     def of(
         cls,
-        lasers: int,
+        rig: Rig,
         table: ParameterTable,
         cells: MeanObservations,
         boards: Sequence[BoardView],
-        board: Board,
     ) -> LeastSquaresProblem:
         """Spots on the cells' placements; every board's placement is one of them."""
         position = np.concatenate([cells.position_px, *(b.corners.position_px for b in boards)])
@@ -86,11 +86,11 @@ class LeastSquaresProblem:
             sd=table.prior_sd,
             standoff_mm=np.array([p.standoff_mm for p in cells.placements]),
             spots=SpotData(cells.laser, cells.placement),
-            corners=_corner_data(cells, boards, board),
+            corners=_corner_data(cells, boards, rig.board),
             position_px=np.where(measured, position, 0.0),
             inverse_sd=np.where(measured, 1.0 / sd, 0.0),
         )
-        return cls(Layout(lasers, len(cells.placements), len(boards)), data)
+        return cls(layout_of(rig, cells, boards), data)
 
     def linearise(self, y: FloatArray, scale: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Predicted - measured (2 M,) and its derivatives by y (2 M, P), in `scale` times the stated noise.
@@ -125,6 +125,11 @@ class LeastSquaresProblem:
             scale_called_for=float(scale_called_for(chi2, freedom)),
             converged=bool(converged),
         )
+
+
+def layout_of(rig: Rig, cells: MeanObservations, boards: Sequence[BoardView]) -> Layout:
+    """Layout of the parameters of `fit.table_of`."""
+    return Layout(rig.camera.lens, len(rig.lasers), len(cells.placements), len(boards))
 
 
 def _corner_data(cells: MeanObservations, boards: Sequence[BoardView], board: Board) -> CornerData:

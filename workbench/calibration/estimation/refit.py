@@ -92,7 +92,7 @@ def measured(problem: LeastSquaresProblem) -> BoolArray:
 
 def problem_of(fit: CalibrationFit) -> LeastSquaresProblem:
     """The problem that a fit has solved."""
-    return LeastSquaresProblem.of(len(fit.rig.lasers), fit.table, fit.cells, fit.boards, fit.rig.board)
+    return LeastSquaresProblem.of(fit.rig, fit.table, fit.cells, fit.boards)
 
 
 def optimum_of(fit: CalibrationFit) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The parameters of a calibration: one description each, used by the fit, the report and the YAML."""
+"""The parameters of a calibration, each described once for fit, report and YAML."""
 
 from __future__ import annotations
 
@@ -12,33 +12,32 @@ import numpy as np
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.board import BOW
 from workbench.model.rig import Prior, Rig
+from workbench.optics.rays import RAY
 
-LENS = ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
 REFERENCE = ("offset_mm", "ruler_scale")
-RAY = ("x_mm", "y_mm", "tx", "ty")
 PLACEMENT = ("error_mm", "slope_x", "slope_y")
 PRINT = ("print_scale",)
-"""Of the printed board; the sensor's, as the ruler's: both carry their lengths into the calibration."""
+"""Of the printed board. It belongs to the sensor, as the ruler's scale does: both scale its lengths."""
 POSE = ("board_x_mm", "board_y_mm", "board_roll_rad")
-"""How the board lies on the plane of a placement, see `workbench.optics.board.Pose`."""
+"""Pose of the board on the plane of a placement, see `workbench.optics.board.Pose`."""
 
 Kind = Literal["sensor", "placement"]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number to be estimated, with what is known of it before the data (Gaussian, 1 sigma)."""
+    """A number to be estimated, and its prior (Gaussian, 1 sigma)."""
 
     name: str
     unit: str
     prior: Prior
     kind: Kind
-    """`sensor` parameters are the calibration; `placement` ones belong to a target and its placings."""
+    """`sensor` parameters are the calibration; `placement` ones belong to a target and its placements."""
 
 
 def sensor_parameters(rig: Rig) -> tuple[Parameter, ...]:
     """The parameters of the sensor and its ruler, in the order lens, reference, rays of each laser."""
-    lens = [sensor_parameter(name, getattr(rig.camera, name)) for name in LENS]
+    lens = [sensor_parameter(name, prior) for name, prior in rig.camera.lens_priors.items()]
     reference = [sensor_parameter(name, getattr(rig.bench, name)) for name in REFERENCE]
     rays = [
         sensor_parameter(f"{laser.id}.{name}", getattr(laser, name)) for laser in rig.lasers for name in RAY
@@ -47,7 +46,7 @@ def sensor_parameters(rig: Rig) -> tuple[Parameter, ...]:
 
 
 def placement_parameters(rig: Rig, placements: Sequence[str]) -> tuple[Parameter, ...]:
-    """Nuisance parameters: how far each placing of the target was off and how it was tilted."""
+    """Nuisance parameters: error along the axis and tilts of each placement of the target."""
     position = Prior(value=0.0, sd=rig.bench.placement_sd_mm)
     # The tangent of a tilt of a few degrees is the tilt to 0.1 %: its prior may be Gaussian too.
     tilt = Prior(value=0.0, sd=radians(rig.bench.tilt_sd_deg))
@@ -60,7 +59,7 @@ def placement_parameters(rig: Rig, placements: Sequence[str]) -> tuple[Parameter
 
 
 def board_parameters(rig: Rig) -> tuple[Parameter, ...]:
-    """Nuisance parameters: how the board's paper sags."""
+    """Nuisance parameters: sag of the board's paper."""
     flat = Prior(value=0.0, sd=rig.bench.board_flatness_sd_mm)
     return tuple(Parameter(name, unit_of(name), flat, "placement") for name in BOW)
 
@@ -81,7 +80,7 @@ class ParameterTable:
     """All parameters of one fit. A parameter whose prior sd is 0 is a constant: not free.
 
     The free ones are solved for in units of their prior sd, counted from the prior mean: the prior is then
-    the unit Gaussian and the problem is as well scaled as the rig file is honest.
+    the unit Gaussian, which scales the problem well if the rig file's priors are realistic.
     """
 
     parameters: tuple[Parameter, ...]

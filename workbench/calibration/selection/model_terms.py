@@ -21,7 +21,6 @@ from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Observation, Rejected
 from workbench.calibration.estimation.fit import CalibrationFit, fit, fit_cells, table_of
 from workbench.calibration.estimation.problem import LeastSquaresProblem
-from workbench.calibration.model.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.model.term import Term
 from workbench.calibration.selection.outliers import fit_without_outliers, without_outliers
 from workbench.model.arrays import FloatArray, IndexArray
@@ -30,6 +29,7 @@ from workbench.model.errors import BadInputError
 from workbench.model.nested import TILTS, fix_parameters
 from workbench.model.rig import Prior, Rig
 from workbench.model.stats import chi2_sf
+from workbench.optics.lens_models import lens_model
 
 STRONG = 1.0
 """log10 of a Bayes factor that is strong evidence (R. E. Kass and A. E. Raftery, JASA 90 (1995) 773)."""
@@ -38,10 +38,6 @@ IDLE_SHIFT_SD = 0.1
 IDLE_SD = 0.02
 """Relative change of a range's deviation."""
 CALLED_FOR_P = 0.001
-TRIAL_SD = {"k1": 0.3, "k2": 0.3, "p1": 0.003, "p2": 0.003, "k3": 0.3}
-"""Prior under which a term that the model lacks is tried."""
-ORDERS = ("k1", "k2", "k3")
-"""Of the radial polynomial: none is left out below one that stays."""
 LEFT_OUT = ("absent", "idle")
 GRID = 12
 KNOWN = 1e-6
@@ -101,8 +97,9 @@ def fit_chosen(
     _check_names(fitted, keep)
     terms: list[Term] = []
     idle: list[str] = []
+    orders = fitted.layout.model.radial_orders
     for name in _candidates(fitted):
-        term = _weigh(fitted, name, idle, any(t.name in ORDERS and t.verdict not in LEFT_OUT for t in terms))
+        term = _weigh(fitted, name, idle, any(t.name in orders and t.verdict not in LEFT_OUT for t in terms))
         if not {name, *name.split()}.isdisjoint(keep):
             term = replace(term, verdict="asked for")
         terms.append(term)
@@ -136,11 +133,11 @@ def _weigh(fitted: CalibrationFit, name: str, idle: Sequence[str], higher_stays:
     verdict: TermVerdict = "open"
     if one.log10_bayes_factor >= STRONG:
         verdict = "shown"
-    elif name in ORDERS and higher_stays:
+    elif name in fitted.layout.model.radial_orders and higher_stays:
         verdict = "below"
     elif one.log10_bayes_factor <= -STRONG:
         verdict = "absent"
-    elif set(name.split()) <= set(LENS):
+    elif set(name.split()) <= set(fitted.layout.model.parameters):
         together, widening = _effect_on_ranges(fitted, _indices(fitted, [*idle, name]))
         verdict = "idle" if together <= IDLE_SHIFT_SD and widening <= IDLE_SD else "open"
     return Term(name, one.p_value, one.log10_bayes_factor, shift, verdict)
@@ -157,15 +154,16 @@ def _check_names(fitted: CalibrationFit, keep: Sequence[str]) -> None:
 
 def _freed(rig: Rig, names: Sequence[str]) -> Rig:
     """The rig with terms of the lens made free, at the scale at which they are tried."""
-    priors = {name: Prior(value=getattr(rig.camera, name).value, sd=TRIAL_SD[name]) for name in names}
+    known, trial_sd = rig.camera.lens_priors, lens_model(rig.camera.lens).trial_sd
+    priors = {name: Prior(value=known[name].value, sd=trial_sd[name]) for name in names}
     return rig.model_copy(update={"camera": rig.camera.model_copy(update=priors)})
 
 
 def _candidates(fitted: CalibrationFit) -> list[str]:
     """Names of the terms of a fit, the first to go first."""
     names = {p.name for p in fitted.table.parameters if p.prior.sd > 0}
-    tangential = " ".join(n for n in ("p1", "p2") if n in names)
-    found = [n for n in ("k3", tangential, "k2", "k1", "ruler_scale") if n and n.split()[0] in names]
+    orders = (*fitted.layout.model.removal_order, "ruler_scale")
+    found = [there for term in orders if (there := " ".join(n for n in term.split() if n in names))]
     return [*found, TILTS] if len(_indices(fitted, [TILTS])) else found
 
 
@@ -235,17 +233,15 @@ def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
     spot_px = float(np.hypot(noise.spot_sd_px, noise.speckle_sd_px)) * fitted.noise_scale
     laser = np.repeat(np.arange(len(fitted.rig.lasers)), GRID)
     range_mm = np.tile(grid, len(fitted.rig.lasers))
-    offset = len(LENS) + REFERENCE.index("offset_mm")
-    w = 1.0 / (range_mm + fitted.values[offset])
+    layout = fitted.layout
+    w = 1.0 / (range_mm + fitted.values[layout.offset])
     spots = fitted.curves.spots(laser, w)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of spots that no picture shows
         found = fitted.curves.invert(laser, spots, np.full(spots.shape, 1.0 / spot_px))
     gradient = np.zeros((len(laser), len(fitted.values)))
-    lens = np.tile(np.arange(len(LENS)), (len(laser), 1))
-    ray = len(RAY) * laser[:, None] + np.arange(len(RAY))
-    own = np.concatenate((lens, len(LENS) + len(REFERENCE) + ray), axis=1)
-    gradient[np.arange(len(laser))[:, None], own] = found.dz
-    gradient[:, offset] = -1.0
+    own = np.array([layout.own(n) for n in range(layout.lasers)])
+    gradient[np.arange(len(laser))[:, None], own[laser]] = found.dz
+    gradient[:, layout.offset] = -1.0
     size = np.array([fitted.rig.camera.width_px, fitted.rig.camera.height_px])
     seen = ((spots > -0.5) & (spots < size - 0.5)).all(axis=1) & np.isfinite(found.z_sd_of_spot_mm)
     return gradient[seen] / range_mm[seen, None], found.z_sd_of_spot_mm[seen] / range_mm[seen]
@@ -254,9 +250,9 @@ def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
 def _called_for(fitted: CalibrationFit) -> list[Term]:
     """Terms of the lens that the rig file holds constant and the data call for (a score test)."""
     rig = fitted.rig
-    tried = [name for name in TRIAL_SD if getattr(rig.camera, name).sd == 0]
+    tried = [name for name in fitted.layout.model.trial_sd if rig.camera.lens_priors[name].sd == 0]
     table = table_of(_freed(rig, tried), fitted.cells.placements, fitted.boards)
-    problem = LeastSquaresProblem.of(len(rig.lasers), table, fitted.cells, fitted.boards, rig.board)
+    problem = LeastSquaresProblem.of(rig, table, fitted.cells, fitted.boards)
     sd = table.prior_sd
     y = np.divide(fitted.values - table.prior_mean, sd, out=np.zeros_like(sd), where=sd > 0)
     residual, jacobian = problem.linearise(y, fitted.noise_scale)

@@ -14,7 +14,6 @@ from workbench.calibration.checks.faults import Fault, find_faults
 from workbench.calibration.checks.residuals import ResidualTest, explain, residual_tests
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.estimation.fit import CalibrationFit
-from workbench.calibration.model.parameters import LENS, RAY, REFERENCE
 from workbench.calibration.verdict.observability import NullDirection, direction_lines
 from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import FloatArray
@@ -141,7 +140,7 @@ def _beyond(fit: CalibrationFit, limits: Acceptance, max_relative_range_sd: floa
 
 def _derive_one(fit: CalibrationFit, index: int) -> Derived:
     laser = fit.rig.lasers[index]
-    start = len(LENS) + len(REFERENCE) + len(RAY) * index
+    start = fit.layout.ray(index).start
     origin = slice(start, start + 2)
 
     baseline = float(np.hypot(*fit.values[origin]))
@@ -151,7 +150,7 @@ def _derive_one(fit: CalibrationFit, index: int) -> Derived:
 
     this, infinity = np.array([index]), np.zeros(1)
     axis = "uv".index(laser.axis)
-    own = [*range(len(LENS)), *range(start, start + len(RAY))]
+    own = fit.layout.own(index)
     vanishing = np.zeros(len(fit.values))
     vanishing[own] = fit.curves.gradients(this, infinity)[0, axis, : len(own)]
     return Derived(

@@ -90,16 +90,16 @@ def _calibration(
     worst: float,
 ) -> Calibration:
     f, cx, cy = values["f_px"], values["cx_px"], values["cy_px"]
-    camera = fit.rig.camera
+    camera, model = fit.rig.camera, fit.layout.model
     standoffs = [s.standoff_mm for s in fit.used]
     return Calibration(
         image_width=camera.width_px,
         image_height=camera.height_px,
         camera_name=fit.rig.rig,
         camera_matrix=Matrix(rows=3, cols=3, data=(f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0)),
-        distortion_model="plumb_bob",
+        distortion_model=model.name,
         distortion_coefficients=Matrix(
-            rows=1, cols=5, data=tuple(values[name] for name in ("k1", "k2", "p1", "p2", "k3"))
+            rows=1, cols=len(model.coefficients), data=tuple(values[name] for name in model.coefficients)
         ),
         rectification_matrix=Matrix(rows=3, cols=3, data=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)),
         projection_matrix=Matrix(rows=3, cols=4, data=(f, 0.0, cx, 0.0, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0)),

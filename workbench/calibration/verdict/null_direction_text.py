@@ -1,12 +1,14 @@
-"""Combinations of parameters in plain words, and what would resolve them."""
+"""Null directions in plain words, and what would resolve them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import hypot
 
-from workbench.calibration.model.parameters import LENS, PRINT
+from workbench.calibration.model.parameters import PRINT
+from workbench.model.lens import COEFFICIENTS, PINHOLE
 from workbench.model.rig import Rig
 
 LEAST_PART = 0.3
@@ -23,7 +25,7 @@ REMEDIES = {
     **dict.fromkeys(PRINT, "check the board's printed ruler against a steel one"),
     "offset_mm": "measure the offset of the reference plane",
     BASELINE: "measure a baseline more closely",
-    **dict.fromkeys(LENS, "use the printed board (workbench target)"),
+    **dict.fromkeys((*PINHOLE, *chain(*COEFFICIENTS.values())), "use the printed board (workbench target)"),
 }
 SHARED = {
     "f_px": "the focal length",

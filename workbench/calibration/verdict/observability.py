@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.calibration.estimation.fit import FLAT_PRIOR_SD
-from workbench.calibration.model.parameters import LENS, PRINT, Parameter
+from workbench.calibration.model.parameters import PRINT, Parameter
 from workbench.calibration.verdict.null_direction_text import (
     Group,
     describe,
@@ -27,7 +27,8 @@ from workbench.calibration.verdict.null_direction_text import (
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
-SHARED_FIRST = ("ruler_scale", *PRINT, "offset_mm", *LENS)
+REFERENCE_FIRST = ("ruler_scale", *PRINT, "offset_mm")
+"""Parameters that all spots share, in the order in which they are taken; the lens's follow."""
 NOT_HURT = 1 / 3
 """A direction that moves ranges by less than this part of their sd adds at most some 5 % to it."""
 WIDE_PRIOR_SD = 10.0
@@ -154,7 +155,8 @@ def _posterior(
 def _directions(posterior: _Posterior) -> Iterator[tuple[int, FloatArray]]:
     """Each pivot, and (F,) how all move: the pivot by its posterior sd, the others to hide it."""
     names = posterior.names
-    shared = [names.index(name) for name in SHARED_FIRST if name in names]
+    order = (*REFERENCE_FIRST, *posterior.rig.camera.lens_priors)
+    shared = [names.index(name) for name in order if name in names]
     rest = list(range(len(names)))
     for pivot in [*shared, *(i for i in rest if i not in shared)]:
         information, at = posterior.information[np.ix_(rest, rest)], rest.index(pivot)

@@ -15,6 +15,7 @@ import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.errors import BadInputError
+from workbench.model.lens import COEFFICIENTS
 from workbench.model.rig import Rig
 from workbench.trials.thesis.schema import LineName, SimulatedScene
 
@@ -88,7 +89,9 @@ def line_of(rig: Rig, name: LineName) -> Line:
             f"rig {rig.rig}: expected at least {FEWEST_LASERS} lasers with axis: {along} for a {name} line,"
             f" got {len(lasers)}"
         )
-    bent = [name for name in ("k1", "k2", "p1", "p2", "k3") if getattr(camera, name).value != 0]
+    if camera.lens != "plumb_bob":
+        raise BadInputError(f"rig {rig.rig}: expected camera.lens plumb_bob, a pinhole, got {camera.lens}")
+    bent = [name for name in COEFFICIENTS[camera.lens] if camera.lens_priors[name].value != 0]
     bent += [f"{x.id}.{t}" for x in lasers for t in ("tx", "ty") if getattr(x, t).value != 0]
     if bent or rig.bench.offset_mm.value != 0:
         raise BadInputError(

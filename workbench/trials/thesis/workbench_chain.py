@@ -9,7 +9,6 @@ from math import degrees
 import numpy as np
 from numpy.random import Generator
 
-from workbench.calibration.model.parameters import LENS, RAY
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.calibration import (
     Calibration,
@@ -23,6 +22,8 @@ from workbench.model.calibration import (
     ReferencePlane,
     Validity,
 )
+from workbench.model.lens import COEFFICIENTS, lens_parameters
+from workbench.optics.rays import RAY
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.ranging.shape import Shape
@@ -86,10 +87,15 @@ def exact_calibration(line: Line, noisy: bool, span_mm: tuple[float, float]) -> 
     cx, cy = (line.centre_px, BAND_PX / 2) if line.axis == "u" else (BAND_PX / 2, line.centre_px)
     f = line.f_px
     origins = {i: (b, 0.0) if line.axis == "u" else (0.0, b) for i, b in line.baselines_by_id.items()}
-    values = dict.fromkeys(LENS, 0.0) | {"f_px": f, "cx_px": cx, "cy_px": cy, "offset_mm": 0.0}
+    values = dict.fromkeys(lens_parameters("plumb_bob"), 0.0) | {
+        "f_px": f,
+        "cx_px": cx,
+        "cy_px": cy,
+        "offset_mm": 0.0,
+    }
     for i, (x, y) in origins.items():
         values |= {f"{i}.{name}": value for name, value in zip(RAY, (x, y, 0.0, 0.0), strict=True)}
-    count = len(values)
+    coefficients, count = COEFFICIENTS["plumb_bob"], len(values)
     zeros = (0.0,) * count
     return Calibration(
         image_width=width,
@@ -97,7 +103,7 @@ def exact_calibration(line: Line, noisy: bool, span_mm: tuple[float, float]) -> 
         camera_name="simulated",
         camera_matrix=Matrix(rows=3, cols=3, data=(f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0)),
         distortion_model="plumb_bob",
-        distortion_coefficients=Matrix(rows=1, cols=5, data=(0.0,) * 5),
+        distortion_coefficients=Matrix(rows=1, cols=len(coefficients), data=(0.0,) * len(coefficients)),
         rectification_matrix=Matrix(rows=3, cols=3, data=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)),
         projection_matrix=Matrix(rows=3, cols=4, data=(f, 0.0, cx, 0.0, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0)),
         laser_ranger=LaserRanger(

@@ -41,7 +41,7 @@ def told(fitted: CalibrationFit) -> dict[str, Term]:
 
 def linear(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray, BoolArray]:
     """At the priors' means: residuals (n,), derivatives (n, P) in priors' sd; which are free (P,)."""
-    problem = LeastSquaresProblem.of(len(fitted.rig.lasers), fitted.table, fitted.cells, (), fitted.rig.board)
+    problem = LeastSquaresProblem.of(fitted.rig, fitted.table, fitted.cells, ())
     sd = fitted.table.prior_sd
     y = np.divide(fitted.values - fitted.table.prior_mean, sd, out=np.zeros_like(sd), where=sd > 0)
     residual, jacobian = problem.linearise(y, fitted.noise_scale)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import runpy
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,13 +15,16 @@ import numpy as np
 import pytest
 import yaml as pyyaml
 
-from tests.support.rigs import PROVENANCE, World, thesis_rig
+from tests.support.rigs import FISHEYE_STANDOFFS_MM, PROVENANCE, World, fisheye_rig, opencv_pixels, thesis_rig
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.verdict.assessment import Assessment, judge
 from workbench.calibration.verdict.export import calibrate, render, write_calibration
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.sensor.calibrated import CalibratedSensor
+
+ROOT = Path(__file__).parents[4]
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +114,70 @@ def test_ros_s_rules_for_camera_info(path: Path) -> None:
     assert read["distortion_model"] == "plumb_bob"
     projection = np.reshape(read["projection_matrix"]["data"], (3, 4))
     np.testing.assert_array_equal(projection[:, :3], np.reshape(read["camera_matrix"]["data"], (3, 3)))
+
+
+@pytest.fixture(scope="module")
+def of_fisheye() -> Calibration:
+    rig = fisheye_rig()
+    fisheye = fit(rig, World(rig, 1).observations(FISHEYE_STANDOFFS_MM))
+    return calibrate(fisheye, Acceptance(), PROVENANCE)[0]
+
+
+def test_a_fisheye_has_ros_s_name_and_four_coefficients(of_fisheye: Calibration, tmp_path: Path) -> None:
+    path = tmp_path / "fisheye.yaml"
+    write_calibration(path, of_fisheye)
+    assert load_calibration(path) == of_fisheye
+    read = pyyaml.safe_load(path.read_text())
+    assert read["distortion_model"] == "equidistant"
+    assert (read["distortion_coefficients"]["rows"], read["distortion_coefficients"]["cols"]) == (1, 4)
+    names = read["laser_ranger"]["parameters"]["names"]
+    assert names[:9] == ["f_px", "cx_px", "cy_px", "k1", "k2", "k3", "k4", "offset_mm", "ruler_scale"]
+    wrong = path.read_text().replace("equidistant", "plumb_bob")
+    (tmp_path / "wrong.yaml").write_text(wrong)
+    with pytest.raises(BadInputError):
+        load_calibration(tmp_path / "wrong.yaml")
+
+
+@pytest.mark.parametrize("lens", ["plumb_bob", "equidistant"])
+def test_opencv_s_file_and_lens_show_spots_where_ours_do(
+    lens: str, calibration: Calibration, of_fisheye: Calibration, tmp_path: Path
+) -> None:
+    """OpenCV alone: its reader, and its lens, on the beams of the file."""
+    ours = of_fisheye if lens == "equidistant" else calibration
+    write_calibration(tmp_path / "c.yaml", ours)
+    storage = cv2.FileStorage(str(tmp_path / "c.yaml"), cv2.FILE_STORAGE_READ)
+    camera, coefficients = (
+        storage.getNode(key).mat() for key in ("camera_matrix", "distortion_coefficients")
+    )
+    name = storage.getNode("distortion_model").string()
+    storage.release()
+    assert name == lens
+    intrinsic = [camera[0, 0], camera[0, 2], camera[1, 2], *coefficients.ravel()]
+    range_mm = np.array([60.0, 200.0, 1500.0])
+    for laser in ours.laser_ranger.lasers:
+        depth = (range_mm + ours.laser_ranger.reference_plane.offset_mm)[:, None]
+        points = np.array(laser.origin_mm) + depth * np.array(laser.direction)
+        expected = CalibratedSensor(ours).spot_px(laser.id, range_mm)
+        np.testing.assert_allclose(
+            opencv_pixels(ours.distortion_model, intrinsic, points), expected, rtol=1e-9
+        )
+
+
+@pytest.mark.parametrize("lens", ["plumb_bob", "equidistant"])
+def test_the_reader_in_the_docs_ranges_alike(
+    lens: str, calibration: Calibration, of_fisheye: Calibration, tmp_path: Path
+) -> None:
+    ours = of_fisheye if lens == "equidistant" else calibration
+    write_calibration(tmp_path / "c.yaml", ours)
+    reader = runpy.run_path(str(ROOT / "docs/examples/read_calibration.py"))["Sensor"](tmp_path / "c.yaml")
+    sensor = CalibratedSensor(ours)
+    for laser_id in sensor.ids:
+        spots = sensor.spot_px(laser_id, np.array([60.0, 150.0, 700.0, 1800.0]))
+        for spot in spots + np.array([0.02, -0.03]):
+            expected = sensor.ranges([laser_id], spot[None], np.array([[0.04, 0.06]]))
+            range_mm, to_range, spot_variance = reader.range(laser_id, *spot, 0.04, 0.06)
+            assert range_mm == pytest.approx(expected.range_mm[0], rel=1e-6)
+            assert reader.sigma(to_range, spot_variance) == pytest.approx(expected.sigma_mm[0], rel=1e-6)
 
 
 def edited(path: Path, change: Callable[[dict[str, Any]], None]) -> str:

@@ -9,7 +9,8 @@ import pytest
 from tests.support.rigs import PROVENANCE, World, prior, thesis_rig
 from workbench.calibration.estimation.fit import CalibrationFit, data_share, fit
 from workbench.calibration.estimation.problem import LeastSquaresProblem
-from workbench.calibration.model.prediction import Layout, SpotData, predict_spots
+from workbench.calibration.model.layout import Layout
+from workbench.calibration.model.prediction import SpotData, predict_spots
 from workbench.calibration.verdict.export import calibrate
 from workbench.calibration.verdict.observability import (
     NullDirection,
@@ -61,7 +62,7 @@ def test_a_pinhole_leaves_open_what_algebra_says(fitted: CalibrationFit) -> None
 def test_a_named_direction_shows_in_no_spot(fitted: CalibrationFit) -> None:
     """By the model itself, not by its derivatives: all spots move by far less than one sd in all."""
     cells = fitted.cells
-    layout = Layout(4, len(cells.placements), 0)
+    layout = Layout("plumb_bob", 4, len(cells.placements))
     spots = SpotData(cells.laser, cells.placement)
     standoffs = jnp.array([p.standoff_mm for p in cells.placements])
     names = [p.name for p in fitted.table.parameters]
@@ -168,7 +169,7 @@ def test_information_is_that_of_the_data_alone() -> None:
     free = fitted.table.free[fitted.table.is_sensor[fitted.table.free]]
     sd = fitted.table.prior_sd[free]
     scaled = fitted.covariance[np.ix_(free, free)] / np.outer(sd, sd)
-    problem = LeastSquaresProblem.of(4, fitted.table, fitted.cells, (), world.rig.board)
+    problem = LeastSquaresProblem.of(world.rig, fitted.table, fitted.cells, ())
     jacobian = problem.solve(fitted.noise_scale).jacobian
     ours, theirs = jacobian[:, free], jacobian[:, ~fitted.table.is_sensor]
     noise = np.eye(len(jacobian)) + theirs @ theirs.T

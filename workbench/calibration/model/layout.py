@@ -1,0 +1,98 @@
+"""Where each block of parameters stands in the parameter vector of a fit."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from workbench.calibration.model.parameters import PLACEMENT, POSE, PRINT, REFERENCE
+from workbench.model.arrays import IndexArray
+from workbench.model.board import BOW
+from workbench.model.lens import LensName
+from workbench.optics.lens import LensModel
+from workbench.optics.lens_models import lens_model
+from workbench.optics.rays import RAY
+
+
+class Layout(NamedTuple):
+    """Lens model and number of lasers, placements and boards: they fix the parameter vector.
+
+    In order: lens, reference, rays; print scale if there are boards; placements; sag and poses of the boards.
+    The layout of one laser and one placement is that of the inputs of `prediction.predict_cell`.
+    """
+
+    lens_name: LensName
+    lasers: int = 1
+    placements: int = 1
+    boards: int = 0
+    """Placements at which the board was seen."""
+
+    @property
+    def model(self) -> LensModel:
+        """Kind of lens."""
+        return lens_model(self.lens_name)
+
+    @property
+    def lens(self) -> slice:
+        """The lens model's parameters."""
+        return slice(0, len(self.model.parameters))
+
+    @property
+    def reference(self) -> slice:
+        """REFERENCE."""
+        return slice(self.lens.stop, self.lens.stop + len(REFERENCE))
+
+    @property
+    def offset(self) -> int:
+        """Index of `offset_mm`."""
+        return len(self.model.parameters) + REFERENCE.index("offset_mm")
+
+    @property
+    def ruler_scale(self) -> int:
+        """Index of `ruler_scale`."""
+        return len(self.model.parameters) + REFERENCE.index("ruler_scale")
+
+    @property
+    def common(self) -> slice:
+        """What all lasers share: lens and reference."""
+        return slice(0, self.reference.stop)
+
+    @property
+    def rays(self) -> slice:
+        """RAY of every laser."""
+        return slice(self.common.stop, self.common.stop + len(RAY) * self.lasers)
+
+    def ray(self, laser: int) -> slice:
+        """RAY of one laser, by its index."""
+        start = self.rays.start + len(RAY) * laser
+        return slice(start, start + len(RAY))
+
+    def own(self, laser: int) -> IndexArray:
+        """Indices of what a spot of one laser depends on at a given depth: the lens, then its ray."""
+        return np.asarray(np.r_[self.lens, self.ray(laser)], np.intp)
+
+    @property
+    def print_scale(self) -> slice:
+        """PRINT; empty if there are no boards."""
+        return slice(self.rays.stop, self.rays.stop + (len(PRINT) if self.boards else 0))
+
+    @property
+    def sensor(self) -> slice:
+        """The parameters of the calibration; those of placements and boards follow."""
+        return slice(0, self.print_scale.stop)
+
+    @property
+    def errors(self) -> slice:
+        """PLACEMENT of every placement."""
+        return slice(self.sensor.stop, self.sensor.stop + len(PLACEMENT) * self.placements)
+
+    @property
+    def bow(self) -> slice:
+        """BOW of the board."""
+        return slice(self.errors.stop, self.errors.stop + len(BOW))
+
+    @property
+    def poses(self) -> slice:
+        """POSE of every board."""
+        return slice(self.bow.stop, self.bow.stop + len(POSE) * self.boards)

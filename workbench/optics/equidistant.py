@@ -1,0 +1,68 @@
+"""Lens model `equidistant`: OpenCV's fisheye, whose distorted radius is a polynomial in the angle.
+
+With theta the angle off the axis, theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8) is
+the distorted radius. Directions up to 90 degrees off the axis have coordinates x = X/Z, y = Y/Z.
+
+Source: J. Kannala and S. S. Brandt, "A generic camera model and calibration method for conventional,
+wide-angle, and fish-eye lenses", IEEE PAMI 28 (2006) 1335, as in OpenCV.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from workbench.optics.lens import EitherArray, LensModel, Numbers
+
+SERIES_BELOW = 0.01
+"""Squared radius below which atan(r) / r is summed as its series: r = 0 is then a point as any other."""
+SERIES_TERMS = 9
+"""The first one left out is below 0.01^9 / 19 = 5e-20."""
+
+
+def _distort(coefficients: Numbers, x: EitherArray, y: EitherArray) -> tuple[EitherArray, EitherArray]:
+    r2 = x * x + y * y
+    angle_over_radius = _angle_over_radius(r2)
+    radial = angle_over_radius * _polynomial(coefficients, r2 * angle_over_radius**2, (1.0,) * 5)
+    return x * radial, y * radial
+
+
+def _radial_slope(coefficients: Numbers, x: EitherArray, y: EitherArray) -> EitherArray:
+    r2 = x * x + y * y
+    by_angle = _polynomial(coefficients, r2 * _angle_over_radius(r2) ** 2, (1.0, 3.0, 5.0, 7.0, 9.0))
+    return by_angle / (1.0 + r2)
+
+
+def _polynomial(coefficients: Numbers, angle2: EitherArray, factors: tuple[float, ...]) -> EitherArray:
+    """Sum of factor x coefficient x angle^(0, 2, ... 8), the first coefficient being 1."""
+    k1, k2, k3, k4 = coefficients
+    _, a, b, c, d = factors
+    return factors[0] + angle2 * (a * k1 + angle2 * (b * k2 + angle2 * (c * k3 + angle2 * d * k4)))
+
+
+def _angle_over_radius(r2: EitherArray) -> EitherArray:
+    """The function atan(r) / r of r^2; it has all derivatives, complex ones too, at r = 0.
+
+    Each branch gets harmless numbers where the other is taken: derivatives of both are computed everywhere.
+    """
+    xp: Any = jnp if isinstance(r2, jnp.ndarray) else np
+    near = r2.real < SERIES_BELOW
+    small, large = xp.where(near, r2, 0.0), xp.where(near, 1.0, r2)
+    series = xp.zeros_like(small)
+    for n in reversed(range(SERIES_TERMS)):
+        series = (-1.0) ** n / (2 * n + 1) + small * series
+    radius = xp.sqrt(large)
+    found: EitherArray = xp.where(near, series, xp.arctan(radius) / radius)
+    return found
+
+
+EQUIDISTANT = LensModel(
+    name="equidistant",
+    distort=_distort,
+    radial_slope=_radial_slope,
+    trial_sd={"k1": 0.1, "k2": 0.1, "k3": 0.1, "k4": 0.1},
+    removal_order=("k4", "k3", "k2", "k1"),
+    radial_orders=("k1", "k2", "k3", "k4"),
+)

@@ -1,0 +1,36 @@
+"""Lens model `plumb_bob`: the pinhole with Brown-Conrady distortion k1 k2 p1 p2 k3.
+
+Source: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37 (1971), with OpenCV's
+order of coefficients.
+"""
+
+from __future__ import annotations
+
+from workbench.optics.lens import EitherArray, LensModel, Numbers
+
+
+def _distort(coefficients: Numbers, x: EitherArray, y: EitherArray) -> tuple[EitherArray, EitherArray]:
+    k1, k2, p1, p2, k3 = coefficients
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    x_distorted = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+    y_distorted = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    return x_distorted, y_distorted
+
+
+def _radial_slope(coefficients: Numbers, x: EitherArray, y: EitherArray) -> EitherArray:
+    """Of the radial polynomial; the tangential terms are left out."""
+    k1, k2, _, _, k3 = coefficients
+    r2 = x * x + y * y
+    return 1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3))
+
+
+PLUMB_BOB = LensModel(
+    name="plumb_bob",
+    distort=_distort,
+    radial_slope=_radial_slope,
+    trial_sd={"k1": 0.3, "k2": 0.3, "p1": 0.003, "p2": 0.003, "k3": 0.3},
+    removal_order=("k3", "p1 p2", "k2", "k1"),
+    radial_orders=("k1", "k2", "k3"),
+    polynomial_degree=7,
+)
