@@ -13,7 +13,8 @@ import yaml as pyyaml
 
 from tests.crash.short import CALLER, write_files
 from workbench.model.calibration import load_calibration
-from workbench.procedure.engine.run import Plan, run
+from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.run import run
 
 CAMERA = """\
 camera:
