@@ -63,7 +63,8 @@ class PolynomialFit:
 
 
 def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
-    """Maximum-likelihood polynomial; None where it would pass behind the pinhole at a spot.
+    """Maximum-likelihood polynomial; None where it would pass behind the pinhole at a spot,
+    or the spots do not determine it.
 
     Weights are the inverse of the full covariance. Residuals are those of inverse depth, whose deviation is
     the same wherever a spot lies: in ranges, the spots that noise put too near would get too much weight. An
@@ -72,15 +73,13 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
     from workbench.ranging.shape_kernels import polynomial  # loads the compiler, which only a fit needs
 
     scale = float(np.abs(points.x_mm).max()) or 1.0
-    coefficients, covariance, by_range, by_place, chi2 = polynomial(
-        points.x_mm,
-        degree,
-        scale,
-        points.range_mm,
-        points.offset_mm,
-        *points.covariances(),
-        STEPS,
-    )
+    measured = points.x_mm, degree, scale, points.range_mm, points.offset_mm
+    try:
+        coefficients, covariance, by_range, by_place, chi2 = polynomial(
+            *measured, *points.covariances(), STEPS
+        )
+    except np.linalg.LinAlgError:  # ranges so far apart that the weights of all but a few vanish
+        return None
     if not math.isfinite(chi2):
         return None
     return PolynomialFit(coefficients, covariance, by_range, by_place, scale, chi2, len(points) - degree - 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
@@ -288,6 +288,7 @@ def test_an_interval_may_have_no_far_end() -> None:
     st.floats(1e-4, 0.2),
     st.floats(-25.0, 50.0),
 )
+@example([55.0, 9371.0, 871.0, 4964.0, 6407.0, 9155.0], 0.125, 0.0)
 def test_any_ranges_have_an_answer(ranges: list[float], relative: float, offset: float) -> None:
     r = np.array(ranges)
     x = np.linspace(-60.0, 60.0, len(r)) + 3.0
