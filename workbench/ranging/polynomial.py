@@ -63,8 +63,9 @@ class PolynomialFit:
 
 
 def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
-    """Maximum-likelihood polynomial; None where it would pass behind the pinhole at a spot,
-    or the spots do not determine it.
+    """Maximum-likelihood polynomial.
+
+    None where it would pass behind the pinhole at a spot, or where the spots do not determine it.
 
     Weights are the inverse of the full covariance. Residuals are those of inverse depth, whose deviation is
     the same wherever a spot lies: in ranges, the spots that noise put too near would get too much weight. An
