@@ -10,7 +10,7 @@ import numpy as np
 from tests.proofs.simulate import Calibrations
 from workbench.calibration.data.observations import Observation, PlacementInfo
 from workbench.calibration.estimation.batch import fit_batch
-from workbench.calibration.selection.model_terms import fit_chosen, without_idle
+from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
@@ -43,7 +43,7 @@ def one_by_one(rig: Rig, placements: Sequence[PlacementInfo], data: Calibrations
     sensors, covariances, scales, converged = [], [], [], []
     for position, sd in zip(data.position_px, data.sd_px, strict=True):
         seen = _observations(rig, placements, position, sd)
-        fitted = without_idle(fit_chosen(rig, seen))
+        fitted = fit_calibration(rig, seen)
         sensors.append(fitted.values[fitted.sensor])
         covariances.append(fitted.covariance[fitted.sensor, fitted.sensor])
         scales.append(fitted.noise_scale)

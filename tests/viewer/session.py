@@ -215,7 +215,7 @@ def a_fit() -> ev.FitFinished:
                 standoff_mm=BAD[1],
                 error_mm=2.5,
                 sd_mm=0.5,
-                lasers=(ev.LaserErrorRecord(laser_id=BAD[0], error_mm=4.25, sd_mm=0.6),),
+                lasers=(ev.LaserError(laser_id=BAD[0], error_mm=4.25, sd_mm=0.6),),
                 alarm=True,
             ),
         ),

@@ -16,10 +16,10 @@ from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Observation, Rejected
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.estimation.fit import CalibrationFit
-from workbench.calibration.selection.model_terms import fit_chosen
+from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict.assessment import Assessment, derive
 from workbench.calibration.verdict.export import accept_with_reason, calibrate, write_calibration
-from workbench.calibration.verdict.records import left_out_records, parameter_records, term_summaries
+from workbench.calibration.verdict.records import left_out_records, parameter_records
 from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.invocation import command_line, now, operator
 from workbench.model.acceptance import Acceptance
@@ -54,8 +54,6 @@ class Request:
     """Standoffs to leave out."""
     fixed: tuple[str, ...]
     """Parameters to hold at the rig file's value."""
-    kept: tuple[str, ...]
-    """Terms of the model to keep whatever the data say."""
 
 
 def fit_captures(request: Request, as_json: bool) -> None:
@@ -73,7 +71,7 @@ def fit_captures(request: Request, as_json: bool) -> None:
     rows = parse_captures(captures, content)
     check_images(captures, rows)
     data = _observations(rig, rows, captures, request)
-    fitted = fit_chosen(rig, *data, keep=request.kept)
+    fitted = fit_calibration(rig, *data)
     calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
     refused = assessment.verdict == "refused" and request.accept is None
     if assessment.verdict == "refused" and request.accept is not None:
@@ -169,10 +167,10 @@ def _as_json(fitted: CalibrationFit, assessment: Assessment) -> dict[str, Any]:
         "null_directions": [asdict(direction) for direction in assessment.directions],
         "verdict": assessment.verdict,
         "reasons": list(assessment.reasons),
-        "faults": [asdict(fault) for fault in assessment.faults],
+        "faults": [fault.model_dump() for fault in assessment.faults],
         "left_out": [record.model_dump() for record in left_out_records(assessment)],
-        "residual_tests": [asdict(test) for test in assessment.residual_tests],
-        "terms": [asdict(term) for term in fitted.terms],
+        "residual_tests": [test.model_dump() for test in assessment.residual_tests],
+        "terms": [term.model_dump() for term in fitted.terms],
     }
 
 
@@ -204,7 +202,7 @@ def _print_tables(fitted: CalibrationFit, assessment: Assessment) -> None:
     console.print(TerminalTable(parameter_table(parameter_records(fitted))))
     console.print(TerminalTable(derived_table(derive(fitted))))
     if fitted.terms:
-        console.print(TerminalTable(term_table(term_summaries(fitted))))
+        console.print(TerminalTable(term_table(fitted.terms)))
     console.print(f"residual rms {fitted.rms_px:.2f} px over {len(fitted.used)} observations")
     if fitted.boards:
         count, views = len(fitted.corner_residual_px), len(fitted.boards)

@@ -164,19 +164,13 @@ def fit(
         list[str] | None,
         typer.Option(metavar="NAME", help="Hold a parameter at the rig's value; repeatable."),
     ] = None,
-    keep: Annotated[
-        list[str] | None,
-        typer.Option(metavar="TERM", help="Keep a term of the model whatever the data say; repeatable."),
-    ] = None,
     json: Json = False,
 ) -> None:
     """Calibrate from a captures file or a session: images or pixel positions at known standoffs."""
     gc.set_threshold(1_000_000)  # more than a fit makes: it ends after a second, and its garbage with it
     from workbench.cli.fit import Request, fit_captures
 
-    request = Request(
-        source, rig, output, accept, tuple(without_standoff or ()), tuple(fix or ()), tuple(keep or ())
-    )
+    request = Request(source, rig, output, accept, tuple(without_standoff or ()), tuple(fix or ()))
     fit_captures(request, json)
     exit_program(0, at_once=True)
 

@@ -18,17 +18,19 @@ from workbench.model.rig import LARGEST, MOST_PX, LaserId, NonNegativeFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 DeterminedBy = Literal["data", "joint", "prior"]
-TermVerdict = Literal["shown", "open", "below", "asked for", "absent", "idle", "called for"]
+TermVerdict = Literal["shown", "open", "unneeded", "called for", "below", "asked for", "absent", "idle"]
+"""The last four were written by version 0.1.0, which dropped terms."""
 TERM_VERDICTS: dict[TermVerdict, str] = {
-    "shown": "kept: the data show it",
-    "open": "kept: the data cannot tell",
+    "shown": "the data show it",
+    "open": "the data cannot tell",
+    "unneeded": "the data speak against it",
+    "called for": "MISSING: the data call for it",
     "below": "kept: a higher order stays",
     "asked for": "kept: asked for",
     "absent": "left out: shown to be absent",
     "idle": "left out: no range depends on it",
-    "called for": "MISSING: the data call for it",
 }
-"""What became of a term of the model, and why."""
+"""Verdict on a term of the model, in words."""
 Vector3 = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 AGREEMENT = 1e-9
 """Relative difference that two copies of one number in the file may have."""
@@ -127,14 +129,15 @@ class Validity(FileModel):
 
 
 class TermSummary(FileModel):
-    """The evidence on a term of the model, against its absence."""
+    """A term of the model, compared with its absence: its parameters at the rig file's values."""
 
     name: str
+    """`k2`, `p1 p2`, `ruler_scale`, or `tilts` (of all placements together)."""
     verdict: TermVerdict
     p_value: float
-    """Of the data, were it absent."""
+    """Of what the data show, were the term absent; its own prior takes no part."""
     log10_bayes_factor: float
-    """For the model with it over the model without."""
+    """For the model with the term, by its prior, over the model without."""
     range_shift_sd: float | None
     """Largest change of a range without it, in standard deviations; null where the model lacks it."""
 

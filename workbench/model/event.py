@@ -13,14 +13,14 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from workbench.model.exposure import Verdict as BrightnessVerdict
-from workbench.model.fit_event import FaultRecord as FaultRecord
+from workbench.model.fit_event import Fault as Fault
 from workbench.model.fit_event import FitFinished as FitFinished
-from workbench.model.fit_event import LaserErrorRecord as LaserErrorRecord
+from workbench.model.fit_event import LaserError as LaserError
 from workbench.model.fit_event import LeftOutRecord as LeftOutRecord
 from workbench.model.fit_event import ParameterRecord as ParameterRecord
 from workbench.model.fit_event import RejectedRecord as RejectedRecord
 from workbench.model.fit_event import ResidualRecord as ResidualRecord
-from workbench.model.fit_event import ResidualTestRecord as ResidualTestRecord
+from workbench.model.fit_event import ResidualTest as ResidualTest
 from workbench.model.legacy_events import upgraded
 from workbench.model.limit import Verdict
 from workbench.model.prompt import Answer, By

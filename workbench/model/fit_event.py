@@ -40,8 +40,11 @@ class RejectedRecord(FileModel):
     reason: str
 
 
-class LaserErrorRecord(FileModel):
-    """Range by one laser's spot at a placement left out - its standoff; 1 sigma as promised."""
+class LaserError(FileModel):
+    """Range by one laser's spot at a placement left out, minus the standoff.
+
+    The standard deviation is that of the fit without the placement, the placement itself, and the spot.
+    """
 
     laser_id: str
     error_mm: float
@@ -56,19 +59,19 @@ class LeftOutRecord(FileModel):
     error_mm: float
     """Range by all its spots - standoff."""
     sd_mm: float
-    lasers: tuple[LaserErrorRecord, ...]
+    lasers: tuple[LaserError, ...]
     alarm: bool
     """Farther off than promised; one sound fit in 1000 has any."""
 
 
-class FaultRecord(FileModel):
+class Fault(FileModel):
     """Something wrong with a fit's data, by name; docs/validation.md lists the names."""
 
     name: str
     message: str
 
 
-class ResidualTestRecord(FileModel):
+class ResidualTest(FileModel):
     """A test of a fit's residuals, and the chance of a value as far out if nothing is wrong."""
 
     name: str
@@ -90,5 +93,5 @@ class FitFinished(FileModel):
     terms: tuple[TermSummary, ...] = ()
     left_out: tuple[LeftOutRecord, ...] = ()
     """Cross-validation, a placement each."""
-    faults: tuple[FaultRecord, ...] = ()
-    residual_tests: tuple[ResidualTestRecord, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    residual_tests: tuple[ResidualTest, ...] = ()

@@ -63,6 +63,5 @@ EQUIDISTANT = LensModel(
     distort=_distort,
     radial_slope=_radial_slope,
     trial_sd={"k1": 0.1, "k2": 0.1, "k3": 0.1, "k4": 0.1},
-    removal_order=("k4", "k3", "k2", "k1"),
-    radial_orders=("k1", "k2", "k3", "k4"),
+    terms=("k4", "k3", "k2", "k1"),
 )

@@ -40,10 +40,8 @@ class LensModel:
     trial_sd: Mapping[str, float]
     """Prior standard deviation (1 sigma) of each coefficient that a rig file holds constant, where a fit
     tests whether the data need it."""
-    removal_order: tuple[str, ...]
+    terms: tuple[str, ...]
     """Terms that may be absent, the first to go first; a term of several coefficients has spaces between."""
-    radial_orders: tuple[str, ...]
-    """Coefficients of the radial polynomial by rising order: none is absent below one that stays."""
     polynomial_degree: int | None = None
     """Degree of the distorted coordinates as polynomials in undistorted ones that move along a straight line;
     None if they are no polynomials."""

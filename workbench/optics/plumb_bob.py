@@ -30,7 +30,6 @@ PLUMB_BOB = LensModel(
     distort=_distort,
     radial_slope=_radial_slope,
     trial_sd={"k1": 0.3, "k2": 0.3, "p1": 0.003, "p2": 0.003, "k3": 0.3},
-    removal_order=("k3", "p1 p2", "k2", "k1"),
-    radial_orders=("k1", "k2", "k3"),
+    terms=("k3", "p1 p2", "k2", "k1"),
     polynomial_degree=7,
 )

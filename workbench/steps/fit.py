@@ -36,7 +36,7 @@ class FitStep(StepModel):
         """
         from workbench.calibration.data.boards import BoardView, on_boards
         from workbench.calibration.data.observations import Observation, Rejected
-        from workbench.calibration.selection.model_terms import fit_chosen
+        from workbench.calibration.selection.model_terms import fit_calibration
         from workbench.calibration.verdict.export import calibrate
         from workbench.calibration.verdict.records import fit_finished
         from workbench.procedure.engine.observed import observe_capture
@@ -50,7 +50,7 @@ class FitStep(StepModel):
         observations = [f for f in found if isinstance(f, Observation)]
         rejected = [f for f in (*found, *context.boards.values()) if isinstance(f, Rejected)]
         boards = [b for b in context.boards.values() if isinstance(b, BoardView)]
-        fitted = fit_chosen(context.rig, observations, rejected, boards)
+        fitted = fit_calibration(context.rig, observations, rejected, boards)
         provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
         calibration, assessment = calibrate(fitted, self.limits, provenance)
         context.emit(fit_finished(fitted, assessment))

@@ -13,7 +13,7 @@ from workbench.calibration.design.tables import range_forecast_table
 from workbench.calibration.verdict.comparison import Difference
 from workbench.calibration.verdict.tables import difference_table
 from workbench.cli.plan import plan_table
-from workbench.model.fit_event import LaserErrorRecord, LeftOutRecord
+from workbench.model.fit_event import LaserError, LeftOutRecord
 from workbench.model.fit_tables import cross_validation_table, fit_tables
 from workbench.model.table import Column, Table
 from workbench.procedure.engine.durations import StepDurations
@@ -28,7 +28,7 @@ LEFT_OUT = LeftOutRecord(
     standoff_mm=1250.0,
     error_mm=-12.5,
     sd_mm=0.55,
-    lasers=tuple(LaserErrorRecord(laser_id=i, error_mm=12.5, sd_mm=1.0) for i in EIGHT),
+    lasers=tuple(LaserError(laser_id=i, error_mm=12.5, sd_mm=1.0) for i in EIGHT),
     alarm=True,
 )
 PLAN = plan_table(

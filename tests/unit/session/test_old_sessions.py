@@ -10,7 +10,7 @@ import pytest
 
 from tests.viewer.readback import Contents
 from workbench.calibration.data.spot_rows import observations_of_rows
-from workbench.calibration.selection.model_terms import fit_chosen
+from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.model.calibration import load_calibration
 from workbench.model.captures import load_captures
 from workbench.model.event import TrialFinished, TrialProgress
@@ -66,7 +66,7 @@ def test_the_recording_is_made_again(tmp_path: Path) -> None:
 
 def test_the_fit_of_its_captures_is_its_calibration() -> None:
     rig = load_session_rig(SESSION)
-    fitted = fit_chosen(rig, *observations_of_rows(rig, load_captures(SESSION / "captures.csv")))
+    fitted = fit_calibration(rig, *observations_of_rows(rig, load_captures(SESSION / "captures.csv")))
     old = load_calibration(SESSION / "calibration.yaml").geometry()
     parameters, sensor = fitted.table.parameters[fitted.sensor], fitted.sensor
     now = {

@@ -35,21 +35,12 @@ from workbench.calibration.estimation.refit import (
     rows_of,
 )
 from workbench.model.arrays import BoolArray, FloatArray
+from workbench.model.fit_event import LaserError
 from workbench.model.stats import chi2_sf, f_sf, norm_cdf, t_cdf
 
 FALSE_ALARM = 1e-3
 """Of one fit whose priors and noise are as stated: the chance that any of its standoffs raises an alarm."""
 FEWEST_PLACEMENTS = 3
-
-
-@dataclass(frozen=True)
-class LaserError:
-    """Range by one laser's spot at a placement left out, minus the standoff; 1 sigma."""
-
-    laser_id: str
-    error_mm: float
-    sd_mm: float
-    """Promised: of the fit without the placement, the placement itself, the spot."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +119,8 @@ def _leave_out(
     for laser, laser_id in enumerate(fit.rig.laser_ids):
         mine = spots & rows_of(cells & (fit.cells.laser == laser), problem)
         if not on_board and (w[mine] ** 2).sum() > 0:
-            lasers.append(LaserError(laser_id, *range_error(left, mine, w)))
+            error_of_one, sd_of_one = range_error(left, mine, w)
+            lasers.append(LaserError(laser_id=laser_id, error_mm=error_of_one, sd_mm=sd_of_one))
     chi2 = deleted_chi2(left, spots)
     return LeftOut(
         placement=info.key,

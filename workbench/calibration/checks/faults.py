@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -15,6 +14,7 @@ from workbench.calibration.checks.target_motion import TargetMotion, find_target
 from workbench.calibration.data.averaging import scatter_chi2, weighted_mean
 from workbench.calibration.data.observations import Observation, positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
+from workbench.model.fit_event import Fault
 from workbench.model.stats import chi2_sf
 
 FaultName = Literal[
@@ -38,17 +38,9 @@ LEAST_TRAVEL = 0.05
 """Of the picture: spots that all move less from the nearest standoff to infinity were seen from afar only."""
 
 
-@dataclass(frozen=True)
-class Fault:
-    """One thing that is wrong."""
-
-    name: FaultName
-    message: str
-
-    @property
-    def refuses(self) -> bool:
-        """Whether no calibration can come of it."""
-        return self.name in REFUSING
+def refuses(fault: Fault) -> bool:
+    """Whether no calibration can come of data with this fault."""
+    return fault.name in REFUSING
 
 
 def find_faults(fit: CalibrationFit, left_out: Sequence[LeftOut]) -> tuple[Fault, ...]:
@@ -96,17 +88,16 @@ def _name_wiring(fit: CalibrationFit, h: Hypothesis) -> Fault:
             " Cause: wired the wrong way round, or their ids exchanged in the captures or the rig file."
             " Do: exchange the plugs (or laser_id) and capture or fit again"
         )
-        return Fault("lasers_swapped", text)
+        return Fault(name="lasers_swapped", message=text)
     how, instead = {
         "mirrored": ("mirrored left to right", " or turned by 180 degrees"),
         "upside_down": ("mirrored top to bottom", " or turned by 180 degrees"),
         "turned": ("turned by 180 degrees", ""),
     }[h.kind]
     return Fault(
-        h.kind,  # type: ignore[arg-type]
-        f"the picture is {how}: turned back, everything fits. Cause: the camera's flip setting, a camera"
-        " mounted"
-        f" by way of a mirror{instead}, or every laser's sign wrong in the rig file. Do: switch the flip"
+        name=h.kind,
+        message=f"the picture is {how}: turned back, everything fits. Cause: the camera's flip setting,"
+        f" a camera mounted by way of a mirror{instead}, or every laser's sign wrong in the rig file. Do: switch the flip"
         " off, or correct the baselines' signs, and capture again",
     )
 
@@ -116,8 +107,8 @@ def _name_standoff(fit: CalibrationFit, h: Hypothesis) -> Fault:
     fitted = float(np.asarray(h.state.problem.data.standoff_mm)[h.subject[0]])
     slip = _slip(info.standoff_mm, fitted)
     return Fault(
-        "standoff",
-        f"the captures at {info.standoff_mm:g} mm fit a standoff of {fitted:.4g} mm, and nothing else"
+        name="standoff",
+        message=f"the captures at {info.standoff_mm:g} mm fit a standoff of {fitted:.4g} mm, and nothing else"
         f" explains them{slip}. Do: correct the standoff where it was written down, or leave it out"
         f" (--without-standoff {info.standoff_mm:g})",
     )
@@ -134,8 +125,9 @@ def _slip(told_mm: float, fitted_mm: float) -> str:
 def _name_movement(fit: CalibrationFit, movement: TargetMotion) -> Fault:
     info = fit.cells.placements[movement.placement]
     return Fault(
-        "moved",
-        f"the target at {info.standoff_mm:g} mm moved by {movement.step_mm:+.2g} mm after {movement.before}"
+        name="moved",
+        message=f"the target at {info.standoff_mm:g} mm moved by {movement.step_mm:+.2g} mm after"
+        f" {movement.before}"
         f" of its {movement.captures} captures, between {movement.last_before} and {movement.first_after}."
         f" Do: fix the target, and capture that standoff again or leave it out (--without-standoff"
         f" {info.standoff_mm:g})",
@@ -152,8 +144,9 @@ def _reflections(fit: CalibrationFit) -> Iterator[Fault]:
         used = [s for s in fit.used if (s.laser_id, s.placement) == (laser, placement)]
         if _is_another_spot(fit, strays, used):
             yield Fault(
-                "reflection",
-                f"laser {laser} at {strays[0].standoff_mm:g} mm: {len(strays)} of its captures agree on a"
+                name="reflection",
+                message=f"laser {laser} at {strays[0].standoff_mm:g} mm: {len(strays)} of its captures"
+                f" agree on a"
                 " spot where it cannot be; they are left out. Cause: a reflection, or another laser lit in"
                 " its place. Do: cover what shines, look at the frames listed as not used, and capture again",
             )
@@ -186,8 +179,9 @@ def _never_lit(fit: CalibrationFit) -> Iterator[Fault]:
                 f"none of its {dark[laser]} captures shows a spot" if dark[laser] else "no capture is of it"
             )
             yield Fault(
-                "never_lit",
-                f"laser {laser} never lit: {shown}. Do: check its supply, its plug and its shutter, and that"
+                name="never_lit",
+                message=f"laser {laser} never lit: {shown}. Do: check its supply, its plug and its"
+                f" shutter, and that"
                 " its id is that of the rig file",
             )
 
@@ -197,8 +191,9 @@ def _saturated(fit: CalibrationFit) -> Iterator[Fault]:
     if clipped.total() > SATURATED_SHARE * len(fit.used):
         where = ", ".join(f"{mm:g}" for mm in sorted(clipped))
         yield Fault(
-            "saturated",
-            f"{clipped.total()} of {len(fit.used)} spots are saturated (at {where} mm): their centres rest"
+            name="saturated",
+            message=f"{clipped.total()} of {len(fit.used)} spots are saturated (at {where} mm): their"
+            f" centres rest"
             " on the"
             " rim alone. Do: shorten the exposure or lower the gain until the peak stays below full scale",
         )
@@ -210,8 +205,8 @@ def _all_far(fit: CalibrationFit) -> Iterator[Fault]:
     if known and max(known) < LEAST_TRAVEL:
         nearest = min(p.standoff_mm for p in fit.cells.placements)
         yield Fault(
-            "all_far",
-            f"all standoffs are far: from {nearest:g} mm on no spot moves by more than"
+            name="all_far",
+            message=f"all standoffs are far: from {nearest:g} mm on no spot moves by more than"
             f" {100 * max(known):.1f} % of the picture, too little to tell lens, offset and pointing apart."
             " Do: add standoffs nearer to the sensor, down to where the outermost spot leaves the picture",
         )

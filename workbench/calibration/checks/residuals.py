@@ -33,6 +33,7 @@ from workbench.calibration.data.observations import positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit
 from workbench.model.arrays import FloatArray, IndexArray
+from workbench.model.fit_event import ResidualTest
 from workbench.model.stats import chi2_sf, gamma_cdf, gamma_sf, norm_cdf
 
 FALSE_ALARM = 0.01
@@ -51,20 +52,11 @@ FEWEST_FREE = 20
 """Degrees of freedom among repeats below which their tests are not made."""
 
 
-@dataclass(frozen=True)
-class ResidualTest:
-    """One test of the residuals."""
-
-    name: str
-    p: float
-    """Chance of a value as far out if nothing is wrong."""
-
-
 def residual_tests(fit: CalibrationFit) -> tuple[ResidualTest, ...]:
     """Every test that the fit has data for."""
     spots = _Spots.of(fit)
     tests = (*_trends(spots, len(fit.rig.lasers)), *_of_spots(fit, spots), *_of_repeats(fit))
-    return tuple(test for test in tests if np.isfinite(test.p))
+    return tuple(ResidualTest(name=name, p=p) for name, p in tests if np.isfinite(p))
 
 
 def alarms(tests: tuple[ResidualTest, ...]) -> tuple[ResidualTest, ...]:
@@ -175,7 +167,7 @@ class _Spots:
         return _two_sided(value, *map(float, moments))
 
 
-def _trends(spots: _Spots, lasers: int) -> Iterator[ResidualTest]:
+def _trends(spots: _Spots, lasers: int) -> Iterator[tuple[str, float]]:
     over_standoff = legvander(spots.distance, 3)
     by_id = np.eye(lasers)[spots.laser]
     axes = np.eye(2)[spots.axis]
@@ -187,17 +179,17 @@ def _trends(spots: _Spots, lasers: int) -> Iterator[ResidualTest]:
         "v": _by_axis(axes, legvander(spots.place[:, 1], 3)[:, 1:]),
     }
     for name, pixels in trends.items():
-        yield ResidualTest(name, spots.trend_p(pixels))
+        yield (name, spots.trend_p(pixels))
 
 
-def _of_spots(fit: CalibrationFit, spots: _Spots) -> Iterator[ResidualTest]:
+def _of_spots(fit: CalibrationFit, spots: _Spots) -> Iterator[tuple[str, float]]:
     order = np.zeros(spots.covariance.shape)
     for axis in (0, 1):
         mine = np.flatnonzero(spots.axis == axis)
         order[mine[:-1], mine[1:]] = order[mine[1:], mine[:-1]] = 0.5
-    yield ResidualTest("order", spots.quadratic_p(order))
+    yield ("order", spots.quadratic_p(order))
     for name, weight in _contrasts(fit, spots.laser, spots.axis, spots.distance):
-        yield ResidualTest(f"variance {name}", spots.quadratic_p(np.diag(weight)))
+        yield (f"variance {name}", spots.quadratic_p(np.diag(weight)))
 
 
 def _contrasts(
@@ -215,7 +207,7 @@ def _contrasts(
             yield name, centred
 
 
-def _of_repeats(fit: CalibrationFit) -> Iterator[ResidualTest]:
+def _of_repeats(fit: CalibrationFit) -> Iterator[tuple[str, float]]:
     """Deviations of the repeats from their means."""
     groups = [
         _Repeats.of(fit, cell, axis)
@@ -232,7 +224,7 @@ def _of_repeats(fit: CalibrationFit) -> Iterator[ResidualTest]:
     mean = sum(g.lag_mean() for g in groups) / free.sum()
     value, variance, third = np.array([g.lag(mean) for g in groups]).sum(axis=0)
     if variance > SEEN_VARIANCE * free.sum():
-        yield ResidualTest("repeats: order", _two_sided(value / noise2, 0.0, variance, third))
+        yield ("repeats: order", _two_sided(value / noise2, 0.0, variance, third))
     cells = np.array([g.cell for g in groups])
     distance = _spread(np.log([p.standoff_mm for p in fit.cells.placements]))[fit.cells.placement[cells]]
     words = {"over standoff": "over standoff", "of u and v": "u and v", "of laser": "laser"}
@@ -241,7 +233,7 @@ def _of_repeats(fit: CalibrationFit) -> Iterator[ResidualTest]:
         centred = weight - (weight * free).sum() / free.sum()
         moments = 2 * (centred**2 * free).sum(), 8 * (centred**3 * free).sum()
         p = _two_sided(float((centred * square).sum() / noise2), 0.0, *map(float, moments))
-        yield ResidualTest(f"repeats: {words[kind]}" + (f": {which}" if which else ""), p)
+        yield (f"repeats: {words[kind]}" + (f": {which}" if which else ""), p)
 
 
 def _share_equal(fit: CalibrationFit, axis: int) -> float:

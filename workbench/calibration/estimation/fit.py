@@ -32,8 +32,8 @@ from workbench.calibration.model.parameters import (
     sensor_parameters,
     unit_of,
 )
-from workbench.calibration.model.term import Term
 from workbench.model.arrays import FloatArray
+from workbench.model.calibration import TermSummary
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.rig import Prior, Rig
 from workbench.sensor.curves import SpotCurves
@@ -74,7 +74,7 @@ class CalibrationFit:
     degrees_of_freedom: float
     """Data minus the effective number of parameters that they determine."""
     converged: bool
-    terms: tuple[Term, ...] = ()
+    terms: tuple[TermSummary, ...] = ()
     """What the data say of parts of the model, where it was asked (`significance.choose`)."""
 
     @property

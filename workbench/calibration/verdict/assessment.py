@@ -10,14 +10,15 @@ from typing import Literal
 import numpy as np
 
 from workbench.calibration.checks.cross_validation import LeftOut, alarms, leave_each_out
-from workbench.calibration.checks.faults import Fault, find_faults
-from workbench.calibration.checks.residuals import ResidualTest, explain, residual_tests
+from workbench.calibration.checks.faults import find_faults, refuses
 from workbench.calibration.checks.residuals import alarms as residual_alarms
+from workbench.calibration.checks.residuals import explain, residual_tests
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.verdict.observability import NullDirection, direction_lines
 from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import DeterminedBy
+from workbench.model.fit_event import Fault, ResidualTest
 
 CONTRADICTION_SD = 5.0
 """By chance one parameter in 2 million lies so far from its prior."""
@@ -97,8 +98,8 @@ def judge(
     left_out = leave_each_out(fit)
     faults = find_faults(fit, left_out)
     tests = residual_tests(fit)
-    named = [fault.message for fault in faults if fault.refuses]
-    warnings = [fault.message for fault in faults if not fault.refuses]
+    named = [fault.message for fault in faults if refuses(fault)]
+    warnings = [fault.message for fault in faults if not refuses(fault)]
     # What has a name needs no list of its consequences.
     if named:
         reasons = [*named, *reasons]

@@ -8,10 +8,8 @@ import numpy as np
 
 from workbench.calibration.data.observations import positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
-from workbench.calibration.selection.model_terms import without_idle
 from workbench.calibration.verdict.assessment import Assessment, determined_by, judge
 from workbench.calibration.verdict.observability import RangeGradients, null_directions
-from workbench.calibration.verdict.records import term_summaries
 from workbench.calibration.verdict.yaml_text import yaml_text
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import (
@@ -39,9 +37,8 @@ def calibrate(
     Raises:
         LimitFailedError: by the fit no spot can be ranged.
     """
-    exported = without_idle(fit)
-    values = dict(zip((p.name for p in fit.table.parameters), exported.values.tolist(), strict=True))
-    provisional = _calibration(exported, values, provenance, Assessment("accepted", (), ()), 0.0)
+    values = dict(zip((p.name for p in fit.table.parameters), fit.values.tolist(), strict=True))
+    provisional = _calibration(fit, values, provenance, Assessment("accepted", (), ()), 0.0)
     ranges = _ranges(CalibratedSensor(provisional))
     worst = float(ranges.sd.max()) if len(ranges.sd) else float("nan")
     if not np.isfinite(worst):
@@ -58,7 +55,7 @@ def calibrate(
         ranges,
     )
     assessment = judge(fit, limits, worst, directions)
-    return _calibration(exported, values, provenance, assessment, worst), assessment
+    return _calibration(fit, values, provenance, assessment, worst), assessment
 
 
 def accept_with_reason(calibration: Calibration, reason: str) -> Calibration:
@@ -129,7 +126,7 @@ def _calibration(
                 verdict=assessment.verdict,
                 reasons=assessment.reasons,
                 warnings=assessment.warnings,
-                terms=term_summaries(fit),
+                terms=fit.terms,
             ),
             provenance=provenance,
         ),

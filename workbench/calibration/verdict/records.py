@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 from workbench.calibration.checks.cross_validation import alarms
 from workbench.calibration.estimation.fit import CalibrationFit
-from workbench.calibration.selection.model_terms import without_idle
 from workbench.calibration.verdict.assessment import Assessment, determined_by
-from workbench.model.calibration import TermSummary
 from workbench.model.fit_event import (
-    FaultRecord,
     FitFinished,
-    LaserErrorRecord,
     LeftOutRecord,
     ParameterRecord,
     RejectedRecord,
     ResidualRecord,
-    ResidualTestRecord,
 )
 
 
 def parameter_records(fit: CalibrationFit) -> tuple[ParameterRecord, ...]:
     """The sensor's parameters; constants (prior sd 0) are among them."""
-    sensor, exported = fit.sensor, without_idle(fit)
+    sensor = fit.sensor
     columns = zip(
         fit.table.parameters[sensor],
-        exported.values[sensor].tolist(),
-        exported.sd[sensor].tolist(),
+        fit.values[sensor].tolist(),
+        fit.sd[sensor].tolist(),
         fit.data_share[sensor].tolist(),
         determined_by(fit)[sensor],
         strict=True,
@@ -47,11 +40,6 @@ def parameter_records(fit: CalibrationFit) -> tuple[ParameterRecord, ...]:
     )
 
 
-def term_summaries(fit: CalibrationFit) -> tuple[TermSummary, ...]:
-    """The evidence on the terms of the model."""
-    return tuple(TermSummary.model_validate(asdict(term)) for term in fit.terms)
-
-
 def fit_finished(fit: CalibrationFit, assessment: Assessment) -> FitFinished:
     """The event of a finished fit."""
     return FitFinished(
@@ -63,10 +51,10 @@ def fit_finished(fit: CalibrationFit, assessment: Assessment) -> FitFinished:
         verdict=assessment.verdict,
         reasons=assessment.reasons,
         warnings=assessment.warnings,
-        terms=term_summaries(fit),
+        terms=fit.terms,
         left_out=left_out_records(assessment),
-        faults=tuple(FaultRecord(name=f.name, message=f.message) for f in assessment.faults),
-        residual_tests=tuple(ResidualTestRecord(name=t.name, p=t.p) for t in assessment.residual_tests),
+        faults=assessment.faults,
+        residual_tests=assessment.residual_tests,
     )
 
 
@@ -79,9 +67,7 @@ def left_out_records(assessment: Assessment) -> tuple[LeftOutRecord, ...]:
             standoff_mm=one.standoff_mm,
             error_mm=one.error_mm,
             sd_mm=one.sd_mm,
-            lasers=tuple(
-                LaserErrorRecord(laser_id=i.laser_id, error_mm=i.error_mm, sd_mm=i.sd_mm) for i in one.lasers
-            ),
+            lasers=one.lasers,
             alarm=one in alarmed,
         )
         for one in assessment.left_out

@@ -13,13 +13,14 @@ from tests.support.corrupted_data import exchanged, mirrored, moved, shifted, to
 from tests.support.rigs import World, board_rig, prior, thesis_rig
 from workbench.calibration.checks import hypotheses
 from workbench.calibration.checks.cross_validation import leave_each_out, rows_at
-from workbench.calibration.checks.faults import Fault, find_faults
+from workbench.calibration.checks.faults import find_faults
 from workbench.calibration.checks.hypotheses import explain_misfit
 from workbench.calibration.data.observations import Observation, Rejected
 from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit
 from workbench.calibration.selection.outliers import fit_without_outliers
 from workbench.calibration.verdict.assessment import Assessment, judge
 from workbench.model.acceptance import Acceptance
+from workbench.model.fit_event import Fault
 from workbench.model.rig import Rig
 
 RIG = thesis_rig()

@@ -14,7 +14,7 @@ from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.data.boards import BoardView, on_boards
 from workbench.calibration.data.observations import Observation, Rejected
 from workbench.calibration.estimation.fit import CalibrationFit, fit
-from workbench.calibration.selection.model_terms import fit_chosen
+from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict.assessment import determined_by
 from workbench.calibration.verdict.export import calibrate, render
 from workbench.model.acceptance import Acceptance
@@ -183,7 +183,7 @@ def test_terms_are_weighed_with_the_board_as_well(seed: int) -> None:
     rig = board_rig()
     world = World(rig, seed)
     observations, views = BoardWorld(world).measure()
-    fitted = fit_chosen(rig, [*observations, *world.observations(FAR_MM)], (), views)
+    fitted = fit_calibration(rig, [*observations, *world.observations(FAR_MM)], (), views)
     told = {term.name: term for term in fitted.terms}
     assert told["k1"].verdict == "shown"
     assert set(told) == {"k2", "k1", "ruler_scale", "tilts"}

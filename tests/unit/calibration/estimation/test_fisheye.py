@@ -10,7 +10,7 @@ from tests.support.rigs import FISHEYE_STANDOFFS_MM, PROVENANCE, World, fisheye_
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.batch import as_grid, fit_batch
 from workbench.calibration.estimation.fit import CalibrationFit, fit
-from workbench.calibration.selection.model_terms import fit_chosen
+from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
 from workbench.model.rig import Rig
@@ -75,11 +75,11 @@ def test_a_coefficient_that_the_rig_file_holds_constant_is_called_for() -> None:
     held = rig.model_copy(update={"camera": rig.camera.model_copy(update={"k1": prior(0.0, 0.0)})})
     world = World(rig, 1)
     world.values["k1"] = 0.08
-    fitted = fit_chosen(held, world.observations(FISHEYE_STANDOFFS_MM))
+    fitted = fit_calibration(held, world.observations(FISHEYE_STANDOFFS_MM))
     assert "k1" in [t.name for t in fitted.terms if t.verdict == "called for"]
 
 
 def test_terms_go_from_the_highest_order_down() -> None:
     observations, world = seen(4)
-    terms = [t.name for t in fit_chosen(world.rig, observations).terms]
+    terms = [t.name for t in fit_calibration(world.rig, observations).terms]
     assert terms[:4] == ["k4", "k3", "k2", "k1"]
