@@ -29,6 +29,11 @@ class AccuracyRow:
     reference_sd_mm: float = 0.0
     """Standard uncertainty of the true range itself: the placement's, by the ruler."""
 
+    @property
+    def mean_relative_error(self) -> float | None:
+        """Mean error over the true range, without unit; None without readings."""
+        return None if self.mean_error_mm is None else self.mean_error_mm / self.standoff_mm
+
 
 def accuracy_row(readings: Sequence[ReadingTaken], bench: BenchSpec) -> AccuracyRow:
     """Statistics of the readings at one standoff; errors are measured - true, mm, 1 sigma.

@@ -36,6 +36,14 @@ COLUMNS = (
         format=".2f",
         meaning="Standard uncertainty of the true range: the placement, by the ruler.",
     ),
+    Column(
+        key="mean_relative_error",
+        name="mean error",
+        unit="%",
+        scale=100,
+        format="+.2f",
+        meaning="Mean error over the true range.",
+    ),
 )
 
 
