@@ -97,8 +97,8 @@ def _name_wiring(fit: CalibrationFit, h: Hypothesis) -> Fault:
     return Fault(
         name=h.kind,
         message=f"the picture is {how}: turned back, everything fits. Cause: the camera's flip setting,"
-        f" a camera mounted by way of a mirror{instead}, or every laser's sign wrong in the rig file. Do: switch the flip"
-        " off, or correct the baselines' signs, and capture again",
+        f" a camera mounted by way of a mirror{instead}, or every laser's sign wrong in the rig file. Do:"
+        " switch the flip off, or correct the baselines' signs, and capture again",
     )
 
 
