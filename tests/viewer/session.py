@@ -13,6 +13,7 @@ import numpy as np
 from workbench.model import event as ev
 from workbench.model.calibration import TermSummary
 from workbench.model.rig import CameraSpec, LaserSpec, Prior, Rig
+from workbench.model.spot import Spot
 from workbench.model.target import FlatTarget, Placement
 from workbench.trials.accuracy.statistics import AccuracyRow
 from workbench.trials.accuracy.trial import accuracy_table
@@ -141,9 +142,9 @@ class MadeUpSession:
         )
         yield self._record(ev.SpotsFound(key=key, spots=spots))
 
-    def _spot(self, laser: str, standoff: float) -> ev.SpotRecord:
+    def _spot(self, laser: str, standoff: float) -> Spot:
         du, dv = self.random.normal(0.0, 0.05, 2)
-        return ev.SpotRecord(
+        return Spot(
             laser_id=laser,
             u_px=CX_PX + F_PX * LASERS[laser] / standoff + du,
             v_px=CY_PX + dv,
@@ -154,7 +155,7 @@ class MadeUpSession:
             peak_dn=210.0 - standoff / 40,
         )
 
-    def _frame(self, name: str, spots: tuple[ev.SpotRecord, ...]) -> ev.FrameRef:
+    def _frame(self, name: str, spots: tuple[Spot, ...]) -> ev.FrameRef:
         rows, columns = np.mgrid[0:480, 0:640]
         image = (
             np.full((480, 640), 12.0)

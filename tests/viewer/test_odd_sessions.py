@@ -16,6 +16,7 @@ import pytest
 from tests.viewer.readback import Contents
 from tests.viewer.session import a_fit, a_rig
 from workbench.model import event as ev
+from workbench.model.spot import Failure, Spot
 from workbench.model.target import (
     CylinderTarget,
     FlatTarget,
@@ -73,8 +74,8 @@ def a_reading(
     )
 
 
-def a_spot(laser: str | None, u_px: float) -> ev.SpotRecord:
-    return ev.SpotRecord(
+def a_spot(laser: str | None, u_px: float) -> Spot:
+    return Spot(
         laser_id=laser,
         u_px=u_px,
         v_px=240.0,
@@ -83,7 +84,7 @@ def a_spot(laser: str | None, u_px: float) -> ev.SpotRecord:
         flux_dn=1.0,
         width_px=1.0,
         peak_dn=1.0,
-        flags=("clipped",),
+        flags=frozenset({Failure.SATURATED}),
     )
 
 
@@ -112,7 +113,7 @@ def test_spots_without_a_laser_are_kept_together(tmp_path: Path) -> None:
     )
     assert contents.values("/spots/unassigned/u_px", "Scalars:scalars") == [(1, [100.0, 300.0])]
     (labels,) = contents.values("/bench/camera/spots", "Points2D:labels")
-    assert labels[1][:2] == ["? (clipped)", "? (clipped)"]
+    assert labels[1][:2] == ["? (saturated)", "? (saturated)"]
     (dots,) = contents.values("/bench/spots/unassigned", "Points3D:positions")
     assert len(dots[1]) == 2
 
@@ -124,7 +125,10 @@ def test_reading_names_the_spots_of_its_picture(tmp_path: Path) -> None:
     reading = a_reading(500.0, "not_enough_points", unseen, seen)
     contents = record(tmp_path, [STARTED, a_capture(tmp_path, "a"), spots, reading])
     labels = contents.values("/bench/camera/spots", "Points2D:labels", "time")
-    assert [label for _, label in labels] == [["? (clipped)", "? (clipped)"], ["? (clipped)", "L2 (clipped)"]]
+    assert [label for _, label in labels] == [
+        ["? (saturated)", "? (saturated)"],
+        ["? (saturated)", "L2 (saturated)"],
+    ]
     assert labels[0][0] == labels[1][0]
 
 

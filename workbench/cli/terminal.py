@@ -15,6 +15,7 @@ from rich.text import Text
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.model.fit_tables import fit_tables
+from workbench.model.spot import Spot
 from workbench.procedure.capture.quality import Quality, quality_of
 from workbench.procedure.engine.progress import TimeLeft
 from workbench.report.rejected_lines import rejected_lines
@@ -35,7 +36,7 @@ class Terminal:
         )
         self._task: TaskID | None = None
         self._captures: dict[str, ev.CaptureTaken] = {}
-        self._spots: dict[str, list[Sequence[ev.SpotRecord]]] = defaultdict(list)
+        self._spots: dict[str, list[Sequence[Spot]]] = defaultdict(list)
 
     def __enter__(self) -> Terminal:
         self._progress.start()
@@ -178,7 +179,7 @@ def _live(quality: Quality) -> str:
     return f"u {quality.u_px:.1f} v {quality.v_px:.1f} snr {quality.snr:.0f}{scatter}{clipped}"
 
 
-def _summary(spots: dict[str, list[Sequence[ev.SpotRecord]]]) -> str:
+def _summary(spots: dict[str, list[Sequence[Spot]]]) -> str:
     """All lasers of a placement, the worst of each; of those lit together only how many spots they made."""
     if "all" in spots:
         each = spots["all"]

@@ -24,6 +24,7 @@ from workbench.model.fit_event import ResidualTest as ResidualTest
 from workbench.model.legacy_events import upgraded
 from workbench.model.limit import Verdict
 from workbench.model.prompt import Answer, By
+from workbench.model.spot import Spot
 from workbench.model.target import Placement
 from workbench.model.trial_event import LaserRange as LaserRange
 from workbench.model.trial_event import ReadingTaken as ReadingTaken
@@ -205,28 +206,12 @@ class CaptureTaken(FileModel):
     """How long a laser was lit for it, switching included; None for a frame in room light."""
 
 
-class SpotRecord(FileModel):
-    """One spot of a capture; pixels, standard deviations are 1 sigma."""
-
-    laser_id: str | None
-    """None while no laser has been assigned."""
-    u_px: float
-    v_px: float
-    u_sd_px: float
-    v_sd_px: float
-    flux_dn: float
-    width_px: float
-    """Standard deviation of the spot's profile, geometric mean of both axes."""
-    peak_dn: float
-    flags: tuple[str, ...] = ()
-
-
 class SpotsFound(FileModel):
     """The spots of one capture, and why others were not found."""
 
     kind: Literal["spots_found"] = "spots_found"
     key: str
-    spots: tuple[SpotRecord, ...]
+    spots: tuple[Spot, ...]
     failures: tuple[str, ...] = ()
 
 

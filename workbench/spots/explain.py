@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from workbench.spots.types import Failure
+from workbench.model.spot import Failure
 
 _WORDS: Final[dict[Failure, str]] = {
     Failure.NO_SPOT: (

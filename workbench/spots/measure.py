@@ -8,13 +8,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from workbench.model.arrays import FloatArray
+from workbench.model.spot import NO_FLAGS, Failure, Spot
 from workbench.spots.detect import FINE_PX, Peaks
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.acceptance import COLUMNS, NEXT_HALF, U_SD, fit_group
 from workbench.spots.kernels.columns import FLUX, LN_SU, U, V
 from workbench.spots.kernels.windows import HALVES_PX, flag_codes, guess, halves_for
 from workbench.spots.pair import PairSignal
-from workbench.spots.types import NO_FLAGS, Failure, Spot
 
 # First guesses of the width scatter upwards; a window too small is cut anew.
 _GUESSED: Final = 0.7

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import hypot
 
-from workbench.spots.types import Spot
+from workbench.model.spot import Spot
 
 CLEAR = 10.0
 """Width of a light over the deviation of its place, which is its brightness over that one's deviation. Noise

@@ -7,13 +7,14 @@ from typing import Final
 import numpy as np
 
 from workbench.model.arrays import Image
+from workbench.model.spot import NO_FLAGS, Failure, Spot
 from workbench.spots.deblending.blend import fit_blends, grown, split
 from workbench.spots.deblending.clusters import CLEAR_SD, are_apart, clearest, clusters, without_duplicates
 from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
 from workbench.spots.measure import FittedSpot, measure
 from workbench.spots.pair import Pair, PairSignal, measure_signal
 from workbench.spots.strip import Strip, is_on, strip_of
-from workbench.spots.types import NO_FLAGS, Failure, Finding, Scanline, Spot
+from workbench.spots.types import Finding, Scanline
 
 # A peak of the smoothed signal between this and the threshold is named: too dim to be told from noise.
 _DIM_SD: Final = 4.2

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from workbench.model.errors import LaserOffNotConfirmedError
+from workbench.model.spot import Spot
 from workbench.spots.persistence import is_same_spot, persistent_spots
-from workbench.spots.types import Spot
 
 
 def refuse_stuck_beam(

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import hypot
 
 import numpy as np
 import rerun as rr
 
-from workbench.model.event import LaserRange, SpotRecord
+from workbench.model.event import LaserRange
+from workbench.model.spot import Spot
 from workbench.viewer import entities as at
 from workbench.viewer.stream import Stream
 
@@ -40,10 +42,10 @@ def log_frame(stream: Stream, png: bytes) -> None:
     stream.log(at.IMAGE, rr.EncodedImage(contents=png, media_type="image/png"))
 
 
-def log_spots(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> None:
+def log_spots(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
     """The spots of one capture: drawn into the picture, and as numbers for curves and for a later fit."""
     _draw(stream, spots, colors)
-    by_laser: dict[str | None, list[SpotRecord]] = defaultdict(list)
+    by_laser: dict[str | None, list[Spot]] = defaultdict(list)
     for spot in spots:
         by_laser[spot.laser_id].append(spot)
     for laser, found in by_laser.items():
@@ -53,14 +55,14 @@ def log_spots(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, 
 
 
 def log_assigned(
-    stream: Stream, spots: Sequence[SpotRecord], lasers: Sequence[LaserRange], colors: Mapping[str, at.Rgb]
+    stream: Stream, spots: Sequence[Spot], lasers: Sequence[LaserRange], colors: Mapping[str, at.Rgb]
 ) -> None:
     """The picture's spots again, now that a reading has told whose they are; a stray one stays nameless."""
-    named = [spot.model_copy(update={"laser_id": _owner(spot, lasers)}) for spot in spots]
+    named = [replace(spot, laser_id=_owner(spot, lasers)) for spot in spots]
     _draw(stream, named, colors)
 
 
-def _owner(spot: SpotRecord, lasers: Sequence[LaserRange]) -> str | None:
+def _owner(spot: Spot, lasers: Sequence[LaserRange]) -> str | None:
     """The laser that was ranged by this very spot."""
     for one in lasers:
         if one.u_px is None or one.v_px is None:
@@ -77,12 +79,12 @@ def _curve(quantity: str, laser: str | None) -> str:
     return at.under(at.SPOTS, quantity, laser)
 
 
-def _draw(stream: Stream, spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> None:
+def _draw(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
     stream.log(at.SPOTS_IN_IMAGE, _dots(spots, colors))
     stream.log(at.RINGS_IN_IMAGE, _rings(spots, colors))
 
 
-def _dots(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
+def _dots(spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
     return rr.Points2D(
         [(spot.u_px + RERUN_PIXEL_CENTRE, spot.v_px + RERUN_PIXEL_CENTRE) for spot in spots],
         colors=[_color(spot, colors) for spot in spots],
@@ -92,7 +94,7 @@ def _dots(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.Point
     )
 
 
-def _rings(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.LineStrips2D:
+def _rings(spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> rr.LineStrips2D:
     """A ring about each spot: a dot large enough to be seen would cover the very light that it marks."""
     turn = np.linspace(0.0, 2 * np.pi, _RING_CORNERS + 1)
     ring = _RING_PX * np.column_stack([np.cos(turn), np.sin(turn)]) + RERUN_PIXEL_CENTRE
@@ -103,10 +105,10 @@ def _rings(spots: Sequence[SpotRecord], colors: Mapping[str, at.Rgb]) -> rr.Line
     )
 
 
-def _color(spot: SpotRecord, colors: Mapping[str, at.Rgb]) -> at.Rgb:
+def _color(spot: Spot, colors: Mapping[str, at.Rgb]) -> at.Rgb:
     return colors.get(spot.laser_id or at.UNASSIGNED, at.WHITE)
 
 
-def _label(spot: SpotRecord) -> str:
-    flags = f" ({', '.join(spot.flags)})" if spot.flags else ""
+def _label(spot: Spot) -> str:
+    flags = f" ({', '.join(sorted(spot.flags))})" if spot.flags else ""
     return f"{spot.laser_id or '?'}{flags}"

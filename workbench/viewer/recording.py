@@ -15,6 +15,7 @@ from types import TracebackType
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
+from workbench.model.spot import Spot
 from workbench.model.target import Placement
 from workbench.viewer import camera, fit, scene, steps
 from workbench.viewer import entities as at
@@ -97,7 +98,7 @@ class _OpenRecording:
         self._placement: Placement | None = None
         self._captures: dict[str, tuple[int, ev.CaptureTaken, Placement | None]] = {}
         self._exposure = Moment(0, 0, 0)
-        self._spots: tuple[ev.SpotRecord, ...] = ()
+        self._spots: tuple[Spot, ...] = ()
         self._capture = 0
         self._step = 0
 

@@ -9,8 +9,9 @@ from math import cos, pi, radians, sin, tan
 import numpy as np
 import rerun as rr
 
-from workbench.model.event import LaserRange, SpotRecord
+from workbench.model.event import LaserRange
 from workbench.model.rig import CameraSpec
+from workbench.model.spot import Spot
 from workbench.model.target import (
     BoardTarget,
     CylinderTarget,
@@ -75,7 +76,7 @@ def log_target(stream: Stream, placement: Placement, geometry: Geometry) -> None
 
 def log_spots_on_target(
     stream: Stream,
-    spots: Sequence[SpotRecord],
+    spots: Sequence[Spot],
     placement: Placement,
     geometry: Geometry,
     colors: Mapping[str, at.Rgb],

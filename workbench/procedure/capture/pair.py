@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from workbench.calibration.data.spot_rows import prior_scanline
@@ -185,22 +185,7 @@ class PairSource:
 
 def spots_found(key: str, finding: Finding, laser_ids: Sequence[str]) -> ev.SpotsFound:
     """The record of what was found in a capture; of a laser alone, its one spot is the laser's."""
-    only = laser_ids[0] if len(laser_ids) == 1 and len(finding.spots) == 1 else None
-    return ev.SpotsFound(
-        key=key,
-        spots=tuple(
-            ev.SpotRecord(
-                laser_id=only,
-                u_px=spot.u_px,
-                v_px=spot.v_px,
-                u_sd_px=spot.u_sd_px,
-                v_sd_px=spot.v_sd_px,
-                flux_dn=spot.flux_dn,
-                width_px=spot.width_px,
-                peak_dn=spot.peak_dn,
-                flags=tuple(sorted(spot.flags)),
-            )
-            for spot in finding.spots
-        ),
-        failures=tuple(finding.failures),
-    )
+    spots = finding.spots
+    if len(laser_ids) == 1 and len(spots) == 1:
+        spots = (replace(spots[0], laser_id=laser_ids[0]),)
+    return ev.SpotsFound(key=key, spots=spots, failures=tuple(finding.failures))

@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from workbench.model.limit import Limit
+from workbench.model.spot import Failure, Spot
 from workbench.model.yamlfile import FileModel
-
-SATURATED = "saturated"
-
-
-class SpotLike(Protocol):
-    """What is asked of a spot, of the finder's or of a record's."""
-
-    @property
-    def u_px(self) -> float: ...  # noqa: D102
-    @property
-    def v_px(self) -> float: ...  # noqa: D102
-    @property
-    def u_sd_px(self) -> float: ...  # noqa: D102
-    @property
-    def width_px(self) -> float: ...  # noqa: D102
-    @property
-    def flags(self) -> Collection[str]: ...  # noqa: D102
 
 
 class CaptureLimits(FileModel):
@@ -57,7 +40,7 @@ class Quality:
     v_px: float | None = None
 
 
-def quality_of(found: Sequence[Sequence[SpotLike]]) -> Quality:
+def quality_of(found: Sequence[Sequence[Spot]]) -> Quality:
     """Quality from the spots of each repeat."""
     spots = [one[0] for one in found if len(one) == 1]
     missing = 1 - len(spots) / len(found)
@@ -68,7 +51,7 @@ def quality_of(found: Sequence[Sequence[SpotLike]]) -> Quality:
     return Quality(
         repeats=len(found),
         missing=missing,
-        saturated=float(np.mean([SATURATED in spot.flags for spot in spots])),
+        saturated=float(np.mean([Failure.SATURATED in spot.flags for spot in spots])),
         snr=float(np.median([spot.width_px / spot.u_sd_px for spot in spots])),
         scatter_px=float(centres.std(axis=0, ddof=1).max()) if len(spots) > 1 else None,
         u_px=float(u_px),

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray
+from workbench.model.spot import Failure, Spot
 from workbench.spots.deblending.clusters import TAIL_WIDTHS, mixes, stands_alone
 from workbench.spots.deblending.joint_fit import Joint, evidence, fit_joint, halves, hidden_spot
 from workbench.spots.fit import Windows, fit_spots
@@ -22,7 +23,6 @@ from workbench.spots.measure import FittedSpot, spot_flags
 from workbench.spots.noise import Noise
 from workbench.spots.pair import PairSignal
 from workbench.spots.psf import principal_axes
-from workbench.spots.types import Failure, Spot
 
 # F statistic that a further spot must reach: with some hundred pixels, chance gives this once in 1e5.
 _EVIDENCE = 10.0

@@ -14,6 +14,7 @@ from workbench.model import event as ev
 from workbench.model.errors import AnswerNeededError, BadInputError
 from workbench.model.limit import Limit
 from workbench.model.prompt import Action, Answer, Prompt, Quantity
+from workbench.model.spot import Failure, Spot
 from workbench.model.target import Placement
 from workbench.procedure.capture.quality import quality_of
 from workbench.procedure.engine.check import check_file
@@ -191,8 +192,8 @@ def test_answers_that_nobody_asks_for_are_told_with_the_nearest_key(tmp_path: Pa
     assert lines[2] == "5: p: stands here again, after line 3; leave one of them"
 
 
-def spot(u: float, v: float, flags: tuple[str, ...] = ()) -> ev.SpotRecord:
-    return ev.SpotRecord(
+def spot(u: float, v: float, flags: tuple[Failure, ...] = ()) -> Spot:
+    return Spot(
         laser_id=None,
         u_px=u,
         v_px=v,
@@ -201,7 +202,7 @@ def spot(u: float, v: float, flags: tuple[str, ...] = ()) -> ev.SpotRecord:
         flux_dn=1,
         width_px=2,
         peak_dn=1,
-        flags=flags,
+        flags=frozenset(flags),
     )
 
 
@@ -214,7 +215,7 @@ def test_quality_is_what_the_repeats_say() -> None:
     assert quality.snr == pytest.approx(2 / 0.05)
     assert quality.scatter_px == pytest.approx(np.std(u, ddof=1))
     assert (quality.u_px, quality.v_px) == pytest.approx((np.mean(u), np.mean(v)))
-    assert quality_of([[spot(0, 0, ("saturated",))], [spot(0, 0)]]).saturated == 0.5
+    assert quality_of([[spot(0, 0, (Failure.SATURATED,))], [spot(0, 0)]]).saturated == 0.5
     assert quality_of([[]]).snr is None
     assert quality_of([[spot(0, 0)]]).scatter_px is None
 
