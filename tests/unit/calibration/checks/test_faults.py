@@ -11,12 +11,10 @@ import pytest
 from tests.support.board_world import PLACINGS, BoardWorld
 from tests.support.corrupted_data import exchanged, mirrored, moved, shifted, told_as
 from tests.support.rigs import World, board_rig, prior, thesis_rig
-from workbench.calibration.checks import hypotheses
-from workbench.calibration.checks.cross_validation import leave_each_out, rows_at
+from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.checks.faults import find_faults
 from workbench.calibration.checks.hypotheses import explain_misfit
 from workbench.calibration.data.observations import Observation, Rejected
-from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit
 from workbench.calibration.selection.outliers import fit_without_outliers
 from workbench.calibration.verdict.assessment import Assessment, judge
 from workbench.model.acceptance import Acceptance
@@ -122,27 +120,6 @@ def test_few_standoffs_that_are_near_are_not_called_far(seed: int, standoffs_mm:
 def test_lasers_read_across_their_line_alone_are_not_called_far() -> None:
     observations = [replace(s, u_px=float("nan")) for s in World(RIG, 1).observations()]
     assert find_faults(fit_without_outliers(RIG, observations), ()) == ()
-
-
-def test_what_leaving_a_placement_out_gains_is_known_to_first_order() -> None:
-    fit = fit_without_outliers(RIG, World(RIG, 3).observations())
-    problem = problem_of(fit)
-    state = refit(problem, measured(problem), optimum_of(fit))
-    for index in range(len(fit.cells.placements)):
-        rows = rows_at(problem, index)
-        gain = state.cost - refit(problem, state.used & ~rows, np.zeros(len(state.y))).cost
-        assert hypotheses._gain_without(state, rows) == pytest.approx(gain, rel=0.1)
-
-
-@pytest.mark.parametrize(("standoff_mm", "off_mm"), [(900.0, 4.5), (900.0, 5.0), (1400.0, 12.0)])
-def test_nothing_is_missed_where_no_refit_is_made(
-    standoff_mm: float, off_mm: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    observations = told_as(World(RIG, 20_001).observations(), standoff_mm, standoff_mm + off_mm)
-    fit = fit_without_outliers(RIG, observations)
-    quick = explain_misfit(fit)
-    monkeypatch.setattr(hypotheses, "CLEARLY_LESS", 0.0)
-    assert [(h.kind, h.subject) for h in quick] == [(h.kind, h.subject) for h in explain_misfit(fit)]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
