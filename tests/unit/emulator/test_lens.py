@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from tests.support.ideal import CX, CY, FISHEYE, F, ideal_rig, laser, moments, painted
+from tests.support.rigs import opencv_pixels
 from workbench.emulator.lens import Lens
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.truth import Truth, draw_truth
+from workbench.model.errors import BadInputError
 
 LENSES = {
     "plumb_bob": Truth(F, CX, CY, -0.25, 0.1, 0.002, 0.001, 0.0, 0.0, 0.0, {}),
@@ -82,3 +84,28 @@ def test_splines_between_pixels_agree_with_newton(name: str) -> None:
     exact_sight = lens.back_project(uu.ravel(), vv.ravel())
     assert np.abs(fine.x.ravel() - exact_sight.x).max() * F < 1e-7
     assert fine.area.ravel() == pytest.approx(exact_sight.area, rel=1e-7)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_points_are_where_opencv_has_them(name: str) -> None:
+    truth = LENSES[name]
+    coefficients = {"plumb_bob": ("k1", "k2", "p1", "p2", "k3"), "equidistant": ("k1", "k2", "k3", "k4")}
+    values = [truth.f_px, truth.cx_px, truth.cy_px, *(getattr(truth, k) for k in coefficients[name])]
+    points = np.array([[60.0, -30.0, 200.0], [-100.0, 80.0, 400.0], [0.0, 0.0, 50.0]])
+    np.testing.assert_allclose(Lens(truth).project(points), opencv_pixels(truth.lens, values, points))
+
+
+def test_a_focal_length_that_drifted_scales_the_picture_about_its_centre() -> None:
+    pinhole = Truth(F, CX, CY, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {})
+    points = np.array([[60.0, -30.0, 200.0], [-100.0, 80.0, 400.0]])
+    drifted, centred = Lens(pinhole, 1.01).project(points), Lens(pinhole).project(points)
+    np.testing.assert_allclose(drifted - [CX, CY], 1.01 * (centred - [CX, CY]))
+
+
+def test_a_pixel_that_no_line_of_sight_leads_to_is_refused() -> None:
+    folding = Truth(F, CX, CY, -0.45, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {})
+    # r (1 - 0.45 r^2) grows up to 0.574 focal lengths.
+    inside, outside = CX + 0.55 * F, CX + 0.6 * F
+    assert Lens(folding).back_project(np.array([inside]), np.array([CY])).x[0] > 0.55
+    with pytest.raises(BadInputError):
+        Lens(folding).back_project(np.array([outside]), np.array([CY]))

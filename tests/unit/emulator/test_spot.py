@@ -9,6 +9,12 @@ import pytest
 from scipy.stats import norm
 
 from tests.support.ideal import CX, CY, F, ideal_rig, laser, moments, painted, scene_of
+from workbench.emulator.beam import Beam
+from workbench.emulator.lens import Lens
+from workbench.emulator.spec import emulator_spec
+from workbench.emulator.spot import ImageFormat, SpotPainter
+from workbench.emulator.surfaces import Plane
+from workbench.emulator.truth import draw_truth
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 
 
@@ -120,3 +126,30 @@ def test_pixels_integrate_small_spots(tmp_path: Path, z_mm: float, within_px: fl
         assert centre[0] - whole == pytest.approx(mean, abs=within_px)
         spread = float(shares @ (edges[:-1] + 0.5 - mean) ** 2)
         assert variance[0] == pytest.approx(spread, abs=within_px, rel=5e-3)
+
+
+def test_what_misses_the_surface_or_the_picture_is_no_spot(tmp_path: Path) -> None:
+    rig = ideal_rig(laser("L", 60.0))
+    spec = emulator_spec(rig)
+    truth = draw_truth(rig, spec)
+    painter = SpotPainter(spec, Lens(truth), ImageFormat(640, 480), truth.f_px)
+    beam = Beam(truth.lasers["L"], spec.beam)
+    wall = Plane(500.0, 0.0, 0.0, 0.8)
+    assert painter.paint(beam, wall, 1.0, ("P", "L")) is not None
+    assert painter.paint(beam, Plane(60.0, 0.0, 0.0, 0.8), 1.0, ("P", "L")) is None
+    narrow = Plane(500.0, 0.0, 0.0, 0.8, half_width_mm=20.0)
+    assert painter.paint(beam, narrow, 1.0, ("P", "L")) is None
+    half, whole = (painter.paint(beam, wall, gain, ("P", "L")) for gain in (0.5, 1.0))
+    assert half is not None
+    assert whole is not None
+    np.testing.assert_allclose(half.rate, whole.rate / 2, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("x_mm", "cut"), [(60.0, False), (63.8, True)])
+def test_the_window_of_a_spot_ends_at_the_picture_s_edge(tmp_path: Path, x_mm: float, cut: bool) -> None:
+    """63.8 mm at 106.3 mm is at u = 639.6 px, of 639.5."""
+    spot = painted(ideal_rig(laser("L", x_mm)), tmp_path, 106.3)
+    right = spot.left + spot.rate.shape[1]
+    assert right <= 640
+    assert (right == 640) == cut
+    assert (spot.rate[:, -1].max() > 0.1 * spot.rate.max()) == cut
