@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.message_text import laser_ids, numbers
 from tests.support.rigs import World, prior, thesis_rig
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.verdict.assessment import CONTRADICTION_SD, Assessment, basis, derive, judge
@@ -23,17 +24,23 @@ def judged(fitted: CalibrationFit, worst: float = 0.01, **limits: float) -> Asse
 
 
 def test_limits_that_fail_are_named(fitted: CalibrationFit) -> None:
-    assert "expected at most 0.001 px" in judged(fitted, max_rms_px=0.001).reasons[0]
-    assert "up to 30 % of it, expected at most 5 %" in judged(fitted, worst=0.3).reasons[0]
-    assert "seen at 11 standoffs, expected at least 12" in judged(fitted, min_standoffs=12).reasons[1]
+    (rms,) = judged(fitted, max_rms_px=0.001).reasons
+    assert numbers(rms)[:2] == [pytest.approx(fitted.rms_px, abs=0.005), 0.001]
+    (relative,) = judged(fitted, worst=0.3).reasons
+    assert numbers(relative)[:2] == [30.0, 5.0]
+    few = judged(fitted, min_standoffs=12).reasons
+    assert [laser_ids(reason) for reason in few] == [["L1"], ["L2"], ["L3"], ["L4"]]
+    assert [numbers(reason) for reason in few[1:3]] == [[11.0, 12.0]] * 2
     assert judged(fitted, worst=float("nan")).verdict == "refused"
 
 
 def test_a_laser_that_never_lit_is_named() -> None:
     rig = thesis_rig()
     observations = [s for s in World(rig, 1).observations(repeats=1) if s.laser_id != "L2"]
-    (reason,) = judged(fit(rig, observations)).reasons
-    assert reason.startswith("laser L2 never lit: no capture is of it. Do: check its supply")
+    found = judged(fit(rig, observations))
+    assert [fault.name for fault in found.faults] == ["never_lit"]
+    assert found.reasons == (found.faults[0].message,)
+    assert laser_ids(found.reasons[0]) == ["L2"]
 
 
 @pytest.mark.parametrize(
