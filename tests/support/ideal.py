@@ -16,6 +16,8 @@ from workbench.model.rig import Rig
 from workbench.model.target import FlatTarget, Placement, TargetShape
 
 F, CX, CY = 533.3, 319.5, 239.5
+FISHEYE = {"lens": "equidistant", "f_px": {"value": 305.6, "sd": 0.0}}
+"""A camera of 120 degrees from the left edge to the right."""
 
 
 def exact(value: float) -> dict[str, float]:

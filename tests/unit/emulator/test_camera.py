@@ -11,47 +11,19 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.support.ideal import exact, ideal_rig, laser, moments
-from workbench.devices.registry import open_bench as open_named_bench
-from workbench.emulator import EmulatedBench, open_bench
+from tests.support.virtual_bench import emulated_thesis, put, shot
+from workbench.emulator import open_bench
 from workbench.emulator.spot import Spot
 from workbench.model.arrays import Image
-from workbench.model.rig import Rig, load_rig
-from workbench.model.target import FlatTarget, Placement
-from workbench.model.yamlfile import parse_document
-
-THESIS = load_rig(Path(__file__).parents[3] / "rigs" / "thesis-emulated.yaml")
-
-
-def thesis_rig(**emulator: Any) -> Rig:
-    return THESIS.model_copy(update={"emulator": {"seed": 2001, **emulator}})
-
-
-def put(bench: EmulatedBench, standoff_mm: float, key: str = "P") -> None:
-    bench.target.place(Placement(key=key, standoff_mm=standoff_mm, target=FlatTarget()))
-
-
-def shot(bench: EmulatedBench, key: str) -> Image:
-    bench.mark(key)
-    with bench.lasers.lit(bench.lasers.ids, for_s=5.0):
-        return bench.camera.grab().image
 
 
 def brightness(image: Image) -> int:
     return int(np.sum(image > 100))
 
 
-def test_the_rig_file_names_the_bench(tmp_path: Path) -> None:
-    with open_named_bench(THESIS, tmp_path / "s") as bench:
-        assert isinstance(bench, EmulatedBench)
-        frame = bench.camera.grab()
-    assert frame.image.shape == (480, 640)
-    assert frame.image.dtype == np.uint8
-    assert frame.time_ns > 1_600_000_000_000_000_000
-
-
 def test_same_key_same_bits(tmp_path: Path) -> None:
     def run(name: str, keys: list[str]) -> dict[str, Image]:
-        with open_bench(thesis_rig(), tmp_path / name) as bench:
+        with open_bench(emulated_thesis(), tmp_path / name) as bench:
             put(bench, 500.0)
             return {key: shot(bench, key) for key in keys}
 
@@ -62,7 +34,7 @@ def test_same_key_same_bits(tmp_path: Path) -> None:
 
 
 def test_frames_of_one_key_differ(tmp_path: Path) -> None:
-    with open_bench(thesis_rig(), tmp_path / "s") as bench:
+    with open_bench(emulated_thesis(), tmp_path / "s") as bench:
         bench.mark("k")
         a, b = bench.camera.grab().image, bench.camera.grab().image
         bench.mark("k")
@@ -70,19 +42,10 @@ def test_frames_of_one_key_differ(tmp_path: Path) -> None:
     assert not np.array_equal(a, b)
 
 
-def test_another_seed_is_another_bench(tmp_path: Path) -> None:
-    images = []
-    for seed in (1, 2):
-        with open_bench(thesis_rig(seed=seed), tmp_path / f"s{seed}") as bench:
-            put(bench, 500.0)
-            images.append(shot(bench, "k"))
-    assert not np.array_equal(images[0], images[1])
-
-
 @pytest.mark.parametrize("standoff", [125.0, 500.0, 2000.0, 5000.0])
 @pytest.mark.parametrize("seed", [2001, 7])
 def test_spots_are_bright_and_not_saturated(tmp_path: Path, standoff: float, seed: int) -> None:
-    with open_bench(thesis_rig(seed=seed), tmp_path / "s") as bench:
+    with open_bench(emulated_thesis(seed=seed), tmp_path / "s") as bench:
         put(bench, standoff)
         peak = int(shot(bench, "k").max())
         dark = bench.camera.grab().image
@@ -104,7 +67,7 @@ def test_exposure_and_gain_hold_from_the_next_frame(tmp_path: Path) -> None:
 
 def test_metering_has_limits(tmp_path: Path) -> None:
     camera = {"shortest_exposure_s": 1e-3, "longest_exposure_s": 2e-3}
-    with open_bench(thesis_rig(camera=camera), tmp_path / "s") as bench:
+    with open_bench(emulated_thesis(camera=camera), tmp_path / "s") as bench:
         put(bench, 200.0, "near")
         assert bench.camera.meter() == 1e-3
         put(bench, 5000.0, "far")
@@ -112,7 +75,9 @@ def test_metering_has_limits(tmp_path: Path) -> None:
 
 
 def test_frames_show_the_lasers_after_the_latency(tmp_path: Path) -> None:
-    with open_bench(thesis_rig(camera={"latency_frames": 3, "exposure_s": 7e-5}), tmp_path / "s") as bench:
+    with open_bench(
+        emulated_thesis(camera={"latency_frames": 3, "exposure_s": 7e-5}), tmp_path / "s"
+    ) as bench:
         put(bench, 500.0)
         with bench.lasers.lit(["L1"], for_s=5.0):
             seen = [brightness(bench.camera.read().image) > 0 for _ in range(5)]
@@ -122,7 +87,7 @@ def test_frames_show_the_lasers_after_the_latency(tmp_path: Path) -> None:
 
 
 def test_grab_discards_stale_frames(tmp_path: Path) -> None:
-    with open_bench(thesis_rig(camera={"latency_frames": 2}), tmp_path / "s") as bench:
+    with open_bench(emulated_thesis(camera={"latency_frames": 2}), tmp_path / "s") as bench:
         put(bench, 500.0)
         with bench.lasers.lit(["L1"], for_s=5.0):
             assert brightness(bench.camera.grab().image) > 0
@@ -135,14 +100,14 @@ def test_grab_discards_stale_frames(tmp_path: Path) -> None:
 def test_latency_does_not_change_the_bits_of_a_capture(tmp_path: Path) -> None:
     images = []
     for run in range(2):
-        with open_bench(thesis_rig(camera={"latency_frames": 2}), tmp_path / f"s{run}") as bench:
+        with open_bench(emulated_thesis(camera={"latency_frames": 2}), tmp_path / f"s{run}") as bench:
             put(bench, 500.0)
             images += [shot(bench, key) for key in ("a", "b")[run:]]
     assert np.array_equal(images[1], images[2])
 
 
 def test_repeated_frames_come_again_whole(tmp_path: Path) -> None:
-    with open_bench(thesis_rig(camera={"repeated": 0.3}), tmp_path / "s") as bench:
+    with open_bench(emulated_thesis(camera={"repeated": 0.3}), tmp_path / "s") as bench:
         bench.mark("k")
         frames = [bench.camera.read().image for _ in range(60)]
     again = sum(np.array_equal(a, b) for a, b in pairwise(frames))
@@ -151,7 +116,7 @@ def test_repeated_frames_come_again_whole(tmp_path: Path) -> None:
 
 def test_dropped_frames_are_missing_from_the_stream(tmp_path: Path) -> None:
     def stream(name: str, dropped: float, count: int) -> list[bytes]:
-        with open_bench(thesis_rig(camera={"dropped": dropped}), tmp_path / name) as bench:
+        with open_bench(emulated_thesis(camera={"dropped": dropped}), tmp_path / name) as bench:
             bench.mark("k")
             return [bench.camera.read().image.tobytes() for _ in range(count)]
 
@@ -164,7 +129,7 @@ def test_dropped_frames_are_missing_from_the_stream(tmp_path: Path) -> None:
 def test_mirrored_image_exchanges_left_and_right(tmp_path: Path) -> None:
     images = []
     for mirrored in (False, True):
-        rig = thesis_rig(camera={"mirrored": mirrored})
+        rig = emulated_thesis(camera={"mirrored": mirrored})
         with open_bench(rig, tmp_path / str(mirrored)) as bench:
             put(bench, 500.0)
             images.append(shot(bench, "k"))
@@ -216,51 +181,10 @@ def _centre(image: NDArray[Any]) -> float:
 
 
 def test_a_stuck_beam_shows_in_a_dark_frame(tmp_path: Path) -> None:
-    with open_bench(thesis_rig(), tmp_path / "s") as bench:
+    with open_bench(emulated_thesis(), tmp_path / "s") as bench:
         put(bench, 500.0)
         bench.controller.fault = "hides_stuck_beam"
         with bench.lasers.lit(["L1"], for_s=0.2):
             pass
         assert brightness(bench.camera.grab().image) > 0
         bench.controller.fault = "none"
-
-
-@pytest.mark.parametrize("seed", [2001, 4, 12])
-def test_a_whole_bench_shows_its_truth(tmp_path: Path, seed: int) -> None:
-    """Centroids of on - off, laser by laser, against the written truth through a textbook lens."""
-    misses = []
-    with open_bench(thesis_rig(seed=seed), tmp_path / "s") as bench:
-        for standoff in (300.0, 800.0, 2500.0):
-            put(bench, standoff, f"P{standoff}")
-            truth = _read(tmp_path / "s.truth.yaml")
-            for name in bench.lasers.ids:
-                bench.mark(f"{standoff} {name}")
-                with bench.lasers.lit([name], for_s=5.0):
-                    on = bench.camera.grab().image.astype(np.float64)
-                off = bench.camera.grab().image.astype(np.float64)
-                u, v = _predicted(truth, name, standoff, f"P{standoff}")
-                left, top = round(u) - 8, round(v) - 8
-                window = np.maximum((on - off)[top : top + 17, left : left + 17] - 6.0, 0)
-                centre, _ = moments(Spot(left, top, window.astype(np.float32)))
-                misses.append(centre - [u, v])
-    # Speckle's 0.04 px, and what a thresholded centroid adds.
-    assert np.sqrt(np.mean(np.square(misses))) < 0.08
-    assert np.abs(np.mean(misses, axis=0)).max() < 0.04
-
-
-def _predicted(truth: Any, name: str, standoff: float, key: str) -> tuple[float, float]:
-    laser, placed = truth["lasers"][name], truth["placements"][key]
-    z0 = standoff * (1 + truth["ruler_scale"]) + placed["error_mm"] + truth["offset_mm"]
-    slope = np.tan(np.radians([placed["yaw_deg"], placed["pitch_deg"]]))
-    start, direction = np.array([laser["x_mm"], laser["y_mm"]]), np.array([laser["tx"], laser["ty"]])
-    z = (z0 + slope @ start) / (1 - slope @ direction)
-    x, y = (start + z * direction) / z
-    radial = 1 + truth["k1"] * (x * x + y * y) + truth["k2"] * (x * x + y * y) ** 2
-    return (
-        float(truth["cx_px"] + truth["f_px"] * x * radial),
-        float(truth["cy_px"] + truth["f_px"] * y * radial),
-    )
-
-
-def _read(path: Path) -> Any:
-    return parse_document(path.read_text(), path).data

@@ -9,17 +9,13 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from tests.support.ideal import exact, ideal_rig, laser, scene_of
-from workbench.emulator import open_bench
-from workbench.emulator.keyed import generator
+from tests.support.ideal import FISHEYE, exact, ideal_rig, laser, scene_of
+from tests.support.virtual_bench import THESIS, read_truth
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.truth import Truth, draw_placement_error, draw_truth
 from workbench.model.errors import BadInputError
-from workbench.model.rig import Rig, load_rig
+from workbench.model.rig import Rig
 from workbench.model.target import Placement
-from workbench.model.yamlfile import parse_document
-
-THESIS = load_rig(Path(__file__).parents[3] / "rigs" / "thesis-emulated.yaml")
 
 
 def truth_of(seed: int, **pins: Any) -> Truth:
@@ -76,34 +72,10 @@ def test_placement_errors_follow_their_tolerances_and_keys() -> None:
     assert draw_placement_error(THESIS, spec, "P7") == errors[7]
 
 
-def test_keys_do_not_run_into_each_other() -> None:
-    draws = [generator(1, *key).random() for key in (("ab", "c"), ("a", "bc"), ("abc",), ("c", "ab"))]
-    assert len(set(draws)) == 4
-    assert generator(1, "ab", "c").random() == draws[0]
-    assert generator(2, "ab", "c").random() != draws[0]
-
-
-def test_truth_lies_beside_the_session(tmp_path: Path) -> None:
-    session = tmp_path / "sessions" / "one"
-    for keys in (("P1", 'odd: "key" #2'), ("P1", "P3")):  # the second time as after a stop
-        with open_bench(THESIS, session) as bench:
-            for key in keys:
-                bench.target.place(Placement(key=key, standoff_mm=500.0))
-    written = _read(session.parent / "one.truth.yaml")
-    spec = emulator_spec(THESIS)
-    truth = draw_truth(THESIS, spec)
-    assert float(written["f_px"]) == truth.f_px
-    assert float(written["lasers"]["L3"]["tx"]) == truth.lasers["L3"].tx
-    assert set(written["placements"]) == {"P1", 'odd: "key" #2', "P3"}
-    assert float(written["placements"]["P3"]["yaw_deg"]) == draw_placement_error(THESIS, spec, "P3").yaw_deg
-    assert not session.exists()
-    assert "np." not in (session.parent / "one.truth.yaml").read_text()
-
-
 def test_another_truth_begins_its_file_anew(tmp_path: Path) -> None:
     scene_of(ideal_rig(seed=1), tmp_path).place(Placement(key="old", standoff_mm=500.0))
     scene_of(ideal_rig(laser("L2", 30.0), seed=2), tmp_path).place(Placement(key="new", standoff_mm=500.0))
-    assert set(_read(tmp_path / "truth.yaml")["placements"]) == {"new"}
+    assert set(read_truth(tmp_path / "truth.yaml")["placements"]) == {"new"}
 
 
 def test_a_torn_line_is_dropped(tmp_path: Path) -> None:
@@ -111,22 +83,7 @@ def test_a_torn_line_is_dropped(tmp_path: Path) -> None:
     with (tmp_path / "truth.yaml").open("a") as file:
         file.write('  "B": {error_mm: 0.')
     scene_of(ideal_rig(), tmp_path)
-    assert set(_read(tmp_path / "truth.yaml")["placements"]) == {"A"}
-
-
-@pytest.mark.parametrize(
-    ("block", "says"),
-    [
-        (None, "emulator.seed: is missing"),
-        ({"seed": 1, "beam": {"power_mw": -1}}, r"emulator.beam.power_mw: expected more than 0.*, got -1"),
-        ({"seed": 1, "lense": {}}, "emulator.lense: no such key"),
-        ({"seed": 1, "truth": {"lasers": {"L9": {}}}}, r"emulator.truth: lasers.L9: expected .*L1"),
-    ],
-)
-def test_mistakes_are_named(tmp_path: Path, block: Any, says: str) -> None:
-    rig = THESIS.model_copy(update={"emulator": block})
-    with pytest.raises(BadInputError, match=says):
-        open_bench(rig, tmp_path / "s")
+    assert set(read_truth(tmp_path / "truth.yaml")["placements"]) == {"A"}
 
 
 def test_an_exact_rig_has_an_exact_truth() -> None:
@@ -145,5 +102,13 @@ def test_no_other_room_knows_the_truth() -> None:
         assert "emulator.truth" not in text, path
 
 
-def _read(path: Path) -> Any:
-    return parse_document(path.read_text(), path).data
+def test_a_fisheye_that_does_not_reach_the_corner_is_refused() -> None:
+    rig = ideal_rig(camera=FISHEYE, truth={"k1": -0.4})
+    with pytest.raises(BadInputError, match="k1, k2, k3, k4"):
+        draw_truth(rig, emulator_spec(rig))
+
+
+def test_a_lens_that_folds_is_refused() -> None:
+    rig = ideal_rig(truth={"k1": -2.0})
+    with pytest.raises(BadInputError, match="climbs to the image corner"):
+        draw_truth(rig, emulator_spec(rig))

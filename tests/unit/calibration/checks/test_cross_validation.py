@@ -13,8 +13,6 @@ from tests.support.rigs import STANDOFFS_MM, World, thesis_rig
 from workbench.calibration.checks.cross_validation import LeftOut, alarms, leave_each_out
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.estimation.fit import fit
-from workbench.calibration.estimation.problem import LeastSquaresProblem
-from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit, rows_of
 from workbench.calibration.verdict.assessment import judge
 from workbench.model.acceptance import Acceptance
 from workbench.model.captures import load_captures
@@ -30,41 +28,6 @@ FITS = 40
 def sound() -> list[tuple[LeftOut, ...]]:
     """The folds of simulated calibrations in which nothing is wrong."""
     return [leave_each_out(fit(RIG, World(RIG, seed).observations())) for seed in range(500, 500 + FITS)]
-
-
-@pytest.mark.parametrize("standoff_mm", [125.0, 600.0, 4500.0])
-def test_a_fold_is_the_fit_without_the_placement(standoff_mm: float) -> None:
-    observations = World(RIG, 1).observations()
-    whole = fit(RIG, observations)
-    without = fit(RIG, [s for s in observations if s.standoff_mm != standoff_mm])
-    problem = problem_of(whole)
-    cells = np.array([whole.cells.placements[i].standoff_mm == standoff_mm for i in whole.cells.placement])
-    left = refit(problem, measured(problem) & ~rows_of(cells, problem), optimum_of(whole))
-    sensor = whole.sensor
-    values = (whole.table.prior_mean + whole.table.prior_sd * left.y)[sensor]
-    free = whole.table.prior_sd[sensor] > 0
-    off = (values - without.values[sensor])[free] / without.sd[sensor][free]
-    assert np.abs(off).max() < 1e-3
-    sd = whole.table.prior_sd[sensor] * np.sqrt(np.diag(left.covariance)[sensor])
-    np.testing.assert_allclose(sd, without.sd[sensor], rtol=1e-3)
-
-
-def test_what_a_standoff_moves_is_its_difference() -> None:
-    problem, y = (
-        problem_of(fit(RIG, World(RIG, 1).observations())),
-        optimum_of(fit(RIG, World(RIG, 1).observations())),
-    )
-    step_mm = 1e-3
-    ahead, behind = (
-        LeastSquaresProblem(
-            problem.layout,
-            problem.data._replace(standoff_mm=np.asarray(problem.data.standoff_mm) + sign * step_mm),
-        ).linearise(y, 2.0)[0]
-        for sign in (1, -1)
-    )
-    np.testing.assert_allclose(
-        problem.by_standoff(y, 2.0), (ahead - behind) / (2 * step_mm), rtol=1e-6, atol=1e-8
-    )
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from workbench.calibration.data.averaging import strays
 from workbench.calibration.data.observations import Observation, group
 from workbench.model.errors import BadInputError
 from workbench.model.rig import NoiseSpec
@@ -71,16 +70,6 @@ def test_rows_that_say_two_things_of_one_placement() -> None:
     rows = observations([100.0, 101.0], [0.1] * 2)
     with pytest.raises(BadInputError, match=r"row 1: .*row 0 says of the same placement p .*got 600 mm"):
         group([rows[0], replace(rows[1], standoff_mm=600.0)], ["1"], NOISE)
-
-
-def test_honest_repeats_are_hardly_ever_rejected() -> None:
-    """As the comment of STRAY_SD says, also where the stated deviation is far too small."""
-    rng = np.random.default_rng(5)
-    draws = rng.normal(0.0, 1.0, (4000, 10, 2))
-    far = sum(int(strays(d, np.full((10, 2), 1e-3)).sum()) for d in draws)
-    right = sum(int(strays(d, np.full((10, 2), 1.0)).sum()) for d in draws)
-    assert right == 0
-    assert far < 2 * 4000 * 10 / 250
 
 
 def test_a_coordinate_never_measured_stays_unknown() -> None:

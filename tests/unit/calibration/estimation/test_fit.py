@@ -10,7 +10,6 @@ import pytest
 from scipy.optimize import least_squares
 
 from tests.support.rigs import STANDOFFS_MM, World, prior, thesis_rig
-from workbench.calibration.data.observations import Observation, Rejected
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.estimation.fit import CalibrationFit, data_share, fit
 from workbench.calibration.model.parameters import Parameter, ParameterTable
@@ -203,17 +202,6 @@ def test_a_laser_unknown_to_the_rig() -> None:
     observation = replace(World(rig, 1).observations()[0], laser_id="L9", source="row 7")
     with pytest.raises(BadInputError, match=r"row 7: laser_id: expected one of L1.*got L9"):
         fit(rig, [observation])
-
-
-@pytest.mark.parametrize(("standoff_mm", "cause"), [(40.0, "outside the picture, at u = "), (700.0, "dark")])
-def test_a_spot_that_cannot_be_in_the_picture_is_not_blamed_on_the_light(
-    standoff_mm: float, cause: str
-) -> None:
-    rig = thesis_rig()
-    observations = World(rig, 1).observations(repeats=1)
-    missing = Observation("row 9", "L4", "near", standoff_mm, 0, np.nan, np.nan)
-    result = fit(rig, observations, [Rejected("row 9", "too dark", missing)])
-    assert cause in result.rejected[0].reason
 
 
 def test_nothing_to_fit() -> None:

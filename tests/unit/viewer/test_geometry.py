@@ -1,4 +1,4 @@
-"""Geometry, colours and names on their own."""
+"""Geometry of the sensor for drawing: lines of sight, rays, and what a fit replaces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from tests.support.rigs import fisheye_rig
 from tests.viewer.session import a_fit, a_rig
 from workbench.model.target import FlatTarget
-from workbench.viewer.entities import laser_colors, under
 from workbench.viewer.geometry import Geometry
 
 
@@ -38,9 +37,3 @@ def test_fit_replaces_what_it_names_and_nothing_else() -> None:
     assert after.lens["f_px"] == 541.0
     assert after.lens["k1"] == before.lens["k1"]
     assert after.rays["L1"] == (-59.95, 0.0, 0.0011, 0.0)
-
-
-def test_lasers_have_colors_of_their_own_and_names_may_be_odd() -> None:
-    colors = laser_colors([str(i) for i in range(7)])
-    assert len(set(colors.values())) == 7
-    assert under("spots/u_px", "left / 650 nm") == "spots/u_px/left\\ \\/\\ 650\\ nm"

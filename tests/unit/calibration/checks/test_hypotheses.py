@@ -1,0 +1,98 @@
+"""Other accounts of the data: what a search finds, and what it saves by first order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.corrupted_data import exchanged, mirrored, shifted, told_as
+from tests.support.rigs import World, thesis_rig
+from workbench.calibration.checks import hypotheses
+from workbench.calibration.checks.cross_validation import rows_at
+from workbench.calibration.checks.hypotheses import explain_misfit, is_improbable
+from workbench.calibration.data.observations import Observation
+from workbench.calibration.estimation.fit import fit
+from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit
+from workbench.calibration.selection.outliers import fit_without_outliers
+
+RIG = thesis_rig()
+SEEDS = (1, 2, 3)
+
+
+def test_what_leaving_a_placement_out_gains_is_known_to_first_order() -> None:
+    fit = fit_without_outliers(RIG, World(RIG, 3).observations())
+    problem = problem_of(fit)
+    state = refit(problem, measured(problem), optimum_of(fit))
+    for index in range(len(fit.cells.placements)):
+        rows = rows_at(problem, index)
+        gain = state.cost - refit(problem, state.used & ~rows, np.zeros(len(state.y))).cost
+        assert hypotheses._gain_without(state, rows) == pytest.approx(gain, rel=0.1)
+
+
+@pytest.mark.parametrize(("standoff_mm", "off_mm"), [(900.0, 4.5), (900.0, 5.0), (1400.0, 12.0)])
+def test_nothing_is_missed_where_no_refit_is_made(
+    standoff_mm: float, off_mm: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    observations = told_as(World(RIG, 20_001).observations(), standoff_mm, standoff_mm + off_mm)
+    fit = fit_without_outliers(RIG, observations)
+    quick = explain_misfit(fit)
+    monkeypatch.setattr(hypotheses, "CLEARLY_LESS", 0.0)
+    assert [(h.kind, h.subject) for h in quick] == [(h.kind, h.subject) for h in explain_misfit(fit)]
+
+
+def kinds(observations: list[Observation]) -> list[tuple[str, tuple[int, ...]]]:
+    return [(h.kind, h.subject) for h in explain_misfit(fit(RIG, observations))]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_sound_data_need_no_other_account(seed: int) -> None:
+    assert kinds(World(RIG, seed).observations()) == []
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_exchanged_lasers_are_the_only_account(seed: int) -> None:
+    assert kinds(exchanged(World(RIG, seed).observations(), "L2", "L4")) == [("lasers_swapped", (1, 3))]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_mirrored_picture_is_the_only_account(seed: int) -> None:
+    world = World(RIG, seed)
+    assert kinds(mirrored(world, world.observations())) == [("mirrored", ())]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_wrong_standoff_is_freed_to_where_the_target_stood(seed: int) -> None:
+    fitted = fit(RIG, told_as(World(RIG, seed).observations(), 600.0, 6000.0))
+    (found,) = explain_misfit(fitted)
+    assert found.kind == "standoff"
+    (index,) = found.subject
+    assert fitted.cells.placements[index].standoff_mm == 6000.0
+    at_mm = float(np.asarray(found.state.problem.data.standoff_mm)[index])
+    assert at_mm == pytest.approx(600.0, abs=5 * RIG.bench.placement_sd_mm + 0.005 * 600.0)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_wrong_spots_are_left_out_and_the_rest_fits(seed: int) -> None:
+    observations = shifted(World(RIG, seed).observations(), "L2", 600.0, 12.0)
+    observations = shifted(observations, "L3", 210.0, -4.0)
+    fitted = fit(RIG, observations)
+    found = explain_misfit(fitted)
+    spots = {
+        (RIG.laser_ids[fitted.cells.laser[n]], fitted.cells.placements[fitted.cells.placement[n]].standoff_mm)
+        for h in found
+        for n in h.subject
+    }
+    assert {h.kind for h in found} == {"spot"}
+    assert spots == {("L2", 600.0), ("L3", 210.0)}
+    last = found[-1].state
+    assert not is_improbable(last)
+    for h in found:
+        assert not last.used[2 * h.subject[0]]
+
+
+def test_a_fit_far_worse_than_its_noise_is_improbable() -> None:
+    fitted = fit(RIG, World(RIG, 1).observations())
+    problem = problem_of(fitted)
+    state = refit(problem, measured(problem), optimum_of(fitted))
+    assert not is_improbable(state)
+    assert is_improbable(state.at(0.5))

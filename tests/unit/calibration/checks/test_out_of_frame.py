@@ -1,0 +1,61 @@
+"""Spots that the fit puts outside the picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.rigs import World, thesis_rig
+from workbench.calibration.checks.out_of_frame import name_out_of_frame
+from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.estimation.fit import CalibrationFit, fit
+
+
+@pytest.mark.parametrize(("standoff_mm", "cause"), [(40.0, "outside the picture, at u = "), (700.0, "dark")])
+def test_a_spot_that_cannot_be_in_the_picture_is_not_blamed_on_the_light(
+    standoff_mm: float, cause: str
+) -> None:
+    rig = thesis_rig()
+    observations = World(rig, 1).observations(repeats=1)
+    missing = Observation("row 9", "L4", "near", standoff_mm, 0, np.nan, np.nan)
+    result = fit(rig, observations, [Rejected("row 9", "too dark", missing)])
+    assert cause in result.rejected[0].reason
+
+
+@pytest.fixture(scope="module")
+def fitted() -> CalibrationFit:
+    return fit(thesis_rig(), World(thesis_rig(), 1).observations(repeats=1))
+
+
+def missing(laser_id: str, standoff_mm: float) -> Rejected:
+    return Rejected("row 9", "too dark", Observation("row 9", laser_id, "p", standoff_mm, 0, np.nan, np.nan))
+
+
+@pytest.mark.parametrize(("laser_id", "side"), [("L1", -0.5), ("L4", 639.5)])
+def test_the_limit_is_the_edge_of_the_outermost_pixel(
+    fitted: CalibrationFit, laser_id: str, side: float
+) -> None:
+    """The standoff at which the fitted spot crosses the edge, found by bisection of its curve."""
+    index, offset = fitted.rig.laser_ids.index(laser_id), fitted.layout.offset
+
+    def u(standoff_mm: float) -> float:
+        depth = standoff_mm * (1 + fitted.values[fitted.layout.ruler_scale]) + fitted.values[offset]
+        return float(fitted.curves.spots(np.array([index]), np.array([1 / depth]))[0, 0])
+
+    near, far = 30.0, 3000.0
+    for _ in range(60):
+        middle = (near + far) / 2
+        beyond = u(middle) < side if side < 0 else u(middle) > side
+        near, far = (middle, far) if beyond else (near, middle)
+    told = [missing(laser_id, factor * far) for factor in (0.999, 1.001)]
+    outside, inside = name_out_of_frame(fitted.rig, fitted.values, told)
+    assert outside.reason != "too dark"
+    assert inside == told[1]
+
+
+def test_everything_but_the_reason_stays(fitted: CalibrationFit) -> None:
+    far_out = missing("L4", 40.0)
+    seen = Rejected("row 3", "stray", stray=far_out.missing)
+    renamed, other = name_out_of_frame(fitted.rig, fitted.values, [far_out, seen])
+    assert other == seen
+    assert (renamed.source, renamed.missing) == (far_out.source, far_out.missing)

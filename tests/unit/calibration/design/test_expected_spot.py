@@ -1,0 +1,72 @@
+"""Where a spot that was not seen should be, by priors alone and by spots seen elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.rigs import World, thesis_rig
+from workbench.calibration.design.expected_spot import SURE_SD, expected_spot
+from workbench.model.arrays import FloatArray
+from workbench.model.nested import fix_parameters
+
+RIG = thesis_rig()
+SEEDS = range(20)
+
+
+def true_spot(world: World, laser_id: str, standoff_mm: float) -> FloatArray:
+    """On a square target without an error of its placement."""
+    return world.pixel(laser_id, standoff_mm * (1 + world.values["ruler_scale"]) + world.values["offset_mm"])
+
+
+def test_without_spots_it_is_the_rig_file_s() -> None:
+    found = expected_spot(RIG, [], "L4", 600.0)
+    assert (found.u_px, found.v_px) == pytest.approx((319.5 + 533.3 * 60 / 600, 239.5), abs=1e-6)
+    # cx, f, the baseline, the pointing and the offset, each by its prior; the lens is straight there.
+    parts = [40.0, 26.7 * 0.1, 533.3 * 0.2 / 600, 533.3 * 0.005, 53.33 * 5.0 / 600]
+    assert found.u_sd_px == pytest.approx(np.linalg.norm(parts), rel=2e-3)
+
+
+@pytest.mark.parametrize("standoff_mm", [300.0, 2000.0])
+def test_spots_elsewhere_put_it_where_it_is(standoff_mm: float) -> None:
+    """Errors in units of the stated deviation, over 20 rigs and both coordinates."""
+    scores = []
+    for seed in SEEDS:
+        world = World(RIG, seed)
+        found = expected_spot(RIG, world.observations((400.0, 900.0), repeats=2), "L3", standoff_mm)
+        miss = true_spot(world, "L3", standoff_mm) - [found.u_px, found.v_px]
+        scores += (miss / [found.u_sd_px, found.v_sd_px]).tolist()
+        assert found.u_sd_px < 3.0
+        assert np.abs(miss).max() < 10.0
+    # The placement's own error and tilt, which the deviation includes, are 0 here: less than 1.
+    assert np.sqrt(np.mean(np.square(scores))) < 1.3
+
+
+def test_more_spots_leave_less_doubt() -> None:
+    observations = World(RIG, 1).observations((400.0, 900.0, 2200.0), repeats=2)
+    near = [s for s in observations if s.standoff_mm == 400.0]
+    sd = [expected_spot(RIG, seen, "L2", 300.0).u_sd_px for seen in ([], near, observations)]
+    assert sd[0] > sd[1] > sd[2]
+
+
+@pytest.mark.parametrize(
+    ("standoff_mm", "place"), [(60.0, "outside"), (100.0, "at the edge"), (300.0, "inside")]
+)
+def test_a_spot_is_outside_inside_or_at_the_edge(standoff_mm: float, place: str) -> None:
+    rig = fix_parameters(RIG, ("k1", "k2"))
+    world = World(rig, 1)
+    world.values |= {"offset_mm": 0.0, "L4.tx": 0.0}
+    world.values |= {"f_px": 533.3, "cx_px": 319.5, "L4.x_mm": 60.0}
+    found = expected_spot(rig, world.observations((200.0, 900.0, 2200.0)), "L4", standoff_mm)
+    assert found.place == place
+    inwards = min(found.u_px + 0.5, 639.5 - found.u_px) / found.u_sd_px
+    assert (inwards > SURE_SD, inwards < -SURE_SD) == (place == "inside", place == "outside")
+
+
+def test_a_laser_s_spots_alone_place_it_across_the_line_too() -> None:
+    world = World(RIG, 3)
+    own = [s for s in world.observations((400.0, 900.0)) if s.laser_id == "L1"]
+    found = expected_spot(RIG, own, "L1", 600.0)
+    miss = true_spot(world, "L1", 600.0) - [found.u_px, found.v_px]
+    assert np.abs(miss / [found.u_sd_px, found.v_sd_px]).max() < 4.0
+    assert found.v_sd_px < 2.0

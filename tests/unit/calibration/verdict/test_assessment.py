@@ -1,0 +1,101 @@
+"""The verdict on a fit: limits, faults, and what makes it accepted or refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.support.message_text import laser_ids, numbers
+from tests.support.rigs import World, prior, thesis_rig
+from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.calibration.verdict.assessment import CONTRADICTION_SD, Assessment, basis, derive, judge
+from workbench.model.acceptance import Acceptance
+
+
+@pytest.fixture(scope="module")
+def fitted() -> CalibrationFit:
+    return fit(thesis_rig(), World(thesis_rig(), 1).observations())
+
+
+def judged(fitted: CalibrationFit, worst: float = 0.01, **limits: float) -> Assessment:
+    return judge(fitted, Acceptance.model_validate(limits), worst)
+
+
+def test_limits_that_fail_are_named(fitted: CalibrationFit) -> None:
+    (rms,) = judged(fitted, max_rms_px=0.001).reasons
+    assert numbers(rms)[:2] == [pytest.approx(fitted.rms_px, abs=0.005), 0.001]
+    (relative,) = judged(fitted, worst=0.3).reasons
+    assert numbers(relative)[:2] == [30.0, 5.0]
+    few = judged(fitted, min_standoffs=12).reasons
+    assert [laser_ids(reason) for reason in few] == [["L1"], ["L2"], ["L3"], ["L4"]]
+    assert [numbers(reason) for reason in few[1:3]] == [[11.0, 12.0]] * 2
+    assert judged(fitted, worst=float("nan")).verdict == "refused"
+
+
+def test_a_laser_that_never_lit_is_named() -> None:
+    rig = thesis_rig()
+    observations = [s for s in World(rig, 1).observations(repeats=1) if s.laser_id != "L2"]
+    found = judged(fit(rig, observations))
+    assert [fault.name for fault in found.faults] == ["never_lit"]
+    assert found.reasons == (found.faults[0].message,)
+    assert laser_ids(found.reasons[0]) == ["L2"]
+
+
+@pytest.mark.parametrize(
+    ("share", "sd", "prior_sd", "rests_on"),
+    [
+        (0.9, 1.0, 1.0, "data"),
+        (0.89, 0.91, 1.0, "prior"),
+        (0.89, 0.89, 1.0, "joint"),
+        (0.0, 0.0, 0.0, "prior"),
+    ],
+)
+def test_a_parameter_rests_on_data_prior_or_both(
+    share: float, sd: float, prior_sd: float, rests_on: str
+) -> None:
+    assert basis(share, sd, prior_sd) == rests_on
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_derived_quantities_carry_the_whole_covariance(seed: int) -> None:
+    """f b and the vanishing point against draws from the posterior, projected by OpenCV's lens."""
+    world = World(thesis_rig(), seed)
+    result = fit(world.rig, world.observations())
+    names = [p.name for p in result.table.parameters][result.sensor]
+    draws = np.random.default_rng(seed).multivariate_normal(
+        result.values[result.sensor], result.covariance[result.sensor, result.sensor], 1000, method="eigh"
+    )
+    for one in derive(result):
+        products, vanishing = [], []
+        for values in draws:
+            world.values = dict(zip(names, values, strict=True))
+            own = [world.values[f"{one.laser_id}.{name}"] for name in ("x_mm", "y_mm", "tx", "ty")]
+            products.append(world.values["f_px"] * np.hypot(own[0], own[1]))
+            vanishing.append(world.pixels(np.array([[*own[2:], 1.0]]))[0, 0])
+        # 1000 draws know a deviation to 2.2 %, a mean to 3.2 % of it.
+        assert one.f_b_sd == pytest.approx(np.std(products), rel=0.09)
+        assert one.f_b_px_mm == pytest.approx(np.mean(products), abs=0.13 * one.f_b_sd)
+        assert one.infinity_sd == pytest.approx(np.std(vanishing), rel=0.09)
+        assert one.infinity_px == pytest.approx(np.mean(vanishing), abs=0.13 * one.infinity_sd)
+
+
+def test_a_prior_that_the_data_contradict_refuses() -> None:
+    """An offset of 40 mm where the rig file says 0 +- 5 mm, and where it says 0 +- 40 mm."""
+    rig = thesis_rig()
+    world = World(rig, 1)
+    world.values["offset_mm"] = 40.0
+    observations = world.observations()
+    bench = rig.bench.model_copy(update={"offset_mm": prior(0.0, 40.0)})
+    narrow, wide = fit(rig, observations), fit(rig.model_copy(update={"bench": bench}), observations)
+    index = [p.name for p in narrow.table.parameters].index("offset_mm")
+    assert abs(narrow.prior_pull[index]) > CONTRADICTION_SD > abs(wide.prior_pull[index])
+    assert (judged(narrow).verdict, judged(wide).verdict) == ("refused", "accepted")
+
+
+def test_a_solver_that_did_not_converge_is_a_reason() -> None:
+    result = fit(thesis_rig(), World(thesis_rig(), 1).observations())
+    found = judged(replace(result, converged=False))
+    assert found.verdict == "refused"
+    assert len(found.reasons) == 1

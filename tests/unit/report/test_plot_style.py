@@ -1,0 +1,34 @@
+"""Matplotlib's settings while the workbench draws."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import pytest
+
+from workbench.report.plot_style import own_style
+
+
+def test_a_user_s_settings_take_no_part_and_come_back() -> None:
+    with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 30.0, "axes.grid": True}):
+        with own_style():
+            assert mpl.rcParams["lines.linewidth"] == mpl.rcParamsDefault["lines.linewidth"]
+            assert not mpl.rcParams["axes.grid"]
+            inside = mpl.rcParams["font.size"]
+        assert mpl.rcParams["font.size"] == 30.0
+        assert mpl.rcParams["axes.grid"]
+    with own_style():
+        assert mpl.rcParams["font.size"] == inside != 30.0
+
+
+def test_settings_come_back_after_an_error_too() -> None:
+    with mpl.rc_context({"font.size": 30.0}):
+        with pytest.raises(ZeroDivisionError), own_style():
+            raise ZeroDivisionError
+        assert mpl.rcParams["font.size"] == 30.0
+
+
+def test_fonts_need_no_file_of_the_machine_s() -> None:
+    """SVG text as outlines, PDF text in the fonts that every reader has."""
+    with own_style():
+        assert mpl.rcParams["svg.fonttype"] == "path"
+        assert mpl.rcParams["pdf.use14corefonts"]

@@ -1,0 +1,69 @@
+"""Timelines of a recording and what is written into its file."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from tests.support.viewer_stream import START_NS, logged
+from workbench.viewer.stream import Moment, Stream
+
+SCALARS = "Scalars:scalars"
+
+
+def test_a_moment_stands_on_every_timeline_and_the_standoff_is_whole_millimetres(tmp_path: Path) -> None:
+    def log(stream: Stream) -> None:
+        stream.at(Moment(3, 2, START_NS + 7, 199.6))
+        stream.log("a/b", rr.Scalars(1.5))
+
+    contents = logged(tmp_path, log)
+    assert contents.values("/a/b", SCALARS) == [(3, [1.5])]
+    assert contents.values("/a/b", SCALARS, "step") == [(2, [1.5])]
+    assert contents.values("/a/b", SCALARS, "standoff_mm") == [(200, [1.5])]
+    ((time, _),) = contents.values("/a/b", SCALARS, "time")
+    assert time.value == START_NS + 7
+
+
+def test_what_belongs_to_no_standoff_does_not_keep_the_last_one(tmp_path: Path) -> None:
+    def log(stream: Stream) -> None:
+        stream.at(Moment(1, 1, START_NS, 500.0))
+        stream.at(Moment(2, 1, START_NS + 1))
+        stream.log("a", rr.Scalars(1.0))
+
+    (row,) = logged(tmp_path, log).everything()["/a"]
+    assert "standoff_mm" not in row
+    assert "('capture', 2)" in row
+
+
+def test_nothing_but_the_stated_timelines_is_on_a_row(tmp_path: Path) -> None:
+    """A log time or tick would make a rebuilt recording differ from the first."""
+    contents = logged(tmp_path, lambda stream: stream.log("a", rr.Scalars(1.0)))
+    (row,) = contents.everything()["/a"]
+    names = re.findall(r"\('([^']+)', ", row)
+    assert names == [SCALARS, "capture", "standoff_mm", "step", "time"]
+
+
+def test_static_data_are_on_no_timeline(tmp_path: Path) -> None:
+    contents = logged(tmp_path, lambda stream: stream.log("a", rr.Scalars(1.0), static=True))
+    assert contents.everything()["/a"] == ["[('Scalars:scalars', [1.0])]"]
+
+
+def test_a_curve_is_over_standoffs_alone_and_an_empty_one_is_none(tmp_path: Path) -> None:
+    def log(stream: Stream) -> None:
+        stream.curve("c", {100: 1.0, 250: -2.0})
+        stream.curve("nothing", {})
+
+    contents = logged(tmp_path, log)
+    assert contents.values("/c", SCALARS, "standoff_mm") == [(100, [1.0]), (250, [-2.0])]
+    assert not any("capture" in row for row in contents.everything()["/c"])
+    assert "/nothing" not in contents.entities
+
+
+def test_the_recording_is_named_after_the_session_and_has_its_properties(tmp_path: Path) -> None:
+    contents = logged(tmp_path, lambda stream: stream.describe("session", id="x", captures=3))
+    (recording,) = RrdReader(str(tmp_path / "part.rrd")).recordings()
+    assert (recording.application_id, recording.recording_id) == ("workbench", "part")
+    assert contents.everything()["/__properties/session"] == ["[('captures', [3]), ('id', ['x'])]"]
