@@ -26,7 +26,6 @@ def test_the_height_of_a_peak_is_that_of_two_gaussians_convolved(scale_px: float
 
 @pytest.mark.parametrize("scale_px", [FINE_PX, COARSE_PX])
 def test_white_noise_has_the_stated_deviation_after_smoothing(scale_px: float) -> None:
-    """By its peaks: above 2.5 sd there are as many as in noise smoothed by numpy."""
     rng = np.random.default_rng(1)
     frame = rng.normal(0.0, 3.0, (400, 400))
     taps = np.exp(-0.5 * (np.arange(-9, 10) / scale_px) ** 2)

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from tests.support.draw import Drawn, Sensor, draw, profile
+from tests.support.spot_models import fitted_spot, scene_of
 from workbench.spots import Failure, Scanline, find_spots
+from workbench.spots.deblending.blend import Blend, fit_blends, grown, split
+from workbench.spots.deblending.joint_fit import fit_joint
+from workbench.spots.measure import FittedSpot
+from workbench.spots.pair import PairSignal
 
 ROW = [Scanline(0, 30, 1, 0, 3)]
 
@@ -77,3 +82,70 @@ def test_neighbours_on_the_second_of_two_scanlines_are_both_found() -> None:
 def test_an_ellipse_is_not_split() -> None:
     frame = draw([Drawn(50, 30, 4e4, 2.6, 1.3)], rng(4), ambient=5.0)
     assert len(find_spots(frame, scanlines=ROW).spots) == 1
+
+
+def scene_with(*drawn: Drawn, seed: int) -> tuple[PairSignal, list[FittedSpot]]:
+    """A scene, and its spots as if they had been fitted."""
+    random = rng(seed)
+    scene = scene_of(draw(drawn, random), draw([], random))
+    return scene, [fitted_spot(d.u, d.v, d.su, d.electrons / 8.0, scene=scene) for d in drawn]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_blend_is_fitted_in_pixels_of_its_window_and_comes_back_in_those_of_the_image(seed: int) -> None:
+    true = [Drawn(60.2, 30.1, 4e4), Drawn(64.4, 31.8, 3e4)]
+    scene, group = scene_with(*true, seed=seed)
+    blend = Blend([scene], group, [])
+    assert blend.fits
+    start = blend.start_of(group)
+    np.testing.assert_allclose(start[:, 2] + blend.col0, [60.2, 64.4])
+    np.testing.assert_allclose(start[:, 3] + blend.row0, [30.1, 31.8])
+    assert blend.win.data[0, 3, 4] == pytest.approx(scene.signal[blend.row0 + 3, blend.col0 + 4])
+    for trace, drawn in zip(blend.as_traces(fit_joint(blend.win, start, blend.noise)), true, strict=True):
+        assert trace.spot.u_px == pytest.approx(drawn.u, abs=4.5 * trace.spot.u_sd_px)
+        assert trace.spot.v_px == pytest.approx(drawn.v, abs=4.5 * trace.spot.v_sd_px)
+        # Nearer than four widths.
+        assert trace.spot.flags == {Failure.MERGED}
+
+
+def test_light_of_others_is_not_used() -> None:
+    scene, (one, other) = scene_with(Drawn(60.0, 30.0), Drawn(67.0, 30.0), seed=1)
+    blend = Blend([scene], [one], [other])
+    v, u = np.mgrid[: blend.win.shape[0], : blend.win.shape[1]]
+    lit = np.hypot(u + blend.col0 - 67.0, v + blend.row0 - 30.0) < 2.5 * 1.3
+    assert lit.any()
+    assert not blend.win.usable[0][lit].any()
+    assert not blend.allowed[lit].any()
+    assert blend.allowed[~lit].all()
+
+
+def test_spots_too_far_from_each_other_do_not_fit_into_one_window() -> None:
+    scene = scene_of(np.zeros((20, 400), np.uint16))
+    ends = [fitted_spot(u, 10.0, scene=scene) for u in (10.0, 300.0)]
+    assert not Blend([scene], ends, []).fits
+    assert fit_blends([scene], ends, [], wants_more=False) == ends
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_elongated_spot_is_two_and_a_round_one_stays(seed: int) -> None:
+    true = [Drawn(60.0, 30.0, 4e4), Drawn(63.5, 30.0, 3e4)]
+    random = rng(seed)
+    scene = scene_of(draw(true, random), draw([], random))
+    whole = fitted_spot(61.5, 30.0, 2.2, 7e4 / 8.0, scene=scene)
+    two = sorted(split([scene], whole, []), key=lambda t: t.spot.u_px)
+    assert len(two) == 2
+    for trace, drawn in zip(two, true, strict=True):
+        assert trace.spot.u_px == pytest.approx(drawn.u, abs=4.5 * trace.spot.u_sd_px)
+    scene, (single,) = scene_with(Drawn(60.0, 30.0, 4e4), seed=seed)
+    assert split([scene], single, []) == [single]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_member_that_is_not_there_is_dropped_and_a_hidden_one_is_found(seed: int) -> None:
+    true = [Drawn(60.0, 30.0, 4e4), Drawn(65.0, 30.0, 2e4)]
+    scene, group = scene_with(*true, seed=seed)
+    false = fitted_spot(62.0, 34.0, 1.3, 300.0, clarity=4.0, scene=scene)
+    kept = fit_blends([scene], [*group, false], [], wants_more=False)
+    assert sorted(round(t.spot.u_px) for t in kept) == [60, 65]
+    more = grown([scene], group[:1], [])
+    assert sorted(round(t.spot.u_px) for t in more) == [60, 65]
