@@ -67,3 +67,40 @@ def test_a_circle_through_noisy_flats_is_none_or_a_sound_one(seed: int) -> None:
         if circle is not None:
             assert (np.linalg.eigvalsh(circle.covariance) > 0).all()
             assert circle.radius_mm > 0
+
+
+def test_the_closest_range_of_a_circle_is_its_apex_or_the_end_of_the_front() -> None:
+    fit = fit_cylinder(seen(X, cylinder(300.0, 20.0)(X)))
+    assert fit is not None
+    assert (fit.axis_x_mm, fit.axis_range_mm, fit.radius_mm) == pytest.approx((20.0, 389.0, 89.0), abs=1e-6)
+    apex, aside = fit.closest((-60.0, 60.0)), fit.closest((-60.0, -10.0))
+    assert (apex.x_mm, apex.range_mm) == pytest.approx((20.0, 300.0))
+    assert (aside.x_mm, aside.range_mm) == pytest.approx((-10.0, 389.0 - np.sqrt(89.0**2 - 30.0**2)))
+    # At the apex the radius counts as much as the axis, against it.
+    row = np.array([0.0, 1.0, -1.0])
+    assert apex.sigma_mm == pytest.approx(np.sqrt(row @ fit.covariance @ row))
+    # All points farther by 1 mm: so is the apex; all aside by 1 mm: it stays as near.
+    assert (apex.by_range.sum(), apex.by_place.sum()) == pytest.approx((1.0, 0.0), abs=1e-6)
+
+
+def test_a_place_that_errs_is_a_range_that_errs_by_the_slope() -> None:
+    ranges, step = cylinder(300.0, 20.0)(X), 1e-3
+    fit = fit_cylinder(seen(X, ranges))
+    assert fit is not None
+    for n, change in enumerate(step * np.eye(4)):
+        ahead, back = (fit_cylinder(seen(X + sign * change, ranges)) for sign in (1, -1))
+        assert ahead is not None
+        assert back is not None
+        assert fit.by_place[2, n] == pytest.approx((ahead.radius_mm - back.radius_mm) / (2 * step), abs=2e-3)
+
+
+@pytest.mark.parametrize("sd_px", [0.02, 20.0])
+def test_a_radius_that_is_hardly_known_is_not_told(sd_px: float) -> None:
+    fit = fit_cylinder(seen(X, cylinder(300.0)(X), sd_px))
+    assert (fit is None) == (sd_px > 1)
+    if fit is not None:
+        assert fit.radius_sigma_mm < 0.5 * fit.radius_mm
+
+
+def test_a_hollow_is_no_cylinder() -> None:
+    assert fit_cylinder(seen(X, 700.0 - cylinder(300.0)(X))) is None

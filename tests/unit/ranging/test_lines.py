@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.support.rangers import IDS, X_MM, positions, ranger_in
 from tests.support.rigs import World, thesis_rig
+from tests.support.surfaces import X, flat, incline, seen
+from workbench.ranging.lines import Axis, Line, line_of, mean_of_lines
 from workbench.ranging.ranger import Ranger
+from workbench.ranging.shape import fit_shape
+from workbench.sensor.calibrated import CalibratedSensor
 
 
 @pytest.mark.parametrize("angle_deg", [-60.0, 0.0, 60.0])
@@ -49,3 +55,49 @@ def test_angle_and_closest_range_lie_where_stated_whatever_the_calibration() -> 
         # Of n standard normals the mean is known to 1 / sqrt(n), that of their squares to sqrt(2 / n).
         assert (z**2).mean() == pytest.approx(1.0, abs=3.5 * np.sqrt(2 / len(z)))
         assert abs(z.mean()) < 3.5 / np.sqrt(len(z))
+
+
+def line(axis: Axis, range_mm: float, spot_sd_mm: float, by_parameter: float) -> Line:
+    """A line whose closest range rests on one spot and one parameter of the calibration."""
+    shape = replace(fit_shape(seen(X, flat(range_mm)(X))), closest_sigma_mm=spot_sd_mm)
+    return Line(axis, shape, (0,), np.array([by_parameter]), np.array([spot_sd_mm]))
+
+
+def test_lines_are_weighted_by_information_or_by_pixels() -> None:
+    lines, variance = [line("u", 500.0, 1.0, 1.0), line("v", 506.0, 2.0, 1.0)], np.zeros((1, 1))
+    mean, sigma = mean_of_lines(lines, variance, "information", (640, 480))
+    assert mean == pytest.approx((500.0 + 506.0 / 4) / 1.25)
+    assert sigma == pytest.approx(np.sqrt(1 / 1.25))
+    mean, sigma = mean_of_lines(lines, variance, "pixels", (640, 480))
+    assert mean == pytest.approx((640 * 500.0 + 480 * 506.0) / 1120)
+    assert sigma == pytest.approx(np.hypot(640 * 1.0, 480 * 2.0) / 1120)
+
+
+@pytest.mark.parametrize(("other", "expected"), [(1.0, 3.0), (-1.0, 0.0)])
+def test_an_error_of_the_calibration_is_common_to_the_lines(other: float, expected: float) -> None:
+    """It stays in the mean where it has the same sign in both, and goes where it has not."""
+    lines = [line("u", 500.0, 1e-9, 1.0), line("v", 500.0, 1e-9, other)]
+    _, sigma = mean_of_lines(lines, np.array([[9.0]]), "information", (640, 480))
+    assert sigma == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["L2.x_mm", "L3.tx", "f_px", "k1", "offset_mm"])
+def test_derivatives_of_the_closest_range_by_the_calibration_are_those_of_differences(
+    ranger: Ranger, name: str
+) -> None:
+    """The same spots, ranged and fitted with one parameter moved."""
+    at = zip(IDS, incline(500.0, 30.0)(X), strict=True)
+    pixels, sd = positions(ranger, dict(at)), np.full((4, 2), 0.03)
+    sensor, names = ranger.sensor, ranger.calibration.laser_ranger.parameters.names
+    value, step = ranger.calibration.geometry()[name], {"f_px": 1e-2}.get(name, 1e-4)
+
+    def closest(moved: CalibratedSensor) -> Line:
+        return line_of(moved, "u", IDS, moved.ranges(IDS, pixels, sd), range(4))
+
+    ahead, back = (
+        closest(CalibratedSensor(ranger.calibration, {name: value + sign * step})).shape.closest_mm
+        for sign in (1, -1)
+    )
+    found = closest(sensor).closest_by_parameter
+    scale = np.abs(found).max() if name in ("f_px", "offset_mm") else abs(found[names.index(name)])
+    assert found[names.index(name)] == pytest.approx((ahead - back) / (2 * step), rel=0.02, abs=1e-3 * scale)

@@ -72,3 +72,26 @@ def test_a_laser_whose_spot_lies_beyond_infinity_does_not_count(ranger: Ranger) 
     assert [laser.laser_id for laser in reading.lasers] == ["L1"]
     assert reading.status == "not_enough_points"
     assert reading.flat_mm == pytest.approx(800.0)
+
+
+def test_a_scanline_holds_a_laser_s_spots_from_the_nearest_standoff_to_infinity(ranger: Ranger) -> None:
+    nearest, _ = ranger.calibration.laser_ranger.validity.standoff_mm
+    ranges = np.append(np.geomspace(nearest, 1e6, 30), np.inf)
+    for laser_id, line in zip(IDS, ranger.scanlines, strict=True):
+        u, v = ranger.sensor.spot_px(laser_id, ranges).T
+        across = ((u - line.u0_px) * line.dv - (v - line.v0_px) * line.du) / np.hypot(line.du, line.dv)
+        assert np.abs(across).max() < line.half_width_px - 7.0
+        along = ((u - line.u0_px) * line.du + (v - line.v0_px) * line.dv) / (line.du**2 + line.dv**2)
+        assert along[[0, -1]] == pytest.approx([1.0, 0.0])
+
+
+def test_lasers_of_one_line_are_searched_for_in_one_band_and_one_alone_on_its_own(ranger: Ranger) -> None:
+    (all_of_them,) = ranger.searched(IDS)
+    assert ranger.searched(["L3"]) == [ranger.scanlines[2]]
+    assert all_of_them.half_width_px >= max(line.half_width_px for line in ranger.scanlines)
+
+
+def test_of_a_laser_fired_alone_only_spots_on_its_line_are_kept(ranger: Ranger) -> None:
+    (own,) = spots(ranger, {"L1": 800.0})
+    assert ranger.alone("L1", [spot_at(own.u_px, own.v_px + 40.0), own]) == [own]
+    assert ranger.alone("L1", []) == []

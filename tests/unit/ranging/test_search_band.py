@@ -28,3 +28,19 @@ def test_one_band_holds_the_scanlines_of_a_line(axis: Axis) -> None:
             across = (u - found.u0_px) * found.dv - (v - found.v0_px) * found.du
             assert abs(across) / np.hypot(found.du, found.dv) <= found.half_width_px - 8.0 + 1e-9
     assert abs(found.du if axis == "u" else found.dv) == 1.0
+
+
+def test_the_band_of_one_line_is_that_line() -> None:
+    line = Scanline(320.0, 240.0, -180.0, 9.0, 8.0)
+    found = band([line, line], "u")
+    assert found.half_width_px == pytest.approx(8.0)
+    assert (found.u0_px, found.du) == (0.0, 1.0)
+    assert found.dv == pytest.approx(-0.05)
+    assert found.v0_px == pytest.approx(240.0 + 0.05 * 320.0)
+
+
+def test_parallel_lines_widen_the_band_by_half_their_distance() -> None:
+    lines = [Scanline(240.0 + aside, 320.0, 0.0, 100.0, 5.0) for aside in (-3.0, 3.0)]
+    found = band(lines, "v")
+    assert (found.u0_px, found.du, found.dv) == pytest.approx((240.0, 0.0, 1.0))
+    assert found.half_width_px == pytest.approx(8.0)

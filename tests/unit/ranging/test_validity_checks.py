@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from tests.support.rangers import IDS, spots
+from workbench.model.calibration import Validity
+from workbench.model.event import LaserRange
 from workbench.ranging.ranger import Ranger
-from workbench.ranging.validity_checks import objections
-from workbench.sensor.calibrated import CalibratedSensor
+from workbench.ranging.validity_checks import objections, outside_validity
+from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
 
 @pytest.mark.parametrize(
@@ -75,3 +77,55 @@ def test_a_calibration_of_one_standoff_tells_how_far_its_spot_is(ranger: Ranger)
     reading = Ranger(only).read_lit("s", spots(ranger, dict.fromkeys(IDS, 800.0)))
     seen, there = ranger.sensor.spot_px("L1", np.array([800.0, 500.0]))
     assert f"its spot {np.hypot(*(seen - there)):.1f} px outside" in reading.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("u_px", "range_mm", "sigma_mm", "misfit_sd", "good"),
+    [
+        (300.0, 500.0, 1.0, 0.0, True),
+        (300.0, 500.0, 249.0, 5.9, True),
+        (300.0, 500.0, 251.0, 0.0, False),
+        (300.0, 500.0, 1.0, 6.1, False),
+        (300.0, np.inf, 1.0, 0.0, False),
+        (300.0, np.nan, np.nan, np.nan, False),
+        (300.0, -5.0, 1.0, 0.0, False),
+        (-0.4, 500.0, 1.0, 0.0, True),
+        (-0.6, 500.0, 1.0, 0.0, False),
+        (639.4, 500.0, 1.0, 0.0, True),
+        (639.6, 500.0, 1.0, 0.0, False),
+    ],
+)
+def test_limits_of_what_gives_a_range(
+    u_px: float, range_mm: float, sigma_mm: float, misfit_sd: float, good: bool
+) -> None:
+    sigma = np.full(1, sigma_mm)
+    ranges = RangeEstimates(
+        np.full(1, range_mm), sigma, np.zeros((1, 1)), np.diag(sigma**2), np.full(1, misfit_sd)
+    )
+    (why,) = objections(np.array([[u_px, 240.0]]), ranges, (640, 480))
+    assert (why is None) == good
+
+
+def test_a_spot_of_one_coordinate_is_inside_by_that_one() -> None:
+    ranges = RangeEstimates(np.full(2, 500.0), np.ones(2), np.zeros((2, 1)), np.eye(2), np.zeros(2))
+    why = objections(np.array([[300.0, np.nan], [700.0, np.nan]]), ranges, (640, 480))
+    assert why[0] is None
+    assert why[1] is not None
+
+
+@pytest.mark.parametrize(
+    ("range_mm", "u_px", "beyond_px"),
+    [(600.0, 150.0, None), (400.0, 98.0, 2.0), (1100.0, 203.0, 3.0), (1100.0, 200.4, 0.0)],
+)
+def test_only_ranges_outside_the_calibrated_ones_are_remarked_with_how_far_the_spot_lies_outside(
+    range_mm: float, u_px: float, beyond_px: float | None
+) -> None:
+    """The spot moves from u = 100 at 500 mm to u = 200 at 1000 mm; less than half a pixel is not told."""
+    validity = Validity(standoff_mm=(500.0, 1000.0), max_relative_range_sd=0.01)
+    field = {"L1": np.array([[100.0, 240.0], [200.0, 240.0]])}
+    laser = LaserRange(laser_id="L1", range_mm=range_mm, sigma_mm=1.0, u_px=u_px, v_px=240.0)
+    remarks = outside_validity([laser], validity, field)
+    assert len(remarks) == (beyond_px is not None)
+    if remarks:
+        assert f"L1: {range_mm:.0f} mm" in remarks[0]
+        assert (f"{beyond_px:.1f} px" in remarks[0]) == bool(beyond_px)

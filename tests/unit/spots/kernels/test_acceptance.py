@@ -92,7 +92,7 @@ def test_a_rim_that_no_pixel_tells_of_leaves_the_floor_alone() -> None:
 
 
 def table_of(light: np.ndarray, start: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Row of the table for one window (side, side) about pixel u = 50, v = 40; row and column for the next."""
+    """Row of the table for one window (side, side) about u = 50, v = 40; row, column of the next."""
     side, found = len(light), np.zeros((1, COLUMNS))
     data = light[None] + np.random.default_rng(1).normal(0.0, 1.0, (1, side, side))
     rows, cols = np.array([40.0]), np.array([50.0])
