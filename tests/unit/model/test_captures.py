@@ -1,3 +1,5 @@
+"""The captures file: rows, and errors by row and column."""
+
 from __future__ import annotations
 
 import contextlib
