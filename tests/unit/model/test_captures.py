@@ -1,3 +1,5 @@
+"""The captures file: rows, and errors by row and column."""
+
 from __future__ import annotations
 
 import contextlib
@@ -8,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from workbench.model.captures import CaptureRow, load_captures
+from workbench.model.captures import CaptureRow, check_images, load_captures, of_file
 from workbench.model.errors import BadInputError
 
 HEADER = "laser_id,standoff_mm,repeat,u_px,v_px"
@@ -130,3 +132,24 @@ def test_a_column_mistyped_is_told_with_the_nearest(tmp_path: Path) -> None:
     path.write_text("laser_id,standoff_mm,repeat,u_pix\n")
     with pytest.raises(BadInputError, match="row 1: no such column: u_pix; expected one of u_px, "):
         load_captures(path)
+
+
+def test_images_that_are_not_there_are_listed_by_row_and_column(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(b"")
+    rows = load(
+        tmp_path,
+        "laser_id,standoff_mm,repeat,on,off\nL1,1,0,a.png,\nL1,1,1,b.png,a.png\nL1,1,2,a.png,c.png\n",
+    )
+    with pytest.raises(BadInputError) as caught:
+        check_images(tmp_path / "c.csv", rows)
+    first, second = str(caught.value).splitlines()
+    for line, words in ((first, ("row 3", "column on", "b.png")), (second, ("row 4", "column off", "c.png"))):
+        assert all(word in line for word in words)
+    check_images(tmp_path / "c.csv", rows[:1])
+
+
+def test_errors_of_rows_name_their_file_in_every_line(tmp_path: Path) -> None:
+    path = tmp_path / "c.csv"
+    with pytest.raises(BadInputError) as caught, of_file(path):
+        raise BadInputError("row 2: x\nrow 3: y")
+    assert str(caught.value).splitlines() == [f"{path}: row 2: x", f"{path}: row 3: y"]

@@ -1,3 +1,5 @@
+"""Rigs with parameters held constant."""
+
 from __future__ import annotations
 
 import pytest

@@ -16,14 +16,15 @@ from pydantic import BaseModel, ValidationError
 import workbench
 from workbench.model.errors import BadInputError
 from workbench.model.problems import EXPECTED, SPELLED, closest_first, problems
-from workbench.model.yamlfile import FileModel, load_yaml_model, parse_document
-from workbench.session.manifest import Manifest
+from workbench.model.yamlfile import FileModel, load_yaml_model
 
 LIBRARY = re.compile(
     r"input should|should match|should be|valid (integer|number|string|list|tuple|dict)|validation|pydantic"
     r"|field required|extra inputs|unable to|discriminator|tag |items? after|something else|\{\w*\}|inf_nan"
 )
 """As pydantic puts things, and what our own words would look like if they were not filled in."""
+
+
 ODD: tuple[Any, ...] = (
     None, True, False, -1e300, -91, -1, 0, 0.5, 1, 95, 1e300, 10**400, float("nan"), float("inf"),
     "", " ", "ä/ö", "1 W", "2,5", "x" * 300, b"\xff", date(2026, 11, 23), {1, 2},
@@ -148,26 +149,3 @@ def test_all_that_is_wrong_is_told_in_the_order_of_the_file(tmp_path: Path) -> N
 def test_the_nearest_name_comes_first() -> None:
     assert closest_first("repeat", ["step", "standoffs_mm", "repeats"]) == ["repeats", "step", "standoffs_mm"]
     assert closest_first("zzz", ["b", "a"]) == ["b", "a"]
-
-
-@pytest.mark.parametrize(
-    ("content", "what"),
-    [
-        (b"\x89PNG\r\n\x1a\n\0\0", "a PNG image"),
-        (b"PK\x03\x04\x14\0\x9d", "an archive, as spreadsheets are"),
-        (b"\xff\xfea\0", "text in UTF-16; save it as UTF-8"),
-        (b"a: 1\nb: caf\xe9\n", r"text in another encoding \(line 2\); save it as UTF-8"),
-        (b"a: 1\0", "binary data"),
-    ],
-)
-def test_what_is_no_text_is_called_what_it_is(content: bytes, what: str, tmp_path: Path) -> None:
-    path = tmp_path / "f.yaml"
-    path.write_bytes(content)
-    with pytest.raises(BadInputError, match=rf"f.yaml: expected a YAML file, got {what}"):
-        load_yaml_model(path, Manifest)
-
-
-def test_lines_of_keys_that_stand_twice() -> None:
-    document = parse_document("a:\n  b: 1\n  c: 2\n  b: 3\na: 4\n", Path("f.yaml"))
-    assert [(one.line, one.text.split(":")[0]) for one in document.doubled] == [(4, "b"), (5, "a")]
-    assert document.data["a"]["b"] == 1

@@ -1,14 +1,17 @@
-"""The lens of a rig file: its model, and the coefficients that belong to it."""
+"""The rig file: its lens and the coefficients that belong to it, priors, lasers, bench."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
+from tests.support.rigs import thesis_rig
 from workbench.model.errors import BadInputError
 from workbench.model.nested import fix_parameters
-from workbench.model.rig import Rig, load_rig
+from workbench.model.rig import BenchSpec, LaserSpec, Prior, Rig, load_rig
 
 RIG = """\
 format: 1
@@ -82,3 +85,72 @@ def test_a_parameter_that_the_lens_has_not_cannot_be_held_constant(tmp_path: Pat
     assert fix_parameters(rig, ["k4"]).camera.k4.sd == 0.0
     with pytest.raises(BadInputError):
         fix_parameters(rig, ["p1"])
+
+
+LASER = {"id": "L1", "axis": "u", "x_mm": {"value": 30.0, "sd": 0.2}, "y_mm": {"value": 0.0, "sd": 0.2}}
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "good"),
+    [
+        (0.0, 0.0, True),
+        (-1e6, 1e6, True),
+        (0.0, 1e-9, True),
+        (0.0, 1e-10, False),
+        (0.0, -1.0, False),
+        (1.1e6, 0.0, False),
+        (float("nan"), 0.0, False),
+    ],
+)
+def test_a_prior_is_known_exactly_or_to_a_deviation_that_can_be_computed_with(
+    value: float, sd: float, good: bool
+) -> None:
+    if good:
+        assert Prior.model_validate({"value": value, "sd": sd}) == Prior(value=value, sd=sd)
+    else:
+        with pytest.raises(ValidationError):
+            Prior.model_validate({"value": value, "sd": sd})
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"id": "all"},
+        {"id": "board"},
+        {"id": "-L"},
+        {"id": "a/b"},
+        {"axis": "x"},
+        {"x_mm": {"value": 0.0, "sd": 0.2}},
+        {"axis": "v"},
+    ],
+)
+def test_a_laser_without_a_name_of_its_own_or_a_baseline_is_refused(change: dict[str, Any]) -> None:
+    assert LaserSpec.model_validate(LASER | {"id": 1}).id == "1"
+    with pytest.raises(ValidationError):
+        LaserSpec.model_validate(LASER | change)
+
+
+@pytest.mark.parametrize("reach_mm", [(500.0, 500.0), (500.0, 100.0), (0.0, 100.0), (100.0, 1.1e6)])
+def test_the_reach_of_a_bench_is_from_near_to_far(reach_mm: tuple[float, float]) -> None:
+    with pytest.raises(ValidationError) as caught:
+        BenchSpec.model_validate({"reach_mm": reach_mm})
+    assert caught.value.errors()[0]["loc"][0] == "reach_mm"
+
+
+def test_lasers_have_ids_that_differ_and_there_is_at_least_one() -> None:
+    data = thesis_rig().model_dump(exclude_unset=True)
+    assert Rig.model_validate(data).laser_ids == ("L1", "L2", "L3", "L4")
+    for lasers in ([], [data["lasers"][0]] * 2):
+        with pytest.raises(ValidationError) as caught:
+            Rig.model_validate(data | {"lasers": lasers})
+        assert [error["loc"] for error in caught.value.errors()] == [("lasers",)]
+
+
+@pytest.mark.parametrize(("laser_class", "good"), [(2, True), ("3R", True), ("5", False), (True, False)])
+def test_a_laser_class_is_one_of_the_standard(laser_class: object, good: bool) -> None:
+    data = thesis_rig().model_dump(exclude_unset=True) | {"laser_class": laser_class}
+    if good:
+        assert Rig.model_validate(data).laser_class == str(laser_class)
+    else:
+        with pytest.raises(ValidationError):
+            Rig.model_validate(data)

@@ -1,3 +1,5 @@
+"""YAML files read into models: errors by file, line and key; what is no such file."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -6,7 +8,9 @@ import pytest
 
 from workbench.model.errors import BadInputError
 from workbench.model.rig import load_rig
+from workbench.model.yamlfile import load_yaml_model, parse_document
 from workbench.procedure.engine.procedure_file import load_procedure
+from workbench.session.manifest import Manifest
 
 RIG = """\
 format: 1
@@ -110,3 +114,26 @@ def test_procedure_errors(tmp_path: Path) -> None:
     assert "steps[1].step: expected one of" in lines[1]
     assert "measure_latency" in lines[1]
     assert "dance" in lines[1]
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        (b"\x89PNG\r\n\x1a\n\0\0", "a PNG image"),
+        (b"PK\x03\x04\x14\0\x9d", "an archive, as spreadsheets are"),
+        (b"\xff\xfea\0", "text in UTF-16; save it as UTF-8"),
+        (b"a: 1\nb: caf\xe9\n", r"text in another encoding \(line 2\); save it as UTF-8"),
+        (b"a: 1\0", "binary data"),
+    ],
+)
+def test_what_is_no_text_is_called_what_it_is(content: bytes, what: str, tmp_path: Path) -> None:
+    path = tmp_path / "f.yaml"
+    path.write_bytes(content)
+    with pytest.raises(BadInputError, match=rf"f.yaml: expected a YAML file, got {what}"):
+        load_yaml_model(path, Manifest)
+
+
+def test_lines_of_keys_that_stand_twice() -> None:
+    document = parse_document("a:\n  b: 1\n  c: 2\n  b: 3\na: 4\n", Path("f.yaml"))
+    assert [(one.line, one.text.split(":")[0]) for one in document.doubled] == [(4, "b"), (5, "a")]
+    assert document.data["a"]["b"] == 1

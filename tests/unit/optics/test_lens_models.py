@@ -9,7 +9,6 @@ from workbench.model.lens import COEFFICIENTS, LensName
 from workbench.model.rig import CameraSpec
 from workbench.optics.lens import LensModel
 from workbench.optics.lens_models import LENS_MODELS, lens_model
-from workbench.optics.undistort import undistort
 
 MODELS = list(LENS_MODELS.values())
 
@@ -34,16 +33,6 @@ def test_a_lens_without_distortion_has_its_focal_length_on_the_axis(model: LensM
     np.testing.assert_allclose(u, [320.0, 320.005], rtol=1e-12)
     np.testing.assert_allclose(v, [240.0, 240.0])
     assert np.asarray(model.is_unfolded(lens, np.array([0.0, 0.5]), np.zeros(2))).all()
-
-
-@pytest.mark.parametrize("model", MODELS, ids=lambda m: m.name)
-def test_pixels_and_lines_of_sight_are_inverse(model: LensModel) -> None:
-    rng = np.random.default_rng(5)
-    lens = np.array([500.0, 320.0, 240.0, *rng.normal(0.0, 0.01, len(model.coefficients))])
-    xy = rng.uniform(-0.6, 0.6, (50, 2))
-    pixels = np.stack(model.project(lens, xy[:, 0], xy[:, 1]), axis=1)
-    np.testing.assert_allclose(undistort(model, lens, pixels), xy, atol=1e-11)
-    assert undistort(model, lens, np.empty((0, 2))).shape == (0, 2)
 
 
 @pytest.mark.parametrize("name", COEFFICIENTS)

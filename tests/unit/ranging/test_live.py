@@ -29,6 +29,7 @@ from workbench.emulator.controller import Controller
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError, RigNotReadyError
 from workbench.model.rig import Rig, load_rig
+from workbench.ranging.live import check_same_sensor, latency_words
 from workbench.ranging.ranger import Ranger
 from workbench.session.manifest import create_session
 
@@ -316,3 +317,24 @@ def test_usage(live: Live, tmp_path: Path) -> None:
     for arguments in (["--readings", "0"], ["--standoff", "-3"]):
         assert live(*arguments).code == 2
     assert live.controllers == []
+
+
+@pytest.mark.parametrize(
+    "change", [{"rig": "another"}, {"serial": "emulated-9"}, {"lasers": ()}, {"camera": {"width_px": 320}}]
+)
+def test_a_calibration_belongs_to_the_rig_that_it_was_made_of(
+    calibration: Path, change: dict[str, object]
+) -> None:
+    rig, own = load_rig(RIG), load_calibration(calibration)
+    check_same_sensor(rig, own)
+    if isinstance(camera := change.get("camera"), dict):
+        change = {"camera": rig.camera.model_copy(update=camera)}
+    with pytest.raises(BadInputError):
+        check_same_sensor(rig.model_copy(update=change), own)
+
+
+def test_latencies_are_told_by_their_percentiles_in_milliseconds() -> None:
+    words = latency_words(np.linspace(0.001, 0.201, 201).tolist(), 20.1)
+    for number in ("201 readings", "20.1 s", "10.0 a second", "p50 101.00 ms", "p99 199.00 ms"):
+        assert number in words
+    assert latency_words([], 1.0)

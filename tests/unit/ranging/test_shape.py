@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scipy.optimize import least_squares
 
+from tests.support.statistics import spread
 from tests.support.surfaces import (
-    F_PX,
-    SD_PX,
     Surface,
     X,
     cubic,
@@ -23,23 +21,10 @@ from tests.support.surfaces import (
     seen,
     share,
 )
-from workbench.model.arrays import FloatArray
-from workbench.ranging.cylinder import fit_cylinder
 from workbench.ranging.points import Points, interval_mm
-from workbench.ranging.polynomial import fit_polynomial
 from workbench.ranging.shape import SIGNIFICANCE, fit_shape
 
 SEEDS = (1, 2, 3)
-
-
-def inverse_of_information(jac: object) -> FloatArray:
-    j = np.asarray(jac, np.float64)
-    return np.asarray(np.linalg.inv(j.T @ j), np.float64)
-
-
-def spread(probability: float, n: int) -> float:
-    """Four standard deviations of a share of n trials."""
-    return float(4 * np.sqrt(probability * (1 - probability) / n))
 
 
 @pytest.mark.parametrize(
@@ -67,54 +52,6 @@ def test_the_angle_of_an_incline(angle_deg: float) -> None:
     shape = fit_shape(seen(X, 500.0 + np.tan(np.radians(angle_deg)) * X))
     assert shape.angle_rad == pytest.approx(np.radians(angle_deg))
     assert shape.closest_x_mm == (X[0] if angle_deg > 0 else X[-1])
-
-
-@pytest.mark.parametrize("degree", [0, 1, 2])
-@pytest.mark.parametrize("seed", SEEDS)
-def test_polynomials_against_scipy(degree: int, seed: int) -> None:
-    """Correlated ranges: the same optimum and covariance as least squares on whitened inverse depths."""
-    rng = np.random.default_rng(seed)
-    root = rng.normal(0.0, 1.0, (5, 5)) + 3 * np.eye(5)
-    x = np.array([-70.0, -35.0, 5.0, 40.0, 60.0])
-    points = Points(x, 800.0 + root @ rng.normal(0.0, 1.0, 5), root @ root.T, offset_mm=12.0)
-    depth = points.range_mm + 12.0
-    whiten = np.linalg.inv(np.linalg.cholesky(points.covariance_mm2 / np.outer(depth**2, depth**2)))
-
-    def residual(c: FloatArray) -> FloatArray:
-        model = np.polynomial.polynomial.polyval(x, c) + 12.0
-        return np.asarray(whiten @ (1.0 / depth - 1.0 / model))
-
-    scale = 70.0 ** np.arange(degree + 1)
-    start = np.zeros(degree + 1)
-    start[0] = 800.0
-    found = least_squares(residual, start, x_scale=1.0 / scale, xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    fit = fit_polynomial(points, degree)
-    assert fit is not None
-    np.testing.assert_allclose(fit.per_mm(), found.x, rtol=1e-6)
-    assert fit.chi2 == pytest.approx(2 * found.cost, rel=1e-6)
-    expected = inverse_of_information(found.jac) * np.outer(scale, scale)
-    np.testing.assert_allclose(fit.covariance, expected, rtol=1e-4)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_circles_against_scipy(seed: int) -> None:
-    """The optimum along the range, by a solver that knows nothing of distances from the axis."""
-    rng = np.random.default_rng(seed)
-    x = np.array([-60.0, -30.0, 10.0, 30.0, 60.0])
-    sigma = np.array([0.1, 0.2, 0.15, 0.2, 0.1])
-    r = cylinder(250.0, 12.0)(x) + rng.normal(0.0, sigma)
-
-    def residual(p: FloatArray) -> FloatArray:
-        return np.asarray((p[1] - np.sqrt(p[2] ** 2 - (x - p[0]) ** 2) - r) / sigma)
-
-    found = least_squares(residual, [12.0, 339.0, 89.0], xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    fit = fit_cylinder(Points(x, r, np.diag(sigma**2)))
-    assert fit is not None
-    sd = np.sqrt(np.diag(inverse_of_information(found.jac)))
-    # Distance from the circle over the cosine is the misfit along the range to first order in noise / radius.
-    assert np.abs((np.array([fit.axis_x_mm, fit.axis_range_mm, fit.radius_mm]) - found.x) / sd).max() < 0.02
-    np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), sd, rtol=0.02)
-    assert fit.chi2 == pytest.approx(2 * found.cost, rel=0.02)
 
 
 @pytest.mark.parametrize("range_mm", [200.0, 1000.0, 4000.0])
@@ -155,33 +92,6 @@ def test_inclines_are_told_and_covered(range_mm: float, angle_deg: float) -> Non
 def test_near_rounds_are_told(surface: Surface, kind: str, degree: int | None) -> None:
     shapes = [s for seed in SEEDS for s in readings(surface, 300, seed)]
     assert share(shapes, lambda s: (s.kind, s.degree) == (kind, degree)) > 0.95
-
-
-@pytest.mark.parametrize(
-    "ranges",
-    [
-        # The first ran off to where three parameters are one: a singular matrix, a variance below 0.
-        (149.9630115393355, 150.05519845673516, 149.91103892060187, 150.00938792642353),
-        (149.95065849473553, 149.98451898274138, 150.06372594965464, 150.09837833002527),
-        (149.96275073216663, 149.97491801867966, 149.98454280237897, 149.9978174227135),
-        (150.0, 150.0, 150.0, 150.0),
-        (150.0, 151.0, 153.0, 154.0),
-    ],
-)
-def test_points_that_are_nearly_on_a_line_are_no_circle(ranges: tuple[float, ...]) -> None:
-    assert fit_cylinder(seen(X, np.array(ranges))) is None
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_circle_through_noisy_flats_is_none_or_a_sound_one(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    for _ in range(1000):
-        range_mm = 10.0 ** rng.uniform(2.0, 3.7)
-        noise = rng.normal(0.0, 1.0, len(X)) * SD_PX / (F_PX * np.abs(X))
-        circle = fit_cylinder(seen(X, 1.0 / (1.0 / range_mm + noise)))
-        if circle is not None:
-            assert (np.linalg.eigvalsh(circle.covariance) > 0).all()
-            assert circle.radius_mm > 0
 
 
 @pytest.mark.parametrize("range_mm", [125.0, 300.0, 600.0])
@@ -262,26 +172,6 @@ def test_the_front_may_be_wider_than_the_lasers() -> None:
     assert shape.closest_x_mm == -120.0
 
 
-@pytest.mark.parametrize("relative", [0.02, 0.1, 0.2])
-def test_the_interval_of_a_far_range_holds_it(relative: float) -> None:
-    """Gaussian in inverse depth: 95 % in the interval, an equal share beyond either end."""
-    rng = np.random.default_rng(5)
-    true, offset, n = 5000.0, 40.0, 20_000
-    depth = 1.0 / (1.0 / (true + offset) + rng.normal(0.0, relative / (true + offset), n))
-    depth = depth[depth > 0]
-    sigma = relative / (true + offset) * depth**2
-    ends = np.array([interval_mm(d - offset, s, offset) for d, s in zip(depth, sigma, strict=True)])
-    assert np.mean(ends[:, 0] > true) == pytest.approx(0.025, abs=spread(0.025, n))
-    assert np.mean(ends[:, 1] < true) == pytest.approx(0.025, abs=spread(0.025, n))
-    symmetric_misses_far_side = np.mean(depth - offset + 1.96 * sigma < true)
-    if relative >= 0.1:
-        assert symmetric_misses_far_side > 0.035
-
-
-def test_an_interval_may_have_no_far_end() -> None:
-    assert interval_mm(5000.0, 2600.0)[1] == np.inf
-
-
 @settings(deadline=None, max_examples=200)
 @given(
     st.lists(st.floats(30.0, 10_000.0), min_size=1, max_size=6),
@@ -297,10 +187,3 @@ def test_any_ranges_have_an_answer(ranges: list[float], relative: float, offset:
     assert np.isfinite([shape.closest_mm, shape.closest_sigma_mm]).all()
     nearest, farthest = shape.closest_interval_mm
     assert nearest <= shape.closest_mm <= farthest
-
-
-def test_points_that_cannot_be() -> None:
-    with pytest.raises(ValueError, match="all differ"):
-        Points(np.zeros(2), np.full(2, 500.0), np.eye(2))
-    with pytest.raises(ValueError, match="before the pinhole"):
-        Points(np.arange(2.0), np.array([500.0, 20.0]), np.eye(2), offset_mm=-30.0)

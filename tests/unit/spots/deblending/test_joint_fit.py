@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from tests.support.spot_models import jacobian_of
 from workbench.spots.deblending.joint_fit import fit_joint
 from workbench.spots.fit import Windows
-from workbench.spots.kernels.columns import FLUX, LN_SU, LN_SV, SHEAR, U, V
-from workbench.spots.kernels.joint_sums import add_pairs, leverages, profiles, sums_alone
-from workbench.spots.kernels.single_sums import invert
+from workbench.spots.kernels.columns import FLUX, LN_SU, LN_SV, U, V
 from workbench.spots.noise import Noise
-from workbench.spots.psf import derivatives
 
 WIDTH, HALF, APART, TOLD = 2.5, 12, 3.0, 400.0
+
+
 SHAPE = (2 * HALF + 1, 2 * HALF + 1)
+
+
 PAIRS = 500
 
 
@@ -26,45 +28,6 @@ def two_spots(rng: np.random.Generator) -> np.ndarray:
     true[:, U] = HALF + rng.uniform(-0.5, 0.5) + np.array([-0.5, 0.5]) * APART * WIDTH
     true[:, U + 1] = HALF + rng.uniform(-0.5, 0.5)
     return true
-
-
-def jacobian_of(params: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """(3 + 3 k, pixels): by background, both widths, then flux, u and v of each spot; every pixel."""
-    rows = derivatives(params, shape).reshape(*params.shape, -1)
-    rows[:, U:] *= params[:, FLUX, None, None]
-    own = rows[:, [FLUX, U, V]].reshape(-1, rows.shape[2])
-    return np.concatenate([rows[:1, 0], rows[:, LN_SU:SHEAR].sum(axis=0), own])
-
-
-@pytest.mark.parametrize("k", [1, 2, 4])
-def test_the_sums_of_a_joint_fit_are_those_of_its_derivatives(k: int) -> None:
-    rng, shape = np.random.default_rng(k), (25, 31)
-    params = np.zeros((k, 6))
-    params[:, FLUX] = rng.uniform(100.0, 5000.0, k)
-    # Two that overlap, one that the border of the window cuts, one by itself.
-    params[:, U] = (12.3, 15.1, 30.4, 4.0)[:k]
-    params[:, V] = (11.8, 13.0, 1.2, 24.6)[:k]
-    params[:, LN_SU], params[:, LN_SV] = np.log(1.1), np.log(1.7)
-    weight, residual = rng.uniform(0.0, 1.0, shape), rng.normal(0.0, 3.0, shape)
-    weight[rng.uniform(size=shape) < 0.2] = 0.0
-    dense = jacobian_of(params, shape)
-    m = len(dense)
-    along_u, along_v, box = np.empty((k, 4, shape[1])), np.empty((k, 4, shape[0])), np.empty((k, 4), np.intp)
-    information, gradient, leverage = np.empty((m, m)), np.empty(m), np.empty(shape)
-    profiles(params, along_u, along_v, box)
-    sums_alone(params, along_u, along_v, box, weight, residual, information, gradient)
-    add_pairs(params, along_u, along_v, box, weight, information)
-    expected = (dense * weight.ravel()) @ dense.T
-    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-    # Light beyond five widths is left out: a millionth, which a derivative by the width weighs by z^2.
-    np.testing.assert_allclose(information / scale, expected / scale, atol=1e-5)
-    pulled = dense @ (weight * residual).ravel()
-    np.testing.assert_allclose((gradient - pulled) / np.sqrt(np.diag(expected)), 0.0, atol=1e-4)
-    root = rng.normal(size=(m, 2 * m))
-    cov = root @ root.T / scale
-    leverages(params, along_u, along_v, box, cov, leverage)
-    theirs = ((cov @ dense) * dense).sum(axis=0).reshape(shape)
-    np.testing.assert_allclose(leverage, theirs, atol=1e-5 * theirs.max())
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -138,20 +101,3 @@ def test_the_deviations_of_spots_fitted_together_are_right_to_second_order() -> 
     # Left out, the term is some 10 / 400.
     assert sampling < 0.4 * 10.0 / TOLD
     assert excess.mean() == pytest.approx(0.0, abs=sampling)
-
-
-@pytest.mark.parametrize("k", [6, 7, 9, 18])
-def test_the_inverse_is_that_of_linear_algebra(k: int) -> None:
-    rng = np.random.default_rng(k)
-    root = rng.normal(size=(k, 3 * k)) * np.logspace(-1, 3, k)[:, None]
-    matrix, found = root @ root.T, np.empty((k, k))
-    theirs = np.linalg.inv(matrix)
-    invert(matrix, found)
-    scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
-    np.testing.assert_allclose(found / scale, theirs / scale, atol=1e-7)
-
-
-def test_two_spots_at_one_place_have_a_finite_inverse() -> None:
-    found = np.empty((2, 2))
-    invert(np.ones((2, 2)), found)
-    assert np.isfinite(found).all()

@@ -6,10 +6,22 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.support.draw import Drawn, draw
+from tests.support.draw import Drawn, draw, profile
 from workbench.spots import find_spots
 from workbench.spots.fit import Windows, fit_spots
-from workbench.spots.kernels.acceptance import _follow_rim
+from workbench.spots.kernels.acceptance import (
+    COLUMNS,
+    FLUX_SD,
+    IS_SPOT,
+    NEXT_HALF,
+    PEAK,
+    U_SD,
+    V_SD,
+    _follow_rim,
+    fit_group,
+    without_outliers,
+)
+from workbench.spots.kernels.columns import FLUX, WORST_EXCESS, U, V
 from workbench.spots.noise import Noise
 
 HALF, WINDOWS = 5, 400
@@ -77,3 +89,59 @@ def test_a_rim_that_no_pixel_tells_of_leaves_the_floor_alone() -> None:
     floor = np.ones(1)
     assert not _follow_rim(floor, np.zeros((1, 9)))
     assert floor[0] == 1.0
+
+
+def table_of(light: np.ndarray, start: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Row of the table for one window (side, side) about u = 50, v = 40; row, column of the next."""
+    side, found = len(light), np.zeros((1, COLUMNS))
+    data = light[None] + np.random.default_rng(1).normal(0.0, 1.0, (1, side, side))
+    rows, cols = np.array([40.0]), np.array([50.0])
+    usable, clip = np.ones(data.shape, bool), np.full(data.shape, np.inf)
+    group = np.array([0])
+    fit_group(data, usable, clip, group, rows, cols, np.array([start]), 1.0, 0.01, (80, 100), found)
+    return found[0], rows, cols
+
+
+def test_the_row_of_a_spot_has_its_values_in_pixels_of_the_image() -> None:
+    found, _, _ = table_of(profile((11, 11), Drawn(5.2, 4.9, 4e3)), [0.0, 3e3, 50.0, 40.0, 0.0, 0.0])
+    assert (found[IS_SPOT], found[NEXT_HALF]) == (1.0, 0.0)
+    assert found[U] == pytest.approx(50.2, abs=4.5 * found[U_SD])
+    assert found[V] == pytest.approx(39.9, abs=4.5 * found[V_SD])
+    assert found[FLUX] == pytest.approx(4e3, abs=4.5 * found[FLUX_SD])
+    assert found[PEAK] == pytest.approx(4e3 / (2 * np.pi * (1.3**2 + 1 / 12)), rel=0.05)
+
+
+def test_a_spot_that_outgrows_its_window_asks_for_the_next_one() -> None:
+    found, _, _ = table_of(
+        profile((11, 11), Drawn(5.0, 5.0, 4e4, 2.2, 2.2)), [0.0, 3e4, 50.0, 40.0, 0.6, 0.6]
+    )
+    assert (found[IS_SPOT], found[NEXT_HALF]) == (1.0, 8.0)
+
+
+def test_a_spot_off_the_middle_of_its_window_has_it_moved() -> None:
+    found, rows, cols = table_of(profile((11, 11), Drawn(7.2, 4.0, 4e3)), [0.0, 3e3, 52.0, 39.0, 0.0, 0.0])
+    assert (found[NEXT_HALF], cols[0], rows[0]) == (5.0, 52.0, 39.0)
+
+
+def test_neither_an_empty_window_nor_a_single_pixel_is_a_spot() -> None:
+    empty = np.zeros((11, 11))
+    single = empty.copy()
+    single[5, 5] = 500.0
+    for light in (empty, single):
+        assert table_of(light, [0.0, 3e3, 50.0, 40.0, 0.0, 0.0])[0][IS_SPOT] == 0.0
+
+
+@pytest.mark.parametrize(("outliers", "dropped"), [(1, 1), (3, 3), (4, 0)])
+def test_a_few_pixels_that_no_spot_explains_are_left_out(outliers: int, dropped: int) -> None:
+    """More than three are a spot that is not understood, and stay."""
+    usable, signal = np.ones((2, 11, 11), bool), np.full((2, 11, 11), 10.0)
+    residual, weight = np.zeros((2, 11, 11)), np.ones((2, 11, 11))
+    residual[1, 3, :outliers] = 6.1
+    residual[1, 5, 5] = 5.9
+    judged = np.zeros((2, 9))
+    judged[:, WORST_EXCESS] = (weight * residual**2).max(axis=(1, 2))
+    kept, changed = without_outliers(usable, signal, residual, weight, judged)
+    assert changed == bool(dropped)
+    assert (~kept).sum() == dropped
+    assert usable.all()
+    assert kept[0].all()

@@ -1,0 +1,69 @@
+"""Files that are no text, told by their first bytes."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import zipfile
+
+import cv2
+import numpy as np
+import pytest
+
+from workbench.model.contents import BEGINNINGS, not_text
+
+
+@pytest.mark.parametrize(
+    "text", ["", "a: 1\n", "\ufeffid,row\r\n1,2\r\n", "Bär\tµm ✓\f", "BM and PK, in a text"]
+)
+def test_text_in_utf_8_is_text(text: str) -> None:
+    assert not_text(text.encode("utf-8")) is None
+
+
+def png() -> bytes:
+    return bytes(cv2.imencode(".png", np.zeros((3, 4), np.uint8))[1])
+
+
+def archive() -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as file:
+        file.writestr("xl/workbook.xml", "\xff" * 40)
+    return buffer.getvalue()
+
+
+def array() -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, np.ones(3))
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "start"),
+    [
+        (png(), b"\x89PNG"),
+        (bytes(cv2.imencode(".jpg", np.zeros((8, 8), np.uint8))[1]), b"\xff\xd8\xff"),
+        (bytes(cv2.imencode(".bmp", np.zeros((8, 8), np.uint8))[1]), b"BM"),
+        (bytes(cv2.imencode(".tiff", np.zeros((8, 8), np.uint8))[1]), b"II*\0"),
+        (archive(), b"PK\x03\x04"),
+        (gzip.compress(b"a" * 100), b"\x1f\x8b"),
+        (array(), b"\x93NUMPY"),
+    ],
+)
+def test_real_files_are_called_what_they_are(content: bytes, start: bytes) -> None:
+    assert content.startswith(start)
+    assert not_text(content) == BEGINNINGS[start]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "latin-1", "cp1252"])
+def test_text_in_another_encoding_is_told_apart_from_binary_data(encoding: str) -> None:
+    words = not_text("standoff: 1\nwho: Jürgen\n".encode(encoding))
+    assert words is not None
+    assert "UTF-8" in words
+    assert ("line 2" in words) == (encoding != "utf-16")
+    binary = not_text(b"\x00\x01\x02\x03")
+    assert binary is not None
+    assert "UTF-8" not in binary
+
+
+def test_a_zero_byte_is_no_text() -> None:
+    assert not_text(b"a: 1\nb: 2\0\n") is not None

@@ -1,0 +1,41 @@
+"""The event of a fit: JSON keeps it, and what does not belong to it is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from tests.viewer.session import a_fit
+from workbench.model.fit_event import FitFinished
+
+
+def test_a_fit_survives_json() -> None:
+    fit = a_fit()
+    again = FitFinished.model_validate_json(fit.model_dump_json())
+    assert again == fit
+    assert (len(again.parameters), len(again.residuals)) == (len(fit.parameters), len(fit.residuals))
+
+
+def test_a_fit_of_an_early_session_lacks_terms_validation_and_tests() -> None:
+    early = {"terms", "left_out", "faults", "residual_tests"}
+    fit = FitFinished.model_validate(a_fit().model_dump(exclude=early))
+    assert [getattr(fit, name) for name in sorted(early)] == [(), (), (), ()]
+
+
+@pytest.mark.parametrize(
+    "change", [{"verdict": "fine"}, {"rms_px": float("nan")}, {"observations": 2.5}, {"colour": "red"}]
+)
+def test_values_that_cannot_be_are_refused_by_their_key(change: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError) as caught:
+        FitFinished.model_validate(a_fit().model_dump() | change)
+    assert [error["loc"] for error in caught.value.errors()] == [tuple(change)]
+
+
+def test_a_parameter_is_determined_by_data_joint_or_prior() -> None:
+    fit = a_fit().model_dump()
+    fit["parameters"][0]["determined_by"] = "luck"
+    with pytest.raises(ValidationError) as caught:
+        FitFinished.model_validate(fit)
+    assert [error["loc"] for error in caught.value.errors()] == [("parameters", 0, "determined_by")]

@@ -1,0 +1,99 @@
+"""Assignment of spots to lasers: right or refused."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from tests.support.rangers import IDS, X_MM, positions, ranger_in
+from tests.support.rigs import World, thesis_rig
+from workbench.ranging.assignment import assign, pair_up
+from workbench.ranging.ranger import Ranger
+
+
+def dealt(ranger: Ranger, pixels: np.ndarray, sd_px: float = 0.05) -> tuple[str, ...] | None:
+    """The lasers of the spots, in the order of the spots; None where they are not told."""
+    pairs = pair_up(ranger.sensor, pixels, np.full(pixels.shape, sd_px))
+    found = assign(pairs, np.arange(len(ranger.sensor.ids)))
+    if found is None:
+        return None
+    by_spot = dict(zip(found[1].tolist(), found[0].tolist(), strict=True))
+    return tuple(ranger.sensor.ids[by_spot[n]] for n in sorted(by_spot))
+
+
+@pytest.mark.parametrize("range_mm", [150.0, 600.0, 2500.0, 4000.0])
+def test_spots_of_a_flat_are_dealt_in_any_order(ranger: Ranger, range_mm: float) -> None:
+    pixels = positions(ranger, dict.fromkeys(IDS, range_mm))
+    for order in permutations(range(4)):
+        expected = tuple(IDS[i] for i in order)
+        assert dealt(ranger, pixels[list(order)]) == expected
+
+
+@pytest.mark.parametrize("angle_deg", [-45.0, 30.0, 60.0])
+def test_spots_of_an_incline_are_dealt(ranger: Ranger, angle_deg: float) -> None:
+    slope = np.tan(np.radians(angle_deg))
+    tilted = {i: 500.0 + slope * x for i, x in zip(IDS, X_MM, strict=True)}
+    assert dealt(ranger, positions(ranger, tilted)) == IDS
+
+
+def test_spots_that_fit_two_ways_are_not_dealt(ranger: Ranger) -> None:
+    """Two spots in one place can be swapped at will."""
+    pixels = positions(ranger, {"L1": 500.0, "L2": 500.0, "L3": 500.0, "L4": 500.0})
+    pixels[1] = pixels[0]
+    assert dealt(ranger, pixels) is None
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_steps_in_depth_are_dealt_rightly_or_not_at_all(seed: int) -> None:
+    """A post before a wall, and one laser of a flat on another surface: where a swap could deceive."""
+    world = World(thesis_rig(), seed)
+    ranger = ranger_in(world)
+    rng = np.random.default_rng(seed)
+    right = wrong = 0
+    for _ in range(150):
+        depths = np.full(4, rng.uniform(300.0, 3000.0))
+        depths[rng.integers(4)] *= rng.uniform(0.5, 2.0)
+        at = zip(IDS, depths + world.values["offset_mm"], strict=True)
+        pixels = np.array([world.pixel(i, z) for i, z in at]) + rng.normal(0.0, 0.05, (4, 2))
+        told = dealt(ranger, pixels, 0.03)
+        right += told == IDS
+        wrong += told not in (None, IDS)
+    assert wrong == 0
+    assert right > 75
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("missing", [1, 2])
+def test_missing_spots_leave_the_others_told(seed: int, missing: int) -> None:
+    """Lasers aligned by eye do not share a line: that tells their spots apart, steps in depth included."""
+    world = World(thesis_rig(), seed)
+    ranger = ranger_in(world)
+    rng = np.random.default_rng([seed, missing])
+    right = wrong = 0
+    for _ in range(100):
+        depths = np.full(4, rng.uniform(300.0, 3000.0))
+        depths[rng.integers(4)] *= rng.uniform(0.5, 2.0)
+        seen = np.sort(rng.permutation(4)[missing:])
+        at = [world.pixel(IDS[n], depths[n] + world.values["offset_mm"]) for n in seen]
+        told = dealt(ranger, np.array(at) + rng.normal(0.0, 0.05, (len(seen), 2)), 0.03)
+        expected = tuple(IDS[n] for n in seen)
+        right += told == expected
+        wrong += told not in (None, expected)
+    assert wrong == 0
+    assert right >= 95
+
+
+def test_on_one_line_three_spots_of_a_flat_are_told_and_two_are_not(coplanar: Ranger) -> None:
+    """The inner pair of a flat at 1 m is the outer pair of a flat at 2 m."""
+    for gone in IDS:
+        seen = [i for i in IDS if i != gone]
+        assert dealt(coplanar, positions(coplanar, dict.fromkeys(seen, 900.0))) == tuple(seen)
+    assert dealt(coplanar, positions(coplanar, {"L2": 1000.0, "L3": 1000.0})) is None
+    assert dealt(coplanar, positions(coplanar, {"L2": 1000.0})) is None
+
+
+def test_more_spots_than_lasers_are_not_dealt(coplanar: Ranger) -> None:
+    flat = positions(coplanar, dict.fromkeys(IDS, 900.0))
+    assert dealt(coplanar, np.vstack((flat, flat[:1] + np.array([9.0, 0.0])))) is None

@@ -1,0 +1,151 @@
+"""Spots whose light mixes are separated, and clear neighbours are kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.draw import Drawn, Sensor, draw, profile
+from tests.support.spot_models import fitted_spot, scene_of
+from workbench.spots import Failure, Scanline, find_spots
+from workbench.spots.deblending.blend import Blend, fit_blends, grown, split
+from workbench.spots.deblending.joint_fit import fit_joint
+from workbench.spots.measure import FittedSpot
+from workbench.spots.pair import PairSignal
+
+ROW = [Scanline(0, 30, 1, 0, 3)]
+
+
+def rng(seed: int = 0) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+@pytest.mark.parametrize("apart", [2.6, 3.5, 5.0, 8.0])
+def test_overlapping_spots_are_separated(apart: float) -> None:
+    true = [Drawn(50, 30, 4e4), Drawn(50 + apart, 30.2, 2e4)]
+    finding = find_spots(draw(true, rng(3), ambient=5.0), scanlines=ROW, expected=2)
+    assert len(finding.spots) == 2
+    for spot, t in zip(finding.spots, true, strict=True):
+        assert spot.u_px == pytest.approx(t.u, abs=5 * spot.u_sd_px)
+    assert (Failure.MERGED in finding.failures) == (apart < 4 * 1.3)
+
+
+CROWDS = {
+    "three side by side": [(13.8, 20.0), (13.9, 24.1), (8.8, 22.7), (21.3, 23.7)],
+    "a merged pair and two more": [(13.8, 16.7), (14.4, 24.5), (24.6, 22.9), (27.6, 22.2)],
+    "two merged pairs": [(13.4, 20.6), (16.7, 20.6), (23.3, 20.6), (26.6, 20.6)],
+}
+"""Places of four lasers' spots on a target far away, u and v."""
+
+
+SPECKLE = 0.2
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("crowd", CROWDS)
+def test_a_crowd_of_spots_is_told_apart(crowd: str, seed: int) -> None:
+    """In speckle, whose noise hides the neighbours of a spot from a model that lacks them."""
+    places, random = sorted(CROWDS[crowd]), rng(seed)
+    light = np.sum([profile((40, 40), Drawn(u, v, 5000.0, 0.75, 0.75)) for u, v in places], axis=0)
+    grains = random.gamma(SPECKLE**-2, SPECKLE**2, light.shape)
+    frame = Sensor(10.0, 6.0, 8).expose(20.0 + light * grains, random)
+    spots = find_spots(frame, expected=4).spots
+    assert len(spots) == 4
+    for spot, (u, v) in zip(spots, places, strict=True):
+        assert spot.u_px == pytest.approx(u, abs=5 * spot.u_sd_px)
+        assert spot.v_px == pytest.approx(v, abs=5 * spot.v_sd_px)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.05])
+def test_a_clear_spot_on_dark_paper_is_not_dropped_for_its_neighbours(share: float) -> None:
+    true = [Drawn(30.2 + 6.5 * n, 30.1, (1.0, share, 1.0, 1.0)[n] * 5e4, 0.85, 0.85) for n in range(4)]
+    for seed in range(5):
+        random = rng(seed)
+        on, off = draw(true, random), draw([], random)
+        spots = find_spots(on, off, scanlines=ROW, expected=4, saturation_dn=4095).spots
+        assert [round(s.u_px) for s in spots] == [30, 37, 43, 50]
+
+
+def test_neighbours_on_the_second_of_two_scanlines_are_both_found() -> None:
+    true = [Drawn(20, 30), Drawn(30, 12), Drawn(30.2, 19), Drawn(45, 30)]
+    lines = [Scanline(0, 30, 1, 0, 2), Scanline(30, 0, 0, 1, 2)]
+    for order in (lines, lines[::-1]):
+        spots = find_spots(draw(true, rng(), (60, 60)), scanlines=order, expected=4).spots
+        assert sorted((round(s.u_px), round(s.v_px)) for s in spots) == [
+            (20, 30),
+            (30, 12),
+            (30, 19),
+            (45, 30),
+        ]
+
+
+def test_an_ellipse_is_not_split() -> None:
+    frame = draw([Drawn(50, 30, 4e4, 2.6, 1.3)], rng(4), ambient=5.0)
+    assert len(find_spots(frame, scanlines=ROW).spots) == 1
+
+
+def scene_with(*drawn: Drawn, seed: int) -> tuple[PairSignal, list[FittedSpot]]:
+    """A scene, and its spots as if they had been fitted."""
+    random = rng(seed)
+    scene = scene_of(draw(drawn, random), draw([], random))
+    return scene, [fitted_spot(d.u, d.v, d.su, d.electrons / 8.0, scene=scene) for d in drawn]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_blend_is_fitted_in_pixels_of_its_window_and_comes_back_in_those_of_the_image(seed: int) -> None:
+    true = [Drawn(60.2, 30.1, 4e4), Drawn(64.4, 31.8, 3e4)]
+    scene, group = scene_with(*true, seed=seed)
+    blend = Blend([scene], group, [])
+    assert blend.fits
+    start = blend.start_of(group)
+    np.testing.assert_allclose(start[:, 2] + blend.col0, [60.2, 64.4])
+    np.testing.assert_allclose(start[:, 3] + blend.row0, [30.1, 31.8])
+    assert blend.win.data[0, 3, 4] == pytest.approx(scene.signal[blend.row0 + 3, blend.col0 + 4])
+    for trace, drawn in zip(blend.as_traces(fit_joint(blend.win, start, blend.noise)), true, strict=True):
+        assert trace.spot.u_px == pytest.approx(drawn.u, abs=4.5 * trace.spot.u_sd_px)
+        assert trace.spot.v_px == pytest.approx(drawn.v, abs=4.5 * trace.spot.v_sd_px)
+        # Nearer than four widths.
+        assert trace.spot.flags == {Failure.MERGED}
+
+
+def test_light_of_others_is_not_used() -> None:
+    scene, (one, other) = scene_with(Drawn(60.0, 30.0), Drawn(67.0, 30.0), seed=1)
+    blend = Blend([scene], [one], [other])
+    v, u = np.mgrid[: blend.win.shape[0], : blend.win.shape[1]]
+    lit = np.hypot(u + blend.col0 - 67.0, v + blend.row0 - 30.0) < 2.5 * 1.3
+    assert lit.any()
+    assert not blend.win.usable[0][lit].any()
+    assert not blend.allowed[lit].any()
+    assert blend.allowed[~lit].all()
+
+
+def test_spots_too_far_from_each_other_do_not_fit_into_one_window() -> None:
+    scene = scene_of(np.zeros((20, 400), np.uint16))
+    ends = [fitted_spot(u, 10.0, scene=scene) for u in (10.0, 300.0)]
+    assert not Blend([scene], ends, []).fits
+    assert fit_blends([scene], ends, [], wants_more=False) == ends
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_elongated_spot_is_two_and_a_round_one_stays(seed: int) -> None:
+    true = [Drawn(60.0, 30.0, 4e4), Drawn(63.5, 30.0, 3e4)]
+    random = rng(seed)
+    scene = scene_of(draw(true, random), draw([], random))
+    whole = fitted_spot(61.5, 30.0, 2.2, 7e4 / 8.0, scene=scene)
+    two = sorted(split([scene], whole, []), key=lambda t: t.spot.u_px)
+    assert len(two) == 2
+    for trace, drawn in zip(two, true, strict=True):
+        assert trace.spot.u_px == pytest.approx(drawn.u, abs=4.5 * trace.spot.u_sd_px)
+    scene, (single,) = scene_with(Drawn(60.0, 30.0, 4e4), seed=seed)
+    assert split([scene], single, []) == [single]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_member_that_is_not_there_is_dropped_and_a_hidden_one_is_found(seed: int) -> None:
+    true = [Drawn(60.0, 30.0, 4e4), Drawn(65.0, 30.0, 2e4)]
+    scene, group = scene_with(*true, seed=seed)
+    false = fitted_spot(62.0, 34.0, 1.3, 300.0, clarity=4.0, scene=scene)
+    kept = fit_blends([scene], [*group, false], [], wants_more=False)
+    assert sorted(round(t.spot.u_px) for t in kept) == [60, 65]
+    more = grown([scene], group[:1], [])
+    assert sorted(round(t.spot.u_px) for t in more) == [60, 65]
