@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.command_line import Run, refused
 from workbench.cli import sessions
 from workbench.cli.sessions import find_session, list_sessions
+from workbench.session.journal import Journal
 from workbench.session.state import SessionStatus
 
 LONG_WHY = "laser controller at /dev/ttyACM0: asked '!', expected 'OK OFF', got a dead line; check the cable"
@@ -74,3 +76,10 @@ def test_how_a_session_ended_takes_two_lines_at_most(
     assert told[2].rstrip().endswith("...")
     list_sessions(Path("sessions"), as_json=True)
     assert json.loads(capsys.readouterr().out)["why"] == why
+
+
+def test_the_only_session_is_running(workbench: Run, tmp_path: Path) -> None:
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s/session.yaml").write_text("format: 1\n")
+    with Journal(tmp_path / "s"):
+        refused(workbench("resume", "--sessions", tmp_path), 2, tmp_path / "s", "is running")
