@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tests.support.ideal import ideal_rig, laser
+from tests.support.ideal import exact, ideal_rig, laser
 from tests.support.rigs import PROVENANCE
 from workbench.devices.protocols import Operator
 from workbench.devices.registry import open_bench
@@ -20,11 +20,13 @@ from workbench.procedure.engine.replay import ReplayingJournal
 from workbench.session.journal import Journal
 
 YES = Answer()
+CY_PX = 59.5
 
 
 def two_laser_rig() -> Rig:
-    """Two lasers of exactly known baselines, with noise left out."""
-    return ideal_rig(laser("L1", -60.0), laser("L2", 60.0))
+    """Two lasers of exactly known baselines, without noise; a low picture, which is fast to draw."""
+    camera = {"height_px": 120, "cy_px": exact(CY_PX)}
+    return ideal_rig(laser("L1", -60.0), laser("L2", 60.0), camera=camera)
 
 
 def with_emulator(rig: Rig, **blocks: object) -> Rig:

@@ -74,3 +74,23 @@ def test_a_colour_image_becomes_grey(tmp_path: Path) -> None:
     path = tmp_path / "a.png"
     cv2.imwrite(str(path), np.full((4, 5, 3), 90, np.uint8))
     assert read_image(path).tolist() == [[90] * 5] * 4
+
+
+def test_frames_of_a_placement_are_set_aside_one_try_after_the_other(tmp_path: Path) -> None:
+    store, image = FrameStore(tmp_path), np.zeros((4, 4), np.uint8)
+    store.set_aside("p.1/500mm")
+    assert not (tmp_path / "set-aside").exists()
+    for _ in range(2):
+        store.save("p.1/500mm/L1/00", "on", image, 0)
+        store.save("p.1/600mm/L1/00", "on", image, 0)
+        store.set_aside("p.1/500mm")
+    aside = sorted(path.relative_to(tmp_path) for path in (tmp_path / "set-aside").rglob("*.png"))
+    assert aside == [Path(f"set-aside/{n}/p.1/500mm/L1/00-on.png") for n in (1, 2)]
+    assert [path.name for path in (tmp_path / "frames/p.1").iterdir()] == ["600mm"]
+
+
+def test_an_image_of_32_bits_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.tiff"
+    cv2.imwrite(str(path), np.zeros((4, 4), np.float32))
+    with pytest.raises(BadInputError, match="float32"):
+        read_image(path)

@@ -8,7 +8,7 @@ import pytest
 
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import SessionFinished, SessionStarted, StepStarted
-from workbench.session.journal import JOURNAL, Journal, read_journal
+from workbench.session.journal import JOURNAL, Journal, is_running, read_journal
 
 STARTED = SessionStarted(session="s", rig="r", procedures=("p",))
 STEP = StepStarted(procedure="p", index=1, step="fit", title="Fit", shots=0)
@@ -65,3 +65,27 @@ def test_a_full_disk_stops_the_session_by_name(tmp_path: Path, monkeypatch: pyte
 def test_no_journal(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match="expected a session's journal"):
         list(read_journal(tmp_path))
+
+
+def test_a_reopened_journal_counts_on_and_cuts_off_what_is_torn(tmp_path: Path) -> None:
+    with Journal(tmp_path) as journal:
+        journal.append(STARTED)
+    path = tmp_path / JOURNAL
+    whole = path.read_bytes()
+    path.write_bytes(whole + b'{"n":1,"time_ns"')
+    reopened, before = Journal.reopen(tmp_path)
+    with reopened:
+        assert path.read_bytes() == whole
+        assert [record.event for record in before] == [STARTED]
+        assert reopened.append(STEP).n == 1
+    assert [record.event for record in read_journal(tmp_path)] == [STARTED, STEP]
+
+
+def test_two_programs_never_write_one_session(tmp_path: Path) -> None:
+    with Journal(tmp_path):
+        assert is_running(tmp_path)
+        with pytest.raises(BadInputError, match=str(tmp_path)) as caught:
+            Journal.reopen(tmp_path)
+        assert caught.value.exit_code == 2
+    assert not is_running(tmp_path)
+    assert not is_running(tmp_path / "none")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.ideal import CX, CY, F
-from tests.support.running import running
+from tests.support.ideal import CX, F
+from tests.support.running import CY_PX, running
 from workbench.model.event import CaptureTaken
 from workbench.procedure.engine.lasers import capture_lasers
 from workbench.procedure.engine.step import flat_placement
@@ -32,4 +32,4 @@ def test_each_laser_is_captured_alone_in_every_repeat(tmp_path: Path) -> None:
         ]
         for laser_id, x_mm in (("L1", -60.0), ("L2", 60.0)):
             (spot,) = context.findings[f"p.1/500mm/{laser_id}/00"].spots
-            assert (spot.u_px, spot.v_px) == pytest.approx((CX + F * x_mm / 500, CY), abs=0.05)
+            assert (spot.u_px, spot.v_px) == pytest.approx((CX + F * x_mm / 500, CY_PX), abs=0.05)

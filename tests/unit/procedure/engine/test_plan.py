@@ -7,21 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.procedures import RIG, plan_of
 from workbench.model.errors import BadInputError
 from workbench.procedure.engine.plan import Plan
 
-ROOT = Path(__file__).parents[4]
-RIG = ROOT / "rigs/thesis-emulated.yaml"
 CAPTURE = "  - {step: capture_grid, standoffs_mm: [300, 600], repeats: 2}\n"
 TRIAL = "  - {step: accuracy_trial, standoffs_mm: [450], readings: 5}\n"
-
-
-def plan_of(folder: Path, **procedures: str) -> Plan:
-    paths = []
-    for name, steps in procedures.items():
-        paths.append(folder / f"{name}.yaml")
-        paths[-1].write_text(f"format: 1\nprocedure: {name}\ntitle: T\nsteps:\n{steps}")
-    return Plan.load(RIG, paths)
 
 
 def test_steps_are_numbered_within_their_procedure_with_placements_and_captures(tmp_path: Path) -> None:
