@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.support.ideal import exact, ideal_rig, laser
+from tests.support.plain_bench import plain_bench
 from tests.support.rigs import PROVENANCE
 from workbench.devices.protocols import Operator
-from workbench.devices.registry import open_bench
 from workbench.model import event as ev
 from workbench.model.errors import AnswerNeededError
 from workbench.model.prompt import Answer, Prompt
@@ -87,8 +87,7 @@ def running(
     rig = rig or two_laser_rig()
     seen: list[ev.Record] = []
     stop: list[str] = []
-    with open_bench(rig, session) as bench, Journal(session) as journal:
-        bench = replace(bench, operator=None)
+    with plain_bench(rig, folder) as bench, Journal(session) as journal:
         recorder = ReplayingJournal(journal, [seen.append], before)
         context = Context(
             session,

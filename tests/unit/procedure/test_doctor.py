@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.plain_bench import plain_bench
 from tests.support.running import Scripted, two_laser_rig, with_emulator
 from workbench.devices.protocols import StreamingCamera
-from workbench.devices.registry import open_bench
 from workbench.model.errors import StoppedError
 from workbench.model.prompt import Answer
 from workbench.model.rig import Rig
@@ -26,7 +26,7 @@ PARTS = ["controller", "interlock", "camera", "latency", "exposure", "laser L1",
 
 def results(folder: Path, rig: Rig, **camera: int) -> dict[str, bool]:
     """Whether each part is well; `camera` sets attributes of the driver before."""
-    with open_bench(rig, folder / "s") as bench:
+    with plain_bench(rig, folder) as bench:
         for name, value in camera.items():
             setattr(bench.camera, name, value)
         found = {one.part: one.ok for one in examine(rig, bench, Scripted())}
@@ -46,7 +46,7 @@ def test_an_open_interlock_fails_and_so_does_all_that_needs_a_laser(tmp_path: Pa
 def test_a_picture_of_another_size_is_the_cameras_fault(tmp_path: Path) -> None:
     rig = noisy_rig()
     other = rig.model_copy(update={"camera": rig.camera.model_copy(update={"height_px": 110})})
-    with open_bench(rig, tmp_path / "s") as bench:
+    with plain_bench(rig, tmp_path) as bench:
         checks = examine(other, bench, Scripted())
         found = {one.part: one for one in (next(checks) for _ in range(3))}
     assert {part: one.ok for part, one in found.items()} == {
@@ -85,7 +85,7 @@ def test_a_fixed_exposure_that_is_too_short_leaves_spots_too_dim(tmp_path: Path)
 def test_no_laser_is_lit_where_the_operator_stops(tmp_path: Path, key: str) -> None:
     operator = Scripted({key: [Answer(action="abort", reason="no eyewear")]})
     lit: list[str] = []
-    with open_bench(noisy_rig(), tmp_path / "s") as bench:
+    with plain_bench(noisy_rig(), tmp_path) as bench:
         bench = replace(bench, mark=lit.append)
         assert isinstance(bench.camera, StreamingCamera)
         with pytest.raises(StoppedError, match="no eyewear") as caught:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.plain_bench import plain_bench
 from tests.support.running import two_laser_rig
 from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.devices.protocols import Frame
-from workbench.devices.registry import open_bench
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.event import CaptureTaken, ExposureSet, TargetPlaced
 from workbench.model.target import Placement
@@ -29,7 +29,7 @@ SET = ExposureSet(key=PLACEMENT.key, exposure=20.0, unit="us", peak=0.6, verdict
 def source(tmp_path: Path) -> Iterator[PairSource]:
     """A bench with the target placed, and beams confirmed to be safe."""
     rig = two_laser_rig()
-    with open_bench(rig, tmp_path / "s") as bench:
+    with plain_bench(rig, tmp_path) as bench:
         bench.target.place(PLACEMENT)
         yield PairSource(tmp_path, rig, bench, may_fire=True)
 
