@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from math import degrees
 from pathlib import Path
 
 import pytest
 
+from tests.support.surfaces import X, incline, seen
 from workbench.cli.reading_json import plain
 from workbench.model.calibration import load_calibration
 from workbench.model.captures import load_captures
 from workbench.ranging.captures import read_captures
 from workbench.ranging.ranger import Ranger, Reading
+from workbench.ranging.shape import fit_shape
 
 SESSION = Path(__file__).parents[3] / "data/session-0.1.0"
 
@@ -33,12 +36,16 @@ def test_numbers_are_the_readings(reading: Reading) -> None:
     assert told["lines"][0]["lasers"] == [laser.laser_id for laser in reading.lasers]
 
 
-def test_angles_are_in_degrees(reading: Reading) -> None:
-    (line,) = reading.lines
-    told = plain(reading)["lines"][0]["shape"]
-    assert told["kind"] == line.shape.kind
-    if line.shape.angle_rad is not None:
-        assert told["angle_deg"] == pytest.approx(degrees(line.shape.angle_rad))
+def test_a_shape_is_told_with_its_angle_in_degrees(reading: Reading) -> None:
+    slope = incline(800.0, 25.0)
+    shape = fit_shape(seen(X, slope(X)))
+    other = replace(reading, lines=(replace(reading.lines[0], shape=shape),))
+    told = plain(other)["shape"]
+    assert told == plain(other)["lines"][0]["shape"]
+    assert (told["kind"], told["degree"]) == ("incline", 1)
+    assert told["angle_deg"] == pytest.approx(25.0, abs=0.01)
+    assert shape.angle_sigma_rad is not None
+    assert told["angle_sigma_deg"] == pytest.approx(degrees(shape.angle_sigma_rad))
 
 
 def test_a_reading_of_nothing_is_valid_json_too(reading: Reading) -> None:
