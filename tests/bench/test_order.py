@@ -107,7 +107,7 @@ def test_a_warm_up_runs_the_camera_in_the_dark(tmp_path: Path, monkeypatch: pyte
     assert ended.outcome == "7 frames"
 
 
-def test_a_plan_prints_every_step_with_shots_emission_and_time(
+def test_a_plan_prints_every_step_with_captures_emission_and_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
@@ -117,14 +117,14 @@ def test_a_plan_prints_every_step_with_shots_emission_and_time(
     told = capsys.readouterr().err
     assert max(map(len, told.splitlines())) <= 80
     steps_told = [re.split(r"\s{2,}", line) for line in told.splitlines() if line.startswith("p.")]
-    # Three placings of 64 s, 12 shots of a second, 2 s of lease each.
+    # Three placings of 64 s, 12 captures of a second, 2 s of lease each.
     assert [row[0] for row in steps_told] == ["p.1", "p.2", "p.3"]
     assert [row[2:] for row in steps_told] == [
         ["-", "-", "-", "10 s"],
         ["3", "12", "24.0", "3 min"],
         ["-", "-", "-", "10 s"],
     ]
-    assert "12 shots, at most 24 s of emission (leases of 2 s); 4 min in all" in told
+    assert "12 captures, at most 24 s of emission (leases of 2 s); 4 min in all" in told
     assert "no session of" in " ".join(told.split())
     session(tmp_path, steps.replace("  - step: fit\n", ""), Says())
     print_plan([procedure], rig, tmp_path)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from tests.viewer.readback import Contents
 from tests.viewer.session import a_rig
-from workbench.model.event import LaserRange, ReadingTaken, SpotRecord
+from workbench.model.event import LaserRange, ReadingTaken
+from workbench.model.spot import Failure, Spot
 from workbench.viewer.blueprint import blueprint
 from workbench.viewer.entities import Rgb, laser_colors
 from workbench.viewer.stream import Moment, Stream
@@ -32,8 +33,8 @@ def packed(color: Rgb) -> int:
     return red << 24 | green << 16 | blue << 8 | 255
 
 
-def a_spot(laser: str | None, u_px: float, v_px: float = 240.0, *flags: str) -> SpotRecord:
-    return SpotRecord(
+def a_spot(laser: str | None, u_px: float, v_px: float = 240.0, *flags: Failure) -> Spot:
+    return Spot(
         laser_id=laser,
         u_px=u_px,
         v_px=v_px,
@@ -42,7 +43,7 @@ def a_spot(laser: str | None, u_px: float, v_px: float = 240.0, *flags: str) -> 
         flux_dn=1000.0,
         width_px=1.5,
         peak_dn=80.0,
-        flags=flags,
+        flags=frozenset(flags),
     )
 
 

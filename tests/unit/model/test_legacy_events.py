@@ -1,47 +1,49 @@
-"""Events of version 0.1.0 as today's tables."""
+"""Events of sessions recorded by version 0.1.0, read as today's."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import pytest
 
 from workbench.model.event import Record, TrialFinished, TrialProgress
 from workbench.model.legacy_events import upgraded
 
-ROWS = [{"standoff_mm": 500.0, "mean_error_mm": 0.25}, {"standoff_mm": 700.0, "missing": 3}]
+
+def read(event: dict[str, object]) -> object:
+    return Record.model_validate({"n": 0, "time_ns": 0, "event": event}).event
 
 
-def record(event: dict[str, Any]) -> Any:
-    return Record.model_validate({"n": 0, "time_ns": 1, "event": event}).event
-
-
-@pytest.mark.parametrize("kind", ["trial_finished", "simulation_finished"])
-def test_rows_of_an_old_trial_become_a_table_of_their_keys(kind: str) -> None:
-    event = record({"kind": kind, "trial": "accuracy", "rows": ROWS})
+def test_rows_of_an_old_trial_are_a_table_with_units_from_their_keys() -> None:
+    rows = [{"standoff_mm": 500.0, "readings": 3, "sd_mm": None}, {"standoff_mm": 800.0, "angle_deg": 3.5}]
+    event = read({"kind": "trial_finished", "trial": "p.8", "rows": rows})
     assert isinstance(event, TrialFinished)
     (table,) = event.tables
+    assert (event.trial, table.name, event.charts) == ("p.8", "p.8", ())
     assert [(c.key, c.name, c.unit) for c in table.columns] == [
         ("standoff_mm", "standoff", "mm"),
-        ("mean_error_mm", "mean error", "mm"),
-        ("missing", "missing", ""),
+        ("readings", "readings", ""),
+        ("sd_mm", "sd", "mm"),
+        ("angle_deg", "angle", "deg"),
     ]
-    assert table.rows == ((500.0, 0.25, None), (700.0, None, 3))
-    assert (table.text(0, 0), table.text(0, 1)) == ("500", "0.25")
+    assert table.rows == ((500.0, 3, None, None), (800.0, None, None, 3.5))
 
 
-def test_a_simulated_scene_becomes_progress_with_its_count_of_distances() -> None:
-    scene = {"name": "flat, near", "source": "figure 21"}
-    event = record({"kind": "scene_simulated", "trial": "thesis", "scene": scene, "set_mm": [1.0, 2.0, 3.0]})
+def test_claims_of_an_old_simulation_are_a_table() -> None:
+    event = read({"kind": "simulation_finished", "trial": "p.1", "rows": [{"scene": "a", "ours": 0.01}]})
+    assert isinstance(event, TrialFinished)
+    assert event.tables[0].rows == (("a", 0.01),)
+
+
+def test_an_old_scene_is_a_line_of_progress() -> None:
+    scene = {"name": "flat", "source": "figure 21"}
+    event = read({"kind": "scene_simulated", "trial": "p.1", "scene": scene, "set_mm": [100.0, 200.0, 300.0]})
     assert isinstance(event, TrialProgress)
-    assert event.trial == "thesis"
-    for word in ("flat, near", "figure 21", "3"):
-        assert word in event.text
+    assert event.trial == "p.1"
+    assert {"flat,", "3"} <= set(event.text.split())
 
 
 @pytest.mark.parametrize(
     "event",
-    [None, "text", 3, {"kind": "trial_finished", "trial": "t"}, {"kind": "step_finished"}, {"rows": []}],
+    [{"kind": "trial_finished", "trial": "p.8", "tables": []}, {"kind": "step_finished"}, {}, "text", None],
 )
-def test_anything_else_stays_as_it_is(event: Any) -> None:
+def test_what_is_of_today_is_left_as_it_is(event: object) -> None:
     assert upgraded(event) is event

@@ -20,7 +20,7 @@ def _slope(coefficients: Numbers, x: EitherArray, y: EitherArray) -> EitherArray
     return as_array(1.0 - coefficients[2] * (x * x + y * y))
 
 
-LENS = LensModel("equidistant", _squeezed, _slope, {}, (), ())
+LENS = LensModel("equidistant", _squeezed, _slope, {}, ())
 
 
 def test_pixels_are_those_of_the_distorted_coordinates() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.viewer_stream import COLORS, a_range, a_spot, logged, packed
+from workbench.model.spot import Failure
 from workbench.viewer.camera import (
     QUANTITIES,
     log_assigned,
@@ -28,14 +29,14 @@ def test_a_frame_is_logged_as_it_is(tmp_path: Path) -> None:
 
 
 def test_dots_lie_at_rerun_s_pixels_in_the_laser_s_colour(tmp_path: Path) -> None:
-    spots = (a_spot("L2", 100.25, 50.75), a_spot(None, 300.0, 20.0, "clipped", "dim"))
+    spots = (a_spot("L2", 100.25, 50.75), a_spot(None, 300.0, 20.0, Failure.SATURATED, Failure.MERGED))
     contents = logged(tmp_path, lambda stream: log_spots(stream, spots, COLORS))
     ((_, positions),) = contents.values(DOTS, "Points2D:positions")
     np.testing.assert_allclose(positions, [[100.75, 51.25], [300.5, 20.5]])
     ((_, colors),) = contents.values(DOTS, "Points2D:colors")
     assert colors == [packed(COLORS["L2"]), packed(WHITE)]
     ((_, labels),) = contents.values(DOTS, "Points2D:labels")
-    assert labels == ["L2", "? (clipped, dim)"]
+    assert labels == ["L2", "? (merged, saturated)"]
 
 
 def test_a_ring_goes_round_each_spot_and_leaves_its_light_free(tmp_path: Path) -> None:

@@ -212,3 +212,55 @@ def test_a_driver_without_what_it_needs(tmp_path: Path) -> None:
     block = "devices:\n  camera: {source: 0, gain: loud}\n  lasers: {port: /dev/ttyACM0}\n"
     (line,) = wrong(tmp_path, changed(RIG, "driver: emulated", "driver: opencv+serial") + block)
     assert "devices.camera.gain: expected a number, such as 12.5, got 'loud'" in line
+
+
+HEAD = "format: 1\nprocedure: p\ntitle: P\nsteps:\n"
+
+
+@pytest.mark.parametrize(
+    ("steps", "words"),
+    [
+        (
+            "  - step: capture_grid\n    standoffs_mm: [5]\n    repeats: 0\n",
+            ":7: steps[0].repeats: expected at least 1, got 0",
+        ),
+        ("  - step: dance\n", ":5: steps[0]"),
+        (
+            "  - step: fit\n  - step: capture_grid\n    standoffs_mm: [5]\n    repeats: 1\n",
+            ":5: steps[0]: fit needs",
+        ),
+        (
+            "  - step: capture_grid\n    standoffs_mm: [5]\n    repeats: 1\n"
+            "  - step: fit\n  - step: check_limits\n"
+            "    limits:\n      rms_px: {in: [0, 1], on_fail: retry}\n",
+            "would give the same fit again",
+        ),
+    ],
+)
+def test_a_wrong_procedure_is_named_with_its_line(tmp_path: Path, steps: str, words: str) -> None:
+    path = tmp_path / "p.yaml"
+    path.write_text(HEAD + steps)
+    with pytest.raises(BadInputError) as caught:
+        check_file(path)
+    assert words in str(caught.value)
+
+
+def test_what_every_file_of_ours_is_worth() -> None:
+    for path in [*ROOT.glob("procedures/*.yaml"), *ROOT.glob("rigs/*.yaml")]:
+        check_file(path)
+    (note,) = check_file(ROOT / "procedures/accuracy-flat.yaml")
+    assert "accuracy-flat.yaml:7: steps[0]: accuracy_trial needs a procedure before" in note
+
+
+def test_a_rig_of_an_unknown_driver(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(
+        (ROOT / "rigs/thesis-emulated.yaml").read_text().replace("driver: emulated", "driver: robot")
+    )
+    with pytest.raises(
+        BadInputError, match=r"rig.yaml:6: driver: expected an installed bench driver .*got robot"
+    ):
+        check_file(rig)
+    rig.write_text("lasers: []\n")
+    with pytest.raises(BadInputError, match="expected a procedure or a rig"):
+        check_file(rig)

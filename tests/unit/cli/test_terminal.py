@@ -1,0 +1,106 @@
+"""What a running session shows on the terminal."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console
+
+from tests.support.records import SESSION, STEPS, records
+from workbench.cli.terminal import FaultTolerantConsumer, Terminal, about
+from workbench.model import event as ev
+from workbench.model.errors import StoppedError
+from workbench.model.spot import Spot
+from workbench.model.table import Column, Table
+from workbench.procedure.engine.durations import StepDurations
+from workbench.procedure.engine.progress import TimeLeft
+
+STARTED = ev.ProcedureStarted(procedure="p", title="Our procedure", steps=2)
+
+
+def console() -> tuple[Console, io.StringIO]:
+    stream = io.StringIO()
+    return Console(file=stream, width=80, markup=False), stream
+
+
+def shown(*timed: tuple[float, ev.Event]) -> list[str]:
+    there, stream = console()
+    with Terminal(there, TimeLeft(STEPS, StepDurations())) as terminal:
+        for record in records((0, STARTED), *timed):
+            terminal(record)
+    return stream.getvalue().splitlines()
+
+
+def spots(key: str, *centres_px: tuple[float, float]) -> ev.SpotsFound:
+    found = [
+        Spot(
+            laser_id=None, u_px=u, v_px=v, u_sd_px=0.05, v_sd_px=0.05, flux_dn=1.0, width_px=2.0, peak_dn=9.0
+        )
+        for u, v in centres_px
+    ]
+    return ev.SpotsFound(key=key, spots=tuple(found))
+
+
+def test_a_placement_is_summed_up_when_it_is_finished() -> None:
+    """Lasers seen, least signal to noise (2 / 0.05), largest scatter (1 / sqrt(2))."""
+    session = [one for one in SESSION if not isinstance(one[1], ev.SpotsFound | ev.PlacementFinished)]
+    seen = [(22.0, spots("a1", (10.0, 5.0))), (22.0, spots("a2", (11.0, 5.0)))]
+    lines = shown(*session[:4], *seen, (23.0, ev.PlacementFinished(key="a")))
+    (line,) = [line for line in lines if "1/1 lasers" in line]
+    assert {"500", "40", "0.707"} <= set(line.replace(",", " ").split())
+    (progress,) = [line for line in lines if line.strip().startswith("placement ")]
+    assert [int(word) for word in progress.split()[1:4:2]] == [1, 3]
+
+
+def test_what_is_wrong_is_shown_and_what_is_well_is_not() -> None:
+    checked = ev.LimitChecked(
+        step="p.1", of="a/L1", quantity="snr", value=7.0, limit="at least 9", verdict="fail"
+    )
+    passed = checked.model_copy(update={"quantity": "missing", "verdict": "pass"})
+    text = "\n".join(shown((1, checked), (2, passed)))
+    assert "a/L1: snr 7" in text
+    assert "missing" not in text
+
+
+def test_tables_of_a_trial_are_shown_within_the_width() -> None:
+    table = Table(
+        name="t",
+        title="Numbers",
+        columns=(Column(key="x_mm", name="x", unit="mm", format=".1f"),),
+        rows=((1.25,),),
+    )
+    lines = shown((1, ev.TrialFinished(trial="p.1", tables=(table,))))
+    assert any("1.2" in line for line in lines)
+    assert max(map(len, lines)) <= 80
+
+
+def test_a_consumer_that_fails_is_told_once_and_asked_never_again() -> None:
+    calls: list[int] = []
+
+    def fails(record: ev.Record) -> None:
+        calls.append(record.n)
+        raise OSError("disk full")
+
+    there, stream = console()
+    consumer = FaultTolerantConsumer(fails, "drawing", there)
+    for record in records((0, STARTED), (1, STARTED)):
+        consumer(record)
+    assert calls == [0]
+    assert stream.getvalue().count("disk full") == 1
+
+
+def test_a_stop_goes_through_a_fault_tolerant_consumer() -> None:
+    def stops(record: ev.Record) -> None:
+        raise StoppedError("enough")
+
+    with pytest.raises(StoppedError):
+        FaultTolerantConsumer(stops, "drawing", console()[0])(records((0, STARTED))[0])
+
+
+@pytest.mark.parametrize(
+    ("seconds", "number", "unit"),
+    [(14.0, "10", "s"), (94.0, "90", "s"), (95.0, "2", "min"), (5399.0, "90", "min"), (5400.0, "1.5", "h")],
+)
+def test_times_are_no_finer_than_an_estimate_is(seconds: float, number: str, unit: str) -> None:
+    assert about(seconds).split()[-2:] == [number, unit]

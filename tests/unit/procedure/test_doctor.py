@@ -1,0 +1,94 @@
+"""Checks of a rig, part by part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.support.plain_bench import plain_bench
+from tests.support.running import Scripted, two_laser_rig, with_emulator
+from workbench.devices.protocols import StreamingCamera
+from workbench.model.errors import StoppedError
+from workbench.model.prompt import Answer
+from workbench.model.rig import Rig
+from workbench.procedure.doctor import examine
+
+
+def noisy_rig(**emulator: object) -> Rig:
+    """A camera without any noise delivers one number for every pixel, as a broken driver does."""
+    return with_emulator(two_laser_rig(), sensor={}, **emulator)
+
+
+PARTS = ["controller", "interlock", "camera", "latency", "exposure", "laser L1", "laser L2"]
+
+
+def results(folder: Path, rig: Rig, **camera: int) -> dict[str, bool]:
+    """Whether each part is well; `camera` sets attributes of the driver before."""
+    with plain_bench(rig, folder) as bench:
+        for name, value in camera.items():
+            setattr(bench.camera, name, value)
+        found = {one.part: one.ok for one in examine(rig, bench, Scripted())}
+        assert bench.lasers.state().lit == ()
+    return found
+
+
+def test_a_rig_that_is_ready_is_well_in_every_part(tmp_path: Path) -> None:
+    assert results(tmp_path, noisy_rig()) == dict.fromkeys(PARTS, True)
+
+
+def test_an_open_interlock_fails_and_so_does_all_that_needs_a_laser(tmp_path: Path) -> None:
+    found = results(tmp_path, noisy_rig(controller={"interlock_closed": False}))
+    assert [part for part, ok in found.items() if ok] == ["controller", "camera"]
+
+
+def test_a_picture_of_another_size_is_the_cameras_fault(tmp_path: Path) -> None:
+    rig = noisy_rig()
+    other = rig.model_copy(update={"camera": rig.camera.model_copy(update={"height_px": 110})})
+    with plain_bench(rig, tmp_path) as bench:
+        checks = examine(other, bench, Scripted())
+        found = {one.part: one for one in (next(checks) for _ in range(3))}
+    assert {part: one.ok for part, one in found.items()} == {
+        "controller": True,
+        "interlock": True,
+        "camera": False,
+    }
+    assert {"640", "120", "110"} <= {word.strip(";,") for word in found["camera"].found.split()}
+
+
+def test_a_picture_of_one_number_is_the_cameras_fault(tmp_path: Path) -> None:
+    found = results(tmp_path, two_laser_rig())
+    assert [part for part, ok in found.items() if not ok] == ["camera"]
+
+
+def test_a_driver_that_discards_too_few_frames_fails_and_is_put_right_for_the_rest(tmp_path: Path) -> None:
+    rig = noisy_rig(camera={"latency_frames": 3})
+    found = results(tmp_path, rig, discard_frames=0)
+    assert [part for part, ok in found.items() if not ok] == ["latency"]
+
+
+def test_a_laser_that_is_not_seen_is_named(tmp_path: Path) -> None:
+    beside = {"lasers": {"L2": {"tx": 3.0}}}
+    found = results(tmp_path, noisy_rig(truth=beside))
+    assert not found["laser L2"]
+    assert found["laser L1"]
+
+
+def test_a_fixed_exposure_that_is_too_short_leaves_spots_too_dim(tmp_path: Path) -> None:
+    found = results(tmp_path, noisy_rig(camera={"exposure_s": 3e-6}))
+    assert "exposure" not in found, "there is nothing to set"
+    assert not found["laser L1"]
+
+
+@pytest.mark.parametrize("key", ["safety", "doctor"])
+def test_no_laser_is_lit_where_the_operator_stops(tmp_path: Path, key: str) -> None:
+    operator = Scripted({key: [Answer(action="abort", reason="no eyewear")]})
+    lit: list[str] = []
+    with plain_bench(noisy_rig(), tmp_path) as bench:
+        bench = replace(bench, mark=lit.append)
+        assert isinstance(bench.camera, StreamingCamera)
+        with pytest.raises(StoppedError, match="no eyewear") as caught:
+            list(examine(noisy_rig(), bench, operator))
+    assert caught.value.exit_code == 5
+    assert lit == ["doctor/camera"]
