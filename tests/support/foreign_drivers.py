@@ -1,6 +1,7 @@
 """A module of drivers of another package: lasers, a camera and a target, none of which the workbench knows.
 
-The line writes each change to a log with its time, fails as the file `<log>.fault` says, and has no leases.
+The line is on when it is opened, writes each change to a log with its time, fails as the file `<log>.fault`
+says (the calls that fail; `exit-<call>`: by SystemExit; `numpy`: state in numpy's types), and has no leases.
 The camera shows a spot for each laser that the log says is on.
 """
 
@@ -38,8 +39,10 @@ class Line:
         self._log = Path(settings.log)
         self._mask = (1 << lasers) - 1
         self._fail("open")
+        self._write(self._mask)  # left on
 
     def identify(self, boot_s):
+        self._fail("identify")
         return "lab lasers"
 
     def light(self, mask, lease_ms):
@@ -53,6 +56,9 @@ class Line:
 
     def state(self):
         self._fail("state")
+        if self._fault() == "numpy":
+            import numpy as np
+            return np.uint8(self._mask), np.bool_(True)
         return self._mask, True
 
     def _write(self, mask):
@@ -60,10 +66,15 @@ class Line:
         with self._log.open("a") as file:
             file.write(f"{time.monotonic_ns()} {mask}\\n")
 
-    def _fail(self, what):
+    def _fault(self):
         fault = Path(f"{self._log}.fault")
-        if fault.exists() and fault.read_text() == what:
+        return fault.read_text() if fault.exists() else ""
+
+    def _fail(self, what):
+        if what in self._fault().split():
             raise ZeroDivisionError(f"a defect of the driver in {what}")
+        if f"exit-{what}" in self._fault().split():
+            raise SystemExit(0)
 
 
 class CameraBlock(DeviceBlock):

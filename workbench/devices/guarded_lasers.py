@@ -48,8 +48,9 @@ class GuardedLaserBank:
 
         Raises:
             BadInputError: the device has fewer outputs than there are lasers.
-            RigNotReadyError: no such device, another program holds it, or it does not answer as expected.
-            LaserOffNotConfirmedError: the device answers, but does not confirm that all are off.
+            RigNotReadyError: no such device, another program holds it, or it could not be identified and
+                confirmed that all are off.
+            LaserOffNotConfirmedError: the device was opened, and does not confirm that all are off.
         """
         self.ids = tuple(ids)
         self._guardian = GuardianClient(line_type, settings, len(ids), boot_s, hang_s, virtual)

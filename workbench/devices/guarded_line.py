@@ -24,8 +24,8 @@ ends, s."""
 class GuardedLine(Protocol):
     """Outputs that switch lasers: bit n of a mask is laser n + 1 of the rig file.
 
-    Every call returns within about a second. An error that is none of the workbench's becomes a
-    `RigNotReadyError`, from `all_off` a `LaserOffNotConfirmedError`.
+    Every call returns within about a second. An error that is none of the workbench's, `SystemExit` included,
+    becomes a `RigNotReadyError`, from `all_off` a `LaserOffNotConfirmedError`.
     """
 
     settings_type: ClassVar[Any]
@@ -52,8 +52,8 @@ class GuardedLine(Protocol):
     def identify(self, boot_s: float) -> str:
         """Name of the device. A device that boots when it is opened has `boot_s` to answer.
 
-        The guardian calls this first, then `all_off`. A device that may have been left on is switched off
-        here or in the constructor, before it is asked anything.
+        The guardian calls this first, then `all_off`, also where this fails. A device that may have been left
+        on is switched off here or in the constructor, before it is asked anything.
 
         Raises:
             RigNotReadyError: it does not answer as expected.
@@ -121,7 +121,7 @@ class CheckedLine:
         """
         with driver_errors(only=RigNotReadyError):
             mask, interlock_closed = self._line.state()
-            return int(mask), interlock_closed
+            return int(mask), None if interlock_closed is None else bool(interlock_closed)
 
 
 def line_reference(line_type: type[GuardedLine]) -> str:
@@ -163,6 +163,15 @@ def driver_errors(
         yield
     except only:
         raise
-    except Exception as error:  # a driver's, of any kind: the guardian goes on and reports it
-        text = str(error) if isinstance(error, WorkbenchError) else f"{type(error).__name__}: {error}"
-        raise raised(f"laser driver: {text}; check the device, its settings, and the driver") from None
+    except BaseException as error:  # SystemExit, too: a driver must not end the guardian with a laser on
+        raise raised(
+            f"laser driver: {_error_text(error)}; check the device, its settings, and the driver"
+        ) from None
+
+
+def _error_text(error: BaseException) -> str:
+    """Message of an error of the workbench; of another one with its kind."""
+    try:
+        return str(error) if isinstance(error, WorkbenchError) else f"{type(error).__name__}: {error}"
+    except Exception:  # a foreign package's error whose own text fails
+        return type(error).__name__

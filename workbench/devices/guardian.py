@@ -34,7 +34,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.devices.guarded_line import TRY_BOARD_S, CheckedLine, open_line
+from workbench.devices.guarded_line import TRY_BOARD_S, CheckedLine, driver_errors, open_line
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError, WorkbenchError
 
 LOOK_S = 0.02
@@ -244,31 +244,75 @@ class Guardian:
 
     def leave(self) -> int:
         """Switch off, trying for a while: the workbench is gone. Returns the exit code."""
-        deadline = time.monotonic() + (TRY_ALONE_S if self._line.has_leases else TRY_BOARD_S)
-        while True:
-            try:
-                self._line.all_off()
-            except LaserOffNotConfirmedError as error:
-                if time.monotonic() >= deadline:
-                    with suppress(OSError):
-                        os.write(sys.stderr.fileno(), f"error: {error}\n".encode())
-                    return error.exit_code
-                time.sleep(LOOK_S)
-            else:
-                return 0
+        try:
+            keep_trying_off(self._line, TRY_ALONE_S if self._line.has_leases else TRY_BOARD_S)
+        except LaserOffNotConfirmedError as error:
+            with suppress(OSError):
+                os.write(sys.stderr.fileno(), f"error: {error}\n".encode(errors="backslashreplace"))
+            return error.exit_code
+        return 0
+
+
+def keep_trying_off(line: CheckedLine, for_s: float) -> None:
+    """Switch every laser off; an off that is not confirmed is tried again for `for_s` seconds.
+
+    Raises:
+        LaserOffNotConfirmedError: the last try failed, too.
+    """
+    deadline = time.monotonic() + for_s
+    while True:
+        try:
+            line.all_off()
+        except LaserOffNotConfirmedError:
+            if time.monotonic() >= deadline:
+                raise
+            time.sleep(LOOK_S)
+        else:
+            return
+
+
+def identify_dark(line: CheckedLine, boot_s: float) -> str:
+    """Identity of a device that has just been opened; whatever `identify` does, every laser is off then.
+
+    Raises:
+        LaserOffNotConfirmedError: the off is not confirmed, whether or not the device was identified.
+        WorkbenchError: `identify` failed, and the off is confirmed.
+    """
+    try:
+        identity = line.identify(boot_s)
+    except WorkbenchError as error:
+        try:
+            keep_trying_off(line, TRY_ALONE_S)
+        except LaserOffNotConfirmedError as unconfirmed:
+            raise LaserOffNotConfirmedError(
+                f"{unconfirmed}. The device was not identified: {error}"
+            ) from None
+        raise
+    line.all_off()
+    return identity
 
 
 def answer(answers: int, number: int, act: Callable[[], object]) -> int:
-    """Do something and write the outcome to the workbench, which may be gone; returns an exit code."""
+    """Do something and write the outcome to the workbench, which may be gone; returns an exit code.
+
+    A value that has no JSON is the driver's defect, and is answered as such.
+    """
     code = 0
     try:
-        said: dict[str, object] = {"to": number, "value": act()}
+        value = act()
+        with driver_errors():
+            said = json.dumps({"to": number, "value": value})
     except WorkbenchError as error:
-        said = {"to": number, "error": type(error).__name__, "text": str(error)}
+        said = json.dumps({"to": number, "error": public_name(error), "text": str(error)})
         code = error.exit_code
     with suppress(OSError):
-        os.write(answers, json.dumps(said).encode() + b"\n")
+        os.write(answers, said.encode() + b"\n")
     return code
+
+
+def public_name(error: WorkbenchError) -> str:
+    """Name in `workbench.model.errors` of an error's class, or of its base where a driver derived it."""
+    return next(kind.__name__ for kind in type(error).__mro__ if kind.__module__ == WorkbenchError.__module__)
 
 
 def main(line: str, settings: str, lasers: int, boot_s: float, hang_s: float, signals: int) -> int:
@@ -282,9 +326,7 @@ def main(line: str, settings: str, lasers: int, boot_s: float, hang_s: float, si
 
     def connect() -> str:
         opened.append(open_line(line, settings, lasers, workbench.alarm, _hurry))
-        identity = opened[0].identify(boot_s)
-        opened[0].all_off()
-        return identity
+        return identify_dark(opened[0], boot_s)
 
     code = answer(answers, 0, connect)
     if code not in {0, LaserOffNotConfirmedError.exit_code} or not opened:

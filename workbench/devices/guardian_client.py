@@ -27,7 +27,7 @@ ANSWER_S = 10.0
 LET_GO_S = 3.0
 """Time for a guardian to end where no lease ends an emission and the off is not confirmed, s."""
 DARK = {0, BadInputError.exit_code, RigNotReadyError.exit_code}
-"""A guardian's exit codes that need no warning: all is off, or it never held the device."""
+"""A guardian's exit codes that need no warning: the off was confirmed, or the device could not be opened."""
 
 
 class GuardianClient:
@@ -54,8 +54,9 @@ class GuardianClient:
 
         Raises:
             BadInputError: the device has fewer outputs than there are `lasers`.
-            RigNotReadyError: no such device, another program holds it, or it does not answer as expected.
-            LaserOffNotConfirmedError: the device answers, but not that all are off.
+            RigNotReadyError: no such device, another program holds it, or it could not be identified and
+                confirmed that all are off.
+            LaserOffNotConfirmedError: the device was opened, and does not confirm that all are off.
         """
         commands, self._commands = os.pipe()
         self._answers, answers = os.pipe()

@@ -130,12 +130,13 @@ def test_what_a_driver_prints_is_not_taken_for_an_answer(rig: Path, bank: LaserB
     ("what", "error"),
     [("light", RigNotReadyError), ("state", RigNotReadyError), ("off", LaserOffNotConfirmedError)],
 )
+@pytest.mark.parametrize(("how", "kind"), [("", "ZeroDivisionError"), ("exit-", "SystemExit")])
 def test_a_defect_of_the_driver_is_an_answer_and_the_guardian_goes_on(
-    rig: Path, bank: LaserBank, what: str, error: type[Exception]
+    rig: Path, bank: LaserBank, what: str, error: type[Exception], how: str, kind: str
 ) -> None:
     calls = {"light": lambda: None, "state": bank.state, "off": bank.all_off}
-    fail(rig, what)
-    with pytest.raises(error, match="ZeroDivisionError"), bank.lit(["L1"], for_s=2.0):
+    fail(rig, how + what)
+    with pytest.raises(error, match=kind), bank.lit(["L1"], for_s=2.0):
         calls[what]()
     fail(rig, "")
     bank.all_off()
@@ -144,25 +145,67 @@ def test_a_defect_of_the_driver_is_an_answer_and_the_guardian_goes_on(
         assert mask(rig) == 0b10
 
 
-def test_an_off_that_fails_while_the_workbench_hangs_is_tried_until_it_works(rig: Path) -> None:
+def wait_for_dark(rig: Path) -> None:
+    deadline = time.monotonic() + 10
+    while mask(rig):
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+@pytest.mark.parametrize("how", [signal.SIGSTOP, signal.SIGKILL])
+@pytest.mark.parametrize("what", ["off", "exit-off"])
+def test_an_off_that_fails_while_the_workbench_hangs_or_is_gone_is_tried_until_it_works(
+    rig: Path, how: signal.Signals, what: str
+) -> None:
     with at_work(rig) as process:
-        fail(rig, "off")
-        process.send_signal(signal.SIGSTOP)
+        fail(rig, what)
+        process.send_signal(how)
         time.sleep(1.0)
         assert mask(rig) == 0b10
         fail(rig, "")
-        deadline = time.monotonic() + 10
-        while mask(rig):
-            assert time.monotonic() < deadline
-            time.sleep(0.005)
+        wait_for_dark(rig)
 
 
-@pytest.mark.parametrize(("what", "error"), [("open", RigNotReadyError), ("off", LaserOffNotConfirmedError)])
-def test_a_driver_that_fails_at_connect(rig: Path, what: str, error: type[Exception]) -> None:
-    fail(rig, what)
-    with pytest.raises(error, match="ZeroDivisionError"):
-        open_lasers(load_rig(rig))
+def test_a_driver_that_exits_in_off_has_not_confirmed_it(rig: Path) -> None:
+    lasers = open_lasers(load_rig(rig))
+    with pytest.raises(LaserOffNotConfirmedError), lasers.lit(["L2"], for_s=2.0):
+        fail(rig, "exit-off")
+    with pytest.raises(LaserOffNotConfirmedError):
+        lasers.close()
+    assert mask(rig) == 0b10
     fail(rig, "")
+    wait_for_dark(rig)
+
+
+def test_a_state_in_numpys_types_is_the_same_state(rig: Path, bank: LaserBank) -> None:
+    fail(rig, "numpy")
+    with bank.lit(["L2"], for_s=2.0):
+        assert bank.state() == LaserState(("L2",), True)
+
+
+@pytest.mark.parametrize(
+    ("what", "error", "left_on"),
+    [
+        ("open", RigNotReadyError, None),
+        ("identify", RigNotReadyError, 0),
+        ("exit-identify", RigNotReadyError, 0),
+        ("off", LaserOffNotConfirmedError, 0b11),
+        ("identify off", LaserOffNotConfirmedError, 0b11),
+        ("exit-identify exit-off", LaserOffNotConfirmedError, 0b11),
+    ],
+)
+def test_a_driver_that_fails_at_connect(
+    rig: Path, what: str, error: type[Exception], left_on: int | None
+) -> None:
+    """The line is on when it is opened."""
+    fail(rig, what)
+    with pytest.raises(error, match="SystemExit" if "exit" in what else "ZeroDivisionError"):
+        open_lasers(load_rig(rig))
+    if left_on is None:
+        return
+    assert mask(rig) == left_on
+    fail(rig, "")
+    wait_for_dark(rig)
 
 
 def test_only_errors_of_the_promised_kind_pass() -> None:
@@ -175,6 +218,21 @@ def test_only_errors_of_the_promised_kind_pass() -> None:
         driver_errors(only=LaserOffNotConfirmedError, raised=LaserOffNotConfirmedError),
     ):
         raise RigNotReadyError("no answer")
+
+
+@pytest.mark.parametrize("defect", [SystemExit(0), KeyboardInterrupt(), ZeroDivisionError()])
+def test_no_defect_of_a_driver_passes(defect: BaseException) -> None:
+    with pytest.raises(RigNotReadyError, match=type(defect).__name__), driver_errors():
+        raise defect
+
+
+def test_an_error_whose_text_fails_is_reported_by_its_kind() -> None:
+    class VendorError(Exception):
+        def __str__(self) -> str:
+            raise OSError("no text for this code")
+
+    with pytest.raises(RigNotReadyError, match="VendorError"), driver_errors():
+        raise VendorError
 
 
 def test_a_line_that_reports_nonsense_is_not_believed() -> None:

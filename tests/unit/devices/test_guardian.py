@@ -6,6 +6,7 @@ process is ended to the moment, on the same clock, when the pins of the chip are
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -22,6 +23,7 @@ from tests.conftest import REAL_TIME
 from tests.firmware.parts import KINDS, Kind, Running, build, hurried, hurry, is_there
 from tests.support.lasers import serial_bank
 from workbench.devices.guarded_lasers import GuardedLaserBank
+from workbench.devices.guardian import answer, public_name
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError
 
 ROOT = Path(__file__).parents[3]
@@ -249,3 +251,24 @@ def test_the_interlock_is_told(controller: Running, bank: GuardedLaserBank) -> N
     while bank.state().interlock_closed:
         assert time.monotonic() < deadline
     controller.toggle_interlock()
+
+
+@pytest.mark.parametrize("value", [object(), {1}, "\udc80"])
+def test_every_answer_is_one_line_of_json(value: object) -> None:
+    read, write = os.pipe()
+    code = answer(write, 7, lambda: value)
+    os.close(write)
+    with os.fdopen(read) as answers:
+        [line] = answers.read().splitlines()
+    said = json.loads(line)
+    assert said["to"] == 7
+    assert (code, said.get("error")) in {(0, None), (4, "RigNotReadyError")}
+    assert ("value" in said) == isinstance(value, str)
+
+
+def test_an_error_that_a_driver_derived_is_answered_as_its_base() -> None:
+    class UnpluggedError(RigNotReadyError):
+        pass
+
+    assert public_name(UnpluggedError("gone")) == "RigNotReadyError"
+    assert public_name(LaserOffNotConfirmedError("on")) == "LaserOffNotConfirmedError"
