@@ -16,7 +16,11 @@ from tests.support.driver_package import put_on_path, write_driver
 
 MODULE = "lab_drivers"
 ENTRY_POINTS = {
-    "workbench.lasers": {"lab_lasers": f"{MODULE}:Line", "lab_broken": f"{MODULE}:Missing"},
+    "workbench.lasers": {
+        "lab_lasers": f"{MODULE}:Line",
+        "lab_broken": f"{MODULE}:Missing",
+        "lab_unloadable": f"{MODULE}_unloadable:Line",
+    },
     "workbench.cameras": {"lab_camera": f"{MODULE}:Camera"},
     "workbench.targets": {"lab_rail": f"{MODULE}:Rail"},
 }
@@ -128,6 +132,7 @@ class Rail:
 def install_drivers(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Install them for this process and those that it starts."""
     write_driver(folder, MODULE, SOURCE, ENTRY_POINTS)
+    (folder / f"{MODULE}_unloadable.py").write_text("import ctypes\nctypes.CDLL('libno_such_vendor.so')\n")
     put_on_path(folder, monkeypatch)
 
 

@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from workbench.devices import real_bench
-from workbench.devices.drivers import BenchDriver, DriverUnusableError, installed, load_driver
+from workbench.devices.drivers import BENCHES, BenchDriver, DriverUnusableError, installed, load_driver
 from workbench.devices.protocols import Bench, LaserBank
 from workbench.model.errors import BadInputError
 from workbench.model.problems import SchemaProblem
 from workbench.model.rig import Rig, load_rig
 from workbench.model.yamlfile import read_document, refuse, schema_problems
 
-BENCHES = "workbench.benches"
 SEPARATE = "opencv+serial"
 """`driver` of a rig whose devices are opened each by its own driver; also where there are `devices` alone."""
 

@@ -102,8 +102,9 @@ def test_an_unknown_driver_names_the_installed_ones(lab: Path) -> None:
         check_driver(load_rig(robot))
 
 
-def test_a_driver_that_cannot_be_imported_is_bad_input(lab: Path) -> None:
-    path = write_rig(lab / "rig.yaml", [OPENCV, "lasers: {driver: lab_broken}"])
+@pytest.mark.parametrize("driver", ["lab_broken", "lab_unloadable"])
+def test_a_driver_that_cannot_be_imported_is_bad_input(lab: Path, driver: str) -> None:
+    path = write_rig(lab / "rig.yaml", [OPENCV, f"lasers: {{driver: {driver}}}"])
     assert places(path) == ["devices.lasers.driver"]
     assert call("check", path).returncode == 2
 
