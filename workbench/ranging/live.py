@@ -20,6 +20,9 @@ from workbench.spots import Finding, Spot, SpotFinder, persistent_spots, positio
 LEASE_S = 2.0
 """Longest time that a laser stays lit for one frame."""
 FEWEST_TO_TELL_P99 = 100
+LATENCY_ADVICE = (
+    "count it with `workbench doctor`, and enter it in the rig file as the camera's latency_frames"
+)
 
 
 def check_same_sensor(rig: Rig, calibration: Calibration) -> None:
@@ -113,7 +116,9 @@ class LiveRanger:
         if self._dark is None:
             return reading
         lights = self._find(self.ranger.sensor.ids, self._dark, None).spots
-        known = refuse_stuck_beam(f"reading {reading.scene}", lights, self._look_again, self._lamps)
+        known = refuse_stuck_beam(
+            f"reading {reading.scene}", lights, self._look_again, LATENCY_ADVICE, self._lamps
+        )
         return replace(reading, notes=(*reading.notes, *map(_burned, known)))
 
     def _look_again(self) -> Sequence[Spot]:

@@ -13,6 +13,7 @@ def refuse_stuck_beam(
     what: str,
     lights: Sequence[Spot],
     look_again: Callable[[], Sequence[Spot]],
+    latency_advice: str,
     lamps: Sequence[Spot] = (),
 ) -> list[Spot]:
     """Raise where a frame with all lasers off shows a beam.
@@ -24,6 +25,8 @@ def refuse_stuck_beam(
         what: the capture or reading that the frame belongs to, for the message.
         lights: spots found in the frame.
         look_again: spots found in another such frame; called where a light is faint.
+        latency_advice: what to do where the camera's latency was never measured, so that the frame may be an
+            old one, exposed while a laser was on; for the message, as the way differs between callers.
         lamps: lights known from before any laser was switched on.
 
     Returns:
@@ -39,8 +42,7 @@ def refuse_stuck_beam(
             f"{what}: the frame with all lasers off shows a spot at {position_text(stuck[0])}. A beam may be"
             " on although the controller says that it is off: cut the lasers' supply, keep out of the beams,"
             " then check the controller. If a lamp or its reflection stands there, cover it and start anew;"
-            " if the camera's latency was never measured, begin with a measure_latency step: the frame may be"
-            " an old one"
+            f" if the camera's latency was never measured, the frame may be an old one: {latency_advice}"
         )
     return known
 

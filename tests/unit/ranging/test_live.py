@@ -225,6 +225,8 @@ def test_a_beam_that_stays_on_is_seen(live: Live, tmp_path: Path) -> None:
     ended = live("--standoff", 600, rig=rig)
     assert ended.code == 7
     assert "A beam may be on" in ended.err
+    assert "latency_frames" in ended.err
+    assert "measure_latency" not in ended.err, "a step of procedures, which ranging has none of"
 
 
 def test_one_beam_that_stays_on_is_seen_among_the_others(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,6 +22,8 @@ from workbench.session.frames import FrameStore, read_image
 from workbench.session.state import Group
 from workbench.spots import Finding, Scanline, Spot, find_spots, refuse_stuck_beam
 
+LATENCY_ADVICE = "begin the procedure with a measure_latency step"
+
 
 @dataclass
 class PairSource:
@@ -180,7 +182,8 @@ class PairSource:
         def look_again() -> Sequence[Spot]:
             return find_spots(self.bench.camera.grab().image, scanlines=scanlines).spots
 
-        refuse_stuck_beam(f"capture {key}", find_spots(off, scanlines=scanlines).spots, look_again)
+        lights = find_spots(off, scanlines=scanlines).spots
+        refuse_stuck_beam(f"capture {key}", lights, look_again, LATENCY_ADVICE)
 
 
 def spots_found(key: str, finding: Finding, laser_ids: Sequence[str]) -> ev.SpotsFound:

@@ -121,6 +121,7 @@ def test_a_beam_in_the_dark_frame_is_refused(source: PairSource) -> None:
     with pytest.raises(LaserOffNotConfirmedError, match=KEY) as caught:
         source.look_for_stuck_beam(KEY)
     assert caught.value.exit_code == 7
+    assert "measure_latency" in str(caught.value)
     source.look_for_stuck_beam(KEY)  # the frame was looked at: nothing is left
 
 
