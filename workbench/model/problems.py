@@ -37,7 +37,6 @@ EXPECTED = {
     "bool_type": TRUTH,
     "tuple_type": LIST,
     "list_type": LIST,
-    "frozen_set_type": LIST,
     "dict_type": MAPPING,
     "path_type": "the path of a file",
     "model_type": MAPPING,
@@ -50,7 +49,6 @@ EXPECTED = {
     "less_than": "less than {lt}",
     "less_than_equal": "at most {le}",
     "literal_error": "{expected}",
-    "enum": "{expected}",
     "union_tag_invalid": "one of {tags}",
     "union_tag_not_found": "the key {discriminator}, which tells what it is",
 }
