@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from workbench.model.device_block import DeviceBlock
-from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError
+from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 
 
 class GpioFilesBlock(DeviceBlock):
@@ -34,11 +34,10 @@ class GpioFilesLine:
     """A GPIO line keeps what was written; the guardian's clock ends an emission."""
 
     def __init__(self, settings: GpioFilesBlock, lasers: int, alarm: Callable[[], bool]) -> None:
-        """Look for the files; `alarm` is not needed by a driver that waits for nothing.
+        """Count the files; `alarm` is not needed by a driver that waits for nothing.
 
         Raises:
             BadInputError: fewer files than lasers.
-            RigNotReadyError: a file is missing.
         """
         self._files = [Path(file) for file in settings.files]
         self._on, self._off = ("0", "1") if settings.active_low else ("1", "0")
@@ -46,9 +45,6 @@ class GpioFilesLine:
             raise BadInputError(
                 f"devices.lasers.files: expected one for each of {lasers} lasers, got {len(self._files)}"
             )
-        for file in self._files:
-            if not file.exists():
-                raise RigNotReadyError(f"GPIO line {file}: expected this file; is the line exported?")
 
     def identify(self, boot_s: float) -> str:
         """Number of lines; a GPIO line needs no time to boot, and is switched off before anything else."""
@@ -64,11 +60,17 @@ class GpioFilesLine:
         """Write every line, whatever becomes of another one, and read all back.
 
         Raises:
-            LaserOffNotConfirmedError: a line does not read as off.
+            LaserOffNotConfirmedError: a line is missing, or does not read as off.
         """
+        missing = [file for file in self._files if not file.exists()]
         for file in self._files:
-            with suppress(OSError):
-                file.write_text(self._off)
+            if file not in missing:
+                with suppress(OSError):
+                    file.write_text(self._off)
+        if missing:  # only now: the lines that are there are off
+            raise LaserOffNotConfirmedError(
+                f"GPIO line {missing[0]}: expected this file, the line may be on: export it or cut the supply"
+            )
         mask, _ = self.state()
         if mask:
             raise LaserOffNotConfirmedError(

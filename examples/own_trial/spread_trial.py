@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from statistics import stdev
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from workbench.model.chart import Axis, Chart, Series
-from workbench.model.fields import Count, Standoffs
+from workbench.model.fields import Count, Standoffs, require_different
 from workbench.model.rig import Rig
 from workbench.model.table import Column, Table
 from workbench.model.target import Placement
@@ -34,7 +34,12 @@ class SpreadTrialStep(StepModel):
     needs: ClassVar[str | None] = "calibration"
     step: Literal["spread_trial"]
     standoffs_mm: Standoffs
-    readings: Count = Field(default=5, ge=2)
+    readings: Annotated[Count, Field(ge=2)] = 5
+
+    @model_validator(mode="after")
+    def _standoffs_differ(self) -> SpreadTrialStep:
+        require_different(self.standoffs_mm, "readings")
+        return self
 
     @property
     def title(self) -> str:

@@ -112,6 +112,14 @@ def test_fewer_files_than_lasers(lab: Lab, command: tuple[str, ...]) -> None:
     assert call(*command, lab.rig).returncode == 2
 
 
+def test_a_missing_line_is_exit_7_and_the_others_are_off(lab: Lab) -> None:
+    lab.files[0].unlink()
+    assert call("lasers", "off", "--rig", lab.rig).returncode == 7
+    assert lab.files[1].read_text().strip() == "0"
+    assert not lab.files[0].exists()
+    lab.files[0].write_text("0")
+
+
 def test_off_that_the_files_do_not_confirm_is_exit_7(lab: Lab) -> None:
     lab.files[1].unlink()
     lab.files[1].symlink_to("/dev/null")  # takes what is written, and reads as nothing

@@ -129,5 +129,5 @@ def test_a_plan_prints_every_step_with_captures_emission_and_time(
     session(tmp_path, steps.replace("  - step: fit\n", ""), Says())
     print_plan([procedure], rig, tmp_path)
     told = " ".join(capsys.readouterr().err.split())
-    assert "Times as the last session of" in told
+    assert "the last session of" in told
     assert "at most" not in told.partition("Where the camera's")[0], "emission as it was measured"

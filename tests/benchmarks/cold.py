@@ -1,8 +1,8 @@
 """A cold `workbench fit` of 480 pixel positions over a minimal script of numpy and scipy.optimize.
 
 From the start of the process to its end; the runs alternate, and the fastest counts: whatever else the
-machine does only adds. The workbench's first run, with an empty cache, is told as well. Both fit the same
-terms: what the script has no means to leave out, ours is told to keep.
+machine does only adds. The workbench's first run, with an empty cache, is shown as well. Both fit the same
+terms.
 
 The script runs twice: as anybody would call it, and told that one thread is enough for matrices as small as
 these (OpenBLAS starts one for each core, and they wait for each other). The workbench tells itself.
@@ -33,7 +33,6 @@ STANDOFFS_MM = np.array([125.0, 150, 180, 210, 280, 400, 600, 900, 1400, 2200, 3
 REPEATS = 10
 RUNS = 15
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-TERMS = ("k1", "k2", "ruler_scale", "tilts")
 
 
 class Took(NamedTuple):
@@ -50,7 +49,7 @@ def lines() -> Iterator[str]:
         count = write_captures(load_rig(RIG), folder / "captures.csv")
         ours, scipys = folder / "ours.yaml", folder / "scipy.yaml"
         fit = [str(Path(sys.executable).parent / "workbench"), "fit", str(folder / "captures.csv")]
-        fit += ["--rig", str(RIG), "-o", str(ours), *(word for term in TERMS for word in ("--keep", term))]
+        fit += ["--rig", str(RIG), "-o", str(ours)]
         script = [sys.executable, str(Path(__file__).with_name("minimal_fit.py"))]
         script += [str(folder / "captures.csv"), str(scipys)]
         environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}

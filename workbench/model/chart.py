@@ -97,7 +97,7 @@ class Limit(FileModel):
 class Chart(FileModel):
     """What is drawn over two axes."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$")]
     """Names the chart's file and its place in the recording."""
     title: str
     x: Axis

@@ -20,12 +20,18 @@ def upgraded(event: Any) -> Any:
     if kind == "trial_finished" and "rows" in event:
         return _finished(trial, "Accuracy (error = measured - true)", event["rows"])
     if kind == "simulation_finished":
-        return _finished(trial, "The thesis's simulation", event["rows"])
+        return _finished(trial, "The thesis's simulation", [_claim(row) for row in event["rows"]])
     if kind == "scene_simulated":
         scene = event["scene"]
         text = f"{scene['name']}, {scene['source']}: {len(event['set_mm'])} distances"
         return {"kind": "trial_progress", "trial": trial, "text": text}
     return event
+
+
+def _claim(row: dict[str, Any]) -> dict[str, Any]:
+    """A claim whose flags are alarms: true where something is not as it should be."""
+    kept = {key: value for key, value in row.items() if key not in {"reproduced", "better"}}
+    return kept | {"not_reproduced": row["reproduced"] is False, "not_better": not row["better"]}
 
 
 def _finished(trial: Any, title: str, rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ EXPECTED = {
     "missing": "is missing",
     "extra_forbidden": "no such key; {names}",
     "invalid_key": "no such key; {names}",
+    "unexpected_keyword_argument": "no such key",
     "int_parsing": WHOLE,
     "int_parsing_size": WHOLE,
     "int_type": WHOLE,
@@ -40,6 +41,7 @@ EXPECTED = {
     "path_type": "the path of a file",
     "model_type": MAPPING,
     "model_attributes_type": MAPPING,
+    "dataclass_type": MAPPING,
     "too_short": "a list of at least {min_length}, got {actual_length}",
     "too_long": "a list of at most {max_length}, got {actual_length}",
     "greater_than": "more than {gt}",
@@ -55,12 +57,13 @@ SPELLED = {
     r"^[A-Za-z0-9_-]+$": "letters (A to z), digits, _ and - alone, such as calibrate-flat",
     r"^[a-z0-9-]+$": "small letters (a to z), digits and - alone, such as flat-near",
     r"^[A-Za-z0-9][A-Za-z0-9_.-]*$": "letters (A to z), digits, _ . and -, not - or . first, such as L1",
+    r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$": "letters (A to z), digits, _ . and -, not . first, such as flat.1",
     r"^[ -~]{4}$": "four letters, such as YUYV or GREY",
     r"^calibration[A-Za-z0-9_.-]*\.yaml$": "a name that begins with calibration and ends with .yaml, such as"
     " calibration-night.yaml, of letters (A to z), digits, _, . and -",
 }
 """The patterns of the models in words."""
-AS_THEY_ARE = {"missing", "extra_forbidden", "invalid_key"}
+AS_THEY_ARE = {"missing", "extra_forbidden", "invalid_key", "unexpected_keyword_argument"}
 SELF_EVIDENT = AS_THEY_ARE | {"too_short", "too_long"}
 """What came is nothing, or is said already."""
 

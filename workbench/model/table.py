@@ -54,7 +54,7 @@ class Column(FileModel):
 class Table(FileModel):
     """Rows of cells under described columns."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$")]
     """Names the table's file and its place in the recording."""
     title: str
     columns: tuple[Column, ...]

@@ -218,7 +218,8 @@ class Ranger:
         """The spots on the line of a laser that was fired alone; its own is known if there is one only."""
         position, sd = spot_arrays(spots)
         ranges = self.sensor.ranges([laser_id] * len(spots), position, sd)
-        on_line = np.flatnonzero((ranges.misfit_sd < MOST_MISFIT_SD) & (ranges.range_mm > 0))
+        possible = (ranges.range_mm > 0) & np.isfinite(ranges.range_mm)  # not beyond infinity
+        on_line = np.flatnonzero((ranges.misfit_sd < MOST_MISFIT_SD) & possible)
         return [spots[n] for n in on_line.tolist()]
 
     def _what_is_left(self, pairs: Pairs, spots: int, ambiguous: tuple[Axis, ...]) -> tuple[str, ...]:

@@ -28,9 +28,18 @@ def test_rows_of_an_old_trial_are_a_table_with_units_from_their_keys() -> None:
 
 
 def test_claims_of_an_old_simulation_are_a_table() -> None:
-    event = read({"kind": "simulation_finished", "trial": "p.1", "rows": [{"scene": "a", "ours": 0.01}]})
+    rows = [
+        {"scene": "a", "ours": 0.01, "reproduced": True, "better": True},
+        {"scene": "b", "ours": 0.2, "reproduced": False, "better": False},
+        {"scene": "c", "ours": 0.3, "reproduced": None, "better": True},
+    ]
+    event = read({"kind": "simulation_finished", "trial": "p.1", "rows": rows})
     assert isinstance(event, TrialFinished)
-    assert event.tables[0].rows == (("a", 0.01),)
+    (table,) = event.tables
+    assert [row[:2] for row in table.rows] == [("a", 0.01), ("b", 0.2), ("c", 0.3)]
+    # What was a success is no alarm.
+    shown = [[table.text(row, column) for column in (2, 3)] for row in range(3)]
+    assert shown == [["", ""], ["!", "!"], ["", ""]]
 
 
 def test_an_old_scene_is_a_line_of_progress() -> None:

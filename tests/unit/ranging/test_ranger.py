@@ -95,3 +95,6 @@ def test_of_a_laser_fired_alone_only_spots_on_its_line_are_kept(ranger: Ranger) 
     (own,) = spots(ranger, {"L1": 800.0})
     assert ranger.alone("L1", [spot_at(own.u_px, own.v_px + 40.0), own]) == [own]
     assert ranger.alone("L1", []) == []
+    # Beyond the image of the laser's point at infinity no target can lie.
+    (u, v) = ranger.sensor.spot_px("L1", np.array([np.inf]))[0]
+    assert ranger.alone("L1", [spot_at(u + 5.0, v), own]) == [own]

@@ -51,7 +51,8 @@ def visit_placements(
         lights: whether it captures spots, and so needs the exposure set for them.
 
     Returns:
-        What `work` returned, for the placements that were not skipped.
+        What `work` returned, for the placements that were not skipped. Where results are grouped, `work`
+        returns the placement's key with them: its standoff is as measured.
 
     Raises:
         AnswerNeededError, StoppedError, LaserOffNotConfirmedError: see `Context.ask`.

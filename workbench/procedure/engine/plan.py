@@ -63,6 +63,7 @@ class Plan:
                     f"{path}: procedure: expected a name that no other procedure of this call has, got {name}"
                 )
         _check_order(procedures, procedure_paths)
+        _check_placements(rig, procedures, procedure_paths)
         check_driver(rig)
         return cls(rig, rig_path, tuple(procedures), tuple(procedure_paths))
 
@@ -98,6 +99,18 @@ class Plan:
             for index, step in enumerate(procedure.steps, start=1):
                 found += step.prompts(procedure.step_name(index), self.rig)
         return {prompt.key: prompt for prompt in found}
+
+
+def _check_placements(rig: Rig, procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:
+    """Placements of a step have keys that differ: captures are stored and resumed by them."""
+    for path, procedure in zip(paths, procedures, strict=True):
+        for index, step in enumerate(procedure.steps, start=1):
+            keys = [placement.key for placement in step.placements(procedure.step_name(index), rig)]
+            if doubled := [key for key in keys if keys.count(key) > 1]:
+                raise BadInputError(
+                    f"{path}: steps[{index - 1}]: {step.step}: expected placements that differ, got"
+                    f" {doubled[0].rpartition('/')[2]} more than once; take more readings there instead"
+                )
 
 
 def _check_order(procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:

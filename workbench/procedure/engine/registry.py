@@ -32,12 +32,14 @@ def register(kind: type[Kind]) -> type[Kind]:
     Raises:
         TypeError: the class does not keep the protocol `Step`, or another class has its name.
     """
+    if not issubclass(kind, StepModel):
+        raise TypeError(f"{kind.__qualname__}: expected a subclass of StepModel")
     fields: dict[str, FieldInfo] = kind.model_fields
     annotation: Any = fields["step"].annotation if "step" in fields else None
     tags = get_args(annotation) if get_origin(annotation) is Literal else ()
     if len(tags) != 1:
         raise TypeError(f'{kind.__qualname__}: expected a field `step: Literal["..."]`, got {annotation}')
-    if missing := [name for name in ("title", "run") if not hasattr(kind, name)]:
+    if missing := [name for name in ("title", "run") if not hasattr(kind, name) and name not in fields]:
         raise TypeError(f"{kind.__qualname__}: expected the members of a Step, {', '.join(missing)} missing")
     known = _kinds.get(tags[0])
     if known is not None and (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):

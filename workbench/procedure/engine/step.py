@@ -83,7 +83,11 @@ class StepModel(FileModel):
         return COMPUTING_S
 
 
-def flat_placement(name: str, standoff_mm: float) -> Placement:
-    """Placement of a flat target at a standoff, in the step `name`."""
+def flat_placement(name: str, standoff_mm: float, number: int | None = None) -> Placement:
+    """Placement of a flat target at a standoff, in the step `name`.
+
+    A target that returns to a standoff needs the `number` of the placement: keys must differ.
+    """
     # 12 digits: keys name files, so standoffs that differ must have keys that differ.
-    return Placement(key=f"{name}/{standoff_mm:.12g}mm", standoff_mm=standoff_mm)
+    turn = "" if number is None else f"{number:02d}-"
+    return Placement(key=f"{name}/{turn}{standoff_mm:.12g}mm", standoff_mm=standoff_mm)

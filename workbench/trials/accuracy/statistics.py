@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.model.event import ReadingTaken
-from workbench.model.rig import BenchSpec
 
 
 @dataclass(frozen=True)
@@ -26,8 +25,8 @@ class AccuracyRow:
     sd_mm: float | None = None
     range_sd_mm: float | None = None
     """Stated standard uncertainty of one reading: calibration and spots."""
-    reference_sd_mm: float = 0.0
-    """Standard uncertainty of the true range itself: the placement's, by the ruler."""
+    reference_sd_mm: float | None = None
+    """Reference uncertainty of the standoff: the placement's own or the rig's; None where not known."""
 
     @property
     def mean_relative_error(self) -> float | None:
@@ -35,7 +34,7 @@ class AccuracyRow:
         return None if self.mean_error_mm is None else self.mean_error_mm / self.standoff_mm
 
 
-def accuracy_row(readings: Sequence[ReadingTaken], bench: BenchSpec) -> AccuracyRow:
+def accuracy_row(readings: Sequence[ReadingTaken]) -> AccuracyRow:
     """Statistics of the readings at one standoff; errors are measured - true, mm, 1 sigma.
 
     The standard deviation over the readings shows what differs between them. What they share (calibration,
@@ -44,14 +43,16 @@ def accuracy_row(readings: Sequence[ReadingTaken], bench: BenchSpec) -> Accuracy
 
     Args:
         readings: every reading taken there, at least one; those without a range count as missing.
-        bench: how well the standoff is known.
     """
     standoff_mm = readings[0].standoff_mm
     ranges = np.array([r.range_mm for r in readings if r.range_mm is not None])
     stated = np.array([r.sigma_mm for r in readings if r.sigma_mm is not None])
     if not len(ranges):
         return AccuracyRow(
-            standoff_mm=standoff_mm, readings=0, missing=len(readings), reference_sd_mm=bench.placement_sd_mm
+            standoff_mm=standoff_mm,
+            readings=0,
+            missing=len(readings),
+            reference_sd_mm=readings[0].reference_sd_mm,
         )
     error = ranges - standoff_mm
     return AccuracyRow(
@@ -63,5 +64,5 @@ def accuracy_row(readings: Sequence[ReadingTaken], bench: BenchSpec) -> Accuracy
         min_error_mm=float(error.min()),
         sd_mm=float(error.std(ddof=1)) if len(error) > 1 else None,
         range_sd_mm=float(np.sqrt((stated**2).mean())),
-        reference_sd_mm=bench.placement_sd_mm,
+        reference_sd_mm=readings[0].reference_sd_mm,
     )

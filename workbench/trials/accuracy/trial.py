@@ -60,7 +60,7 @@ def run_trial(context: Context, name: str, placements: Sequence[Placement], coun
         return take_readings(context, ranger, name, placement, count)
 
     taken = visit_placements(context, placements, work)
-    rows = [accuracy_row(readings, context.rig.bench) for readings in taken]
+    rows = [accuracy_row(readings) for readings in taken]
     chart = error_chart(f"{name}-errors", [reading for readings in taken for reading in readings])
     finish_trial(context, name, [accuracy_table(name, rows)], [chart])
     return f"{sum(row.readings for row in rows)} readings, table in {name}.csv"

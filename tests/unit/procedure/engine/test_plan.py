@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from tests.support.procedures import RIG, plan_of
 from workbench.model.errors import BadInputError
+from workbench.model.rig import Rig
+from workbench.model.target import Placement
+from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.step import StepModel, flat_placement
 
 CAPTURE = "  - {step: capture_grid, standoffs_mm: [300, 600], repeats: 2}\n"
 TRIAL = "  - {step: accuracy_trial, standoffs_mm: [450], readings: 5}\n"
@@ -30,6 +37,29 @@ def test_a_step_finds_what_an_earlier_procedure_gives(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=r"a\.yaml: steps\[1\]: export .*fit"):
         plan_of(tmp_path, a=CAPTURE + "  - {step: export}\n")
     assert len(plan_of(tmp_path, a=calibrate, b=TRIAL).procedures) == 2
+
+
+@register
+class TwicePlacedStep(StepModel):
+    """Two placements under one key: the captures of one would pass for those of the other."""
+
+    step: Literal["twice_placed"]
+
+    @property
+    def title(self) -> str:
+        return "Twice"
+
+    def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
+        return [flat_placement(name, 800.0), flat_placement(name, 800.0)]
+
+    def run(self, context: Context, name: str) -> str:
+        return "never"
+
+
+def test_placements_of_one_key_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=r"a\.yaml: steps\[1\]: twice_placed: .*800mm") as caught:
+        plan_of(tmp_path, a=CAPTURE + "  - {step: twice_placed}\n")
+    assert caught.value.exit_code == 2
 
 
 def test_two_procedures_of_one_name_are_refused(tmp_path: Path) -> None:

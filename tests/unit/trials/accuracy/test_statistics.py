@@ -7,11 +7,8 @@ import pandas as pd
 import pytest
 
 from workbench.model.event import ReadingTaken
-from workbench.model.rig import BenchSpec, Prior
 from workbench.trials.accuracy.statistics import accuracy_row
 from workbench.trials.accuracy.trial import accuracy_table
-
-BENCH = BenchSpec(ruler_scale=Prior(value=0.0, sd=0.001), placement_sd_mm=0.3)
 
 
 def empty(standoff_mm: float = 400.0) -> ReadingTaken:
@@ -23,6 +20,7 @@ def empty(standoff_mm: float = 400.0) -> ReadingTaken:
         status="no_points",
         range_mm=None,
         sigma_mm=None,
+        reference_sd_mm=0.3,
         lasers=(),
     )
 
@@ -33,7 +31,7 @@ def readings(*ranges_mm: float, sigma_mm: float = 0.4) -> list[ReadingTaken]:
 
 
 def test_errors_are_measured_minus_true() -> None:
-    row = accuracy_row(readings(401.0, 399.5, 402.0), BENCH)
+    row = accuracy_row(readings(401.0, 399.5, 402.0))
     assert (row.mean_error_mm, row.max_error_mm, row.min_error_mm) == pytest.approx((2.5 / 3, 2.0, -0.5))
     assert row.sd_mm == pytest.approx(np.std([1.0, -0.5, 2.0], ddof=1))
     assert row.range_sd_mm == pytest.approx(0.4)
@@ -42,17 +40,17 @@ def test_errors_are_measured_minus_true() -> None:
 
 
 def test_readings_without_a_range_are_counted_not_averaged() -> None:
-    row = accuracy_row([*readings(401.0), empty()], BENCH)
+    row = accuracy_row([*readings(401.0), empty()])
     assert (row.readings, row.missing, row.mean_error_mm, row.sd_mm) == (1, 1, 1.0, None)
 
 
 def test_no_reading_at_all() -> None:
-    row = accuracy_row([empty(), empty()], BENCH)
+    row = accuracy_row([empty(), empty()])
     assert (row.readings, row.missing, row.mean_error_mm, row.range_sd_mm) == (0, 2, None, None)
 
 
 def test_the_table_as_csv() -> None:
-    rows = [accuracy_row(readings(401.1, 399.3), BENCH), accuracy_row([empty(500.0)], BENCH)]
+    rows = [accuracy_row(readings(401.1, 399.3)), accuracy_row([empty(500.0)])]
     table = pd.read_csv(io.StringIO(accuracy_table("a.1", rows).to_csv()))
     assert table["mean_error_mm"][0] == pytest.approx(rows[0].mean_error_mm, rel=1e-14)
     assert table["missing"].tolist() == [0, 1]

@@ -17,11 +17,11 @@ from workbench.trials.accuracy.trial import COLUMNS, accuracy_table
 
 
 def test_every_statistic_is_a_column_with_its_unit() -> None:
-    assert {column.key for column in COLUMNS} == set(AccuracyRow.__dataclass_fields__)
+    assert {column.key for column in COLUMNS} == {*AccuracyRow.__dataclass_fields__, "mean_relative_error"}
     assert all((column.unit == "mm") == column.key.endswith("_mm") for column in COLUMNS)
     table = accuracy_table("p.1", [AccuracyRow(500.0, 3, 1, 0.5, 0.9, -0.1, 0.2, 0.3, 0.4)])
     assert table.name == "p.1"
-    assert table.rows == ((500.0, 3, 1, 0.5, 0.9, -0.1, 0.2, 0.3, 0.4),)
+    assert table.rows == ((500.0, 3, 1, 0.5, 0.9, -0.1, 0.2, 0.3, 0.4, 0.001),)
 
 
 def test_placements_that_are_left_out_have_no_row(tmp_path: Path) -> None:
