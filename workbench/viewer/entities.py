@@ -68,6 +68,11 @@ def from_hex(color: str) -> Rgb:
     return red, green, blue
 
 
+def trial_charts(names: Sequence[str]) -> list[str]:
+    """Entities of the charts of a trial's results, by the charts' names; the first has the live chart's."""
+    return [TRIAL_CHART, *(under(TRIAL_CHARTS, name) for name in names[1:])][: len(names)]
+
+
 def under(parent: str, *parts: str) -> str:
     """Entity path of `parts` below `parent`, whatever characters a name from a file has."""
     import rerun as rr

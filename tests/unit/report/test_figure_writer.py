@@ -26,5 +26,5 @@ def test_every_chart_of_a_finished_trial_is_written(tmp_path: Path) -> None:
     assert written == {f"{one.name}.svg": svg(one) for one in charts}
 
 
-def test_charts_of_a_part_of_a_trial_are_not_written(tmp_path: Path) -> None:
-    assert write(tmp_path, TrialProgress(trial="t.1", text="half", charts=(chart("c"),))) == {}
+def test_nothing_is_written_before_a_trial_has_finished(tmp_path: Path) -> None:
+    assert write(tmp_path, TrialProgress(trial="t.1", text="half")) == {}
