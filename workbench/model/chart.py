@@ -87,7 +87,7 @@ class Band(FileModel):
     high: tuple[float, ...]
 
 
-class Limit(FileModel):
+class LimitLine(FileModel):
     """A horizontal line that y is held against."""
 
     name: str
@@ -104,7 +104,7 @@ class Chart(FileModel):
     y: Axis
     series: tuple[Series, ...]
     bands: tuple[Band, ...] = ()
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[LimitLine, ...] = ()
     caption: str = ""
 
     @property

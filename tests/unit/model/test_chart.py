@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from workbench.model.chart import Axis, Band, Chart, Limit, Series
+from workbench.model.chart import Axis, Band, Chart, LimitLine, Series
 
 
-def chart(*series: Series, bands: tuple[Band, ...] = (), limits: tuple[Limit, ...] = ()) -> Chart:
+def chart(*series: Series, bands: tuple[Band, ...] = (), limits: tuple[LimitLine, ...] = ()) -> Chart:
     x, y = Axis(label="standoff", unit="mm"), Axis(label="error", unit="%")
     return Chart(name="c", title="C", x=x, y=y, series=series, bands=bands, limits=limits)
 
@@ -35,7 +35,7 @@ def test_everything_drawn_counts_for_the_axes() -> None:
     one = chart(
         Series(name="a", x=(3.0, 1.0, 9.0), y=(1.0, 2.0, None), sd=(0.5, None, None)),
         bands=(Band(name="b", x=(1.0, 5.0), low=(-4.0, -1.0), high=(4.0, 1.0)),),
-        limits=(Limit(name="MPE", y=8.0),),
+        limits=(LimitLine(name="MPE", y=8.0),),
     )
     assert one.x_values() == [1.0, 3.0]
     assert one.y_values() == [-4.0, -1.0, 0.5, 1.0, 1.5, 2.0, 4.0, 8.0]

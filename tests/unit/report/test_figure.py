@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.viewer.session import a_fit
-from workbench.model.chart import Axis, Band, Chart, Limit, Series
+from workbench.model.chart import Axis, Band, Chart, LimitLine, Series
 from workbench.model.fit_charts import residual_chart
 from workbench.report.figure import draw, svg
 from workbench.report.plot_style import own_style
@@ -75,7 +75,7 @@ def test_standoffs_are_labelled_on_a_logarithmic_axis_and_outliers_ringed() -> N
 
 def test_bands_and_limits_are_drawn_and_named() -> None:
     band = Band(name="tolerance", x=(0.0, 10.0), low=(-0.5, -0.2), high=(0.5, 0.2))
-    figure = draw(CHART.model_copy(update={"bands": (band,), "limits": (Limit(name="MPE", y=0.8),)}))
+    figure = draw(CHART.model_copy(update={"bands": (band,), "limits": (LimitLine(name="MPE", y=0.8),)}))
     (legend,) = figure.legends
     assert {"tolerance", "MPE"} < {text.get_text() for text in legend.get_texts()}
 
