@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 from rerun.chunk import RrdReader
 
-from tests.support.viewer_stream import COLORS, HERE, a_range, a_reading, logged
+from tests.support.viewer_stream import COLORS, HERE, a_range, a_reading, logged, packed
 from tests.viewer.readback import Contents, layout_views
 from tests.viewer.session import a_rig
-from workbench.model.chart import Axis, Chart, Series
+from workbench.model.chart import PALETTE, Axis, Chart, Series
 from workbench.model.event import ReadingTaken, TrialFinished
 from workbench.model.table import Column, Table
+from workbench.viewer.entities import from_hex
 from workbench.viewer.stream import Moment, Stream
 from workbench.viewer.table_text import table_text
 from workbench.viewer.trial import NO_TRIAL, TrialView
@@ -163,6 +164,16 @@ def test_the_end_of_the_session_leaves_the_charts_of_a_finished_trial(tmp_path: 
         view.stop()
 
     assert "Title of one" in logged(tmp_path, log).values("/trial/chart/ticks", LABELS)[-1][1]
+
+
+def test_a_series_of_another_name_has_a_colour_that_no_series_has(tmp_path: Path) -> None:
+    one = a_chart("one")
+    other = one.series[0].model_copy(update={"name": "mean"})
+    trial = TrialFinished(trial="t", charts=(one.model_copy(update={"series": (other, *one.series)}),))
+    contents = logged(tmp_path, lambda stream: TrialView(stream, a_rig(), COLORS).finish(trial))
+    drawn = [contents.values(f"/trial/chart/series/{name}", "Points2D:colors") for name in ("mean", "L1")]
+    colors = [values[-1][1] for values in drawn]
+    assert colors == [[packed(from_hex(PALETTE[1]))], [packed(COLORS["L1"])]]
 
 
 def titles(contents: Contents, entity: str) -> list[str]:
