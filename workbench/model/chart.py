@@ -127,7 +127,7 @@ class Chart(FileModel):
 
     @model_validator(mode="after")
     def _log_axes_have_positive_data(self) -> Chart:
-        xs = [x for part in (*self.series, *self.bands) for x in part.x]
+        xs = [x for series in self.series for x in series.x] + [x for band in self.bands for x in band.x]
         ys = [y for series in self.series for y in series.y if y is not None]
         ys += [y for band in self.bands for y in (*band.low, *band.high)] + [one.y for one in self.limits]
         for axis, values in ((self.x, xs), (self.y, ys)):
