@@ -132,3 +132,9 @@ def test_colours_repeat_after_the_palette() -> None:
     assert series_colors(named(*names), {}) == [*PALETTE, *PALETTE[:2]]
     assert list(laser_colors(names).values()) == [*PALETTE, *PALETTE[:2]]
     assert series_colors(named(*names[:7], "else"), laser_colors(names[:7])) == [*PALETTE, PALETTE[0]]
+
+
+@pytest.mark.parametrize("color", ["red", "#12345", "#1234567", "112233", "#11223g"])
+def test_a_colour_is_six_hexadecimal_digits(color: str) -> None:
+    with pytest.raises(ValidationError):
+        Series(name="s", x=(), y=(), color=color)
