@@ -73,15 +73,17 @@ class Viewer:
     def show_tab(self, name: str) -> None:
         """Bring a tab of the layout to the front: a view in a hidden tab cannot be photographed."""
         layout = self.client.get_blueprint().blueprint
-        tabs = {
-            parts["ContainerBlueprint"].get("display_name"): path.lstrip("/")
+        named = {
+            path.lstrip("/")
             for path, parts in layout.items()
-            if "ContainerBlueprint" in parts
+            for kind in ("ContainerBlueprint", "ViewBlueprint")
+            if parts.get(kind, {}).get("display_name") == name
         }
         for parts in layout.values():
             container = parts.get("ContainerBlueprint", {})
             if container.get("container_kind") == "Tabs":
-                container["active_tab"] = tabs[name]
+                for tab in named.intersection(container["contents"]):
+                    container["active_tab"] = tab
         self.client.set_blueprint(layout, "recording")
 
     def shot(self, view_id: Any = None) -> Picture:

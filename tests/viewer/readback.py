@@ -34,6 +34,18 @@ class Contents:
         return {entity: sorted(_comparable(row) for row in rows) for entity, rows in self._rows.items()}
 
 
+def layout_views(path: Path) -> dict[str, str]:
+    """Origins of the views of the layout that was sent last, by the views' names."""
+    reader = RrdReader(str(path))
+    layouts = [
+        [row for chunk in reader.stream(store=store) for row in _rows(chunk.to_record_batch())]
+        for store in reader.blueprints()
+    ]
+    last = max(layouts, key=lambda rows: max(row[ROW_ID] for row in rows))
+    views = [row for row in last if row.get("ViewBlueprint:space_origin")]
+    return {row["ViewBlueprint:display_name"][0]: f"/{row['ViewBlueprint:space_origin'][0]}" for row in views}
+
+
 def _rows(batch: Any) -> list[Row]:
     columns = {name: _column(name, batch.column(name)) for name in batch.schema.names}
     return [{name: values[i] for name, values in columns.items()} for i in range(batch.num_rows)]

@@ -13,8 +13,10 @@ from tests.viewer.conftest import Recorded
 from tests.viewer.harness import Picture, Viewer, distinct_colors, headless_viewer
 from tests.viewer.session import LASERS, SESSION
 from workbench.model import event as ev
+from workbench.model.chart import Axis, Chart, Series
 from workbench.viewer.blueprint import PICTURE_VIEW
 from workbench.viewer.entities import laser_colors
+from workbench.viewer.recording import rebuild
 
 VIEWS_OF_TAB = {
     "Live": {PICTURE_VIEW, "Standoff [mm]", "Spot position u [px]", "Peak brightness [DN]", "Steps", "Log"},
@@ -87,3 +89,28 @@ def _ringed(shown: Picture) -> set[str]:
     """Lasers whose colour is drawn into the picture."""
     colors = laser_colors(list(LASERS))
     return {laser for laser, rgb in colors.items() if (shown == np.array(rgb[::-1])).all(axis=2).sum() > 10}
+
+
+def test_every_chart_of_a_trial_has_a_tab_that_shows_it(recorded: Recorded, tmp_path: Path) -> None:
+    *earlier, last = recorded.records
+    charts = tuple(a_chart(name) for name in ("first", "second", "third"))
+    finished = last.model_copy(update={"event": ev.TrialFinished(trial="own", charts=charts)})
+    rebuild(recorded.folder, recorded.rig, [*earlier, finished, last], tmp_path / "charts.rrd")
+    titles = {chart.title for chart in charts}
+    # A viewer of its own: the other one keeps the layout that was changed in it.
+    with headless_viewer(tmp_path, "1280x720") as viewer:
+        viewer.open(tmp_path / "charts.rrd")
+        names = {view.name for view in viewer.state().views}
+        assert names == set.union(*VIEWS_OF_TAB.values()) - {"Results"} | titles
+        viewer.show_tab("Trial")
+        for title in titles:
+            viewer.show_tab(title)
+            viewer.shot()
+            assert distinct_colors(viewer.glance(viewer.view_id(title))) > 30, title
+        assert viewer.problems() == []
+
+
+def a_chart(name: str) -> Chart:
+    series = Series(name="L1", x=(1.0, 2.0, 3.0), y=(0.5, -0.5, 0.2))
+    x, y = Axis(label="standoff", unit="mm"), Axis(label="error", unit="mm")
+    return Chart(name=name, title=f"Chart {name}", x=x, y=y, series=(series,))

@@ -17,6 +17,7 @@ from workbench.cli.terminal import FaultTolerantConsumer, Terminal
 from workbench.cli.terminal_operator import choose_operator
 from workbench.devices.protocols import Operator
 from workbench.model import event as ev
+from workbench.model.chart import laser_colors
 from workbench.model.errors import (
     AnswerNeededError,
     LaserOffNotConfirmedError,
@@ -93,7 +94,8 @@ def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
     with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
         person = choose_operator(answers.no_input, console, lambda: asked.reason, terminal.quiet)
         operator = person if script is None else replace(script, other=person)
-        figures = FaultTolerantConsumer(FigureWriter(session_dir), "drawing figures", console)
+        writer = FigureWriter(session_dir, laser_colors(plan.rig.laser_ids))
+        figures = FaultTolerantConsumer(writer, "drawing figures", console)
         consumers = (FaultTolerantConsumer(terminal, "the progress", console), figures, beside)
         try:
             yield Screen(consumers, lambda: asked.reason, operator)

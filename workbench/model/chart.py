@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -26,6 +28,15 @@ class Axis(FileModel):
     limits: tuple[float, float] | None = None
     """None: from the data."""
 
+    @model_validator(mode="after")
+    def _limits_make_an_axis(self) -> Axis:
+        low, high = self.limits or (1.0, 2.0)
+        if low >= high or (self.scale == "log" and low <= 0):
+            raise ValueError(
+                f"axis {self.label}: expected ascending limits, above 0 if log, got {self.limits}"
+            )
+        return self
+
     @property
     def text(self) -> str:
         """Label and unit."""
@@ -36,7 +47,7 @@ class Series(FileModel):
     """Points of one kind, joined by a line or not."""
 
     name: str
-    """In the legend. A series named as a laser has the laser's colour."""
+    """In the legend. A series named as a laser has the laser's colour, see `series_colors`."""
     x: tuple[float, ...]
     y: tuple[Number, ...]
     sd: tuple[Number, ...] = ()
@@ -44,8 +55,8 @@ class Series(FileModel):
     expected_sd: tuple[Number, ...] = ()
     """1 sigma of everything that moves y from zero. Beyond 3 of these a point is marked as an outlier."""
     style: Literal["points", "line"] = "points"
-    color: str = ""
-    """`#rrggbb`; empty: by its name, or the next of the palette."""
+    color: Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")] = ""
+    """`#rrggbb`; empty: as `series_colors` chooses."""
     dashed: bool = False
 
     @model_validator(mode="after")
@@ -86,8 +97,15 @@ class Band(FileModel):
     low: tuple[float, ...]
     high: tuple[float, ...]
 
+    @model_validator(mode="after")
+    def _lengths_agree(self) -> Band:
+        if not len(self.x) == len(self.low) == len(self.high):
+            lengths = len(self.x), len(self.low), len(self.high)
+            raise ValueError(f"band {self.name}: expected as many x, low and high, got {lengths}")
+        return self
 
-class Limit(FileModel):
+
+class LimitLine(FileModel):
     """A horizontal line that y is held against."""
 
     name: str
@@ -104,8 +122,19 @@ class Chart(FileModel):
     y: Axis
     series: tuple[Series, ...]
     bands: tuple[Band, ...] = ()
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[LimitLine, ...] = ()
     caption: str = ""
+
+    @model_validator(mode="after")
+    def _log_axes_have_positive_data(self) -> Chart:
+        xs = [x for series in self.series for x in series.x] + [x for band in self.bands for x in band.x]
+        ys = [y for series in self.series for y in series.y if y is not None]
+        ys += [y for band in self.bands for y in (*band.low, *band.high)] + [one.y for one in self.limits]
+        for axis, values in ((self.x, xs), (self.y, ys)):
+            if axis.scale == "log" and min(values, default=1.0) <= 0:
+                where = f"chart {self.name}, log axis {axis.label}"
+                raise ValueError(f"{where}: expected values above 0, got {min(values)}")
+        return self
 
     @property
     def is_empty(self) -> bool:
@@ -124,3 +153,21 @@ class Chart(FileModel):
         for series in self.series:
             values.update(end for i in range(len(series.x)) for end in series.bar(i))
         return sorted(values)
+
+
+def laser_colors(laser_ids: Sequence[str]) -> dict[str, str]:
+    """One colour (`#rrggbb`) a laser, in the order of the rig file; they repeat after seven."""
+    return dict(zip(laser_ids, cycle(PALETTE), strict=False))
+
+
+def series_colors(series: Sequence[Series], named: Mapping[str, str]) -> list[str]:
+    """Colour (`#rrggbb`) of each series: its own, else that of its name, else the next unused of the palette.
+
+    Args:
+        series: of one chart.
+        named: colours by name, such as those of lasers.
+    """
+    known = [one.color or named.get(one.name, "") for one in series]
+    used = {color.lower() for color in known}
+    free = cycle([color for color in PALETTE if color not in used] or PALETTE)
+    return [color or next(free) for color in known]

@@ -11,6 +11,8 @@ from workbench.model.chart import Axis, Chart
 MARGIN = 0.05
 """Part of the axis that stays free at each end, where the data give its ends."""
 MOST_TICKS = 8
+LEAST_LOG_TICKS = 2
+"""With fewer than these within a logarithmic axis its ticks are those of a linear one."""
 MOST_LABELLED = 30
 """Different values of x up to which each has a tick, as standoffs do; with more, ticks are round numbers."""
 
@@ -94,7 +96,8 @@ def _log_ticks(low: float, high: float) -> list[float]:
     exponents = range(floor(log10(low)), ceil(log10(high)) + 1)
     factors = (1.0, 2.0, 5.0) if log10(high / low) < MOST_TICKS / 3 else (1.0,)
     ticks = [float(f"{m}e{e}") for e in exponents for m in factors]
-    return [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+    inside = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+    return inside if len(inside) >= LEAST_LOG_TICKS else linear_ticks(low, high)
 
 
 def _thinned(values: Sequence[float], scale: Scale, least_distance: float) -> list[float]:

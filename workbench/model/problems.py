@@ -58,6 +58,7 @@ SPELLED = {
     r"^[a-z0-9-]+$": "small letters (a to z), digits and - alone, such as flat-near",
     r"^[A-Za-z0-9][A-Za-z0-9_.-]*$": "letters (A to z), digits, _ . and -, not - or . first, such as L1",
     r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$": "letters (A to z), digits, _ . and -, not . first, such as flat.1",
+    r"^(#[0-9a-fA-F]{6})?$": "# and six digits (0 to 9, a to f), or nothing, such as #56b4e9",
     r"^[ -~]{4}$": "four letters, such as YUYV or GREY",
     r"^calibration[A-Za-z0-9_.-]*\.yaml$": "a name that begins with calibration and ends with .yaml, such as"
     " calibration-night.yaml, of letters (A to z), digits, _, . and -",

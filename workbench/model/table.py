@@ -6,7 +6,9 @@ single one of them.
 
 from __future__ import annotations
 
-from typing import Annotated
+import csv
+from io import StringIO
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -14,7 +16,13 @@ from workbench.model.finite import finite_or_none
 from workbench.model.number_text import duration, significant, two_digits
 from workbench.model.yamlfile import FileModel
 
-Cell = Annotated[float | int | bool | str | None, BeforeValidator(finite_or_none)]
+
+def _plain(value: Any) -> Any:
+    """A Python scalar in place of a numpy one, which would lose its type; None if it is not finite."""
+    return finite_or_none(value.item() if hasattr(value, "item") else value)
+
+
+Cell = Annotated[float | int | bool | str | None, BeforeValidator(_plain)]
 """None: there is no such number; so is one that is not finite. A bool is an alarm."""
 MISSING = "-"
 ALARM = "!"
@@ -37,8 +45,6 @@ class Column(FileModel):
     """
     scale: float = 1.0
     """A number is multiplied by it for people: 100 with the unit `%`. CSV and JSON have it unscaled."""
-    meaning: str = ""
-    """One sentence for the legend and the documentation."""
 
     @property
     def sd_key(self) -> str:
@@ -88,10 +94,11 @@ class Table(FileModel):
 
     def to_csv(self) -> str:
         """The records as CSV, the columns' keys as the header; lines end with a line feed."""
-        import pandas as pd  # only where a file is written: it takes longer to load than most commands run
-
-        keys = [column.key for column in self.columns]
-        return pd.DataFrame(self.records(), columns=keys).to_csv(index=False, lineterminator="\n")
+        file = StringIO()
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([column.key for column in self.columns])
+        writer.writerows(self.rows)  # None is empty, a float as short as it reads back
+        return file.getvalue()
 
 
 def cell_text(table: Table, row: tuple[Cell, ...], index: int) -> str:

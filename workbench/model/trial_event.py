@@ -47,8 +47,6 @@ class TrialProgress(FileModel):
     trial: str
     text: str
     """One line for people."""
-    charts: tuple[Chart, ...] = ()
-    """What there is to see so far."""
 
 
 class TrialFinished(FileModel):

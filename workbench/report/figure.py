@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from io import BytesIO
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from workbench.model.chart import PALETTE, Chart, Series
+from workbench.model.chart import Chart, Series, series_colors
 from workbench.model.chart_scale import x_scale, x_ticks, y_scale
 from workbench.report.plot_style import own_style
 
@@ -20,15 +21,20 @@ LEGEND_CHARACTERS, SYMBOL_CHARACTERS = 100, 8
 OUTLIER_COLOR = "#d00000"
 
 
-def svg(chart: Chart) -> bytes:
-    """The chart as an SVG file: text as outlines, so that it looks alike whatever fonts there are."""
+def svg(chart: Chart, colors: Mapping[str, str]) -> bytes:
+    """The chart as an SVG file: text as outlines, so that it looks alike whatever fonts there are.
+
+    Args:
+        chart: what to draw.
+        colors: of series by name, such as lasers (`#rrggbb`).
+    """
     file = BytesIO()
     with own_style():
-        draw(chart).savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+        draw(chart, colors).savefig(file, format="svg", metadata={"Date": None, "Creator": None})
     return file.getvalue()
 
 
-def draw(chart: Chart) -> Figure:
+def draw(chart: Chart, colors: Mapping[str, str]) -> Figure:
     """The chart as a figure, without pyplot: nothing is kept between two of them. Call it in `own_style`."""
     figure = Figure(figsize=SIZE_IN, layout="constrained")
     axes = figure.add_subplot()
@@ -37,8 +43,8 @@ def draw(chart: Chart) -> Figure:
         axes.fill_between(band.x, band.low, band.high, alpha=0.2, label=band.name, linewidth=0)
     for limit in chart.limits:
         axes.axhline(limit.y, color=OUTLIER_COLOR, linestyle="--", linewidth=1, label=limit.name)
-    for number, series in enumerate(chart.series):
-        _draw_series(axes, series, series.color or PALETTE[number % len(PALETTE)])
+    for series, color in zip(chart.series, series_colors(chart.series, colors), strict=True):
+        _draw_series(axes, series, color)
     axes.set_title(chart.title, loc="left", fontsize=11, fontweight="bold")
     names = [series.name for series in chart.series] + [band.name for band in chart.bands]
     names += [limit.name for limit in chart.limits]

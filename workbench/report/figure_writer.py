@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,8 @@ class FigureWriter:
     """A consumer of records that writes `<chart name>.svg` for each chart of a trial."""
 
     session_dir: Path
+    colors: Mapping[str, str]
+    """Of series by name, such as lasers (`#rrggbb`)."""
 
     def __call__(self, record: Record) -> None:
         """Take one record."""
@@ -21,4 +24,4 @@ class FigureWriter:
             from workbench.report.figure import svg  # loads matplotlib, which most sessions do not need
 
             for chart in record.event.charts:
-                write_record(self.session_dir / f"{chart.name}.svg", svg(chart))
+                write_record(self.session_dir / f"{chart.name}.svg", svg(chart, self.colors))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import rerun.blueprint as rrb
 
+from workbench.model.chart import Chart
 from workbench.model.reading_chart import SENSOR
 from workbench.model.rig import Rig
 from workbench.viewer import entities as at
@@ -11,14 +14,21 @@ from workbench.viewer.chart import BOUNDS_X, BOUNDS_Y
 
 PICTURE_VIEW = "Picture, lasers on"
 """Name of the view with the frames, by which a test finds it."""
+RESULTS_VIEW = "Results"
 TABLE_FORMAT = rrb.archetypes.TextDocumentFormat(monospace=True, word_wrap=False)
 """Of the views whose documents are tables in plain text."""
 
 
-def blueprint(rig: Rig) -> rrb.Blueprint:
-    """The layout for one rig; the technician's tab is in front, the cursor follows what comes in."""
+def blueprint(rig: Rig, charts: Sequence[Chart] = ()) -> rrb.Blueprint:
+    """The layout for one rig; the technician's tab is in front, the cursor follows what comes in.
+
+    Args:
+        rig: whose picture and lasers are shown.
+        charts: results of the last trial, in the order of their places (`entities.trial_charts`); with more
+            than one each has a tab of its own.
+    """
     return rrb.Blueprint(
-        rrb.Tabs(_live(rig), _fit(), _trial(), _bench(), active_tab=0),
+        rrb.Tabs(_live(rig), _fit(), _trial(charts), _bench(), active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=at.CAPTURE, play_state="following"),
@@ -62,9 +72,9 @@ def _fit() -> rrb.Container:
     return rrb.Horizontal(charts, words, column_shares=[3, 2], name="Fit")
 
 
-def _trial() -> rrb.Container:
+def _trial(charts: Sequence[Chart]) -> rrb.Container:
     curves = rrb.Vertical(
-        _chart(at.TRIAL_CHART, "Results"),
+        _results(charts),
         rrb.TimeSeriesView(
             origin=f"{at.TRIAL_ERRORS}/{SENSOR}", name="Error of the sensor [mm] as the trial went"
         ),
@@ -72,6 +82,15 @@ def _trial() -> rrb.Container:
     )
     table = rrb.TextDocumentView(origin=at.TRIAL_SUMMARY, name="Tables", format_options=TABLE_FORMAT)
     return rrb.Horizontal(curves, table, column_shares=[3, 2], name="Trial")
+
+
+def _results(charts: Sequence[Chart]) -> rrb.Container | rrb.View:
+    """The chart that grows as the trial goes and becomes the first of its results; the others beside it."""
+    if len(charts) <= 1:
+        return _chart(at.TRIAL_CHART, RESULTS_VIEW)
+    places = at.trial_charts([chart.name for chart in charts])
+    views = [_chart(place, chart.title or chart.name) for place, chart in zip(places, charts, strict=True)]
+    return rrb.Tabs(*views, active_tab=0, name=RESULTS_VIEW)
 
 
 def _bench() -> rrb.Container:

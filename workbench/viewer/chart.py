@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import rerun as rr
 
-from workbench.model.chart import Chart, Series
+from workbench.model.chart import Chart, Series, series_colors
 from workbench.model.chart_scale import Scale, x_scale, x_ticks, y_scale
 from workbench.viewer import entities as at
 from workbench.viewer.stream import Stream
@@ -92,9 +92,10 @@ def log_chart(stream: Stream, entity: str, chart: Chart, colors: Mapping[str, at
     plot = Plot.of(chart)
     _log_axes(stream, entity, plot)
     _log_limits(stream, entity, plot)
-    for position, series in enumerate(chart.series):
-        color = at.from_hex(series.color) if series.color else colors.get(series.name, at.WHITE)
-        _log_series(stream, at.under(f"{entity}/series", series.name), plot, position, color)
+    named = {name: at.to_hex(color) for name, color in colors.items()}
+    for position, color in enumerate(series_colors(chart.series, named)):
+        place = at.under(f"{entity}/series", chart.series[position].name)
+        _log_series(stream, place, plot, position, at.from_hex(color))
     _log_outliers(stream, f"{entity}/outliers", plot)
 
 

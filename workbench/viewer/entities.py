@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.model.chart import PALETTE
+from workbench.model import chart
 
 APPLICATION = "workbench"
 
@@ -58,14 +58,24 @@ RED: Rgb = (255, 70, 70)
 
 
 def laser_colors(laser_ids: Sequence[str]) -> dict[str, Rgb]:
-    """One colour a laser, in the order of the rig file; they repeat after seven."""
-    return {laser: from_hex(PALETTE[i % len(PALETTE)]) for i, laser in enumerate(laser_ids)}
+    """Colours of lasers as Rerun takes them."""
+    return {laser: from_hex(color) for laser, color in chart.laser_colors(laser_ids).items()}
 
 
 def from_hex(color: str) -> Rgb:
     """Red, green, blue of `#rrggbb`."""
     red, green, blue = bytes.fromhex(color.removeprefix("#"))
     return red, green, blue
+
+
+def to_hex(color: Rgb) -> str:
+    """`#rrggbb` of red, green, blue."""
+    return f"#{bytes(color).hex()}"
+
+
+def trial_charts(names: Sequence[str]) -> list[str]:
+    """Entities of the charts of a trial's results, by the charts' names; the first has the live chart's."""
+    return [TRIAL_CHART, *(under(TRIAL_CHARTS, name) for name in names[1:])][: len(names)]
 
 
 def under(parent: str, *parts: str) -> str:

@@ -94,7 +94,7 @@ class _OpenRecording:
         self._rig = rig
         self._colors = at.laser_colors(rig.laser_ids)
         self._geometry = Geometry.of_rig(rig)
-        self._trial = TrialView(stream, self._colors)
+        self._trial = TrialView(stream, rig, self._colors)
         self._placement: Placement | None = None
         self._captures: dict[str, tuple[int, ev.CaptureTaken, Placement | None]] = {}
         self._exposure = Moment(0, 0, 0)
@@ -249,7 +249,6 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.TrialProgress, moment: Moment) -> None:
-        self._trial.progress(event)
         steps.say(self.stream, event.text)
 
     @_log.register

@@ -43,6 +43,10 @@ class Stream:
         self._recording.set_sinks(rr.FileSink(str(path)), default_blueprint=layout)
         self._recording.send_recording_name(session)
 
+    def lay_out(self, layout: rrb.Blueprint) -> None:
+        """Replace the layout, also in a viewer that is showing the recording."""
+        self._recording.send_blueprint(layout)
+
     def at(self, moment: Moment) -> None:
         """Everything logged from here on happened at `moment`."""
         self._recording.reset_time()

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import rerun as rr
 
 from workbench.model.chart import Chart
-from workbench.model.event import ReadingTaken, TrialFinished, TrialProgress
+from workbench.model.event import ReadingTaken, TrialFinished
 from workbench.model.reading_chart import SENSOR, error_chart
+from workbench.model.rig import Rig
 from workbench.viewer import documents
 from workbench.viewer import entities as at
+from workbench.viewer.blueprint import blueprint
 from workbench.viewer.chart import log_chart
 from workbench.viewer.stream import Stream
 from workbench.viewer.table_text import table_text
@@ -24,8 +26,11 @@ class TrialView:
     """Readings of one trial as they come."""
 
     stream: Stream
+    rig: Rig
     colors: Mapping[str, at.Rgb]
     readings: list[ReadingTaken] = field(default_factory=list)
+    laid_out: list[tuple[str, str]] = field(default_factory=list)
+    """Names and titles of the charts that have views of their own; empty: there is the live chart alone."""
 
     def log_none_yet(self) -> None:
         """Say so where the trial will be shown."""
@@ -42,30 +47,34 @@ class TrialView:
         self.readings.append(reading)
         log_errors(self.stream, reading, self.colors)
 
-    def progress(self, trial: TrialProgress) -> None:
-        """Log the charts of a part of a trial."""
-        for chart in trial.charts:
-            self._log(at.TRIAL_CHART, chart)
-
     def finish(self, trial: TrialFinished) -> None:
-        """Log the tables, the readings without a range, and the charts, the first in front."""
-        if trial.charts:
-            self._log(at.TRIAL_CHART, trial.charts[0])
-        else:
+        """Log the tables, the readings without a range, and the charts; they replace an earlier trial's."""
+        self.stream.log(at.TRIAL_CHARTS, rr.Clear(recursive=True))
+        if not trial.charts:
             self.stop()
-        for chart in trial.charts[1:]:
-            self._log(at.under(at.TRIAL_CHARTS, chart.name), chart)
+        places = at.trial_charts([chart.name for chart in trial.charts])
+        for place, chart in zip(places, trial.charts, strict=True):
+            self._log(place, chart)
+        self._lay_out(trial.charts)
         parts = [
             f"Trial {trial.trial}",
             *map(table_text, trial.tables),
             documents.without_range(self.readings),
         ]
         self._document("\n\n".join(part for part in parts if part))
+        self.readings.clear()  # or the end of the session would draw them over the first chart
 
     def stop(self) -> None:
         """The session ends: show what there is."""
         if self.readings:
             self._log_errors()
+
+    def _lay_out(self, charts: Sequence[Chart]) -> None:
+        """Show a view for each chart. A layout that fits already stays: it may have been changed by hand."""
+        titles = [(chart.name, chart.title) for chart in charts] if len(charts) > 1 else []
+        if titles != self.laid_out:
+            self.stream.lay_out(blueprint(self.rig, charts))
+            self.laid_out = titles
 
     def _log_errors(self) -> None:
         self._log(at.TRIAL_CHART, error_chart("errors", self.readings))

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from workbench.model.chart import Axis, Chart, Limit, Series
+from workbench.model.chart import Axis, Chart, LimitLine, Series
 from workbench.model.chart_scale import MOST_LABELLED, linear_ticks, x_scale, x_ticks, y_scale
 
 
@@ -77,7 +77,7 @@ def test_limits_of_the_axis_come_first() -> None:
 
 
 def test_a_limit_far_out_is_on_the_chart() -> None:
-    one = chart((1.0, 2.0), (-1.0, 1.0)).model_copy(update={"limits": (Limit(name="MPE", y=20.0),)})
+    one = chart((1.0, 2.0), (-1.0, 1.0)).model_copy(update={"limits": (LimitLine(name="MPE", y=20.0),)})
     assert y_scale(one).high > 20.0
 
 
@@ -94,3 +94,18 @@ def test_ticks_about_zero_have_it(limit: float) -> None:
     ticks = linear_ticks(-limit, limit)
     assert 3 <= len(ticks) <= 11
     assert 0.0 in ticks
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(300.0, 339.0), (3.0, 4.0), (1.5, 1.6), (9.0, 11.0), (80.0, 400.0)]
+)
+def test_a_short_logarithmic_axis_has_ticks_inside(low: float, high: float) -> None:
+    x = tuple(np.linspace(low, high, 40).tolist())
+    one = chart(x, x, "log")
+    log = Axis(label="y", scale="log")
+    scale = x_scale(one)
+    (above, below), y = x_ticks(one, scale, 0.05), y_scale(one.model_copy(update={"y": log})).round_ticks()
+    assert below == []
+    for ticks in (above, y):
+        assert len(ticks) >= 2
+        assert all(scale.low * (1 - 1e-9) <= tick <= scale.high * (1 + 1e-9) for tick in ticks)

@@ -101,7 +101,7 @@ def test_every_pattern_is_spelled_out_with_an_example_that_fits() -> None:
         found |= {value for name, value in schema if name == "pattern" and isinstance(value, str)}
     assert found == set(SPELLED)
     for pattern, words in SPELLED.items():
-        examples = re.findall(r"[\w.-]+", words.partition("such as ")[2].partition(", of")[0])
+        examples = re.findall(r"[\w.#-]+", words.partition("such as ")[2].partition(", of")[0])
         assert [e for e in examples if re.match(pattern, e)], words
         assert re.match(pattern, examples[-1]), words
 

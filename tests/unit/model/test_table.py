@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 from pydantic import ValidationError
@@ -111,6 +113,33 @@ def test_csv_is_that_of_a_data_frame_to_the_byte(records: list[dict[str, Cell]],
     """Files of the trials are written from the rows' own fields: these stay the same."""
     expected = pd.DataFrame(records[:count]).to_csv(index=False, lineterminator="\n")
     assert table_of(records[:count]).to_csv() == expected
+
+
+def test_csv_keeps_whole_numbers_whole_beside_a_missing_one() -> None:
+    rows: tuple[tuple[Cell, ...], ...] = (
+        (3, 0.1 + 0.2, "a,b", True),
+        (None, None, None, None),
+        (12, 2.0, "", False),
+    )
+    text = table(*rows, n={}, x={}, word={}, alarm={}).to_csv()
+    assert text == 'n,x,word,alarm\n3,0.30000000000000004,"a,b",True\n,,,\n12,2.0,,False\n'
+
+
+@pytest.mark.parametrize(
+    ("scalar", "plain"),
+    [
+        (np.bool_(True), True),
+        (np.int64(3), 3),
+        (np.float32(0.5), 0.5),
+        (np.float64(2.0), 2.0),
+        (np.str_("a"), "a"),
+        (np.float32("nan"), None),
+        (np.array(7), 7),
+    ],
+)
+def test_a_numpy_scalar_keeps_its_type(scalar: Any, plain: Cell) -> None:
+    ((cell,),) = table((scalar,), a={}).rows
+    assert (cell, type(cell)) == (plain, type(plain))
 
 
 def test_csv_without_rows_is_the_header() -> None:

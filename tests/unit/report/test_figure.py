@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.viewer.session import a_fit
-from workbench.model.chart import Axis, Band, Chart, Limit, Series
+from workbench.model.chart import PALETTE, Axis, Band, Chart, LimitLine, Series, laser_colors
 from workbench.model.fit_charts import residual_chart
 from workbench.report.figure import draw, svg
 from workbench.report.plot_style import own_style
@@ -34,7 +34,7 @@ def strokes(picture: bytes, color: str) -> list[str]:
 
 
 def test_a_line_is_drawn_to_scale_with_its_gap() -> None:
-    line, *_ = strokes(svg(CHART), "#112233")
+    line, *_ = strokes(svg(CHART, {}), "#112233")
     commands = re.findall(r"([ML]) ([\d.]+) ([\d.]+)", line)
     assert [command for command, _, _ in commands] == ["M", "M", "L"]
     x, y = np.array([[float(a), float(b)] for _, a, b in commands]).T
@@ -43,15 +43,15 @@ def test_a_line_is_drawn_to_scale_with_its_gap() -> None:
 
 
 def test_the_same_chart_gives_the_same_bytes_whatever_the_user_s_style() -> None:
-    first = svg(CHART)
+    first = svg(CHART, {})
     with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 30.0, "svg.fonttype": "none"}):
-        assert svg(CHART) == first
+        assert svg(CHART, {}) == first
         assert mpl.rcParams["font.size"] == 30.0, "the caller's style is left alone"
     assert b"<dc:date>" not in first
 
 
 def test_titles_units_legend_and_caption_are_on_it() -> None:
-    figure = draw(CHART)
+    figure = draw(CHART, {})
     (axes,) = figure.axes
     assert axes.get_title(loc="left") == "T"
     assert axes.get_xlabel().splitlines() == ["distance [mm]", "what it shows"]
@@ -61,11 +61,11 @@ def test_titles_units_legend_and_caption_are_on_it() -> None:
 
 
 def test_one_series_needs_no_legend() -> None:
-    assert draw(CHART.model_copy(update={"series": (LINE,)})).legends == []
+    assert draw(CHART.model_copy(update={"series": (LINE,)}), {}).legends == []
 
 
 def test_standoffs_are_labelled_on_a_logarithmic_axis_and_outliers_ringed() -> None:
-    figure = draw(residual_chart(a_fit(), "u"))
+    figure = draw(residual_chart(a_fit(), "u"), {})
     (axes,) = figure.axes
     assert axes.get_xscale() == "log"
     assert [label.get_text() for label in axes.get_xticklabels()] == ["200", "500", "1250", "3000"]
@@ -75,7 +75,7 @@ def test_standoffs_are_labelled_on_a_logarithmic_axis_and_outliers_ringed() -> N
 
 def test_bands_and_limits_are_drawn_and_named() -> None:
     band = Band(name="tolerance", x=(0.0, 10.0), low=(-0.5, -0.2), high=(0.5, 0.2))
-    figure = draw(CHART.model_copy(update={"bands": (band,), "limits": (Limit(name="MPE", y=0.8),)}))
+    figure = draw(CHART.model_copy(update={"bands": (band,), "limits": (LimitLine(name="MPE", y=0.8),)}), {})
     (legend,) = figure.legends
     assert {"tolerance", "MPE"} < {text.get_text() for text in legend.get_texts()}
 
@@ -84,7 +84,7 @@ def test_bands_and_limits_are_drawn_and_named() -> None:
 def test_nothing_is_drawn_over_anything_else_or_over_the_edge(series: int) -> None:
     many = tuple(LINE.model_copy(update={"name": f"workbench, noise, shift {i} mm"}) for i in range(series))
     with own_style():
-        figure = draw(CHART.model_copy(update={"series": many}))
+        figure = draw(CHART.model_copy(update={"series": many}), {})
         figure.draw_without_rendering()
     (axes,) = figure.axes
     page = figure.bbox
@@ -97,3 +97,10 @@ def test_nothing_is_drawn_over_anything_else_or_over_the_edge(series: int) -> No
         assert not box.overlaps(plot)
     for legend in figure.legends:
         assert not legend.get_window_extent().overlaps(axes.xaxis.label.get_window_extent())
+
+
+def test_a_laser_has_its_colour_and_others_the_next_of_the_palette() -> None:
+    lines = tuple(Series(name=name, x=(0.0, 1.0), y=(0.0, 1.0), style="line") for name in ("mean", "L2"))
+    (axes,) = draw(CHART.model_copy(update={"series": lines}), laser_colors(("L1", "L2"))).axes
+    drawn = {str(line.get_label()): line.get_color() for line in axes.lines}
+    assert (drawn["mean"], drawn["L2"]) == PALETTE[:2]

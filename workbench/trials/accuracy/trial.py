@@ -15,35 +15,16 @@ from workbench.trials.readings import session_ranger, take_readings
 from workbench.trials.results import finish_trial
 
 COLUMNS = (
-    Column(key="standoff_mm", name="true", unit="mm", meaning="Standoff by the ruler."),
-    Column(key="readings", name="n", meaning="Readings with a range; the statistics are of these."),
-    Column(key="missing", name="missing", meaning="Readings without a range."),
-    Column(key="mean_error_mm", name="mean error", unit="mm", format="+.2f", meaning="Measured - true."),
+    Column(key="standoff_mm", name="true", unit="mm"),
+    Column(key="readings", name="n"),
+    Column(key="missing", name="missing"),
+    Column(key="mean_error_mm", name="mean error", unit="mm", format="+.2f"),
     Column(key="max_error_mm", name="max", unit="mm", format="+.2f"),
     Column(key="min_error_mm", name="min", unit="mm", format="+.2f"),
-    Column(key="sd_mm", name="sd", unit="mm", format=".2f", meaning="Over the readings at this placement."),
-    Column(
-        key="range_sd_mm",
-        name="stated u",
-        unit="mm",
-        format=".2f",
-        meaning="Stated standard uncertainty of one reading: calibration and spots.",
-    ),
-    Column(
-        key="reference_sd_mm",
-        name="reference u",
-        unit="mm",
-        format=".2f",
-        meaning="Standard uncertainty of the true range: the placement, by the ruler.",
-    ),
-    Column(
-        key="mean_relative_error",
-        name="mean error",
-        unit="%",
-        scale=100,
-        format="+.2f",
-        meaning="Mean error over the true range.",
-    ),
+    Column(key="sd_mm", name="sd", unit="mm", format=".2f"),
+    Column(key="range_sd_mm", name="stated u", unit="mm", format=".2f"),
+    Column(key="reference_sd_mm", name="reference u", unit="mm", format=".2f"),
+    Column(key="mean_relative_error", name="mean error", unit="%", scale=100, format="+.2f"),
 )
 
 

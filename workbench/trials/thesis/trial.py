@@ -70,19 +70,19 @@ def _claim_table(name: str, quantity: Quantity, rows: Sequence[ClaimRow]) -> Tab
     unit = "%" if relative else "mm" if quantity == "shape" else ""
     suffix = "" if relative or not unit else f"_{unit}"
 
-    def value(key: str, heading: str, meaning: str) -> Column:
-        return Column(key=f"{key}{suffix}", name=heading, unit=unit, meaning=meaning, **form)
+    def value(key: str, heading: str) -> Column:
+        return Column(key=f"{key}{suffix}", name=heading, unit=unit, **form)
 
     columns = (
         Column(key="scene", name="scene"),
         Column(key="nearest_mm", name="from", unit="mm"),
         Column(key="farthest_mm", name="to", unit="mm"),
-        value("stated", "stated", "By the thesis."),
-        value("thesis", "thesis", "Its own chain, run again."),
-        Column(key="not_reproduced", name="", meaning="!: the chain does not reach what the thesis states."),
-        value("ours", "ours", "The workbench's chain, without noise."),
-        Column(key="not_better", name="", meaning="!: not better than the thesis's chain."),
-        value("noisy", "noise", "The workbench's chain, with noise."),
+        value("stated", "stated"),
+        value("thesis", "thesis"),
+        Column(key="not_reproduced", name=""),
+        value("ours", "ours"),
+        Column(key="not_better", name=""),
+        value("noisy", "noise"),
     )
     return Table(
         name=f"{name}-claims-{quantity}",
