@@ -275,8 +275,8 @@ def identify_dark(line: CheckedLine, boot_s: float) -> str:
     """Identity of a device that has just been opened; whatever `identify` does, every laser is off then.
 
     Raises:
-        LaserOffNotConfirmedError: the off is not confirmed, whether or not the device was identified.
-        WorkbenchError: `identify` failed, and the off is confirmed.
+        LaserOffNotConfirmedError: the off is not confirmed, and no lease of the hardware ends an emission.
+        WorkbenchError: `identify` failed.
     """
     try:
         identity = line.identify(boot_s)
@@ -284,6 +284,8 @@ def identify_dark(line: CheckedLine, boot_s: float) -> str:
         try:
             keep_trying_off(line, TRY_ALONE_S)
         except LaserOffNotConfirmedError as unconfirmed:
+            if line.has_leases:  # the hardware ends an emission by itself, if this is that hardware at all
+                raise error from None
             raise LaserOffNotConfirmedError(
                 f"{unconfirmed}. The device was not identified: {error}"
             ) from None
