@@ -11,6 +11,8 @@ from workbench.optics.rays import Ray, spot_at_inverse_depth
 
 STRAIGHT_PX = 1.0
 """A laser's line that bends by less counts as straight."""
+LEAST_LENGTH_PX = 1e-9
+"""A direction that is shorter belongs to a spot that does not move: its line does not bend."""
 BEND_POINTS = 17
 """Spots of a laser at which its line is evaluated, from infinity to the nearest depth."""
 
@@ -47,7 +49,7 @@ def bend_px(
         ray: (4,) the laser's.
         nearest_mm: depth of the nearest spot; the farthest is at infinity.
         size_px: (width, height) of the picture.
-        line: a point of the line, (2,) pixels, and its direction (2,), of any length but 0.
+        line: a point of the line, (2,) pixels, and its direction (2,), of any length.
     """
     x_mm, y_mm, tx, ty = ray
     inverse_depth = np.linspace(0.0, 1.0 / nearest_mm, BEND_POINTS)
@@ -55,6 +57,6 @@ def bend_px(
     seen = model.is_unfolded(lens, tx + x_mm * inverse_depth, ty + y_mm * inverse_depth)
     seen &= in_picture(spots, size_px)
     point, (du, dv) = line[0], np.asarray(line[1], float)
-    away = np.abs((spots - point) @ [dv, -du]) / np.hypot(du, dv)
+    away = np.abs((spots - point) @ [dv, -du]) / max(float(np.hypot(du, dv)), LEAST_LENGTH_PX)
     bend = float(away[seen].max(initial=0.0))
     return bend if bend > STRAIGHT_PX else 0.0

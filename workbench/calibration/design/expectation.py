@@ -20,6 +20,7 @@ from workbench.calibration.model.prediction import predict_cell
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.lens import PINHOLE, LensName
 from workbench.model.rig import Rig
+from workbench.optics.image import in_picture
 from workbench.optics.rays import RAY
 
 BLOCK = 4096
@@ -121,8 +122,7 @@ class Expectation:
         spot, slopes, radius = _in_blocks(
             inputs.reshape(-1, inputs.shape[-1]), standoff.ravel(), cell.lens_name
         )
-        size = np.array([self.rig.camera.width_px, self.rig.camera.height_px])
-        inside = ((spot > -0.5) & (spot < size - 0.5)).all(axis=-1).reshape(shape)
+        inside = in_picture(spot, (self.rig.camera.width_px, self.rig.camera.height_px)).reshape(shape)
         lens = self.sensors[:, cell.lens].T
         fold = cell.model.unfolded_radius(lens[len(PINHOLE) :])
         seen = inside & (radius.reshape(shape) < fold[:, None, None])
