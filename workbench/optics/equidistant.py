@@ -14,6 +14,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from workbench.model.arrays import FloatArray
 from workbench.optics.lens import EitherArray, LensModel, Numbers
 
 SERIES_BELOW = 0.01
@@ -25,21 +26,16 @@ SERIES_TERMS = 9
 def _distort(coefficients: Numbers, x: EitherArray, y: EitherArray) -> tuple[EitherArray, EitherArray]:
     r2 = x * x + y * y
     angle_over_radius = _angle_over_radius(r2)
-    radial = angle_over_radius * _polynomial(coefficients, r2 * angle_over_radius**2, (1.0,) * 5)
+    k1, k2, k3, k4 = coefficients
+    angle2 = r2 * angle_over_radius**2
+    radial = angle_over_radius * (1.0 + angle2 * (k1 + angle2 * (k2 + angle2 * (k3 + angle2 * k4))))
     return x * radial, y * radial
 
 
-def _radial_slope(coefficients: Numbers, x: EitherArray, y: EitherArray) -> EitherArray:
-    r2 = x * x + y * y
-    by_angle = _polynomial(coefficients, r2 * _angle_over_radius(r2) ** 2, (1.0, 3.0, 5.0, 7.0, 9.0))
-    return by_angle / (1.0 + r2)
-
-
-def _polynomial(coefficients: Numbers, angle2: EitherArray, factors: tuple[float, ...]) -> EitherArray:
-    """Sum of factor x coefficient x angle^(0, 2, ... 8), the first coefficient being 1."""
-    k1, k2, k3, k4 = coefficients
-    _, a, b, c, d = factors
-    return factors[0] + angle2 * (a * k1 + angle2 * (b * k2 + angle2 * (c * k3 + angle2 * d * k4)))
+def _undistorted_radius(angle_rad: FloatArray) -> FloatArray:
+    """Tangent of an angle off the axis; infinite from 90 degrees."""
+    seen = angle_rad < np.pi / 2
+    return np.where(seen, np.tan(np.where(seen, angle_rad, 0.0)), np.inf)
 
 
 def _angle_over_radius(r2: EitherArray) -> EitherArray:
@@ -61,7 +57,8 @@ def _angle_over_radius(r2: EitherArray) -> EitherArray:
 EQUIDISTANT = LensModel(
     name="equidistant",
     distort=_distort,
-    radial_slope=_radial_slope,
+    radial_terms=("k1", "k2", "k3", "k4"),
+    undistorted_radius=_undistorted_radius,
     trial_sd={"k1": 0.1, "k2": 0.1, "k3": 0.1, "k4": 0.1},
     terms=("k4", "k3", "k2", "k1"),
 )

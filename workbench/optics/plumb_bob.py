@@ -18,17 +18,11 @@ def _distort(coefficients: Numbers, x: EitherArray, y: EitherArray) -> tuple[Eit
     return x_distorted, y_distorted
 
 
-def _radial_slope(coefficients: Numbers, x: EitherArray, y: EitherArray) -> EitherArray:
-    """Of the radial polynomial; the tangential terms are left out."""
-    k1, k2, _, _, k3 = coefficients
-    r2 = x * x + y * y
-    return 1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3))
-
-
 PLUMB_BOB = LensModel(
     name="plumb_bob",
     distort=_distort,
-    radial_slope=_radial_slope,
+    radial_terms=("k1", "k2", "k3"),
+    undistorted_radius=lambda radius: radius,
     trial_sd={"k1": 0.3, "k2": 0.3, "p1": 0.003, "p2": 0.003, "k3": 0.3},
     terms=("k3", "p1 p2", "k2", "k1"),
     polynomial_degree=7,

@@ -26,9 +26,6 @@ MERGING_WIDTHS = 4.0
 """Spots nearer than this to each other may be found as one."""
 SCANLINE_HALF_WIDTH_PX = 8.0
 """A beam of 1.5 mm at the sensor's front spreads over some 8 px on either side of its line."""
-STRAIGHT_PX = 1.0
-"""A laser's line that bends by less counts as straight."""
-BEND_POINTS = 17
 
 
 @dataclass(frozen=True)
@@ -289,14 +286,10 @@ class Ranger:
         return tuple(lines)
 
     def _scanline(self, laser_id: str, nearest_mm: float) -> Scanline:
-        with np.errstate(divide="ignore"):  # from the nearest standoff to infinity
-            depth_mm = (nearest_mm + self.sensor.offset_mm) / np.linspace(1.0, 0.0, BEND_POINTS)
-        spots = self.sensor.spot_px(laser_id, depth_mm - self.sensor.offset_mm)
-        near, far = spots[0], spots[-1]
+        near, far = self.sensor.spot_px(laser_id, np.array([nearest_mm, np.inf]))
         du, dv = near - far
-        bend = float(np.abs((spots - far) @ [dv, -du]).max()) / max(float(np.hypot(du, dv)), 1e-9)
-        half_width = SCANLINE_HALF_WIDTH_PX + (bend if bend > STRAIGHT_PX else 0.0)
-        return Scanline(far[0], far[1], du, dv, half_width)
+        bend = self.sensor.bend_px(laser_id, nearest_mm, far, near - far)
+        return Scanline(far[0], far[1], du, dv, SCANLINE_HALF_WIDTH_PX + bend)
 
 
 def spot_arrays(spots: Sequence[Spot]) -> tuple[FloatArray, FloatArray]:

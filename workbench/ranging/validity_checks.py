@@ -9,6 +9,7 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import Validity
 from workbench.model.event import LaserRange
+from workbench.optics.image import in_picture, inside_px
 from workbench.ranging.assignment import MOST_MISFIT_SD
 from workbench.sensor.calibrated import RangeEstimates
 
@@ -29,7 +30,7 @@ def objections(position_px: FloatArray, ranges: RangeEstimates, size_px: tuple[i
     why: list[str | None] = [None] * len(position_px)
     bound = MOST_RELATIVE_SIGMA * ranges.range_mm
     good = (ranges.misfit_sd < MOST_MISFIT_SD) & (ranges.sigma_mm < bound) & np.isfinite(ranges.range_mm)
-    good &= ((position_px > -0.5) & (position_px < np.array(size_px) - 0.5)).all(axis=1)
+    good &= in_picture(position_px, size_px)
     for n in np.flatnonzero(~good).tolist():
         range_mm, sigma_mm, misfit_sd = ranges.range_mm[n], ranges.sigma_mm[n], ranges.misfit_sd[n]
         why[n] = _objection(position_px[n], range_mm, sigma_mm, misfit_sd, np.array(size_px, float))
@@ -40,7 +41,7 @@ def _objection(
     position: FloatArray, range_mm: float, sigma_mm: float, misfit_sd: float, size: FloatArray
 ) -> str | None:
     seen = np.isfinite(position)
-    if not (seen.any() and ((position > -0.5) & (position < size - 0.5))[seen].all()):
+    if not (seen.any() and inside_px(position, size)[seen].all()):
         return "its spot lies outside the picture"
     if np.isnan(range_mm):
         return "its spot lies where the lens model folds over: at no range would it be seen there"

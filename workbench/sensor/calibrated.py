@@ -11,6 +11,7 @@ import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.calibration import Calibration
+from workbench.optics.image import bend_px, in_picture
 from workbench.optics.lens import LensModel
 from workbench.optics.lens_models import lens_model
 from workbench.optics.rays import RAY
@@ -189,13 +190,27 @@ class CalibratedSensor:
 
     def in_frame(self, laser_id: str, range_mm: FloatArray) -> BoolArray:
         """(n,) whether the laser's spot lies in the image, where the lens model does not fold over."""
-        u, v = self.spot_px(laser_id, range_mm).T
+        inside = in_picture(self.spot_px(laser_id, range_mm), self._size_px)
         laser, w = self._points(laser_id, range_mm)
         x, y, tx, ty = self._rays[laser].T
-        unfolded = np.asarray(self._model.is_unfolded(self._lens, tx + x * w, ty + y * w))
-        width, height = self.calibration.image_width, self.calibration.image_height
-        inside = (u > -0.5) & (u < width - 0.5) & (v > -0.5) & (v < height - 0.5) & unfolded
-        return np.asarray(inside, bool)
+        return inside & self._model.is_unfolded(self._lens, tx + x * w, ty + y * w)
+
+    def bend_px(self, laser_id: str, nearest_mm: float, point_px: FloatArray, direction: FloatArray) -> float:
+        """Largest distance of a laser's spots from a straight line; see `workbench.optics.image.bend_px`.
+
+        Args:
+            laser_id: the laser.
+            nearest_mm: range of the nearest spot; the farthest is at infinity.
+            point_px: (2,) a point of the line.
+            direction: (2,) its direction, of any length.
+        """
+        ray, depth_mm = self._rays[self.ids.index(laser_id)], nearest_mm + self.offset_mm
+        return bend_px(self._model, self._lens, ray, depth_mm, self._size_px, (point_px, direction))
+
+    @property
+    def _size_px(self) -> tuple[int, int]:
+        """(width, height) of the picture."""
+        return self.calibration.image_width, self.calibration.image_height
 
     def _points(self, laser_id: str, range_mm: FloatArray) -> tuple[IndexArray, FloatArray]:
         """Index of the laser, n times, and the inverse depths of ranges (n,)."""

@@ -11,19 +11,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from workbench.model.arrays import BoolArray, FloatArray, IndexArray
+from workbench.model.arrays import FloatArray, IndexArray
+from workbench.model.lens import PINHOLE
 from workbench.optics.lens import LensModel
 from workbench.optics.rays import RAY, Ray, spot_at_inverse_depth
-from workbench.sensor.interpolation import interpolations
+from workbench.sensor.interpolation import image_line, interpolations
 
 STEP = 1e-30
 """Along the imaginary axis: its square is nothing beside any number of the model."""
-CHECKS = 5
-"""Points between the nodes, for each term of the table one more, at which it is held against the model."""
 AGREEMENT = 1e-11
 """Largest difference between table and model at the checks, over the largest value there."""
 CONVERGED = 1e-9
-"""Of a step, in units where 1 is 45 degrees off the axis: steps shrink by their own square."""
+"""Largest last step in the variable s of the interpolation; steps shrink by their own square.
+
+For a polynomial 1 is an angle of 45 degrees from the beam, for a series one of 90 degrees.
+"""
 ITERATIONS = 20
 """Gauss-Newton steps at most. Each is exact except for distortion; six reach the last digit as a rule."""
 
@@ -48,13 +50,12 @@ class SpotCurves:
     """The curves of the lasers `rays` (L, 4) seen through `lens`, a vector in the order of its `model`."""
 
     def __init__(self, model: LensModel, lens: FloatArray, rays: FloatArray) -> None:
-        # At an inverse depth of 1 / baseline the spot lies 45 degrees off: outside most images, not by much.
-        self._unit = 1.0 / np.maximum(np.hypot(rays[:, 0], rays[:, 1]), 1e-3)
         self._columns = len(model.parameters) + len(RAY)
         for self._by in interpolations(model):
             nodes, terms = self._by.nodes, self._by.terms
+            self._unit, self._at_infinity = self._by.scale(rays)
             at = self._by.argument(np.concatenate((nodes, self._by.checks)))
-            values = _model(model, lens, rays, at * self._unit[:, None])
+            values = _model(model, lens, rays, (at - self._at_infinity[:, None]) * self._unit[:, None])
             table = np.asarray(np.linalg.solve(self._by.basis(nodes), values[:, :terms]), float)
             difference = np.abs(self._by.basis(self._by.checks) @ table - values[:, terms:]).max(axis=(0, 1))
             if (difference <= AGREEMENT * np.abs(values).max(axis=(0, 1)) + 1e-300).all():
@@ -64,13 +65,13 @@ class SpotCurves:
         place = table[:, :, :2]
         self._place_and_slope = np.concatenate((place, self._by.derivative(place)), axis=2)
         self._derivatives = table[:, :, 2:]
-        self._outwards = (self._by.basis(np.zeros(1)) @ self._place_and_slope)[:, 0, 2:]
-        """(L, 2) slope at infinity."""
+        self._unfolded = self._unfolded_between(rays, float(model.unfolded_radius(lens[len(PINHOLE) :])))
+        """(L, 2) s between which the lens model has not folded over."""
         self._starts = self._by.starts
-        start = self._by.basis(self._starts) @ self._place_and_slope
-        self._start_px = start[:, :, :2]
-        self._may_start = _all_from_the_middle((start[:, :, 2:] * self._outwards[:, None]).sum(axis=2) > 0)
-        """(L, G) whether the lens model does not fold over between infinity and this start."""
+        self._start_px = (self._by.basis(self._starts) @ self._place_and_slope)[:, :, :2]
+        lower, upper = self._unfolded.T[:, :, None]
+        self._may_start = (self._starts > lower) & (self._starts < upper)
+        """(L, G) whether the lens model has not folded over at this start."""
 
     def spots(self, laser: IndexArray, inverse_depth_per_mm: FloatArray) -> FloatArray:
         """(n, 2) pixels where points of the lasers `laser` (n,) at inverse depths (n,) appear."""
@@ -104,9 +105,10 @@ class SpotCurves:
         # The residual across the line no longer changes; the rest is evaluated once, at the end.
         own = self._at(self._derivatives[laser], s).reshape(len(s), 2, self._columns)
         by = own * inverse_sd[:, :, None]
-        found = (np.abs(step) <= CONVERGED) & (_dot(self._outwards[laser], seen[:, 2:]) > 0)
+        lower, upper = self._unfolded[laser].T
+        found = (np.abs(step) <= CONVERGED) & (s > lower) & (s < upper)
         unit = self._unit[laser]
-        w = np.where(found, self._by.argument(s) * unit, np.nan)
+        w = np.where(found, (self._by.argument(s) - self._at_infinity[laser]) * unit, np.nan)
         root = np.sqrt(information)
         dz_ds = unit * self._by.argument_slope(s) / w**2
         along = slope * (dz_ds / information)[:, None]
@@ -128,21 +130,21 @@ class SpotCurves:
         return np.asarray(self._starts[away2.argmin(axis=1)])
 
     def _variable(self, laser: IndexArray, inverse_depth_per_mm: FloatArray) -> FloatArray:
-        return self._by.variable(inverse_depth_per_mm / self._unit[laser])
+        return self._by.variable(inverse_depth_per_mm / self._unit[laser] + self._at_infinity[laser])
+
+    def _unfolded_between(self, rays: FloatArray, radius: float) -> FloatArray:
+        """(L, 2) s of the ends of the part of each line nearer to the axis than `radius`; NaN if none is."""
+        line = image_line(rays)
+        with np.errstate(invalid="ignore"):
+            half = np.sqrt(radius**2 - line.off_axis**2)
+        ends = np.stack((-half, half), axis=1) - line.at_infinity[:, None]
+        lasers = np.arange(len(rays))
+        return np.stack([self._variable(lasers, end / line.baseline_mm) for end in ends.T], axis=1)
 
     def _at(self, table: FloatArray, s: FloatArray) -> FloatArray:
         """(n, m) of tables (n, terms, m), each at its own s (n,)."""
         values: FloatArray = np.matmul(self._by.basis(s)[:, None, :], table)[:, 0]
         return values
-
-
-def _all_from_the_middle(true: BoolArray) -> BoolArray:
-    """(L, G) whether everything from the middle of a row to a place in it is true."""
-    middle = true.shape[1] // 2
-    before, after = (
-        np.logical_and.accumulate(part, axis=1) for part in (true[:, middle::-1], true[:, middle:])
-    )
-    return np.concatenate((before[:, :0:-1], after), axis=1)
 
 
 def _dot(a: FloatArray, b: FloatArray) -> FloatArray:

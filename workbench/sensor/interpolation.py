@@ -1,32 +1,57 @@
 """Interpolation of a spot's curve along its laser: exact polynomials, or Chebyshev series in an angle.
 
-The argument t of every curve is the inverse depth times the laser's baseline: the tangent of the angle
-between the beam and the line of sight, if the beam is parallel to the axis. A table has one column for each
-quantity that is interpolated, and one row for each term.
+The argument t of a curve is linear in the inverse depth: inverse depth / unit + t at infinity, both by the
+laser. A table has one column for each quantity that is interpolated, and one row for each term.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from workbench.model.arrays import FloatArray
 from workbench.optics.lens import LensModel
 
+LEAST_BASELINE_MM = 1e-3
+"""Shorter baselines are replaced by this: the spot of such a laser does not move."""
 POLYNOMIAL_CHECKS = 5
 SERIES_TERMS = (16, 24, 32, 48, 64, 96, 128)
 """Lengths of the Chebyshev series that are tried, the shortest first."""
 STARTS = 33
 """Angles from which an inversion may start, 6 degrees apart."""
-HALF_TURN = np.pi / 2
+QUARTER_TURN_RAD = np.pi / 2
+
+
+class ImageLine(NamedTuple):
+    """Lines of L lasers in undistorted coordinates x = X/Z, y = Y/Z, along which their points move."""
+
+    baseline_mm: FloatArray
+    """(L,) distance along the line by the inverse depth in 1/mm."""
+    at_infinity: FloatArray
+    """(L,) place along the line of the point at infinity, from the point nearest to the axis."""
+    off_axis: FloatArray
+    """(L,) distance of the line from the axis."""
+
+
+def image_line(rays: FloatArray) -> ImageLine:
+    """Lines of rays (L, 4)."""
+    origin, direction = rays[:, :2], rays[:, 2:]
+    baseline = np.maximum(np.hypot(*origin.T), LEAST_BASELINE_MM)
+    along = origin / baseline[:, None]
+    at_infinity = (along * direction).sum(axis=1)
+    return ImageLine(baseline, at_infinity, np.hypot(*(direction - along * at_infinity[:, None]).T))
 
 
 class Interpolation(Protocol):
     """Functions of t by their values at nodes; s is the variable in which they are smooth."""
 
     terms: int
+
+    def scale(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(L,) unit of inverse depth, 1/mm, and (L,) t at infinity, of rays (L, 4)."""
+        ...
 
     @property
     def nodes(self) -> FloatArray:
@@ -64,15 +89,23 @@ class Interpolation(Protocol):
 
     @property
     def starts(self) -> FloatArray:
-        """(G,) s in rising order, 0 in their middle: an inversion starts at one of them."""
+        """(G,) s in rising order: an inversion starts at one of them."""
         ...
 
 
 class Polynomial:
-    """Powers of t itself: exact for functions that are polynomials of degree `terms` - 1, at any t."""
+    """Powers of t itself: exact for functions that are polynomials of degree `terms` - 1, at any t.
+
+    t is the inverse depth times the laser's baseline: the tangent of the angle between the beam and the line
+    of sight, if the beam is parallel to the axis. Few images show spots beyond t = 1.
+    """
 
     def __init__(self, terms: int) -> None:
         self.terms = terms
+
+    def scale(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `Interpolation`."""
+        return 1.0 / image_line(rays).baseline_mm, np.zeros(len(rays))
 
     @property
     def nodes(self) -> FloatArray:
@@ -121,13 +154,21 @@ class Polynomial:
 class AngleSeries:
     """Chebyshev series in the angle atan(t), s = 1 at 90 degrees.
 
-    In inverse depth a fisheye's curve bends ever more the nearer the target is; in the angle it is all but a
-    straight line, from infinity (s = 0) to targets at no depth (s = 1). Series of smooth functions converge
-    geometrically (L. N. Trefethen, "Approximation Theory and Approximation Practice" (2013), ch. 8).
+    The angle is that in the plane through beam and pinhole, from the line of sight nearest to the axis to
+    the line of sight of the laser's point. In inverse depth a fisheye's curve bends ever more the nearer the
+    target is; in this angle it is all but a straight line, up to targets at no depth (s = 1), whatever the
+    beam's tilt. Series of smooth functions converge geometrically (L. N. Trefethen, "Approximation Theory and
+    Approximation Practice" (2013), ch. 8).
     """
 
     def __init__(self, terms: int) -> None:
         self.terms = terms
+
+    def scale(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `Interpolation`."""
+        line = image_line(rays)
+        nearest = np.hypot(1.0, line.off_axis)  # distance of the line from the pinhole
+        return nearest / line.baseline_mm, line.at_infinity / nearest
 
     @property
     def nodes(self) -> FloatArray:
@@ -141,15 +182,15 @@ class AngleSeries:
 
     def variable(self, t: FloatArray) -> FloatArray:
         """See `Interpolation`."""
-        return np.asarray(np.arctan(t) / HALF_TURN)
+        return np.asarray(np.arctan(t) / QUARTER_TURN_RAD)
 
     def argument(self, s: FloatArray) -> FloatArray:
         """See `Interpolation`."""
-        return np.asarray(np.tan(HALF_TURN * s))
+        return np.asarray(np.tan(QUARTER_TURN_RAD * s))
 
     def argument_slope(self, s: FloatArray) -> FloatArray:
         """See `Interpolation`."""
-        return np.asarray(HALF_TURN * (1.0 + self.argument(s) ** 2))
+        return np.asarray(QUARTER_TURN_RAD * (1.0 + self.argument(s) ** 2))
 
     def basis(self, s: FloatArray) -> FloatArray:
         """See `Interpolation`."""

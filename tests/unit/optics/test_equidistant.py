@@ -83,13 +83,6 @@ def test_second_derivatives_are_finite_on_the_axis() -> None:
     assert float(third) == pytest.approx(6 * LENS[0] * (LENS[3] - 1 / 3), rel=1e-12)
 
 
-def test_radial_slope_is_the_derivative_of_the_radius() -> None:
-    radius, step, zero = np.linspace(0.0, 4.0, 17), 1e-6, np.zeros(17)
-    ahead, behind = (EQUIDISTANT.distort(LENS[3:], radius + d, zero)[0] for d in (step, -step))
-    slope = EQUIDISTANT.radial_slope(LENS[3:], radius, zero)
-    np.testing.assert_allclose(slope, (ahead - behind) / (2 * step), atol=1e-8)
-
-
 def test_the_model_folds_where_its_polynomial_in_the_angle_does() -> None:
     """With k1 alone theta_d is largest at theta = (-3 k1)^-1/2: at -0.3, 60.4 degrees."""
     lens = np.array([300.0, 0.0, 0.0, -0.3, 0.0, 0.0, 0.0])

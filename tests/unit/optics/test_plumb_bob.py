@@ -24,13 +24,3 @@ def test_projection_is_opencv_s() -> None:
 def test_an_undistorted_lens_is_a_pinhole() -> None:
     u, v = PLUMB_BOB.project([500.0, 320.0, 240.0, *[0.0] * 5], 0.2, -0.1)
     assert (float(u), float(v)) == pytest.approx((420.0, 190.0), abs=1e-12)
-
-
-def test_radial_slope_is_the_derivative_of_the_radius() -> None:
-    coefficients = [-0.4, 0.05, 0.0, 0.0, 0.01]
-    radius, step, zero = np.linspace(0.0, 1.2, 13), 1e-6, np.zeros(13)
-    ahead, behind = (PLUMB_BOB.distort(coefficients, radius + d, zero)[0] for d in (step, -step))
-    slope = PLUMB_BOB.radial_slope(coefficients, radius, zero)
-    np.testing.assert_allclose(slope, (ahead - behind) / (2 * step), atol=1e-8)
-    unfolded = PLUMB_BOB.is_unfolded([1.0, 0.0, 0.0, *coefficients], radius, zero)
-    assert (unfolded[0], unfolded[-1]) == (True, False)

@@ -57,3 +57,33 @@ def test_a_lens_without_distortion_needs_no_search() -> None:
     fisheye = undistort(EQUIDISTANT, np.array([500.0, 320.0, 240.0, *np.zeros(4)]), pixels)
     radius = np.hypot(*((pixels[1] - [320.0, 240.0]) / 500.0))
     assert np.hypot(*fisheye[1]) == pytest.approx(np.tan(radius), rel=1e-12)
+
+
+FOLDING = {
+    PLUMB_BOB: ([500.0, 320.0, 240.0, -0.5, 0.09, 0.0, 0.0, 0.0], 0.95986, 2.5),
+    EQUIDISTANT: ([300.0, 320.0, 240.0, -0.6, 0.15, 0.0, 0.0], np.tan(0.93451), np.tan(np.radians(89.0))),
+}
+
+
+@pytest.mark.parametrize("model", FOLDING, ids=lambda m: m.name)
+def test_a_pixel_shown_only_from_beyond_the_fold_has_no_line_of_sight(model: LensModel) -> None:
+    """There the distorted radius grows again, beyond all that it was before the fold."""
+    numbers, fold, beyond = FOLDING[model]
+    lens = np.array(numbers)
+    x = np.array([0.0, 0.3 * fold, 0.9 * fold, 0.99 * fold, beyond])
+    pixels = np.stack(model.project(lens, x, np.zeros(5)), axis=1)
+    found = undistort(model, lens, pixels)[:, 0]
+    np.testing.assert_allclose(found[:4], x[:4], atol=1e-7)
+    assert np.isnan(found[4])
+
+
+@pytest.mark.parametrize("model", FOLDING, ids=lambda m: m.name)
+def test_the_search_for_a_line_of_sight_does_not_leap_over_the_fold(model: LensModel) -> None:
+    """The distorted radius first grows faster than the undistorted: the first guess lies beyond the fold."""
+    lens = np.array([500.0, 320.0, 240.0, *np.zeros(len(model.coefficients))])
+    lens[3:5] = 2.0, -2.0
+    fold = float(model.unfolded_radius(lens[3:]))
+    x = np.linspace(0.05, 0.98, 30) * fold
+    pixels = np.stack(model.project(lens, x, np.zeros(30)), axis=1)
+    assert pixels[-1, 0] > 320.0 + 500.0 * fold
+    np.testing.assert_allclose(undistort(model, lens, pixels)[:, 0], x, atol=1e-9)

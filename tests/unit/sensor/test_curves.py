@@ -145,3 +145,39 @@ def test_no_depth_where_the_lens_model_folds_over() -> None:
     found = SpotCurves(PLUMB_BOB, lens, ray).invert(np.zeros(6, np.intp), position, np.full((6, 2), 20.0))
     np.testing.assert_allclose(found.inverse_depth_per_mm[:3], seen_at / 60.0, rtol=1e-9)
     assert np.isnan(found.inverse_depth_per_mm[3:]).all()
+
+
+FOLDING = {
+    "plumb_bob": (PLUMB_BOB, [500.0, 320.0, 240.0, -0.5, 0.09, 0.0, 0.0, 0.0], 0.95986, 24.0),
+    "equidistant": (EQUIDISTANT, [300.0, 320.0, 240.0, -0.6, 0.15, 0.0, 0.0], np.tan(0.93451), 1.05),
+}
+
+
+@pytest.mark.parametrize("name", FOLDING)
+def test_no_depth_beyond_the_fold_where_the_spot_moves_outwards_again(name: str) -> None:
+    kind, lens, fold, beyond_mm = FOLDING[name]
+    found, laser = SpotCurves(kind, np.array(lens), np.array([[60.0, 0.0, 0.0, 0.0]])), np.zeros(5, np.intp)
+    w = np.array([1e-5, 0.3 * fold / 60.0, 0.9 * fold / 60.0, 0.98 * fold / 60.0, 1.0 / beyond_mm])
+    inverted = found.invert(laser, found.spots(laser, w), np.full((5, 2), 20.0)).inverse_depth_per_mm
+    np.testing.assert_allclose(inverted[:4], w[:4], atol=1e-9)
+    assert np.isnan(inverted[4])
+
+
+STRONG_FISHEYE = (EQUIDISTANT, np.array([305.0, 322.0, 236.0, -0.2, 0.1, -0.05, 0.01]))
+
+
+@pytest.mark.parametrize("lens", [*LENSES.values(), STRONG_FISHEYE], ids=[*LENSES, "strong fisheye"])
+@pytest.mark.parametrize("tilt", [(1.5, 0.0), (1.8, 0.0), (3.0, -2.0), (-6.0, 0.0)])
+def test_a_beam_may_be_tilted_much(lens: tuple[LensModel, np.ndarray], tilt: tuple[float, float]) -> None:
+    kind, numbers = lens
+    rays = np.array([[-60.0, 0.3, *tilt], [30.0, -0.2, *tilt], [0.2, 45.0, *tilt]])
+    found, laser = SpotCurves(kind, numbers, rays), np.repeat(np.arange(3), 4)
+    w = np.tile(np.array([1 / 200.0, 1 / 700.0, 1 / 3000.0, 1 / 30_000.0]), 3)
+    u, v = spot_at_inverse_depth(kind, numbers[:, None], Ray(*rays[laser].T), w)
+    np.testing.assert_allclose(found.spots(laser, w), np.stack((u, v), axis=1), rtol=1e-9)
+    x, y = rays[laser, 2] + rays[laser, 0] * w, rays[laser, 3] + rays[laser, 1] * w
+    unfolded = kind.is_unfolded(numbers, x, y)
+    if kind is EQUIDISTANT:
+        inverted = found.invert(laser, found.spots(laser, w), np.full((12, 2), 20.0)).inverse_depth_per_mm
+        np.testing.assert_allclose(inverted[unfolded], w[unfolded], rtol=1e-8, atol=1e-12)
+        assert np.isnan(inverted[~unfolded]).all()

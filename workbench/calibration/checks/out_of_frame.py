@@ -10,6 +10,7 @@ from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.prediction import predict_cell
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
+from workbench.optics.image import in_picture
 
 
 def name_out_of_frame(rig: Rig, values: FloatArray, rejected: Sequence[Rejected]) -> tuple[Rejected, ...]:
@@ -33,7 +34,7 @@ def _renamed(rig: Rig, values: FloatArray, rejected: Rejected) -> Rejected:
     inputs = (*values[layout.common], *values[ray], *square)
     u, v = (float(c) for c in predict_cell(layout.lens_name, inputs, observation.standoff_mm))
     width, height = rig.camera.width_px, rig.camera.height_px
-    if -0.5 <= u < width - 0.5 and -0.5 <= v < height - 0.5:
+    if in_picture((u, v), (width, height)):
         return rejected
     return replace(
         rejected,

@@ -17,8 +17,9 @@ from workbench.calibration.data.boards import BoardView, on_boards, see_board
 from workbench.calibration.data.observations import Observation, PlacementInfo, Rejected
 from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
 from workbench.model.rig import LaserSpec, Rig
+from workbench.optics.image import bend_px, inside_px
 from workbench.optics.lens_models import lens_model
-from workbench.optics.rays import RAY, Ray, spot_at_inverse_depth
+from workbench.optics.rays import RAY
 
 if TYPE_CHECKING:
     from workbench.spots import Finding, Scanline
@@ -26,9 +27,8 @@ if TYPE_CHECKING:
 NO_STANDOFF = "standoff_mm is empty: a calibration needs known standoffs"
 PRIOR_REACH_SD = 4.0
 BEAM_HALF_WIDTH_PX = 8.0
-STRAIGHT_PX = 1.0
-"""A laser's line that bends by less counts as straight."""
-BEND_POINTS = 17
+LEAST_DEPTH_MM = 1.0
+"""Nearest depth at which a spot is expected: at depth 0 the lens shows none."""
 
 
 def observations_of_rows(
@@ -76,7 +76,7 @@ def _in_picture(rig: Rig, observation: Observation) -> Observation | Rejected:
         ("u_px", observation.u_px, rig.camera.width_px),
         ("v_px", observation.v_px, rig.camera.height_px),
     ):
-        if value < -0.5 or value >= size - 0.5:
+        if not (isnan(value) or inside_px(value, size)):
             where = f"laser {observation.laser_id} at {observation.standoff_mm:g} mm"
             return Rejected(
                 observation.source, f"{where}: {name}: expected -0.5 to {size - 0.5}, got {value:g}"
@@ -101,30 +101,15 @@ def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
     reach = PRIOR_REACH_SD * sum(part**2 for part in across) ** 0.5
     u = camera.cx_px.value + camera.f_px.value * laser.tx.value
     v = camera.cy_px.value + camera.f_px.value * laser.ty.value
-    bend = _bend_px(rig, laser, (u, v), (du, dv))
-    return Scanline(u, v, du, dv, BEAM_HALF_WIDTH_PX + reach + (bend if bend > STRAIGHT_PX else 0.0))
-
-
-def _bend_px(rig: Rig, laser: LaserSpec, point_px: tuple[float, float], along: tuple[float, float]) -> float:
-    """Largest distance of the laser's expected spots in the picture from a line, within the rig's reach.
-
-    Args:
-        rig: lens, reach and size of the picture.
-        laser: whose spots.
-        point_px: a point of the line.
-        along: its direction, of length 1.
-    """
-    camera = rig.camera
-    model, lens = lens_model(camera.lens), np.array([[p.value] for p in camera.lens_priors.values()])
-    ray = Ray(*(getattr(laser, name).value for name in RAY))
-    nearest_mm = max(rig.bench.reach_mm[0] + rig.bench.offset_mm.value, 1.0)
-    inverse_depth = np.linspace(0.0, 1.0 / nearest_mm, BEND_POINTS)
-    u, v = (np.asarray(part) for part in spot_at_inverse_depth(model, lens, ray, inverse_depth))
-    x, y = ray.tx + ray.x_mm * inverse_depth, ray.ty + ray.y_mm * inverse_depth
-    seen = np.asarray(model.is_unfolded(lens, x, y)) & (u > -0.5) & (u < camera.width_px - 0.5)
-    seen &= (v > -0.5) & (v < camera.height_px - 0.5)
-    away = np.abs((u - point_px[0]) * along[1] - (v - point_px[1]) * along[0])
-    return float(away[seen].max(initial=0.0))
+    bend = bend_px(
+        lens_model(camera.lens),
+        np.array([p.value for p in camera.lens_priors.values()]),
+        np.array([getattr(laser, name).value for name in RAY]),
+        max(rig.bench.reach_mm[0] + rig.bench.offset_mm.value, LEAST_DEPTH_MM),
+        (camera.width_px, camera.height_px),
+        ((u, v), (du, dv)),
+    )
+    return Scanline(u, v, du, dv, BEAM_HALF_WIDTH_PX + reach + bend)
 
 
 def _see_boards(rig: Rig, rows: Sequence[CaptureRow]) -> dict[str, BoardView | Rejected]:

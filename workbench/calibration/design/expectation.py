@@ -18,8 +18,9 @@ from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.parameters import PLACEMENT, ParameterTable, sensor_parameters
 from workbench.calibration.model.prediction import predict_cell
 from workbench.model.arrays import BoolArray, FloatArray
-from workbench.model.lens import LensName
+from workbench.model.lens import PINHOLE, LensName
 from workbench.model.rig import Rig
+from workbench.optics.image import in_picture
 from workbench.optics.rays import RAY
 
 BLOCK = 4096
@@ -118,12 +119,14 @@ class Expectation:
         ]
         inputs = np.stack([np.broadcast_to(p, shape) for p in parts], axis=-1)
         standoff = np.broadcast_to(standoff_mm[:, None], shape)
-        spot, slopes, unfolded = _in_blocks(
+        spot, slopes, radius = _in_blocks(
             inputs.reshape(-1, inputs.shape[-1]), standoff.ravel(), cell.lens_name
         )
-        size = np.array([self.rig.camera.width_px, self.rig.camera.height_px])
-        inside = ((spot > -0.5) & (spot < size - 0.5)).all(axis=-1) & unfolded
-        return spot.reshape(*shape, 2), slopes.reshape(*shape, 2, -1), inside.reshape(shape)
+        inside = in_picture(spot, (self.rig.camera.width_px, self.rig.camera.height_px)).reshape(shape)
+        lens = self.sensors[:, cell.lens].T
+        fold = cell.model.unfolded_radius(lens[len(PINHOLE) :])
+        seen = inside & (radius.reshape(shape) < fold[:, None, None])
+        return spot.reshape(*shape, 2), slopes.reshape(*shape, 2, -1), seen
 
     def _spread(self, by_input: FloatArray) -> FloatArray:
         """(N, J, L, C, I) derivatives by a cell's inputs as (..., S) by all parameters, in prior sd.
@@ -140,19 +143,22 @@ class Expectation:
 
 def _in_blocks(
     inputs: FloatArray, standoff_mm: FloatArray, lens_name: LensName
-) -> tuple[FloatArray, FloatArray, BoolArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """`_slopes` of any number of cells by one compiled program; the last block is filled up."""
     count = len(inputs)
     indices = np.arange(-(-count // BLOCK) * BLOCK) % count
     chosen = np.split(indices, len(indices) // BLOCK)
     blocks = [_slopes(inputs[i], standoff_mm[i], lens_name) for i in chosen]
-    spot, slopes, unfolded = (np.concatenate([np.asarray(b) for b in p]) for p in zip(*blocks, strict=True))
-    return spot[:count], slopes[:count], unfolded[:count]
+    spot, slopes, radius = (np.concatenate([np.asarray(b) for b in p]) for p in zip(*blocks, strict=True))
+    return spot[:count], slopes[:count], radius[:count]
 
 
 @jit_cached(static=1)
 def _slopes(inputs: Array, standoff_mm: Array, lens_name: LensName) -> tuple[Array, Array, Array]:
-    """(n, 2) spots, (n, 2, I) their derivatives by the inputs, (n,) whether the lens is unfolded there."""
+    """(n, 2) spots, (n, 2, I) their derivatives by the inputs, (n,) undistorted radii.
+
+    A radius is infinite at and behind the pinhole.
+    """
 
     def spot(inputs: Array) -> Array:
         return jnp.stack(predict_cell(lens_name, tuple(inputs.T), standoff_mm), axis=1)
@@ -162,5 +168,5 @@ def _slopes(inputs: Array, standoff_mm: Array, lens_name: LensName) -> tuple[Arr
     cell = Layout(lens_name)
     x, y, tx, ty = inputs.T[cell.rays]
     depth = standoff_mm * (1.0 + inputs[:, cell.ruler_scale]) + inputs[:, cell.offset]
-    unfolded = cell.model.is_unfolded(inputs.T[cell.lens], tx + x / depth, ty + y / depth)
-    return spot(inputs), jnp.moveaxis(slopes, 0, -1), (depth > 0) & jnp.asarray(unfolded)
+    radius = jnp.hypot(tx + x / depth, ty + y / depth)
+    return spot(inputs), jnp.moveaxis(slopes, 0, -1), jnp.where(depth > 0, radius, jnp.inf)

@@ -25,6 +25,7 @@ from workbench.model.calibration import TermSummary, TermVerdict
 from workbench.model.nested import TILTS
 from workbench.model.rig import Prior, Rig
 from workbench.model.stats import chi2_sf
+from workbench.optics.image import in_picture
 from workbench.optics.lens_models import lens_model
 
 STRONG = 1.0
@@ -165,8 +166,8 @@ def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
     own = np.array([layout.own(n) for n in range(layout.lasers)])
     gradient[np.arange(len(laser))[:, None], own[laser]] = found.dz
     gradient[:, layout.offset] = -1.0
-    size = np.array([fitted.rig.camera.width_px, fitted.rig.camera.height_px])
-    seen = ((spots > -0.5) & (spots < size - 0.5)).all(axis=1) & np.isfinite(found.z_sd_of_spot_mm)
+    size = fitted.rig.camera.width_px, fitted.rig.camera.height_px
+    seen = in_picture(spots, size) & np.isfinite(found.z_sd_of_spot_mm)
     return gradient[seen] / range_mm[seen, None], found.z_sd_of_spot_mm[seen] / range_mm[seen]
 
 
