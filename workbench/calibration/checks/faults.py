@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from typing import Literal
 
 import numpy as np
 
@@ -17,18 +16,6 @@ from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.model.fit_event import Fault
 from workbench.model.stats import chi2_sf
 
-FaultName = Literal[
-    "lasers_swapped",
-    "mirrored",
-    "upside_down",
-    "turned",
-    "standoff",
-    "moved",
-    "reflection",
-    "never_lit",
-    "saturated",
-    "all_far",
-]
 REFUSING = ("lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "moved", "never_lit")
 """With any other the calibration may still be what it says of itself."""
 SUSPECT = 1e-3
