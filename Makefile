@@ -40,7 +40,8 @@ lint: $(INSTALLED)
 	$(BIN)/lint-imports
 
 test: lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -m "not real_time"
+	$(BIN)/python -m pytest -n 0 -m real_time
 
 bench: $(INSTALLED)
 	$(BIN)/python -m tests.benchmarks

@@ -1,7 +1,6 @@
 import os
 
 import pytest
-from xdist.scheduler import LoadFileScheduling  # type: ignore[import-untyped]
 
 # As the command line does. Two workers with two threads each on two cores spend most of their time waiting.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -15,18 +14,12 @@ REAL_TIME = {
     "tests/unit/devices/test_guardian.py",
     "tests/unit/devices/test_real_bench.py",
 }
-"""They run processes of real-time priority: two that compute keep each other from running, as nothing does at
-a bench."""
+"""They run processes of real-time priority and measure milliseconds: `make test` runs them alone, since another
+worker that computes keeps their processes from running, as nothing does at a bench."""
 
 
-class Schedule(LoadFileScheduling):  # type: ignore[misc]
-    """A file's tests run one after the other, and so do all of `REAL_TIME`."""
-
-    def _split_scope(self, nodeid: str) -> str:
-        file: str = super()._split_scope(nodeid)
-        return "real time" if file in REAL_TIME else file
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Schedule:
-    return Schedule(config, log)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of these files, so that they can be chosen and left out."""
+    for item in items:
+        if item.nodeid.partition("::")[0] in REAL_TIME:
+            item.add_marker("real_time")
