@@ -14,8 +14,8 @@ REAL_TIME = {
     "tests/unit/devices/test_guardian.py",
     "tests/unit/devices/test_real_bench.py",
 }
-"""They run processes of real-time priority and measure milliseconds. `make test` runs them alone: another worker
-that computes keeps their processes from running, as nothing does at a bench."""
+"""They run processes of real-time priority and measure milliseconds. `make test` runs them alone: another
+worker that computes keeps their processes from running, as nothing does at a bench."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
