@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
 from workbench.emulator.beam import Beam
 from workbench.emulator.board import BoardSurface, Print, stand
-from workbench.emulator.lens import Lens
+from workbench.emulator.lens import STEADY, Drift, Lens
 from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
 from workbench.emulator.spot import ImageFormat, Spot, SpotPainter
 from workbench.emulator.surfaces import Cylinder, Plane, Polynomial, Surface, wall_in_mirror
@@ -31,8 +32,8 @@ from workbench.model.target import (
     TargetShape,
 )
 
-F_STEP = 4e-6
-"""Relative: spots are painted anew when the focal length has drifted by this (1e-3 px at the edge)."""
+DRIFT_STEP = Drift(f_scale=4e-6, u_px=1e-3, v_px=1e-3)
+"""Spots are painted anew when the camera has drifted by this: 1e-3 px at the edge."""
 
 
 class BenchScene:
@@ -45,7 +46,7 @@ class BenchScene:
         self._beams = {name: Beam(ray, spec.beam) for name, ray in truth.lasers.items()}
         self._surfaces: list[tuple[Surface, float]] = []
         self._key = ""
-        self._f_step = 0
+        self._drift = STEADY
         self._spots: dict[str, list[Spot]] = {}
         self._picture: Float32Array | None = None
         self.moves = 0
@@ -62,7 +63,12 @@ class BenchScene:
         Raises:
             BadInputError: a flat target or the board is turned by 90 degrees or more.
         """
-        error = draw_placement_error(self._rig, self._spec, placement.key)
+        own = draw_placement_error(self._rig, self._spec, placement.key)
+        error = replace(
+            own,
+            yaw_deg=own.yaw_deg + self._truth.target_yaw_deg,
+            pitch_deg=own.pitch_deg + self._truth.target_pitch_deg,
+        )
         z_mm = placement.standoff_mm * (1 + self._truth.ruler_scale) + error.error_mm + self._truth.offset_mm
         if isinstance(placement.target, BoardTarget):
             self._put_board(placement.target, z_mm, error, placement.key)
@@ -74,30 +80,35 @@ class BenchScene:
         self.moves += 1
         return placement
 
-    def spots(self, laser_id: str, f_scale: float = 1.0) -> list[Spot]:
-        """What one laser alone adds to the image (a mirror-like target shows two spots), at a drifted f."""
-        self._drift_to(f_scale)
+    def spots(self, laser_id: str, drift: Drift = STEADY) -> list[Spot]:
+        """What one laser alone adds to the image (a mirror-like target shows two spots)."""
+        self._drift_to(drift)
         if laser_id not in self._spots:
             self._spots[laser_id] = self._paint(laser_id)
         return self._spots[laser_id]
 
-    def picture(self, f_scale: float = 1.0) -> Float32Array | None:
-        """(height, width) what room light shows of a board, at a drifted f; None for all other targets."""
+    def picture(self, drift: Drift = STEADY) -> Float32Array | None:
+        """(height, width) what room light shows of a board; None for all other targets."""
         board = self._surfaces[0][0] if self._surfaces else None
         if not isinstance(board, BoardSurface):
             return None
-        self._drift_to(f_scale)
+        self._drift_to(drift)
         if self._picture is None:
             self._picture = board.lit_by_room(self._lens(), self._image, self._spec.lens.blur_px)
         return self._picture
 
-    def _drift_to(self, f_scale: float) -> None:
-        f_step = round((f_scale - 1) / F_STEP)
-        if f_step != self._f_step:
-            self._f_step, self._spots, self._picture = f_step, {}, None
+    def _drift_to(self, drift: Drift) -> None:
+        stepped = Drift(
+            *(
+                still + step * round((now - still) / step)
+                for now, still, step in zip(drift, STEADY, DRIFT_STEP, strict=True)
+            )
+        )
+        if stepped != self._drift:
+            self._drift, self._spots, self._picture = stepped, {}, None
 
     def _lens(self) -> Lens:
-        return Lens(self._truth, 1 + self._f_step * F_STEP)
+        return Lens(self._truth, self._drift)
 
     @cached_property
     def _print(self) -> Print:

@@ -101,6 +101,8 @@ class MeanObservations:
     """(N, 2) u, v; NaN where a coordinate was not measured."""
     sd_px: FloatArray
     """(N, 2) 1 sigma of the mean, shared error of the repeats included."""
+    time: FloatArray
+    """(N,) mean place of the repeats in the order of capture: -0.5 first of the session, 0.5 last."""
     members: tuple[tuple[Observation, ...], ...]
     """The observations behind each mean."""
     repeat_scale: float = 1.0
@@ -154,6 +156,7 @@ def group(
             placement=np.array([order.index(placement) for placement, _ in kept], dtype=np.intp),
             position_px=np.array([mean for mean, _ in means]).reshape(-1, 2),
             sd_px=np.array([np.hypot(sd, noise.speckle_sd_px) for _, sd in means]).reshape(-1, 2),
+            time=_mean_times(seen, list(kept.values())),
             members=tuple(tuple(m) for m in kept.values()),
             repeat_scale=scale,
             captures=tuple(seen),
@@ -161,6 +164,13 @@ def group(
         ),
         rejected,
     )
+
+
+def _mean_times(captured: Sequence[Observation], cells: Sequence[Sequence[Observation]]) -> FloatArray:
+    """(N,) `MeanObservations.time`, by the order in which the observations were captured."""
+    last = max(len(captured) - 1, 1)
+    time = {id(s): n / last - 0.5 for n, s in enumerate(captured)}
+    return np.array([np.mean([time[id(s)] for s in members]) for members in cells])
 
 
 def positions(observations: Sequence[Observation]) -> FloatArray:

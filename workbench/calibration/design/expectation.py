@@ -80,7 +80,7 @@ class Expectation:
         by_range = slopes[..., cell.errors.start]
         strength = (by_range**2).sum(axis=-1)
         gradient = -(by_range[..., None] * slopes[..., cell.sensor]).sum(axis=-2) / strength[..., None]
-        gradient[..., cell.ruler_scale] = 0.0  # a ranger reads no ruler
+        gradient[..., cell.bench_only] = 0.0  # a ranger reads no ruler and knows of no common tilt
         rows = self._spread(gradient[..., None, :])[..., 0, :]
         at = range_mm[:, None]
         own = sd_px / np.sqrt(strength) / at
@@ -109,7 +109,7 @@ class Expectation:
         cell = self.cell
         common = np.array(self.sensors[:, cell.common])
         if ranging:
-            common[:, cell.ruler_scale] = 0.0
+            common[:, cell.bench_only] = 0.0
         rays = self.sensors[:, cell.common.stop :].reshape(len(common), -1, len(RAY))
         shape = (len(common), len(standoff_mm), rays.shape[1])
         parts = [

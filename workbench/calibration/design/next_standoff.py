@@ -146,7 +146,13 @@ def _with_room(cells: MeanObservations, lasers: int, planned: int) -> MeanObserv
     position, sd = as_grid(replace(cells, placements=placements), lasers)
     placement, laser = np.indices(position.shape[:2]).reshape(2, -1)
     return MeanObservations(
-        placements, laser, placement, position.reshape(-1, 2), sd.reshape(-1, 2), members=()
+        placements=placements,
+        laser=laser,
+        placement=placement,
+        position_px=position.reshape(-1, 2),
+        sd_px=sd.reshape(-1, 2),
+        time=np.zeros(len(laser)),
+        members=(),
     )
 
 

@@ -85,7 +85,7 @@ class LeastSquaresProblem:
             mean=table.prior_mean,
             sd=table.prior_sd,
             standoff_mm=np.array([p.standoff_mm for p in cells.placements]),
-            spots=SpotData(cells.laser, cells.placement),
+            spots=SpotData(cells.laser, cells.placement, cells.time),
             corners=_corner_data(cells, boards, rig.board),
             position_px=np.where(measured, position, 0.0),
             inverse_sd=np.where(measured, 1.0 / sd, 0.0),
@@ -140,7 +140,16 @@ def _corner_data(cells: MeanObservations, boards: Sequence[BoardView], board: Bo
         board=np.repeat(np.arange(len(boards)), counts),
         placement=np.repeat(np.array([order.index(b.placement.key) for b in boards], np.intp), counts),
         printed_mm=board.corners_mm[ids],
+        time=np.repeat(
+            np.array([_board_time(cells, order.index(b.placement.key)) for b in boards], float), counts
+        ),
     )
+
+
+def _board_time(cells: MeanObservations, placement: int) -> float:
+    """When the spots beside the board were captured, as `SpotData.time`; 0 where there are none."""
+    beside = cells.time[cells.placement == placement]
+    return float(beside.mean()) if len(beside) else 0.0
 
 
 @jit_cached(static=1)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from workbench.calibration.model.parameters import PLACEMENT, POSE, PRINT, REFERENCE
+from workbench.calibration.model.parameters import DRIFT, PLACEMENT, POSE, PRINT, REFERENCE
 from workbench.model.arrays import IndexArray
 from workbench.model.board import BOW
 from workbench.model.lens import LensName
@@ -52,6 +52,17 @@ class Layout(NamedTuple):
     def ruler_scale(self) -> int:
         """Index of `ruler_scale`."""
         return len(self.model.parameters) + REFERENCE.index("ruler_scale")
+
+    @property
+    def bench_only(self) -> slice:
+        """REFERENCE without `offset_mm`: the bench during the calibration, of no effect on a range."""
+        return slice(self.offset + 1, self.reference.stop)
+
+    @property
+    def drift(self) -> slice:
+        """DRIFT."""
+        start = len(self.model.parameters) + REFERENCE.index(DRIFT[0])
+        return slice(start, start + len(DRIFT))
 
     @property
     def common(self) -> slice:
