@@ -133,13 +133,13 @@ def group(
         _check_placement(placements.setdefault(s.placement, PlacementInfo.of(s)), s)
     kept: dict[tuple[str, str], list[Observation]] = {}
     rejected: list[Rejected] = []
-    scatter = [_scatter(members, noise) for members in buckets.values()]
-    usual = usual_scale(scatter)
-    for n, (key, members) in enumerate(buckets.items()):
-        kept[key], dropped = _without_strays(members, noise, usual)
-        if dropped:
-            scatter[n] = _scatter(kept[key], noise)
+    usual = usual_scale([_scatter(members, noise) for members in buckets.values()])
+    for key, members in buckets.items():
+        left, dropped = _without_strays(members, noise, usual)
         rejected += dropped
+        if left:  # repeats may lie apart one in u and the next in v: then none is left
+            kept[key] = left
+    scatter = [_scatter(members, noise) for members in kept.values()]
     torn = [n for n, one in enumerate(scatter) if is_torn(one, usual)]
     alike = [one for n, one in enumerate(scatter) if n not in torn]
     scale = float(scale_called_for(sum(chi2 for chi2, _ in alike), sum(free for _, free in alike)))
@@ -148,10 +148,11 @@ def group(
         weighted_mean(positions(m), own * stated_sd(m, noise))
         for m, own in zip(kept.values(), scales, strict=True)
     ]
-    order = list(placements)
+    seen_at = {placement for placement, _ in kept}
+    order = [key for key in placements if key in seen_at]
     return (
         MeanObservations(
-            placements=tuple(placements.values()),
+            placements=tuple(placements[key] for key in order),
             laser=np.array([laser_ids.index(laser) for _, laser in kept], dtype=np.intp),
             placement=np.array([order.index(placement) for placement, _ in kept], dtype=np.intp),
             position_px=np.array([mean for mean, _ in means]).reshape(-1, 2),

@@ -19,9 +19,11 @@ from workbench.calibration.data.observations import (
     group,
     positions,
 )
-from workbench.calibration.estimation.problem import LeastSquaresProblem, layout_of
+from workbench.calibration.estimation.placement_scatter import placement_scatter
+from workbench.calibration.estimation.problem import LeastSquaresProblem, Solution, layout_of
 from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.parameters import (
+    PLACEMENT,
     POSE,
     PRINT,
     Parameter,
@@ -32,7 +34,7 @@ from workbench.calibration.model.parameters import (
     sensor_parameters,
     unit_of,
 )
-from workbench.model.arrays import FloatArray
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import TermSummary
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.rig import Prior, Rig
@@ -69,6 +71,8 @@ class CalibrationFit:
     """Over all single positions of spots used, not over the means."""
     noise_scale: float
     """Factor on the stated pixel noise that the residuals called for; 1 where they agree with it."""
+    placement_scale: float
+    """Factor on the stated deviations of placements that their fitted errors called for; 1 likewise."""
     chi2: float
     """Of the data at the stated noise."""
     degrees_of_freedom: float
@@ -137,6 +141,11 @@ def fit(
     """
     _check(rig, observations)
     cells, strays = group(observations, rig.laser_ids, rig.noise)
+    if not cells.placements:
+        raise BadInputError(
+            f"no spot is left to fit: all {len(strays)} observations are apart from the repeats of their spot,"
+            f" as {strays[0].reason} ({strays[0].source})"
+        )
     return fit_cells(rig, with_placements(cells, boards), (*rejected, *strays), boards)
 
 
@@ -149,19 +158,12 @@ def fit_cells(
         LimitFailedError: the fit does not come to a finite result.
     """
     table = table_of(rig, cells.placements, boards)
-    problem = LeastSquaresProblem.of(rig, table, cells, boards)
-    scale = 1.0
-    with np.errstate(over="ignore", invalid="ignore"):  # a result that is not finite is refused by name
-        for _ in range(10):
-            solution = problem.solve(scale)
-            if not solution.scale_called_for > scale * 1.001:
-                break
-            scale = solution.scale_called_for
-    if not np.isfinite([*solution.y, *np.diag(solution.covariance), solution.chi2]).all():
-        raise LimitFailedError(
-            "the fit does not come to a finite result: the positions contradict the rig file altogether;"
-            " check its baselines, standoffs and image size"
-        )
+    solution, scale = _solve(LeastSquaresProblem.of(rig, table, cells, boards))
+    errors = _placement_errors(table)
+    scatter = placement_scatter(solution.y[errors], solution.covariance[np.ix_(errors, errors)])
+    if scatter.scale > 1:
+        table = table.with_wider_priors(errors, scatter.scale)
+        solution, scale = _solve(LeastSquaresProblem.of(rig, table, cells, boards))
     values = table.prior_mean + table.prior_sd * solution.y
     residual, corner_residual = np.split(solution.residual_px, [len(cells.laser)])
     return CalibrationFit(
@@ -178,9 +180,39 @@ def fit_cells(
         corner_residual_px=corner_residual,
         rms_px=_rms(cells, residual),
         noise_scale=scale,
+        placement_scale=scatter.scale,
         chi2=solution.chi2,
         degrees_of_freedom=solution.degrees_of_freedom,
         converged=solution.converged,
+    )
+
+
+def _solve(problem: LeastSquaresProblem) -> tuple[Solution, float]:
+    """The solution, and the factor on the stated noise that its residuals called for.
+
+    Raises:
+        LimitFailedError: the result is not finite.
+    """
+    scale = 1.0
+    with np.errstate(over="ignore", invalid="ignore"):  # a result that is not finite is refused by name
+        for _ in range(10):
+            solution = problem.solve(scale)
+            if not solution.scale_called_for > scale * 1.001:
+                break
+            scale = solution.scale_called_for
+    if not np.isfinite([*solution.y, *np.diag(solution.covariance), solution.chi2]).all():
+        raise LimitFailedError(
+            "the fit does not come to a finite result: the positions contradict the rig file altogether;"
+            " check its baselines, standoffs and image size"
+        )
+    return solution, scale
+
+
+def _placement_errors(table: ParameterTable) -> IndexArray:
+    """(J,) indices of the placements' errors along the axis that are not held constant."""
+    name = PLACEMENT[0]
+    return np.flatnonzero(
+        [p.kind == "placement" and p.name.endswith(f".{name}") and p.prior.sd > 0 for p in table.parameters]
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians
 from typing import Literal
 
@@ -104,6 +104,14 @@ class ParameterTable:
     def free(self) -> IndexArray:
         """Indices of the free parameters."""
         return np.flatnonzero(self.prior_sd > 0)
+
+    def with_wider_priors(self, indices: IndexArray, factor: float) -> ParameterTable:
+        """The table with the prior sd of some parameters multiplied."""
+        wider = list(self.parameters)
+        for i in indices.tolist():
+            prior = wider[i].prior
+            wider[i] = replace(wider[i], prior=prior.model_copy(update={"sd": factor * prior.sd}))
+        return ParameterTable(tuple(wider))
 
     @property
     def is_sensor(self) -> BoolArray:
