@@ -118,7 +118,7 @@ def lint(paths: Sequence[Path], rules: Rules) -> list[Finding]:
 def sentences(text: str) -> Iterator[tuple[int, str]]:
     """Each sentence of a paragraph with the offset of its first character."""
     begin = 0
-    for match in re.finditer(rf"[.!?][\"')]*(?=\s+[\"'(]*[A-Z0-9{CODE}])", text):
+    for match in re.finditer(r"[.!?][\"')]*(?=\s+[^a-z\s])", text):
         if not _ABBREVIATION.search(text[begin : match.start() + 1]):
             yield begin, text[begin : match.end()]
             rest = text[match.end() :]
