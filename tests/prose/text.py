@@ -63,23 +63,25 @@ def _without_fences(text: str) -> str:
 
 
 def _paragraphs(path: Path, first_line: int, kind: str, text: str) -> Iterator[Block]:
-    """Paragraphs, headings, list items, table cells; indented code is left out."""
+    """Paragraphs, headings, list items, table cells; indented code and doctests are left out."""
     held: list[str] = []
     begin = first_line
     indent = 0
     after_blank = True
+    example = False
     for number, line in enumerate(text.split("\n"), start=first_line):
         stripped = line.strip()
         depth = len(line) - len(line.lstrip())
         code = after_blank and not held and depth >= indent + 4
+        example = bool(stripped) and (example or stripped.startswith(">>> "))
         begins = bool(_BEGINS[kind == "docstring"].match(stripped))
-        if not stripped or begins or code:
+        if not stripped or begins or code or example:
             yield from _block(path, begin, kind, held)
             held = []
         if not stripped:
             after_blank = True
             continue
-        if code:
+        if code or example:
             continue
         if stripped.startswith("|"):
             for cell in stripped.strip("|").split("|"):

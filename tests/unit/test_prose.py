@@ -96,6 +96,7 @@ def test_prose_of_python_is_linted(tmp_path: Path, code: str, line: int, rule: s
         '"""Spots of a frame."""\n',
         '"""Whether the camera can set its exposure."""\n',
         '"""Module.\n\n    told = formula\n"""\n',
+        '"""Module.\n\n>>> who = told\ntold\n"""\n',
         '"""Module."""\n\nkey = "told"\n',
         '"""Module."""\n\nkey = told.by\n',
         '"""Module."""\n\ncount = "it took %d captures"\n',

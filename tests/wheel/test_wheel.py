@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -80,5 +81,21 @@ def test_installed_workbench_calibrates_in_a_folder_of_its_own(scripts: Path, tm
     run(scripts / "workbench", "run", "procedures/short.yaml", "--rig", "rigs/thesis-emulated.yaml", cwd=lab)
     (session,) = (path for path in (lab / "sessions").iterdir() if path.is_dir())
     assert (session / "calibration.yaml").is_file()
-    imported = run(scripts / "python", "-c", "import workbench; print(workbench.__file__)", cwd=lab)
+    code = f"import workbench as wb; print(wb.open_session({str(session)!r}).calibration.verdict)"
+    assert run(scripts / "python", "-c", code, cwd=lab) == "accepted\n"
+
+
+def test_script_of_a_user_passes_strict_type_checks(scripts: Path, tmp_path: Path) -> None:
+    """Types are those of the installed package (`py.typed`), not of the repository."""
+    script = shutil.copy(ROOT / "examples/analysis/residuals.py", tmp_path)
+    options = ("--strict", "--cache-dir", tmp_path / "cache", "--python-executable", scripts / "python")
+    run(sys.executable, "-m", "mypy", *options, script, cwd=tmp_path)
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text('import workbench as wb\n\nwb.load_calibration("c.yaml").no_such_name\n')
+    with pytest.raises(AssertionError):
+        run(sys.executable, "-m", "mypy", *options, wrong, cwd=tmp_path)
+
+
+def test_installed_package_is_imported_not_the_repository(scripts: Path, tmp_path: Path) -> None:
+    imported = run(scripts / "python", "-c", "import workbench; print(workbench.__file__)", cwd=tmp_path)
     assert Path(imported.strip()).is_relative_to(scripts.parent)

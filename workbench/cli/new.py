@@ -6,7 +6,6 @@ import shlex
 import shutil
 from pathlib import Path
 
-import workbench
 from workbench.model.errors import BadInputError
 
 PARTS = ("procedures", "rigs")
@@ -42,6 +41,6 @@ def lay_out(folder: Path) -> str:
 
 def _templates() -> Path:
     """Folder with `PARTS`: package data of an installed workbench, the repository of an editable one."""
-    package = Path(workbench.__file__).parent
+    package = Path(__file__).parents[1]
     installed = package / "templates"
     return installed if installed.is_dir() else package.parent
