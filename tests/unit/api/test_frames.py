@@ -9,7 +9,7 @@ from workbench.model.table import Column, Table
 
 
 def test_missing_numbers_are_nan_also_where_all_are_missing() -> None:
-    rows = [{"a": 1.5, "b": None, "c": "x"}, {"a": None, "b": None, "c": "y"}]
+    rows: list[dict[str, object]] = [{"a": 1.5, "b": None, "c": "x"}, {"a": None, "b": None, "c": "y"}]
     frame = frame_of(rows, ("c", "a", "b"))
     assert list(frame.columns) == ["c", "a", "b"]
     assert frame["a"].dtype == frame["b"].dtype == np.float64

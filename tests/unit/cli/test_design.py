@@ -30,8 +30,8 @@ class TestDesign:
         assert all(set(p) == keys and p["sd"] <= p["prior_sd"] for p in result["parameters"])
         assert {r["laser_id"] for r in result["ranges"]} == {"L1", "L2", "L3", "L4"}
         assert result["worst_relative_sd"] > result["worst_relative_sd_of_calibration"] > 0
-        assert any("f_px" in d["change"] for d in result["directions"])
-        assert "(f_px) and all baselines cannot be known apart" in " ".join(outcome.err.split())
+        (of_f,) = [d for d in result["directions"] if next(iter(d["change"])) == "f_px"]
+        assert of_f["words"] in " ".join(outcome.err.split())
         assert max(len(line) for line in outcome.err.splitlines()) <= 80
 
     def test_without_standoffs_some_are_proposed(self, workbench: Run) -> None:
@@ -51,7 +51,7 @@ class TestDesign:
             (("--standoffs", "200", "--count", 3), "--standoffs or --count, not both"),
             (("--repeats", 0), "'--repeats': expected a whole number of at least 1, such as 10, got 0"),
             (("--count", 0), "'--count': expected a whole number of at least 1, such as 10, got 0"),
-            (("--count", 100), "got 100: so many of the"),
+            (("--count", 100), "got 100"),
         ],
     )
     def test_bad_options(self, workbench: Run, options: tuple[object, ...], words: str) -> None:

@@ -1,17 +1,18 @@
-"""Placement errors larger than the rig file states: the scale that the fit's own placement errors call for.
+"""Scale of the placement errors where they are significantly larger than stated.
 
-Residuals cannot show such errors, because each placement has a parameter that absorbs its own. Their fitted values
-do. In units of the stated deviation the J errors e have the prior N(0, 1); the data, with every other parameter
-marginalised, give them the information L = C^-1 - 1 (C: their posterior covariance) and the vector of
-information n = C^-1 y (y: their posterior means). If the true variances are D, n has the covariance L + L D L
-(D = 1: as stated). In the eigenvectors of L, with eigenvalues l, each component a obeys
+Residuals cannot show that, because each placement has a parameter that absorbs its error. The fitted errors
+do. In units of the stated deviation the J errors e have the prior N(0, 1). The data, with every other
+parameter marginalised, give them the information L = C^-1 - 1 (C: their posterior covariance) and the
+information vector n = C^-1 y (y: their posterior means). If the true variances are D, n has the covariance
+L + L D L. In the eigenvectors of L, with eigenvalues l, each component a then obeys
 
     a^2 / l  ~  (1 + s^2 l) chi-square(1)        where all variances are s^2.
 
-The test weighs each component by l / (1 + l), which is the score of s^2 at 1 (C. R. Rao, Proc. Camb. Phil. Soc. 44
-(1948) 50), and approximates the sum by a scaled chi-square of the same mean and variance (F. E. Satterthwaite,
-Biometrics Bull. 2 (1946) 110). The scale is the maximum of the likelihood. One or a few placements that stand
-far from where the ruler says are no scatter: where that explains the errors better, the scale is of the others.
+The test weighs each component by l / (1 + l), the score of s^2 at 1 (C. R. Rao, Proc. Camb. Phil. Soc. 44
+(1948) 50), and approximates the sum by a scaled chi-square of the same mean and variance (F. E.
+Satterthwaite, Biometrics Bull. 2 (1946) 110). The scale is the maximum of the likelihood. One or two
+placements far from their standoff are no scatter: where that explains the errors better, the scale is that
+of the others.
 """
 
 from __future__ import annotations
@@ -21,13 +22,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from workbench.calibration.estimation.noise_scale import SCATTER_SIGNIFICANCE
 from workbench.model.arrays import FloatArray
 from workbench.model.stats import chi2_sf
 
 LEAST_INFORMATION = 1e-3
 """Information on a combination of placement errors, in units of its prior's, below which it tells nothing."""
 LARGEST_SCALE = 100.0
+SCALED_P = 0.1
+"""P value below which the deviations are scaled: a scale that was not needed costs less than one that was."""
 OUTLIER_SD = 30.0
 """Prior deviation of a placement that stands elsewhere, in stated deviations."""
 MOST_OUTLIERS = 2
@@ -59,7 +61,7 @@ def placement_scatter(errors: FloatArray, covariance: FloatArray) -> PlacementSc
     variance = np.ones(len(errors))
     outliers: list[int] = []
     p = _p_value(seen, variance)
-    while p < SCATTER_SIGNIFICANCE and len(outliers) < MOST_OUTLIERS:
+    while p < SCALED_P and len(outliers) < MOST_OUTLIERS:
         scaled = _log_likelihood(seen, np.where(variance > 1, variance, _variance(seen, variance)))
         tried = [
             _log_likelihood(seen, np.where(np.arange(len(errors)) == n, OUTLIER_SD**2, variance))
@@ -71,7 +73,7 @@ def placement_scatter(errors: FloatArray, covariance: FloatArray) -> PlacementSc
         outliers.append(best)
         variance[best] = OUTLIER_SD**2
         p = _p_value(seen, variance)
-    if p < SCATTER_SIGNIFICANCE and len(errors) - len(outliers) >= FEWEST:
+    if p < SCALED_P and len(errors) - len(outliers) >= FEWEST:
         return PlacementScatter(float(np.sqrt(_variance(seen, variance))), p, tuple(outliers))
     return PlacementScatter(1.0, p, tuple(outliers))
 

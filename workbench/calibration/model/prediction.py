@@ -35,7 +35,7 @@ class CornerData(NamedTuple):
     placement: ArrayLike
     """(K,) index of the placement."""
     printed_mm: ArrayLike
-    """(K, 2) where the corner is in the board's file."""
+    """(K, 2) nominal position of the corner on the board."""
     time: ArrayLike
     """(K,) as of `SpotData`."""
 
@@ -46,8 +46,8 @@ def predict_cell(
     """Pixel position (u, v) of one laser on the target of one placement; shapes broadcast.
 
     Args:
-        lens_name: kind of lens.
-        inputs: the numbers that it depends on, in the order of `Layout` of one laser and one placement.
+        lens_name: lens model.
+        inputs: parameters of one laser and one placement, in the order of `Layout`.
         standoff_mm: of the placement, by the ruler.
         time: when it was captured, see `SpotData`.
     """
@@ -64,8 +64,8 @@ def predict_spots(values: Array, layout: Layout, spots: SpotData, standoff_mm: A
     Args:
         values: (P,) parameters in the order of `Layout`.
         layout: their layout.
-        spots: which laser on which placement.
-        standoff_mm: standoffs of all placements by the ruler.
+        spots: laser and placement of each spot.
+        standoff_mm: (J,) standoffs of all placements by the ruler.
     """
     rays = values[layout.rays].reshape(layout.lasers, len(RAY))[spots.laser]
     errors = values[layout.errors].reshape(-1, len(PLACEMENT))[spots.placement]
@@ -91,7 +91,7 @@ def predict_corners(values: Array, layout: Layout, corners: CornerData, standoff
 def _plane(
     reference: tuple[ArrayLike, ...] | Array, errors: tuple[ArrayLike, ...] | Array, standoff_mm: ArrayLike
 ) -> Plane:
-    """The target's plane, by REFERENCE and PLACEMENT."""
+    """Plane of the target in the camera frame, from REFERENCE and PLACEMENT."""
     offset_mm, ruler_scale, common_x, common_y, *_ = reference
     error_mm, slope_x, slope_y = errors
     depth_mm = standoff_mm * (1.0 + ruler_scale) + error_mm + offset_mm

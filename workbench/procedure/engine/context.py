@@ -23,9 +23,8 @@ from workbench.procedure.engine.step import Step
 from workbench.spots import Finding, Scanline, find_spots
 
 if TYPE_CHECKING:  # results of steps: a file is checked without the solver
-    from workbench.calibration.checks.cross_validation import LeftOut
     from workbench.calibration.data.boards import BoardView
-    from workbench.calibration.data.observations import Rejected
+    from workbench.model.fit_event import CrossValidatedPlacement, Rejected
 
 
 @dataclass
@@ -51,8 +50,8 @@ class Context:
     """Of the step under way among `steps`, from 0."""
     accepted: Calibration | None = None
     """What the last fit amounts to."""
-    left_out: tuple[LeftOut, ...] = ()
-    """And what it says of each placement when it has not seen it."""
+    left_out: tuple[CrossValidatedPlacement, ...] = ()
+    """Its cross-validation."""
     calibration: Calibration | None = None
     """The exported one: trials range with it."""
     pairs: PairSource = field(init=False)
