@@ -19,5 +19,9 @@ class Acceptance(FileModel):
     max_rms_px: PositiveFloat = 1.0
     max_relative_range_sd: PositiveFloat = 0.05
     """1 sigma over the range, for any laser between the nearest and the farthest standoff."""
+    max_drift_px: PositiveFloat = 1.0
+    """Shift of the image from the first capture to the last, in u or v."""
+    max_placement_scale: Annotated[float, Field(ge=1)] = 5.0
+    """Scatter of the placements over what the rig file states."""
     min_standoffs: Annotated[int, Field(ge=FEWEST_STANDOFFS)] = FEWEST_STANDOFFS
     """For each laser."""

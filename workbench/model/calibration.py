@@ -149,6 +149,7 @@ class FitSummary(FileModel):
     observations: int
     rejected: int
     noise_scale: Annotated[float, Field(ge=1)]
+    placement_scale: Annotated[float, Field(ge=1)] = 1.0
     verdict: Literal["accepted", "refused"]
     reasons: tuple[str, ...] = ()
     """Why refused."""

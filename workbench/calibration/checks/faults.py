@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit
+from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit, tilt_deg
 from workbench.calibration.checks.target_motion import TargetMotion, find_target_motion
 from workbench.calibration.data.averaging import scatter_chi2, weighted_mean
 from workbench.calibration.data.observations import Observation, RejectedObservation, positions, stated_sd
@@ -15,7 +15,7 @@ from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.model.fit_event import CrossValidatedPlacement, Fault
 from workbench.model.stats import chi2_sf
 
-REFUSING = ("lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "moved", "never_lit")
+REFUSING = ("lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "tilted", "moved", "never_lit")
 """Faults that invalidate the calibration; all others are notes."""
 SUSPECT_P = 1e-3
 """P value below which the captures of a placement are searched for target motion."""
@@ -48,15 +48,16 @@ def find_faults(fit: CalibrationFit, placements: Sequence[CrossValidatedPlacemen
 
 def _by_hypothesis(fit: CalibrationFit, placements: Sequence[CrossValidatedPlacement]) -> Iterator[Fault]:
     hypotheses = explain_misfit(fit)
-    wiring = [h for h in hypotheses if h.kind not in {"standoff", "spot"}]
+    wiring = [h for h in hypotheses if h.kind not in {"standoff", "tilted", "spot"}]
     for h in wiring:
         yield _wiring_fault(fit, h)
     motions = () if wiring else find_target_motion(fit, _suspects(fit, placements))
     for motion in motions:
         yield _motion_fault(fit, motion)
+    of_placement = {"standoff": _standoff_fault, "tilted": _tilt_fault}
     for h in hypotheses:
-        if h.kind == "standoff" and h.subject[0] not in {m.placement for m in motions}:
-            yield _standoff_fault(fit, h)
+        if h.kind in of_placement and h.subject[0] not in {m.placement for m in motions}:
+            yield of_placement[h.kind](fit, h)
 
 
 def _suspects(fit: CalibrationFit, placements: Sequence[CrossValidatedPlacement]) -> list[int]:
@@ -105,6 +106,19 @@ def _standoff_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
         message=f"the captures at {info.standoff_mm:g} mm fit a standoff of {fitted:.4g} mm"
         f"{_digit_error(info.standoff_mm, fitted)}; no other cause explains them. Do: correct the standoff in"
         f" the captures, or leave it out (--without-standoff {info.standoff_mm:g})",
+    )
+
+
+def _tilt_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
+    index, slope = h.subject
+    info, name = fit.cells.placements[index], fit.table.parameters[slope].name
+    axis, expected_deg = ("vertical", info.yaw_deg) if name.endswith("slope_x") else ("horizontal", 0.0)
+    return Fault(
+        name="tilted",
+        message=f"the target at {info.standoff_mm:g} mm was turned by {tilt_deg(h.state, slope):+.1f} deg"
+        f" about the {axis} (expected {expected_deg:g} +- {fit.rig.bench.tilt_sd_deg:g} deg). Do: set it"
+        " square, then capture this standoff again or leave it out (--without-standoff"
+        f" {info.standoff_mm:g})",
     )
 
 

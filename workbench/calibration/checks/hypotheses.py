@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import log
+from math import log, radians, tan
 from typing import Literal
 
 import numpy as np
@@ -26,10 +26,11 @@ from workbench.calibration.checks.cross_validation import by_standoff, predictiv
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit, rows_of
-from workbench.model.arrays import BoolArray, FloatArray
+from workbench.calibration.model.parameters import PLACEMENT
+from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.stats import chi2_sf, f_sf
 
-HypothesisKind = Literal["lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "spot"]
+HypothesisKind = Literal["lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "tilted", "spot"]
 IMPROBABLE = 1e-4
 """P value of a fit below which hypotheses other than single wrong spots are tried."""
 FALSE_REJECTION = 1e-3
@@ -44,6 +45,8 @@ STANDOFF_COST = 2 * log(5000 / 0.5)
 """Occam factor of a free standoff: some metres of prior range, determined to half a millimetre."""
 SPOT_COST = 2 * 2 * log(500 / 0.05)
 """Occam factor of a wrong spot: anywhere in the image, determined to its deviation, in u and v."""
+TILTED_SD = tan(radians(20.0))
+"""Prior deviation of the slopes of a placement whose target is not square at all."""
 FIRST_ORDER_SHARE = 0.5
 """Share of the necessary gain; below it, to first order, a fit that is not improbable is not refitted."""
 MINIMA = 4
@@ -70,7 +73,7 @@ class Hypothesis:
 
     kind: HypothesisKind
     subject: tuple[int, ...]
-    """Indices of the two lasers, of the placement, or of the cell."""
+    """Indices of the two lasers, of the placement (and its slope), or of the cell."""
     state: Refit
     """The refit with this and all earlier hypotheses adopted."""
     score: float
@@ -148,6 +151,7 @@ def _candidates(fit: CalibrationFit, state: Refit, first: bool) -> Iterator[Hypo
         yield from _exchanged_lasers(fit, state)
     if improbable or first:
         yield from _wrong_standoffs(fit, state)
+        yield from _tilted_targets(fit, state)
     yield from _wrong_spots(fit, state)
 
 
@@ -301,6 +305,52 @@ def _deviance(reduced: Refit, rows: BoolArray) -> float:
 
 def _error_index(fit: CalibrationFit, index: int) -> int:
     return [p.name for p in fit.table.parameters].index(f"{fit.cells.placements[index].key}.error_mm")
+
+
+def _tilted_targets(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
+    """The placement whose slopes are the most improbable, turned about the vertical or the horizontal.
+
+    The Occam factor is that of two Gaussian models that differ in a prior: the change of the log determinant
+    of the information, in units of the priors.
+    """
+    boards = {view.placement.key for view in fit.boards}
+    flat = [n for n, info in enumerate(fit.cells.placements) if info.key not in boards]
+    slopes = {n: s for n in flat if len(s := slope_indices(fit, n))}
+    if not slopes:
+        return
+    index = max(slopes, key=lambda n: _joint_strain(state, slopes[n]))
+    cost = 2 * log(2 * len(slopes))
+    if _joint_strain(state, slopes[index]) < FIRST_ORDER_SHARE * (cost + DECISIVE):
+        return
+    for slope in slopes[index].tolist():
+        sd = np.array(state.problem.data.sd, float)
+        sd[slope] = max(sd[slope], TILTED_SD)
+        problem = LeastSquaresProblem(state.problem.layout, state.problem.data._replace(sd=sd))
+        after = _from_priors(problem, state.used)
+        narrowed = np.linalg.slogdet(state.covariance)[1] - np.linalg.slogdet(after.covariance)[1]
+        yield _scored("tilted", (index, slope), state, after, cost + float(narrowed))
+
+
+def slope_indices(fit: CalibrationFit, index: int) -> IndexArray:
+    """Indices of the free slopes of a placement among the parameters."""
+    key = fit.cells.placements[index].key
+    names = {f"{key}.{name}" for name in PLACEMENT[1:]}
+    return np.flatnonzero([p.name in names and p.prior.sd > 0 for p in fit.table.parameters])
+
+
+def tilt_deg(state: Refit, slope: int) -> float:
+    """Tilt by the refit, from a slope's index among the parameters."""
+    data = state.problem.data
+    value = np.asarray(data.mean)[slope] + np.asarray(data.sd)[slope] * state.y[slope]
+    return float(np.degrees(np.arctan(value)))
+
+
+def _joint_strain(state: Refit, index: IndexArray) -> float:
+    """Squared distance of parameters from their priors by the covariance that it has if these hold."""
+    narrowed = np.eye(len(index)) - state.covariance[np.ix_(index, index)]
+    values, vectors = np.linalg.eigh(narrowed)
+    seen = values > LEAST_NARROWING
+    return float(((vectors.T @ state.y[index])[seen] ** 2 / values[seen]).sum())
 
 
 def _wrong_spots(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:

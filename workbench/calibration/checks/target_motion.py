@@ -4,8 +4,8 @@ The fit averages the repeats of a spot. Here the captures of a placement are com
 in which they were taken, with their prediction by the fit without the placement. The standoff of the
 placement is free, so that a wrong standoff is not motion. A step of the target after capture m moves all
 later spots as a change of the standoff does: one free number for each m, estimated by generalised least
-squares. Other explanations compete: a spot that is wrong in all its repeats, and single wrong captures.
-Motion is reported where its score (see `hypotheses`) is decisively higher than theirs.
+squares. Other explanations compete: a target that is not square, a spot that is wrong in all its repeats, and
+single wrong captures. Motion is reported where its score (see `hypotheses`) is decisively higher than theirs.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from math import log
 import numpy as np
 
 from workbench.calibration.checks.cross_validation import by_standoff
-from workbench.calibration.checks.hypotheses import DECISIVE, SPOT_COST
+from workbench.calibration.checks.hypotheses import DECISIVE, SPOT_COST, TILTED_SD, slope_indices
 from workbench.calibration.data.averaging import scatter_chi2
 from workbench.calibration.data.observations import Observation, positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
@@ -149,7 +149,11 @@ def _best_step(fit: CalibrationFit, captures: _Captures, reduced: Refit, index: 
     gain = (columns.T @ white) ** 2 / information
     best = int(np.argmax(gain))
     score = gain[best] - STEP_COST - 2 * log(len(steps))
-    if score < DECISIVE or score < _alternative_score(captures, whitened, white) + DECISIVE:
+    alternative = max(
+        _alternative_score(captures, whitened, white),
+        _tilt_score(whitened @ _by_slope(fit, captures, reduced, index), white),
+    )
+    if score < DECISIVE or score < alternative + DECISIVE:
         return None
     before = steps[best]
     return TargetMotion(
@@ -183,6 +187,14 @@ def _prediction(
     return mean, slope, variance + own @ reduced.covariance @ own.T + np.outer(standoff, standoff)
 
 
+def _by_slope(fit: CalibrationFit, captures: _Captures, reduced: Refit, index: int) -> FloatArray:
+    """(n, 2) shift of the coordinates, px, by slopes of the target of TILTED_SD."""
+    rows, slopes = 2 * captures.cell + captures.axis, slope_indices(fit, index)
+    sd = fit.cells.sd_px.ravel()[rows] * reduced.scale
+    by_prior = reduced.jacobian[np.ix_(rows, slopes)] * sd[:, None]
+    return np.asarray(by_prior * TILTED_SD / fit.table.prior_sd[slopes])
+
+
 def _is_one_spot(lasers: IndexArray, step: int) -> bool:
     """Whether a step separates all captures of one laser from the rest, as a wrong spot does too."""
     before, after = lasers[:step], lasers[step:]
@@ -196,6 +208,16 @@ def _alternative_score(captures: _Captures, whitened: FloatArray, white: FloatAr
     spots = [captures.cell == k for k in sorted(set(captures.cell.tolist()))]
     alternatives = [outliers, *([*outliers, spot] for spot in spots)]
     return max(_score(whitened, white, [mask[:, None] & axes for mask in one]) for one in alternatives)
+
+
+def _tilt_score(columns: FloatArray, white: FloatArray) -> float:
+    """Twice the log evidence of a target that is not square, against a square one.
+
+    With a Gaussian prior on the slopes the whitened captures have the covariance 1 + A A^T, A the columns.
+    """
+    information = np.eye(columns.shape[1]) + columns.T @ columns
+    along = columns.T @ white
+    return float(along @ np.linalg.solve(information, along) - np.linalg.slogdet(information)[1])
 
 
 def _score(whitened: FloatArray, white: FloatArray, wrong: list[BoolArray]) -> float:

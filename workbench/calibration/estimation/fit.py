@@ -76,6 +76,8 @@ class CalibrationFit:
     """Factor on the stated pixel noise, estimated from the residuals; 1 where they agree with it."""
     placement_scale: float
     """Factor on the stated deviations of placements, estimated from their errors; 1 likewise."""
+    placement_scatter_p: float
+    """P value of the placement errors under their stated deviations."""
     chi2: float
     """Of the data at the stated noise."""
     degrees_of_freedom: float
@@ -100,6 +102,12 @@ class CalibrationFit:
         layout = self.layout
         rays = self.values[layout.rays].reshape(layout.lasers, -1)
         return SpotCurves(layout.model, self.values[layout.lens], rays)
+
+    @property
+    def drift_px(self) -> FloatArray:
+        """(2,) shift of the image in u and v from the first capture to the last; 0 where it is not fitted."""
+        free = self.table.prior_sd[self.layout.drift] > 0
+        return np.where(free, self.values[self.layout.drift], 0.0)
 
     @property
     def corner_rms_px(self) -> float:
@@ -184,6 +192,7 @@ def fit_cells(
         rms_px=_rms(cells, residual),
         noise_scale=scale,
         placement_scale=scatter.scale,
+        placement_scatter_p=scatter.p_value,
         chi2=solution.chi2,
         degrees_of_freedom=solution.degrees_of_freedom,
         converged=solution.converged,

@@ -18,8 +18,10 @@ import numpy as np
 
 from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Observation
-from workbench.calibration.estimation.fit import CalibrationFit, fit, fit_cells, table_of
+from workbench.calibration.estimation.fit import CalibrationFit, fit_cells, table_of
 from workbench.calibration.estimation.problem import LeastSquaresProblem
+from workbench.calibration.model.parameters import DRIFT, TILT
+from workbench.calibration.selection.drift import drift_is_shown, fit_with_drift, with_drift
 from workbench.calibration.selection.outliers import fit_without_outliers, without_outliers
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import TermSummary, TermVerdict
@@ -69,7 +71,8 @@ def fit_calibration(
         LimitFailedError: as `fit`.
     """
     # Tested before any rejection: spots that need a missing term look like outliers.
-    whole = fit(rig, observations, rejected, boards)
+    whole = fit_with_drift(rig, observations, rejected, boards)
+    rig = whole.rig
     missing = _called_for(whole)
     if missing:
         freed = _freed(rig, [term.name for term in missing])
@@ -77,6 +80,8 @@ def fit_calibration(
         fitted = fit_cells(rig, sound.cells, sound.rejected, boards)
     else:
         fitted = without_outliers(whole, rejected)
+    if drift_is_shown(fitted):  # which outliers may have hidden
+        fitted = fit_cells(with_drift(rig), fitted.cells, fitted.rejected, boards)
     if fitted is not whole:
         missing = _called_for(fitted)
     terms = [_weigh(fitted, name) for name in _candidates(fitted)]
@@ -109,7 +114,7 @@ def _freed(rig: Rig, names: Sequence[str]) -> Rig:
 def _candidates(fitted: CalibrationFit) -> list[str]:
     """Names of the terms of a fit, the highest order first."""
     names = {p.name for p in fitted.table.parameters if p.prior.sd > 0}
-    orders = (*fitted.layout.model.terms, "ruler_scale")
+    orders = (*fitted.layout.model.terms, "ruler_scale", " ".join(TILT), " ".join(DRIFT))
     found = [there for term in orders if (there := " ".join(n for n in term.split() if n in names))]
     return [*found, TILTS] if len(_indices(fitted, TILTS)) else found
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from workbench.calibration.checks.cross_validation import alarms, leave_each_out
+from workbench.calibration.checks.cross_validation import alarms
 from workbench.calibration.checks.faults import find_faults, refuses
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.checks.residuals import explain, residual_tests
@@ -19,11 +19,20 @@ from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import DeterminedBy
 from workbench.model.fit_event import CrossValidatedPlacement, Fault, ResidualTest
+from workbench.model.stats import chi2_sf, norm_cdf
 
 CONTRADICTION_SD = 5.0
-"""Distance from its prior at which a parameter contradicts it; 1 in 2 million lies so far by chance."""
+"""Distance from its prior at which a parameter refuses the fit; 1 in 2 million lies so far by chance."""
+DOUBT_P = 0.005
+"""Probability that the priors of a sound fit raise a warning, one by one; the same for all together."""
+WARNED_P = 0.01
+"""P value of the placement errors below which their scatter is a warning."""
+SPECKLE_SCALE = 1.5
+"""Noise scale from which a missing speckle_sd_px is named as the cause."""
 DATA_SHARE_DETERMINED = 0.9
 """Information share of the data from which a parameter is determined by them."""
+LEAST_NARROWING = 1e-6
+"""Least decrease of a prior's variance by the data for its pull to be tested."""
 PRIOR_UNMOVED = 0.9
 """Ratio of posterior to prior sd above which neither data nor other priors constrain the parameter."""
 
@@ -82,6 +91,7 @@ def assess(
     limits: Acceptance,
     max_relative_range_sd: float,
     directions: Sequence[NullDirection] = (),
+    placements: Sequence[CrossValidatedPlacement] = (),
 ) -> Assessment:
     """Compare a fit with the limits, and run all checks of it.
 
@@ -93,11 +103,11 @@ def assess(
         limits: limits of the calibration.
         max_relative_range_sd: as in the calibration's `validity`.
         directions: null directions, for the warnings.
+        placements: cross-validation of the fit.
     """
     reasons = _too_few_standoffs(fit, limits)
     if not fit.converged:
         reasons.append("the solver did not converge. Do: check the standoffs and the laser ids")
-    placements = leave_each_out(fit)
     faults = find_faults(fit, placements)
     tests = residual_tests(fit)
     refusing = [fault.message for fault in faults if refuses(fault)]
@@ -116,7 +126,7 @@ def assess(
         verdict="refused" if reasons else "accepted",
         reasons=tuple(reasons),
         warnings=tuple(warnings),
-        cross_validation=placements,
+        cross_validation=tuple(placements),
         faults=faults,
         residual_tests=tests,
         directions=tuple(directions),
@@ -125,6 +135,17 @@ def assess(
 
 def _missed_limits(fit: CalibrationFit, limits: Acceptance, max_relative_range_sd: float) -> list[str]:
     reasons = []
+    if not np.abs(fit.drift_px).max() <= limits.max_drift_px:
+        reasons.append(
+            f"the image drifted by {_drift_text(fit)} from the first capture to the last, expected at most"
+            f" {limits.max_drift_px:g} px. Do: warm up longer, fix the camera and capture again"
+        )
+    if not fit.placement_scale <= limits.max_placement_scale:
+        reasons.append(
+            f"placements scatter {fit.placement_scale:.1f} times more than stated"
+            f" ({fit.rig.bench.placement_sd_mm:g} mm), expected at most {limits.max_placement_scale:g} times."
+            " Do: check the ruler and the stop, and capture again"
+        )
     if not fit.rms_px <= limits.max_rms_px:
         reasons.append(
             f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px. Do: capture the"
@@ -183,11 +204,47 @@ def _too_few_standoffs(fit: CalibrationFit, limits: Acceptance) -> list[str]:
 def _contradictions(fit: CalibrationFit) -> list[str]:
     """Priors that the data contradict: a wrong rig file, or a mistyped standoff."""
     return [
-        f"{p.name} = {value:.5g} {p.unit} lies {abs(pull):.1f} sd from its prior in the rig file"
-        f" ({p.prior.value:g} +- {p.prior.sd:g} {p.unit}). Do: check this prior, and the standoffs"
-        for p, pull, value in zip(fit.table.parameters, fit.prior_pull, fit.values, strict=True)
-        if abs(pull) > CONTRADICTION_SD
+        f"{_prior_text(fit, n)}. Do: check this prior, and the standoffs"
+        for n in np.flatnonzero(np.abs(fit.prior_pull) > CONTRADICTION_SD).tolist()
     ]
+
+
+def prior_doubts(fit: CalibrationFit) -> list[str]:
+    """Priors of the sensor that the data move improbably far, one by one and all together.
+
+    If priors and data are as stated, the posterior mean y of parameters in units of their priors has the
+    covariance 1 - C, C being their posterior covariance.
+    """
+    free = np.flatnonzero(fit.table.is_sensor & (fit.table.prior_sd > 0))
+    sd = fit.table.prior_sd[free]
+    y, narrowed = (
+        fit.prior_pull[free],
+        np.eye(len(free)) - fit.covariance[np.ix_(free, free)] / np.outer(sd, sd),
+    )
+    values, vectors = np.linalg.eigh(narrowed)
+    seen = values > LEAST_NARROWING
+    chi2 = float(((vectors.T @ y)[seen] ** 2 / values[seen]).sum())
+    z = np.abs(y) / np.sqrt(np.maximum(np.diag(narrowed), LEAST_NARROWING))
+    p = np.minimum(1.0, len(free) * 2.0 * norm_cdf(-z))
+    order = np.argsort(-z)
+    doubted = [int(free[n]) for n in order if p[n] < DOUBT_P]
+    together = seen.any() and chi2_sf(chi2, seen.sum()) < DOUBT_P
+    lines = [f"{_prior_text(fit, n)}. Check this value in the rig file." for n in doubted]
+    if together and not doubted:
+        largest = ", ".join(fit.table.parameters[free[n]].name for n in order[:3])
+        lines.append(
+            f"the priors of the rig file together contradict the data (chi2 {chi2:.0f}, expected"
+            f" {seen.sum()}); {largest} move most. Check these values in the rig file."
+        )
+    return lines
+
+
+def _prior_text(fit: CalibrationFit, index: int) -> str:
+    p, pull = fit.table.parameters[index], abs(fit.prior_pull[index])
+    return (
+        f"{p.name} = {fit.values[index]:.5g} {p.unit} lies {pull:.1f} sd from its prior in the rig file"
+        f" ({p.prior.value:g} +- {p.prior.sd:g} {p.unit})"
+    )
 
 
 def _alarm(one: CrossValidatedPlacement) -> str:
@@ -201,6 +258,11 @@ def _alarm(one: CrossValidatedPlacement) -> str:
     )
 
 
+def _drift_text(fit: CalibrationFit) -> str:
+    u, v = fit.drift_px
+    return f"{u:+.2f} px in u and {v:+.2f} px in v"
+
+
 def _largest_residual(fit: CalibrationFit) -> str:
     size = np.abs(fit.residual_px / fit.cells.sd_px)
     cell, axis = np.unravel_index(np.nanargmax(size), size.shape)
@@ -212,7 +274,7 @@ def _largest_residual(fit: CalibrationFit) -> str:
 def _warnings(fit: CalibrationFit) -> list[str]:
     sensor = [(p, by) for p, by in zip(fit.table.parameters, determined_by(fit), strict=True) if p.prior.sd]
     prior = [p.name for p, by in sensor if by == "prior" and p.kind == "sensor"]
-    warnings: list[str] = []
+    warnings = prior_doubts(fit)
     if prior:
         are, priors = ("is", "prior is") if len(prior) == 1 else ("are", "priors are")
         warnings.append(
@@ -229,10 +291,26 @@ def _warnings(fit: CalibrationFit) -> list[str]:
             f"repeats scatter {fit.cells.repeat_scale:.2f} times more than the stated noise of the spots;"
             " their sd is scaled by this factor."
         )
+    if fit.placement_scatter_p < WARNED_P:
+        warnings.append(
+            f"placements scatter {fit.placement_scale:.1f} times more than stated"
+            f" (bench.placement_sd_mm {fit.rig.bench.placement_sd_mm:g}); their sd is scaled by this factor."
+        )
+    if np.any(fit.drift_px):
+        warnings.append(
+            f"the image drifted by {_drift_text(fit)} from the first capture to the last; the fit allows for"
+            " it, and the sd of the image centre includes half of it. Do: warm up longer, or fix the camera."
+        )
     if fit.noise_scale > 1:
         warnings.append(
             f"residuals are {fit.noise_scale:.2f} times larger than the stated noise of the spots"
             f" (chi2 {fit.chi2:.1f} for {fit.degrees_of_freedom:.1f} degrees of freedom);"
             f" every sd is scaled by this factor. The largest residual is {_largest_residual(fit)}."
+        )
+    if fit.noise_scale > SPECKLE_SCALE and fit.rig.noise.speckle_sd_px == 0:
+        warnings.append(
+            "the rig file states no speckle (noise.speckle_sd_px): all repeats of a spot share it, so their"
+            " scatter does not show it. State it: docs/rig-format.md computes it from wavelength, f-number and"
+            " pixel pitch."
         )
     return warnings

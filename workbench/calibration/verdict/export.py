@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.data.observations import positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.verdict.assessment import Assessment, assess, determined_by
@@ -40,7 +41,10 @@ def calibrate(
     values = dict(zip((p.name for p in fit.table.parameters), fit.values.tolist(), strict=True))
     provisional = _calibration(fit, values, provenance, Assessment("accepted", (), ()), 0.0)
     ranges = _ranges(CalibratedSensor(provisional))
-    worst = float(ranges.sd.max()) if len(ranges.sd) else float("nan")
+    placements = leave_each_out(fit)
+    # Few placements do not support what the fit states: the worse of fit and cross-validation counts.
+    predicted = [one.sd_mm / one.standoff_mm for one in placements]
+    worst = float(max([ranges.sd.max(), *predicted])) if len(ranges.sd) else float("nan")
     if not np.isfinite(worst):
         raise LimitFailedError(
             "no calibration: no laser has a range with a finite uncertainty in the image between the nearest"
@@ -54,7 +58,7 @@ def calibrate(
         fit.covariance[sensor, sensor],
         ranges,
     )
-    assessment = assess(fit, limits, worst, directions)
+    assessment = assess(fit, limits, worst, directions, placements)
     return _calibration(fit, values, provenance, assessment, worst), assessment
 
 
@@ -123,6 +127,7 @@ def _calibration(
                 observations=len(fit.used),
                 rejected=len(fit.rejected),
                 noise_scale=fit.noise_scale,
+                placement_scale=fit.placement_scale,
                 verdict=assessment.verdict,
                 reasons=assessment.reasons,
                 warnings=assessment.warnings,
@@ -136,13 +141,17 @@ def _calibration(
 def _parameters(fit: CalibrationFit) -> Parameters:
     sensor = fit.sensor
     table = fit.table.parameters[sensor]
-    covariance = fit.covariance[sensor, sensor]
+    names = [p.name for p in table]
+    covariance = np.array(fit.covariance[sensor, sensor])
+    # The image was anywhere along its drift: half of it is added as the deviation of the image centre.
+    centre = [names.index(name) for name in ("cx_px", "cy_px")]
+    covariance[centre, centre] += (fit.drift_px / 2) ** 2
     symmetric = (covariance + covariance.T) / 2
     return Parameters(
-        names=tuple(p.name for p in table),
+        names=tuple(names),
         units=tuple(p.unit for p in table),
         values=tuple(fit.values[sensor].tolist()),
-        sd=tuple(fit.sd[sensor].tolist()),
+        sd=tuple(np.sqrt(np.diag(symmetric)).tolist()),
         prior_sd=tuple(p.prior.sd for p in table),
         data_share=tuple(fit.data_share[sensor].tolist()),
         determined_by=determined_by(fit)[sensor],

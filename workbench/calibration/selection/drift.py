@@ -1,0 +1,124 @@
+"""Drift of the image over a session: a score test, and the decision to fit it.
+
+A mount that creeps or a camera that warms up shifts the image. Where standoffs are visited from near to far
+the shift follows the standoff and is taken for baselines and pointing: residuals hardly show it. The test
+is that of a missing trend (C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50). With residuals r of the fit in
+standard deviations, their covariance R = 1 - J C J^T, and the shift W (one column for u, one for v) that is
+linear in the order of capture, the score W^T r has the covariance S = W^T R W; S^-1 W^T r is the drift that
+the data show beside everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.calibration.checks.hypotheses import explain_misfit
+from workbench.calibration.data.boards import BoardView
+from workbench.calibration.data.observations import Observation
+from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.calibration.estimation.problem import LeastSquaresProblem
+from workbench.calibration.estimation.refit import optimum_of, problem_of
+from workbench.calibration.model.parameters import DRIFT
+from workbench.model.arrays import FloatArray
+from workbench.model.fit_event import Rejected
+from workbench.model.rig import Prior, Rig
+from workbench.model.stats import chi2_sf
+
+SHOWN_P = 0.003
+"""P value below which the drift is fitted."""
+PRIOR_SD_PX = 0.5
+"""Prior deviation of a drift that the data show, px over the session."""
+LEAST_INFORMATION = 1e-6
+"""Information on a drift, 1/px^2, below which the order of the captures tells nothing of it."""
+
+
+@dataclass(frozen=True)
+class DriftTest:
+    """Drift that the data show, from the first capture to the last."""
+
+    shift_px: FloatArray
+    """(2,) in u and v; 0 where nothing is known."""
+    sd_px: FloatArray
+    """(2,) standard deviation; infinite where nothing is known."""
+    p_value: float
+    """Of no drift; 1 where nothing is known."""
+    score: float
+    """Twice the log evidence of a drift against none."""
+
+
+def drift_test(fitted: CalibrationFit) -> DriftTest:
+    """Test a fit without a drift for one."""
+    problem = problem_of(fitted)
+    residual, jacobian = problem.linearise(optimum_of(fitted), fitted.noise_scale)
+    sd = fitted.table.prior_sd
+    covariance = fitted.covariance / np.outer(*(np.where(sd > 0, sd, np.inf),) * 2)
+    shift = _shifts(problem) / fitted.noise_scale
+    along = jacobian.T @ shift
+    information = shift.T @ shift - along.T @ covariance @ along
+    score = -shift.T @ residual
+    values, vectors = np.linalg.eigh(information)
+    known = values > LEAST_INFORMATION
+    inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
+    chi2 = float(score @ inverse @ score)
+    spread = np.eye(2) + PRIOR_SD_PX**2 * information
+    evidence = score @ np.linalg.solve(spread, PRIOR_SD_PX**2 * score) - np.linalg.slogdet(spread)[1]
+    axis_known = np.diag(information) > LEAST_INFORMATION
+    return DriftTest(
+        shift_px=np.where(axis_known, inverse @ score, 0.0),
+        sd_px=np.where(axis_known, np.sqrt(np.diag(inverse)), np.inf),
+        p_value=float(chi2_sf(chi2, known.sum())) if known.any() else 1.0,
+        score=float(evidence),
+    )
+
+
+def fits_drift(rig: Rig) -> bool:
+    """Whether the drift is a free parameter."""
+    return any(getattr(rig.bench, name).sd > 0 for name in DRIFT)
+
+
+def with_drift(rig: Rig) -> Rig:
+    """The rig with the drift free."""
+    free = {name: Prior(value=getattr(rig.bench, name).value, sd=PRIOR_SD_PX) for name in DRIFT}
+    return rig.model_copy(update={"bench": rig.bench.model_copy(update=free)})
+
+
+def fit_with_drift(
+    rig: Rig,
+    observations: Sequence[Observation],
+    rejected: Sequence[Rejected] = (),
+    boards: Sequence[BoardView] = (),
+) -> CalibrationFit:
+    """`fit`, with the drift free where the data show one and no named fault explains them better.
+
+    Raises:
+        BadInputError: as `fit`.
+        LimitFailedError: as `fit`.
+    """
+    fitted = fit(rig, observations, rejected, boards)
+    if drift_is_shown(fitted):
+        return fit(with_drift(rig), observations, rejected, boards)
+    return fitted
+
+
+def drift_is_shown(fitted: CalibrationFit) -> bool:
+    """Whether a fit without a drift needs one."""
+    if fits_drift(fitted.rig):
+        return False
+    test = drift_test(fitted)
+    if not test.p_value < SHOWN_P:
+        return False
+    faults = [h for h in explain_misfit(fitted) if h.kind != "spot"]
+    return test.score > max((h.score for h in faults), default=0.0)
+
+
+def _shifts(problem: LeastSquaresProblem) -> FloatArray:
+    """(R, 2) change of the residuals, in their stated deviations, with a drift of 1 px in u and in v."""
+    data = problem.data
+    time = np.concatenate([np.asarray(data.spots.time, float), np.asarray(data.corners.time, float)])
+    by_axis = np.asarray(data.inverse_sd) * time[:, None]
+    shift = np.zeros((2 * len(time), 2))
+    shift[0::2, 0], shift[1::2, 1] = by_axis.T
+    return shift
