@@ -310,7 +310,7 @@ def _warnings(fit: CalibrationFit) -> list[str]:
     if fit.noise_scale > SPECKLE_SCALE and fit.rig.noise.speckle_sd_px == 0:
         warnings.append(
             "the rig file states no speckle (noise.speckle_sd_px): all repeats of a spot share it, so their"
-            " scatter does not show it. State it: docs/rig-format.md computes it from wavelength, f-number and"
-            " pixel pitch."
+            " scatter does not show it. State it: docs/rig-format.md computes it from wavelength, f-number"
+            " and pixel pitch."
         )
     return warnings
