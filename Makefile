@@ -13,7 +13,7 @@ help:
 	@echo "make test   lint, type check and test everything"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
 	@echo "make prove  12 000 simulated calibrations against what is stated of them (a few minutes)"
-	@echo "make crash  a session of 10 000 shots with random faults; nothing may be lost (a quarter of an hour)"
+	@echo "make crash  a session of 10 000 captures with random faults; nothing may be lost (a quarter of an hour)"
 	@echo "make lint   only the linters and the type checker"
 	@echo "make lock   renew requirements.lock from pyproject.toml"
 

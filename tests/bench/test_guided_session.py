@@ -32,7 +32,7 @@ from workbench.procedure.doctor import examine
 from workbench.procedure.engine.operator import ScriptedOperator
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.resume import resume
-from workbench.procedure.engine.run import NOBODY, run
+from workbench.procedure.engine.run import NO_OPERATOR, run
 from workbench.session.journal import Journal, read_journal
 from workbench.session.state import effective, session_status
 
@@ -147,7 +147,7 @@ def test_nobody_at_a_real_rig_and_then_somebody(tmp_path: Path) -> None:
     answers.write_text("safety: true\np.1/300mm: 300\n")
     foreseen = (Prompt("safety", "?"), Prompt("p.1/300mm", "?", quantity=Quantity("mm", 270, 330)))
     with pytest.raises(AnswerNeededError, match="prompt safety"):
-        session(tmp_path, GRID, ScriptedOperator.load(answers, {p.key: p for p in foreseen}, NOBODY))
+        session(tmp_path, GRID, ScriptedOperator.load(answers, {p.key: p for p in foreseen}, NO_OPERATOR))
     assert not list((tmp_path / "s/frames").iterdir()), "nothing was lit"
     waiting = session_status(tmp_path / "s")
     assert (waiting.state, waiting.unfinished) == ("waiting", True)

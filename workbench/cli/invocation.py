@@ -1,4 +1,4 @@
-"""Who called, and with what: for the record."""
+"""Operator, command line and time of an invocation, for the record."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import time
 
 
 def operator() -> str:
-    """Name of the account; its number where it has no name."""
+    """Name of the user account; its number if it has no name."""
     try:
         return getpass.getuser()
     except (KeyError, OSError):
@@ -18,10 +18,10 @@ def operator() -> str:
 
 
 def command_line() -> str:
-    """The command as it could be typed again."""
+    """Command line as text for a shell."""
     return shlex.join(["workbench", *sys.argv[1:]])
 
 
 def now() -> str:
-    """Local time with its zone, ISO 8601."""
+    """Local time with zone, ISO 8601."""
     return time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())

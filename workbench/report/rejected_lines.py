@@ -1,17 +1,17 @@
-"""Captures and rows that a fit did not use, one line for each reason."""
+"""Captures and rows that a fit rejected, one line per reason."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # what is printed of them is made without the rest
+if TYPE_CHECKING:  # rendering needs none of the calibration code
     from workbench.calibration.data.observations import Rejected
     from workbench.model.fit_event import RejectedRecord
 
 
 def rejected_lines(rejected: Iterable[Rejected | RejectedRecord]) -> list[str]:
-    """`row 3 and 2 more: no spot`, in the order in which the reasons occur."""
+    """Lines such as `row 3 and 2 more: no spot`, in the order in which the reasons occur."""
     sources: dict[str, list[str]] = {}
     for r in rejected:
         sources.setdefault(r.reason, []).append(r.source)
