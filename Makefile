@@ -1,30 +1,41 @@
 # Every target works on a fresh clone: the first one called creates .venv from the lock file.
 PYTHON ?= python3
-VENV := .venv
+# Each interpreter has its own environment: `make test PYTHON=python3.13` uses .venv-python3.13.
+VENV := .venv$(if $(filter-out python3,$(PYTHON)),-$(notdir $(PYTHON)))
 # Our matrices are small: threads of the linear algebra wait for each other longer than they work.
 export OPENBLAS_NUM_THREADS ?= 1
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
+# The dependencies of the workbench alone, without those of its developers.
+RUNNABLE := $(VENV)/.runnable
 
-.PHONY: help demo test lint bench prove crash lock clean schema
+.PHONY: help demo test wheel lint bench prove crash lock clean schema
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
-	@echo "make test   lint, type check and test everything"
+	@echo "make test   lint, type check and test everything; PYTHON=python3.13 with another interpreter"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
-	@echo "make prove  12 000 simulated calibrations against what is stated of them (a few minutes)"
-	@echo "make crash  a session of 10 000 captures with random faults; nothing may be lost (a quarter of an hour)"
+	@echo "make prove  stated uncertainties compared with 12 000 simulated calibrations (a few minutes)"
+	@echo "make crash  a session of 10 000 captures with random faults; none may be lost (a quarter of an hour)"
+	@echo "make wheel  build the wheel, install it with the run-time dependencies only, run a session (two minutes)"
 	@echo "make lint   only the linters and the type checker"
-	@echo "make lock   renew requirements.lock from pyproject.toml"
+	@echo "make lock   update requirements.lock and requirements-run.lock from pyproject.toml"
 
-$(INSTALLED): requirements.lock pyproject.toml
+$(BIN)/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, this is " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
+
+$(RUNNABLE): requirements-run.lock pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements-run.lock
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
-demo: $(INSTALLED)
+$(INSTALLED): requirements.lock pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@ $(RUNNABLE)
+
+demo: $(RUNNABLE)
 	$(BIN)/workbench run procedures/calibrate-flat.yaml procedures/accuracy-flat.yaml --rig rigs/thesis-emulated.yaml
 
 prove: $(INSTALLED)
@@ -38,20 +49,27 @@ lint: $(INSTALLED)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python -m tests.prose
 
 test: lint
-	$(BIN)/python -m pytest -m "not real_time"
+	$(BIN)/python -m pytest -m "not real_time and not wheel"
 	$(BIN)/python -m pytest -n 0 -m real_time
+
+wheel: $(INSTALLED)
+	$(BIN)/python -m pytest -n 0 -m wheel
 
 bench: $(INSTALLED)
 	$(BIN)/python -m tests.benchmarks
 
+# The second file holds versions of the first only.
+LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --fork-strategy fewest \
+	--generate-hashes --no-emit-index-url --no-header --no-annotate
 lock:
-	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --fork-strategy fewest \
-		--generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements.lock
+	$(LOCK) --extra dev --output-file requirements.lock
+	$(LOCK) --extra build --constraint requirements.lock --output-file requirements-run.lock
 
 schema: $(INSTALLED)
 	$(BIN)/python -c 'import json; from workbench.model.calibration import Calibration; print(json.dumps(Calibration.model_json_schema(), indent=2))' > docs/calibration.schema.json
 
 clean:
-	rm -rf $(VENV) sessions build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-* sessions build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

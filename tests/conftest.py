@@ -23,3 +23,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.partition("::")[0] in REAL_TIME:
             item.add_marker("real_time")
+        if item.nodeid.startswith("tests/wheel/"):
+            item.add_marker("wheel")

@@ -34,7 +34,7 @@ class GpioFilesLine:
     """A GPIO line keeps what was written; the guardian's clock ends an emission."""
 
     def __init__(self, settings: GpioFilesBlock, lasers: int, alarm: Callable[[], bool]) -> None:
-        """Count the files; `alarm` is not needed by a driver that waits for nothing.
+        """Count the files; `alarm` is not used, because this driver never waits.
 
         Raises:
             BadInputError: fewer files than lasers.
@@ -57,7 +57,7 @@ class GpioFilesLine:
             file.write_text(self._on if mask >> bit & 1 else self._off)
 
     def all_off(self) -> None:
-        """Write every line, whatever becomes of another one, and read all back.
+        """Write every line, even where another one fails, and read all back.
 
         Raises:
             LaserOffNotConfirmedError: a line is missing, or does not read as off.

@@ -21,7 +21,7 @@ from workbench.calibration.verdict.assessment import Assessment, derive
 from workbench.calibration.verdict.export import accept_with_reason, calibrate, write_calibration
 from workbench.calibration.verdict.records import left_out_records, parameter_records
 from workbench.calibration.verdict.tables import derived_table
-from workbench.cli.invocation import command_line, now, operator
+from workbench.cli.invocation import command_line
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
 from workbench.model.captures import (
@@ -37,6 +37,7 @@ from workbench.model.nested import fix_parameters
 from workbench.model.rig import Rig, load_rig
 from workbench.report.rejected_lines import rejected_lines
 from workbench.report.terminal_table import TerminalTable
+from workbench.session.caller import now, operator
 from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.files import check_output
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version

@@ -1,27 +1,11 @@
-"""Operator, command line and time of an invocation, for the record."""
+"""The command line, for the record."""
 
 from __future__ import annotations
 
-import getpass
-import os
 import shlex
 import sys
-import time
-
-
-def operator() -> str:
-    """Name of the user account; its number if it has no name."""
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError):
-        return str(os.getuid())
 
 
 def command_line() -> str:
-    """Command line as text for a shell."""
+    """The command in a form that a shell accepts."""
     return shlex.join(["workbench", *sys.argv[1:]])
-
-
-def now() -> str:
-    """Local time with zone, ISO 8601."""
-    return time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())

@@ -63,6 +63,14 @@ NoInput = Annotated[
 
 
 @app.command()
+def new(folder: Annotated[Path, typer.Argument(help="New or empty folder.")]) -> None:
+    """Lay out a laboratory's own folder: procedures, rigs, firmware."""
+    from workbench.cli.new import lay_out
+
+    print_message(lay_out(folder))
+
+
+@app.command()
 def run(
     procedures: Annotated[list[Path], typer.Argument(help="Procedure files, run in this order.")],
     rig: Annotated[Path, typer.Option(help="Rig file.")],

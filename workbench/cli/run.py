@@ -11,7 +11,7 @@ from rich.console import Console
 
 from workbench.cli.background import Background
 from workbench.cli.console import print_message
-from workbench.cli.invocation import command_line, now, operator
+from workbench.cli.invocation import command_line
 from workbench.cli.stopping import StopAfterCapture
 from workbench.cli.terminal import FaultTolerantConsumer, Terminal
 from workbench.cli.terminal_operator import choose_operator
@@ -31,6 +31,7 @@ from workbench.procedure.engine.progress import TimeLeft
 from workbench.procedure.engine.resume import files_now, plan_of, resume
 from workbench.procedure.engine.run import NO_OPERATOR, Invocation, run
 from workbench.report.figure_writer import FigureWriter
+from workbench.session.caller import now, operator
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer

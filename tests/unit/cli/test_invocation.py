@@ -1,36 +1,16 @@
-"""Who called, with what, and when."""
+"""The command line, for the record."""
 
 from __future__ import annotations
 
-import getpass
-import os
 import shlex
 import sys
-import time
-from datetime import datetime
 
 import pytest
 
-from workbench.cli.invocation import command_line, now, operator
+from workbench.cli.invocation import command_line
 
 
 def test_the_command_can_be_typed_again(monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = ["fit", "my captures.csv", "--accept", "it's $5; all right"]
     monkeypatch.setattr(sys, "argv", ["/usr/bin/workbench", *arguments])
     assert shlex.split(command_line()) == ["workbench", *arguments]
-
-
-def test_the_time_has_its_zone() -> None:
-    before = time.time()
-    at = datetime.strptime(now(), "%Y-%m-%dT%H:%M:%S%z")
-    assert before - 1 <= at.timestamp() <= time.time()
-
-
-def test_an_account_without_a_name_is_its_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nameless() -> str:
-        raise KeyError
-
-    monkeypatch.setattr(getpass, "getuser", lambda: "technician")
-    assert operator() == "technician"
-    monkeypatch.setattr(getpass, "getuser", nameless)
-    assert operator() == str(os.getuid())

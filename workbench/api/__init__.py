@@ -1,0 +1,32 @@
+"""The public interface for notebooks and programs; `workbench` exports its names.
+
+Everything returns values or data frames and prints nothing. Errors are subclasses of `WorkbenchError`.
+"""
+
+from workbench.api.calibration import Calibration, CalibrationComparison, compare, fit, load_calibration
+from workbench.api.calibration_design import CalibrationDesign, design
+from workbench.api.ranger import Ranger
+from workbench.api.session import Session, Trial, open_session, sessions
+from workbench.model.errors import BadInputError, LimitFailedError, WorkbenchError
+from workbench.model.rig import Rig
+from workbench.ranging.ranger import Reading
+
+__all__ = [
+    "BadInputError",
+    "Calibration",
+    "CalibrationComparison",
+    "CalibrationDesign",
+    "LimitFailedError",
+    "Ranger",
+    "Reading",
+    "Rig",
+    "Session",
+    "Trial",
+    "WorkbenchError",
+    "compare",
+    "design",
+    "fit",
+    "load_calibration",
+    "open_session",
+    "sessions",
+]

@@ -1,0 +1,265 @@
+"""Recorded sessions, read-only: captures, spots, residuals, readings, trials, frames."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import pandas as pd
+
+from workbench.api.calibration import Calibration, load_calibration
+from workbench.api.frames import (
+    CAPTURE_COLUMNS,
+    READING_COLUMNS,
+    RESIDUAL_COLUMNS,
+    SESSION_COLUMNS,
+    SPOT_COLUMNS,
+    frame_of,
+    frame_of_table,
+)
+from workbench.model.arrays import Image
+from workbench.model.chart import Chart
+from workbench.model.errors import BadInputError
+from workbench.model.event import (
+    CalibrationExported,
+    CaptureTaken,
+    FitFinished,
+    FrameRef,
+    ReadingTaken,
+    SpotsFound,
+    TrialFinished,
+)
+from workbench.model.rig import Rig
+from workbench.session.frames import read_image
+from workbench.session.journal import read_journal
+from workbench.session.manifest import load_manifest, load_session_rig
+from workbench.session.state import effective, session_statuses
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Results of one trial of a session."""
+
+    name: str
+    """Name of the procedure and number of the step: `accuracy-flat.1`."""
+    tables: Mapping[str, pd.DataFrame]
+    """By the name of the table; values are unscaled."""
+    charts: tuple[Chart, ...]
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """The first table.
+
+        Raises:
+            BadInputError: the trial has no table.
+        """
+        if not self.tables:
+            raise BadInputError(f"trial {self.name}: expected a table, it has none")
+        return next(iter(self.tables.values()))
+
+
+@dataclass(frozen=True)
+class Session:
+    """A session folder; see `open_session`.
+
+    >>> import workbench as wb
+    >>> session = wb.open_session("data/session-0.1.0")
+    >>> session.captures.groupby("laser_id").size().to_dict()
+    {'L1': 3, 'L4': 3, 'all': 1}
+    >>> session.spots.loc[0, ["u_px", "v_px"]].round(1).tolist()
+    [262.6, 249.6]
+    """
+
+    folder: Path
+
+    @cached_property
+    def rig(self) -> Rig:
+        """The rig file with which the session began."""
+        return load_session_rig(self.folder)
+
+    @cached_property
+    def captures(self) -> pd.DataFrame:
+        """One row per capture, in order of time; `on` and `off` are the paths of its frames."""
+        return frame_of((self._capture_row(event) for event in self._captures.values()), CAPTURE_COLUMNS)
+
+    @cached_property
+    def spots(self) -> pd.DataFrame:
+        """One row per spot; pixels, digital numbers (DN), 1 sigma.
+
+        The origin is the centre of the top-left pixel. `laser_id` is that of the capture. It is empty
+        where several lasers were on and the spot is not assigned. `flags` are names separated by spaces.
+        """
+        found = {event.key: event for event in self._events if isinstance(event, SpotsFound)}
+        rows = (row for event in found.values() for row in self._spot_rows(event))
+        return frame_of(rows, SPOT_COLUMNS)
+
+    @cached_property
+    def residuals(self) -> pd.DataFrame:
+        """Residuals of the last fit, observed - predicted: one row per laser and placement, px, 1 sigma."""
+        fits = [event for event in self._events if isinstance(event, FitFinished)]
+        rows = (record.model_dump() for record in (fits[-1].residuals if fits else ()))
+        return frame_of(rows, RESIDUAL_COLUMNS)
+
+    @cached_property
+    def readings(self) -> pd.DataFrame:
+        """Readings of all trials; mm, 1 sigma, error = measured - true."""
+        rows = (self._reading_row(event) for event in self._events if isinstance(event, ReadingTaken))
+        return frame_of(rows, READING_COLUMNS)
+
+    @cached_property
+    def trials(self) -> Mapping[str, Trial]:
+        """Results of finished trials by their name."""
+        return {
+            event.trial: Trial(
+                event.trial, {table.name: frame_of_table(table) for table in event.tables}, event.charts
+            )
+            for event in self._events
+            if isinstance(event, TrialFinished)
+        }
+
+    @cached_property
+    def calibration(self) -> Calibration:
+        """The calibration that the session exported last.
+
+        Raises:
+            BadInputError: the session exported none, or its file is damaged.
+        """
+        exported = [event for event in self._events if isinstance(event, CalibrationExported)]
+        if not exported:
+            raise BadInputError(f"{self.folder}: expected an exported calibration, the session has none")
+        return load_calibration(self.folder / exported[-1].path)
+
+    def captures_for_fit(self, without: Collection[float] = ()) -> pd.DataFrame:
+        """Captures of the calibration, as columns of a captures file, for `fit`.
+
+        Args:
+            without: standoffs to leave out, mm.
+
+        Raises:
+            BadInputError: a standoff in `without` has no capture.
+        """
+        captures = self.captures[self.captures["purpose"] == "calibration"]
+        if unknown := set(without) - set(captures["standoff_mm"]):
+            raise BadInputError(f"without: no capture has the standoff {min(unknown):g} mm")
+        kept = captures[~captures["standoff_mm"].isin(list(without))]
+        scene = kept["scene"].where(kept["scene"] != "", kept["placement"])
+        columns = ["laser_id", "standoff_mm", "repeat", "on", "off", "scene", "standoff_sd_mm"]
+        return kept.assign(scene=scene)[columns].reset_index(drop=True)
+
+    def frame(self, capture: str, off: bool = False) -> Image:
+        """A frame, (height, width), uint8 or uint16: lasers on, or all off.
+
+        Args:
+            capture: key of the capture, as in the column `capture`.
+            off: whether to return the frame with all lasers off.
+
+        Raises:
+            BadInputError: the session has no such capture or frame, or the file is damaged.
+        """
+        event = self._captures.get(capture)
+        reference = None if event is None else event.off if off else event.on
+        if reference is None:
+            raise BadInputError(f"{self.folder}: expected a capture of the session, got {capture!r}")
+        return read_image(self.folder / reference.path)
+
+    def crop(self, spot: pd.Series, half_px: int = 12) -> Image:
+        """The part of the frame around a spot, lasers on.
+
+        Args:
+            spot: a row of `spots`.
+            half_px: half width and half height of the part; it ends at the border of the image.
+
+        Returns:
+            (height, width), at most 2 half_px + 1 each; uint8 or uint16.
+        """
+        image = self.frame(str(spot["capture"]))
+        u, v = round(float(spot["u_px"])), round(float(spot["v_px"]))
+        return image[max(v - half_px, 0) : v + half_px + 1, max(u - half_px, 0) : u + half_px + 1]
+
+    @cached_property
+    def _events(self) -> list[object]:
+        """Events that are in effect, in order."""
+        return [record.event for record in effective(read_journal(self.folder))]
+
+    @cached_property
+    def _captures(self) -> dict[str, CaptureTaken]:
+        """By key."""
+        return {event.key: event for event in self._events if isinstance(event, CaptureTaken)}
+
+    def _capture_row(self, event: CaptureTaken) -> dict[str, object]:
+        return {
+            "capture": event.key,
+            "purpose": event.purpose,
+            "placement": event.placement_key,
+            "scene": event.scene or "",
+            "laser_id": event.laser_id,
+            "standoff_mm": event.standoff_mm,
+            "standoff_sd_mm": event.standoff_sd_mm,
+            "repeat": event.repeat,
+            "exposure": event.exposure,
+            "exposure_unit": event.exposure_unit or "",
+            "time": pd.Timestamp(event.on.time_ns, unit="ns", tz="UTC"),
+            "on": self._path(event.on),
+            "off": self._path(event.off),
+        }
+
+    def _path(self, frame: FrameRef | None) -> str:
+        return "" if frame is None else str((self.folder / frame.path).resolve())
+
+    def _spot_rows(self, event: SpotsFound) -> list[dict[str, object]]:
+        capture = self._captures[event.key]
+        alone = capture.laser_id not in {"all", "board"}
+        return [
+            {
+                "capture": event.key,
+                "laser_id": spot.laser_id or (capture.laser_id if alone else ""),
+                "standoff_mm": capture.standoff_mm,
+                "repeat": capture.repeat,
+                "u_px": spot.u_px,
+                "v_px": spot.v_px,
+                "u_sd_px": spot.u_sd_px,
+                "v_sd_px": spot.v_sd_px,
+                "flux_dn": spot.flux_dn,
+                "width_px": spot.width_px,
+                "peak_dn": spot.peak_dn,
+                "flags": " ".join(sorted(spot.flags)),
+            }
+            for spot in event.spots
+        ]
+
+    def _reading_row(self, event: ReadingTaken) -> dict[str, object]:
+        error = None if event.range_mm is None else event.range_mm - event.standoff_mm
+        return event.model_dump(exclude={"lasers", "kind"}) | {"error_mm": error}
+
+
+def open_session(folder: str | Path) -> Session:
+    """Open a session folder for reading; nothing in it changes.
+
+    Raises:
+        BadInputError: this is no session folder, or its manifest is damaged.
+    """
+    path = Path(folder)
+    load_manifest(path)
+    return Session(path)
+
+
+def sessions(folder: str | Path = "sessions") -> pd.DataFrame:
+    """The sessions in a folder, by time: one row each, with state and number of captures.
+
+    Raises:
+        BadInputError: the folder does not exist.
+    """
+    rows = (
+        {
+            "session": status.session_dir.name,
+            "folder": str(status.session_dir),
+            "state": status.state,
+            "procedures": " ".join(status.procedures),
+            "captures": status.captures,
+            "reason": status.why,
+        }
+        for status in session_statuses(Path(folder))
+    )
+    return frame_of(rows, SESSION_COLUMNS)
