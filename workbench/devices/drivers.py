@@ -28,8 +28,8 @@ class CameraDriver(Protocol):
         Args:
             settings: validated block, an instance of `settings_type`.
             rig: rig; `rig.camera` is the required format of frames.
-            beat: must be called at least every 0.1 s while waiting for a frame, in the thread that requested
-                it; otherwise the guardian assumes that the workbench hangs and switches the lasers off.
+            beat: must be called at least every 0.1 s while waiting for a frame, in the same thread. Without
+                beats the guardian assumes that the workbench hangs and switches the lasers off.
 
         Raises:
             RigNotReadyError: the camera is missing, does not answer, or contradicts the rig file.

@@ -14,8 +14,8 @@ per line with the command's number:
 The first answer, number 0 without a command, is the device's identity. A second descriptor receives the
 numbers of signals to the workbench, one byte each, written by its C-level signal handler.
 
-The guardian switches all lasers off when the workbench ends in any way, when a signal (SIGTERM, SIGHUP) ends
-it, and when no beat has come for `hang_s` while a laser was on. The device's clock enforces the last rule: it
+The guardian switches all lasers off when the workbench ends in any way or gets SIGTERM or SIGHUP. It also
+does so when no beat has come for `hang_s` while a laser was on. The device's clock enforces the last rule: it
 never gets a lease longer than `hang_s`, and each beat renews the lease. For a device without leases, such as
 a digital output board, the guardian's clock enforces it.
 """

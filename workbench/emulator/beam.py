@@ -24,9 +24,9 @@ class Beam:
     def irradiance(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Power per area of the surface (W / mm^2) at points (n, 3) with unit front normals (n, 3).
 
-        The profile is a Gaussian with 1/e^2 diameter exit + divergence x path, and 2 P / (pi w^2) on its
-        axis, so that its integral over any cross-section is P. It is multiplied by the cosine of incidence,
-        which is 0 on the rear side. The irradiance behind the origin of the beam is 0.
+        The profile is a Gaussian with 1/e^2 diameter exit + divergence x path. On the axis it is
+        2 P / (pi w^2), so that the integral over a cross-section is P. It is multiplied by the cosine of
+        incidence, which is 0 on the rear side. The irradiance behind the origin of the beam is 0.
         """
         to_point = points - self.origin
         path = to_point @ self._axis

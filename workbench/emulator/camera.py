@@ -39,9 +39,9 @@ MICRO = 1e-6
 class EmulatedCamera:
     """Camera of the virtual bench.
 
-    `exposure_s` (None: metered at every placement) and `gain` may be set at any time and apply from the next
-    frame on; `set_exposure` sets the exposure in microseconds, unless the rig file fixes it. `discard_frames`
-    is the assumed latency: the number of frames that `grab` discards.
+    `exposure_s` (None: metered at every placement) and `gain` may be set at any time. They apply from the
+    next frame on. `set_exposure` sets the exposure in microseconds, unless the rig file fixes it.
+    `discard_frames` is the assumed latency: the number of frames that `grab` discards.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class EmulatedCamera:
         return self._metered[2]
 
     def close(self) -> None:
-        """Do nothing: there is no device to release."""
+        """Return at once: there is no device to release."""
 
     def _metered_for(self, spots: Sequence[SpotImage]) -> float:
         spec = self._spec.camera

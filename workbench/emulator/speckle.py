@@ -22,9 +22,10 @@ def speckle_field(
     """Relative intensity of a speckle pattern at intervals of `step_px`: mean 1, sd `contrast`.
 
     A circular pupil of diameter 1 / (lambda N) in spatial frequency passes random, independent amplitudes.
-    The squared modulus of their transform has the negative exponential statistics of fully developed speckle
-    and grains of area (4 / pi) (lambda N)^2 (J. W. Goodman, Speckle Phenomena in Optics, 2007, sections 3.2
-    and 4.4). A contrast below 1 models a depolarising surface.
+    The squared modulus of their transform has the negative exponential statistics of fully developed speckle,
+    and grains of area (4 / pi) (lambda N)^2. A contrast below 1 models a depolarising surface.
+
+    Source: J. W. Goodman, Speckle Phenomena in Optics, 2007, sections 3.2 and 4.4.
     """
     frequency_v = np.fft.fftfreq(shape[0], step_px)[:, None]
     frequency_u = np.fft.fftfreq(shape[1], step_px)[None, :]

@@ -1,8 +1,8 @@
 """Image of one beam on one surface, in electrons per second and pixel, without noise.
 
 Radiometry. A surface patch under irradiance E (W/mm^2 of surface) has the radiance L = albedo E / pi in
-every direction (Lambert). A pixel whose lines of sight cover d(x, y) in the plane z = 1, at angle alpha off
-the axis, covers the solid angle cos^3(alpha) d(x, y); the projected area of the pupil is A cos(alpha). The
+every direction (Lambert). Let the lines of sight of a pixel, at angle alpha to the axis, cover d(x, y) in the
+plane z = 1. Their solid angle is cos^3(alpha) d(x, y). The projected area of the pupil is A cos(alpha). The
 pixel therefore receives L A cos^4(alpha) d(x, y). The obliquity of the surface adds no factor: a pixel sees a
 longer patch of a tilted surface, which is foreshortened by the same factor. Integrated over the whole spot
 this is P albedo A cos(alpha) cos(theta) / (pi r^2), with theta between the line of sight and the normal, and

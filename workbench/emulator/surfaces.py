@@ -167,9 +167,9 @@ class PolynomialSurface(Plain):
     def _first_crossing(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """Exact `depth` of each ray.
 
-        All crossings are eigenvalues of a companion matrix, so that none is missed. The unknown is 1/t: the
-        leading coefficient is then the gap at the ray's origin, which does not vanish, and a degree that is
-        lost along a ray of constant x appears as 1/t = 0 instead of a division by zero.
+        All crossings are eigenvalues of a companion matrix, so that none is missed. The unknown is 1/t. Its
+        leading coefficient is the gap at the ray's origin, which does not vanish. A degree that is lost along
+        a ray of constant x appears as 1/t = 0 instead of a division by zero.
         """
         p = self._along(origin, direction)
         degree = p.shape[1] - 1

@@ -32,11 +32,11 @@ class Prompt:
     key: str
     """Name in answers files and in the journal."""
     do: str
-    """What to do."""
+    """Instruction or question."""
     expect: str = ""
-    """What to see afterwards."""
+    """Expected sight afterwards."""
     otherwise: str = ""
-    """What to do if that is not seen."""
+    """Instruction for another sight than the expected one."""
     quantity: Quantity | None = None
     choices: tuple[str, ...] = ()
     yes: str = ""

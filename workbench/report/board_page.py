@@ -82,7 +82,7 @@ def _instructions(board: Board) -> tuple[str, str]:
     return (
         "Print at 100 % (not 'fit to page') and glue flat on a plate of glass or metal. Measure the ruler"
         " below with a steel rule;",
-        f"rig file: bench.print_scale.value = measured / {length} - 1. Laser spots go on the blank band."
+        f"rig file: bench.print_scale.value = measured / {length} - 1. Place the spots on the blank band."
         f" Squares {board.square_mm:g} mm, markers {board.marker_mm:g} mm, {board.dictionary}.",
     )
 

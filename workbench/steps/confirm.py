@@ -19,9 +19,9 @@ class ConfirmStep(StepModel):
     step: Literal["confirm"]
     text: str
     expect: str = ""
-    """What to see afterwards."""
+    """Expected sight afterwards."""
     otherwise: str = ""
-    """What to do if that is not seen."""
+    """Instruction for another sight than the expected one."""
 
     @property
     def default_duration_s(self) -> float:

@@ -27,5 +27,5 @@ class MessageStep(StepModel):
         return self.text
 
     def run(self, context: Context, name: str) -> str:
-        """Do nothing: the terminal shows the title when the step begins."""
+        """Return at once: the terminal shows the title when the step begins."""
         return "shown"

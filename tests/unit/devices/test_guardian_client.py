@@ -28,7 +28,7 @@ def test_commands_are_answered_by_their_number(tmp_path: Path, monkeypatch: pyte
     assert guardian.ask("STATE") == [0, True]
     guardian.close()
     guardian.close()
-    with pytest.raises(ValueError, match="let go"):
+    with pytest.raises(ValueError, match="closed"):
         guardian.send("BEAT")
 
 

@@ -146,8 +146,8 @@ def test_lasers_off_needs_no_other_device(lab: Path) -> None:
 def test_devices_that_are_no_blocks(tmp_path: Path, devices: str) -> None:
     path = write_rig(tmp_path / "rig.yaml", [], "opencv+serial")
     path.write_text(path.read_text().replace("rig: lab\n", f"rig: lab\ndevices: {devices}\n"))
-    with pytest.raises(BadInputError, match=r"rig\.yaml:3: devices"):
-        check_file(path)
+    mistakes = check_file(path).mistakes
+    assert any(mistake.startswith(f"{path}:3: devices") for mistake in mistakes)
 
 
 def test_a_rig_without_devices_can_be_fitted_but_not_run(tmp_path: Path) -> None:

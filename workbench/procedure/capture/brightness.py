@@ -49,8 +49,8 @@ def measure_brightness(
     """Measure the brightest pixel with laser light.
 
     A flickering lamp is as bright in dark frames as in lit ones, or it differs between frames of one kind.
-    The criterion for laser light at a pixel is therefore its minimum over the lit frames, minus its maximum
-    over the dark frames, minus its largest difference between frames of one kind.
+    The criterion for laser light at a pixel is therefore min(lit frames) - max(dark frames) - its largest
+    difference between frames of one kind.
 
     Args:
         on: two frames with the lasers on, (height, width).

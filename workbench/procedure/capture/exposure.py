@@ -5,8 +5,8 @@ by (aim / value) therefore converges to the aim: only the pedestal, some hundred
 wrongly, and the next test pair corrects that. A clipped pixel gives only a bound.
 
 Not every pixel is clipped at full scale. In a colour camera that converts to grey itself, a red spot is
-clipped at 30 % of full scale; a longer exposure gives no higher value, and this value is taken as full scale.
-If the driver reports such a pixel as clipped, the value jumps to full scale; the search then ends below the
+clipped at 30 % of full scale. A longer exposure then gives no higher value, which is taken as full scale. If
+the driver reports such a pixel as clipped, the value jumps to full scale; the search then ends below the
 jump.
 
 If no laser is seen, only room light is visible: it is too dark, or so bright that it hides the lasers.

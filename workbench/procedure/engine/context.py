@@ -169,7 +169,7 @@ class Context:
         self.bench.mark(key)
 
     def ask_now(self, prompt: Prompt) -> Answer:
-        """Answer of the operator, asked anew even in a replay; raises the errors of `ask`."""
+        """Answer of the operator, asked even in a replay; raises the errors of `ask`."""
         self.bench.lasers.all_off()
         answer = self.operator.ask(prompt)
         self.check_stop()

@@ -67,20 +67,20 @@ def check_captures(context: Context, step: str, placement: Placement, limits: Ca
         keys = [c.key for c in context.captures if (c.placement_key, c.laser_id) == (placement.key, laser_id)]
         found = [context.findings[key].spots for key in keys]
         quality = quality_of(found)
-        unseen, answered = quality.u_px is None, False
+        missing, answered = quality.u_px is None, False
         for name, limit in _stated(limits):
             of = f"{placement.key}/{laser_id}"
             why = why_not_measured(name, laser_id, [len(spots) for spots in found])
             failed = _check(context, step, of, name, getattr(quality, name), limit, f"none: {why}")
-            if failed is None or (unseen and answered and limit.on_fail == "ask"):
+            if failed is None or (missing and answered and limit.on_fail == "ask"):
                 continue  # a missing spot fails several limits: ask once
             if limit.on_fail == "retry" and context.recorder.retries(placement.key) < RETRIES:
                 raise RetakeError(failed, by_limit=True)
-            where = _expected_position(context, laser_id, placement) if unseen else ""
+            where = _expected_position(context, laser_id, placement) if missing else ""
             if limit.on_fail != "ask":
-                raise LimitFailedError(f"{failed}. {where}" if unseen else failed)
+                raise LimitFailedError(f"{failed}. {where}" if missing else failed)
             shown = f"{why} at {placement.standoff_mm:g} mm ({name}: expected {limit.describe()})"
-            question = captures_prompt(f"{of}/{name}", shown if unseen else failed, placement, where)
+            question = captures_prompt(f"{of}/{name}", shown if missing else failed, placement, where)
             settle(context, question, failed)
             answered = True
 

@@ -95,7 +95,7 @@ def visit_placements(
 def _work(
     context: Context, work: Callable[[Placement], T], placed: Placement, from_n: int, answer: Answer
 ) -> T:
-    """Do the work at a placement, again if it requests that."""
+    """Call the work at a placement, again if it requests that."""
     while True:
         try:
             return work(placed)

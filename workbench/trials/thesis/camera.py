@@ -2,7 +2,7 @@
 
 The thesis evaluates a spot's intensity at the centre of each pixel. Beyond half a metre its spots are then
 narrower than any lens produces, and their position between two pixels is almost lost. Here the same beams
-pass a lens with a Gaussian point spread and fall on pixels with an area; the flux of a spot decreases with
+pass a lens with a Gaussian point spread and fall on pixels with an area. The flux of a spot decreases with
 the square of the distance. Lens and noise are those of the virtual bench's camera.
 """
 

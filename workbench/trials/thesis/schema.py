@@ -29,8 +29,9 @@ class Claim(FileModel):
 class SimulatedScene(FileModel):
     """Surface at distances from `set_mm[0]` to `set_mm[1]`.
 
-    In front of each line the surface is y(x) = set distance + slope x for an incline, or + the sum of
-    coefficients[k] (x - shift)^(k + 1); x is the position along the front from the line's first laser, mm.
+    In front of each line the surface is y(x) = set distance + slope x for an incline. For coefficients, the
+    second term is the sum of coefficients[k] (x - shift)^(k + 1). The position x along the front counts from
+    the line's first laser, mm.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9-]+$")]

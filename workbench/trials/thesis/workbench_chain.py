@@ -40,7 +40,7 @@ class Chain:
 
     line: LaserLine
     noisy: bool
-    """Whether frames have shot, read and speckle noise; otherwise they are only rounded."""
+    """Whether frames have shot noise, read noise and speckle; otherwise they are only rounded."""
     span_mm: tuple[float, float]
     """Nearest and farthest standoff of the calibration's validity."""
 

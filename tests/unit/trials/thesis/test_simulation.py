@@ -98,7 +98,7 @@ def test_a_simulation_is_the_same_again(rig: Rig) -> None:
         ({"lost": (5,)}, "expected numbers from 1 to 4, got 5"),
         ({"incline_deg": 30.0, "coefficients": (1.0,)}, "incline_deg or coefficients, got both"),
         ({"set_mm": (500.0, 100.0)}, "nearest < farthest"),
-        ({"lines": ("vertical", "vertical")}, "each once"),
+        ({"lines": ("vertical", "vertical")}, "lines: "),
     ],
 )
 def test_scenes_that_make_no_sense(rig: Rig, changes: dict[str, object], message: str) -> None:
