@@ -47,9 +47,11 @@ def residuals_of(batch: BatchFit, rig: Rig, position: FloatArray, sd: FloatArray
     def residuals(y: FloatArray) -> FloatArray:
         values = mean.astype(y.dtype)
         values[free] += prior_sd[free] * y
-        f, cx, cy, k1, k2, p1, p2, k3, offset, scale = values[:common]
+        f, cx, cy, k1, k2, p1, p2, k3, offset, scale, common_x, common_y, _, _ = values[:common]
         x, y0, tx, ty = values[common:sensor].reshape(lasers, 4).T
         error, slope_x, slope_y = values[sensor:].reshape(-1, 3, 1).swapaxes(0, 1)
+        slope_x = (slope_x + common_x) / (1.0 - slope_x * common_x)
+        slope_y = (slope_y + common_y) / (1.0 - slope_y * common_y)
         z0 = STANDOFFS_MM[:, None] * (1.0 + scale) + error + offset
         w = (1.0 - slope_x * tx - slope_y * ty) / (z0 + slope_x * x + slope_y * y0)
         u, v = tx + x * w, ty + y0 * w

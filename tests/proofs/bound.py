@@ -26,7 +26,8 @@ def parameter_covariance(rig: Rig, standoffs_mm: FloatArray, data: Calibrations)
 
     def seen(truth: FloatArray, errors: FloatArray) -> FloatArray:
         z0 = simulate.depths(rig, truth, standoffs_mm, errors[..., 0])
-        return simulate.spots(rig, truth, z0, errors[..., 1:]) / data.sd_px
+        slopes = simulate.tilted(rig, truth, errors[..., 1:])
+        return simulate.spots(rig, truth, z0, slopes) / data.sd_px
 
     def difference(sensor_step: FloatArray, error_step: FloatArray) -> FloatArray:
         ahead = seen(data.truth + STEP_SD * sensor_step, data.errors + STEP_SD * error_step)

@@ -188,7 +188,7 @@ def _ranged(sensor: CalibratedSensor, seen: FloatArray) -> tuple[FloatArray, Flo
 def _truth(rig: Rig, path: Path) -> FloatArray:
     """(S,) in the order of `simulate.names`."""
     told = YAML(typ="safe").load(path)
-    common = [float(told[name]) for name in (*simulate.LENSES[rig.camera.lens], *simulate.BENCH)]
+    common = [float(told.get(name, 0.0)) for name in (*simulate.LENSES[rig.camera.lens], *simulate.BENCH)]
     rays = [float(told["lasers"][laser][name]) for laser in rig.laser_ids for name in simulate.RAY]
     return np.array([*common, *rays])
 

@@ -18,7 +18,7 @@ LENSES: dict[str, tuple[str, ...]] = {
     "plumb_bob": ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"),
     "equidistant": ("f_px", "cx_px", "cy_px", "k1", "k2", "k3", "k4"),
 }
-BENCH = ("offset_mm", "ruler_scale")
+BENCH = ("offset_mm", "ruler_scale", "target_slope_x", "target_slope_y", "drift_u_px", "drift_v_px")
 RAY = ("x_mm", "y_mm", "tx", "ty")
 
 
@@ -97,6 +97,13 @@ def depths(
     return standoff_mm * (1.0 + scale[:, None]) + offset[:, None] + error_mm
 
 
+def tilted(rig: Rig, sensors: FloatArray, slopes: FloatArray) -> FloatArray:
+    """(N, J, 2) slopes of the target, by those of each placement and the tilt that all share."""
+    start = lens_size(rig) + BENCH.index("target_slope_x")
+    common = np.arctan(sensors[:, None, start : start + 2])
+    return np.asarray(np.tan(np.arctan(slopes) + common))
+
+
 def in_frame(rig: Rig, position_px: FloatArray) -> BoolArray:
     """(...) whether positions (..., 2) lie between the centres of the outermost pixels."""
     size = np.array([rig.camera.width_px, rig.camera.height_px])
@@ -110,7 +117,7 @@ def calibrations(
     truth = draw_truths(rig, n, rng)
     error = rng.normal(0.0, rig.bench.placement_sd_mm, (n, len(standoffs_mm)))
     slopes = np.tan(np.radians(rng.normal(0.0, rig.bench.tilt_sd_deg, (*error.shape, 2))))
-    centre = spots(rig, truth, depths(rig, truth, standoffs_mm, error), slopes)
+    centre = spots(rig, truth, depths(rig, truth, standoffs_mm, error), tilted(rig, truth, slopes))
     centre = centre + rng.normal(0.0, rig.noise.speckle_sd_px, centre.shape)
     single = centre[..., None, :] + rng.normal(0.0, rig.noise.spot_sd_px, (*centre.shape[:-1], repeats, 2))
     seen = in_frame(rig, single)

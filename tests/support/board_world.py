@@ -63,7 +63,8 @@ class BoardWorld:
         rig, values, rng = self.world.rig, self.world.values, self.rng
         sd = TILTED_SD_MM if yaw or pitch else rig.bench.placement_sd_mm
         told_sd = sd if yaw or pitch else float("nan")
-        slopes = np.tan(np.radians(np.array([yaw, pitch]) + rng.normal(0.0, rig.bench.tilt_sd_deg, 2)))
+        turn = np.radians(np.array([yaw, pitch]) + rng.normal(0.0, rig.bench.tilt_sd_deg, 2))
+        slopes = np.tan(turn + self.world.common_tilt)
         z0 = standoff * (1 + values["ruler_scale"]) + rng.normal(0.0, sd) + values["offset_mm"]
         stood = Stood(float(z0), *map(float, slopes))
         corners = self._corners(stood)

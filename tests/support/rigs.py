@@ -123,6 +123,9 @@ class World:
             self.values[name] = draw(rng, spread)
         self.values["offset_mm"] = draw(rng, self.rig.bench.offset_mm)
         self.values["ruler_scale"] = draw(rng, self.rig.bench.ruler_scale)
+        of_bench = np.random.default_rng([self.seed, 3])
+        for name in ("target_slope_x", "target_slope_y", "drift_u_px", "drift_v_px"):
+            self.values[name] = draw(of_bench, getattr(self.rig.bench, name))
         for laser in self.rig.lasers:
             for name in ("x_mm", "y_mm", "tx", "ty"):
                 self.values[f"{laser.id}.{name}"] = draw(rng, getattr(laser, name))
@@ -133,6 +136,11 @@ class World:
         system = np.array([[1, 0, -tx], [0, 1, -ty], [-np.tan(yaw), -np.tan(pitch), 1.0]])
         point = np.linalg.solve(system, [x, y, z0_mm])
         return np.asarray(self.pixels(point[None])[0])
+
+    @property
+    def common_tilt(self) -> FloatArray:
+        """(2,) yaw and pitch of the target at every placement, radians."""
+        return np.arctan([self.values["target_slope_x"], self.values["target_slope_y"]])
 
     def pixels(self, points_mm: FloatArray) -> FloatArray:
         """(n, 2) where points (n, 3) in the camera frame appear, by OpenCV's lens."""
@@ -148,7 +156,7 @@ class World:
         found = []
         for standoff in standoffs_mm:
             error = rng.normal(0.0, bench.placement_sd_mm)
-            yaw, pitch = np.radians(rng.normal(0.0, bench.tilt_sd_deg, 2))
+            yaw, pitch = np.radians(rng.normal(0.0, bench.tilt_sd_deg, 2)) + self.common_tilt
             z0 = standoff * (1 + self.values["ruler_scale"]) + error + self.values["offset_mm"]
             for laser in self.rig.lasers:
                 centre = self.pixel(laser.id, z0, yaw, pitch) + rng.normal(0, noise.speckle_sd_px, 2)

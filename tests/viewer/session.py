@@ -201,7 +201,7 @@ def a_fit() -> ev.FitFinished:
         residuals=tuple(_residuals()),
         rms_px=0.061,
         observations=64,
-        rejected=(ev.RejectedRecord(source="frames/a-on.png", reason="L3 at 125 mm: no spot"),),
+        rejected=(ev.Rejected(source="frames/a-on.png", reason="L3 at 125 mm: no spot"),),
         verdict="accepted",
         reasons=("range uncertainty stays below 1 % up to 2 m",),
         warnings=("f_px is determined by the prior: the data know only its product with the baselines",),
@@ -211,7 +211,7 @@ def a_fit() -> ev.FitFinished:
             ),
         ),
         left_out=(
-            ev.LeftOutRecord(
+            ev.CrossValidatedPlacement(
                 placement="P2",
                 standoff_mm=BAD[1],
                 error_mm=2.5,

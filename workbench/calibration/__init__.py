@@ -1,1 +1,1 @@
-"""Parameters, priors, fit, covariance and what the data cannot determine."""
+"""Calibration: parameters and priors, fit, covariance, null directions, checks."""

@@ -13,13 +13,13 @@ from typing import Any
 from rich.console import Console
 
 from workbench.calibration.data.boards import BoardView
-from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.data.observations import Observation
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict.assessment import Assessment, derive
 from workbench.calibration.verdict.export import accept_with_reason, calibrate, write_calibration
-from workbench.calibration.verdict.records import left_out_records, parameter_records
+from workbench.calibration.verdict.records import parameter_records
 from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.invocation import command_line
 from workbench.model.acceptance import Acceptance
@@ -32,6 +32,7 @@ from workbench.model.captures import (
     read_captures_file,
 )
 from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.model.fit_event import Rejected
 from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
 from workbench.model.nested import fix_parameters
 from workbench.model.rig import Rig, load_rig
@@ -177,7 +178,7 @@ def _as_json(fitted: CalibrationFit, assessment: Assessment) -> dict[str, Any]:
         "verdict": assessment.verdict,
         "reasons": list(assessment.reasons),
         "faults": [fault.model_dump() for fault in assessment.faults],
-        "left_out": [record.model_dump() for record in left_out_records(assessment)],
+        "left_out": [placement.model_dump() for placement in assessment.cross_validation],
         "residual_tests": [test.model_dump() for test in assessment.residual_tests],
         "terms": [term.model_dump() for term in fitted.terms],
     }
@@ -216,8 +217,8 @@ def _print_tables(fitted: CalibrationFit, assessment: Assessment) -> None:
     if fitted.boards:
         count, views = len(fitted.corner_residual_px), len(fitted.boards)
         console.print(f"board: {fitted.corner_rms_px:.3f} px over {count} corners in {views} views")
-    if assessment.left_out:
-        console.print(TerminalTable(cross_validation_table(left_out_records(assessment))))
+    if assessment.cross_validation:
+        console.print(TerminalTable(cross_validation_table(assessment.cross_validation)))
     for line in rejected_lines(fitted.rejected):
         console.print(f"rejected: {line}", highlight=False)
     for warning in assessment.warnings:

@@ -24,8 +24,8 @@ class Beam:
     def irradiance(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Power per area of the surface (W / mm^2) at points (n, 3) with unit front normals (n, 3).
 
-        The profile is a Gaussian with 1/e^2 diameter exit + divergence x path. On the axis it is
-        2 P / (pi w^2), so that the integral over a cross-section is P. It is multiplied by the cosine of
+        The profile is a Gaussian with 1/e^2 diameter exit + divergence x path. It is
+        normalised by 2 P / (pi w^2) on the axis: its integral over a cross-section is P. It is multiplied by the cosine of
         incidence, which is 0 on the rear side. The irradiance behind the origin of the beam is 0.
         """
         to_point = points - self.origin

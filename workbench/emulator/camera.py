@@ -11,6 +11,7 @@ import numpy as np
 
 from workbench.devices.protocols import Frame
 from workbench.emulator.keyed import generator
+from workbench.emulator.lens import Drift
 from workbench.emulator.scene import BenchScene
 from workbench.emulator.sensor import ImageSensor
 from workbench.emulator.spec import EmulatorSpec
@@ -129,14 +130,22 @@ class EmulatedCamera:
         return self._queue.popleft()
 
     def _expose(self, lit: tuple[str, ...]) -> Exposure:
-        warm = self._spec.warm_up
-        f_scale = 1 + warm.f_relative * float(np.exp(-self._frames / warm.time_constant_frames))
-        spots = tuple(spot for name in lit for spot in self._scene.spots(name, f_scale))
-        picture = self._scene.picture(f_scale)
+        drift = self._drift()
+        spots = tuple(spot for name in lit for spot in self._scene.spots(name, drift))
+        picture = self._scene.picture(drift)
         exposure = Exposure(spots, picture, bool(lit), self._key, self._number, self._exposure_s(), self.gain)
         self._frames += 1
         self._number += 1
         return exposure
+
+    def _drift(self) -> Drift:
+        """State of the camera at the next frame."""
+        warm, steady = self._spec.warm_up, self._spec.drift
+        return Drift(
+            f_scale=1 + warm.f_relative * float(np.exp(-self._frames / warm.time_constant_frames)),
+            u_px=steady.u_px_per_frame * self._frames,
+            v_px=steady.v_px_per_frame * self._frames,
+        )
 
     def _develop(self, exposure: Exposure) -> Frame:
         rng = generator(self._spec.seed, "frame", exposure.key, exposure.number)

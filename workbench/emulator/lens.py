@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -34,12 +34,24 @@ class LinesOfSight:
     area: FloatArray
 
 
+class Drift(NamedTuple):
+    """State of the camera at one frame against its truth."""
+
+    f_scale: float = 1.0
+    u_px: float = 0.0
+    v_px: float = 0.0
+    """Shift of the image."""
+
+
+STEADY = Drift()
+
+
 class Lens:
     """Lens in OpenCV's camera frame; the centre of the top-left pixel is (0, 0)."""
 
-    def __init__(self, truth: Truth, f_scale: float = 1.0) -> None:
-        f = truth.f_px * f_scale
-        self._matrix = np.array([[f, 0, truth.cx_px], [0, f, truth.cy_px], [0, 0, 1]])
+    def __init__(self, truth: Truth, drift: Drift = STEADY) -> None:
+        f, cx, cy = truth.f_px * drift.f_scale, truth.cx_px + drift.u_px, truth.cy_px + drift.v_px
+        self._matrix = np.array([[f, 0, cx], [0, f, cy], [0, 0, 1]])
         self._coefficients = {name: getattr(truth, name) for name in COEFFICIENTS[truth.lens]}
         self._forward = FORWARD[truth.lens]
 

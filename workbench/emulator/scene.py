@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
 from workbench.emulator.beam import Beam
 from workbench.emulator.board import BoardSurface, Print, stand
-from workbench.emulator.lens import Lens
+from workbench.emulator.lens import STEADY, Drift, Lens
 from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
 from workbench.emulator.spot import ImageFormat, SpotImage, SpotPainter
 from workbench.emulator.surfaces import (
@@ -37,8 +38,8 @@ from workbench.model.target import (
     TargetShape,
 )
 
-F_STEP = 4e-6
-"""Relative drift of the focal length after which spots are painted again (1e-3 px at the edge)."""
+DRIFT_STEP = Drift(f_scale=4e-6, u_px=1e-3, v_px=1e-3)
+"""Drift of the camera after which spots are painted again: 1e-3 px at the edge of the image."""
 
 
 class BenchScene:
@@ -51,7 +52,7 @@ class BenchScene:
         self._beams = {name: Beam(ray, spec.beam) for name, ray in truth.lasers.items()}
         self._surfaces: list[tuple[Surface, float]] = []
         self._key = ""
-        self._f_step = 0
+        self._drift = STEADY
         self._spots: dict[str, list[SpotImage]] = {}
         self._picture: Float32Array | None = None
         self.moves = 0
@@ -68,7 +69,12 @@ class BenchScene:
         Raises:
             BadInputError: a flat target or the board is turned by 90 degrees or more.
         """
-        error = draw_placement_error(self._rig, self._spec, placement.key)
+        own = draw_placement_error(self._rig, self._spec, placement.key)
+        error = replace(
+            own,
+            yaw_deg=own.yaw_deg + self._truth.target_yaw_deg,
+            pitch_deg=own.pitch_deg + self._truth.target_pitch_deg,
+        )
         z_mm = placement.standoff_mm * (1 + self._truth.ruler_scale) + error.error_mm + self._truth.offset_mm
         if isinstance(placement.target, BoardTarget):
             self._put_board(placement.target, z_mm, error, placement.key)
@@ -80,30 +86,35 @@ class BenchScene:
         self.moves += 1
         return placement
 
-    def spots(self, laser_id: str, f_scale: float = 1.0) -> list[SpotImage]:
-        """Spots of one laser (two on a mirror-like target), with the focal length scaled by `f_scale`."""
-        self._drift_to(f_scale)
+    def spots(self, laser_id: str, drift: Drift = STEADY) -> list[SpotImage]:
+        """Spots of one laser (two on a mirror-like target), with the camera's drift."""
+        self._drift_to(drift)
         if laser_id not in self._spots:
             self._spots[laser_id] = self._paint(laser_id)
         return self._spots[laser_id]
 
-    def picture(self, f_scale: float = 1.0) -> Float32Array | None:
-        """Board in room light (height, width), focal length scaled by `f_scale`; None for other targets."""
+    def picture(self, drift: Drift = STEADY) -> Float32Array | None:
+        """Board in room light (height, width), with the camera's drift; None for other targets."""
         board = self._surfaces[0][0] if self._surfaces else None
         if not isinstance(board, BoardSurface):
             return None
-        self._drift_to(f_scale)
+        self._drift_to(drift)
         if self._picture is None:
             self._picture = board.lit_by_room(self._lens(), self._image, self._spec.lens.blur_px)
         return self._picture
 
-    def _drift_to(self, f_scale: float) -> None:
-        f_step = round((f_scale - 1) / F_STEP)
-        if f_step != self._f_step:
-            self._f_step, self._spots, self._picture = f_step, {}, None
+    def _drift_to(self, drift: Drift) -> None:
+        stepped = Drift(
+            *(
+                still + step * round((now - still) / step)
+                for now, still, step in zip(drift, STEADY, DRIFT_STEP, strict=True)
+            )
+        )
+        if stepped != self._drift:
+            self._drift, self._spots, self._picture = stepped, {}, None
 
     def _lens(self) -> Lens:
-        return Lens(self._truth, 1 + self._f_step * F_STEP)
+        return Lens(self._truth, self._drift)
 
     @cached_property
     def _print(self) -> Print:

@@ -101,6 +101,13 @@ class WarmUpSpec(FileModel):
     time_constant_frames: PositiveFloat = 2000.0
 
 
+class DriftSpec(FileModel):
+    """Steady shift of the image, as of a mount that creeps. Counts frames since the bench was opened."""
+
+    u_px_per_frame: float = 0.0
+    v_px_per_frame: float = 0.0
+
+
 class SurfaceSpec(FileModel):
     """Surface finishes of targets."""
 
@@ -147,6 +154,8 @@ class TruthSpec(FileModel):
     k4: float | None = None
     offset_mm: float | None = None
     ruler_scale: float | None = None
+    target_yaw_deg: float | None = None
+    target_pitch_deg: float | None = None
     print_scale: float | None = None
     bow_x_mm: float | None = None
     bow_y_mm: float | None = None
@@ -172,6 +181,7 @@ class EmulatorSpec(FileModel):
     ambient: AmbientSpec = AmbientSpec()
     camera: StreamSpec = StreamSpec()
     warm_up: WarmUpSpec = WarmUpSpec()
+    drift: DriftSpec = DriftSpec()
     surface: SurfaceSpec = SurfaceSpec()
     truth: TruthSpec = TruthSpec()
     controller: ControllerSpec = ControllerSpec()

@@ -78,6 +78,9 @@ class Truth:
     lasers: dict[str, TrueRay]
     lens: LensName = "plumb_bob"
     k4: float = 0.0
+    target_yaw_deg: float = 0.0
+    """This and the next: tilt of a flat target at every placement."""
+    target_pitch_deg: float = 0.0
     print_scale: float = 0.0
     bow_x_mm: float = 0.0
     """First of three coefficients of the sag of the board's paper, see `workbench.model.board.sag_mm`."""
@@ -106,6 +109,8 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
         lens=camera.lens,
         offset_mm=_value(spec.seed, "offset_mm", rig.bench.offset_mm, pins),
         ruler_scale=_value(spec.seed, "ruler_scale", rig.bench.ruler_scale, pins),
+        target_yaw_deg=_value(spec.seed, "target_yaw_deg", _tilt(rig, rig.bench.target_yaw_deg), pins),
+        target_pitch_deg=_value(spec.seed, "target_pitch_deg", _tilt(rig, rig.bench.target_pitch_deg), pins),
         print_scale=_value(spec.seed, "print_scale", rig.bench.print_scale, pins),
         **{name: _value(spec.seed, name, bow, pins) for name in BOW},
         lasers={
@@ -127,7 +132,7 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
 
 
 def draw_placement_error(rig: Rig, spec: EmulatorSpec, key: str) -> PlacementError:
-    """Errors of the placement `key`, equal whenever the same key is placed again."""
+    """Errors of the placement `key` itself, equal whenever the same key is placed again."""
     rng = generator(spec.seed, "placement", key)
     error, yaw, pitch = rng.standard_normal(3)
     pins = spec.truth.placements.get(key, PlacementTruth())
@@ -231,6 +236,10 @@ def _reaches_corner(name: LensName, lens: dict[str, float], corner: float) -> bo
     height = a * (1 + sum(k * a**n for n, k in powers))
     climbing = np.logical_and.accumulate(slope >= 0.3)
     return bool(np.any(climbing & (height >= corner)))
+
+
+def _tilt(rig: Rig, measured_deg: float) -> Prior:
+    return Prior(value=measured_deg, sd=rig.bench.target_tilt_sd_deg)
 
 
 def _value(seed: int, name: str, prior: Prior, pins: FileModel, *owner: str) -> float:

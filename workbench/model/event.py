@@ -13,12 +13,12 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from workbench.model.exposure import Verdict as BrightnessVerdict
+from workbench.model.fit_event import CrossValidatedPlacement as CrossValidatedPlacement
 from workbench.model.fit_event import Fault as Fault
 from workbench.model.fit_event import FitFinished as FitFinished
 from workbench.model.fit_event import LaserError as LaserError
-from workbench.model.fit_event import LeftOutRecord as LeftOutRecord
 from workbench.model.fit_event import ParameterRecord as ParameterRecord
-from workbench.model.fit_event import RejectedRecord as RejectedRecord
+from workbench.model.fit_event import Rejected as Rejected
 from workbench.model.fit_event import ResidualRecord as ResidualRecord
 from workbench.model.fit_event import ResidualTest as ResidualTest
 from workbench.model.legacy_events import upgraded

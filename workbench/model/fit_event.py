@@ -1,10 +1,12 @@
-"""What a fit says of itself: parameters, residuals, cross-validation, faults, verdict."""
+"""Result of a fit as an event: parameters, residuals, cross-validation, faults, verdict."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 from workbench.model.calibration import TermSummary
+from workbench.model.stats import chi2_sf, f_sf, norm_cdf, t_cdf
 from workbench.model.yamlfile import FileModel
 
 
@@ -32,8 +34,9 @@ class ResidualRecord(FileModel):
     v_sd_px: float | None
 
 
-class RejectedRecord(FileModel):
-    """A capture or row that a fit left out."""
+@dataclass(frozen=True)
+class Rejected:
+    """A capture or row that the fit does not use."""
 
     source: str
     """`row 3` of a captures file, or the path of a frame."""
@@ -41,9 +44,9 @@ class RejectedRecord(FileModel):
 
 
 class LaserError(FileModel):
-    """Range by one laser's spot at a placement left out, minus the standoff.
+    """Range by one laser's spot, by the fit without the placement, minus the standoff.
 
-    The standard deviation is that of the fit without the placement, the placement itself, and the spot.
+    The standard deviation covers the fit without the placement, the placement itself, and the spot.
     """
 
     laser_id: str
@@ -51,28 +54,55 @@ class LaserError(FileModel):
     sd_mm: float
 
 
-class LeftOutRecord(FileModel):
-    """What the fit without one placement says of it; 1 sigma as promised."""
+class CrossValidatedPlacement(FileModel):
+    """Placement ranged by the fit without it; 1 sigma as that fit predicts it."""
 
     placement: str
     standoff_mm: float
     error_mm: float
-    """Range by all its spots - standoff."""
+    """Range by all spots of the placement - standoff."""
     sd_mm: float
     lasers: tuple[LaserError, ...]
-    alarm: bool
-    """Farther off than promised; one sound fit in 1000 has any."""
+    """Empty on the printed board: its tilt is known from its corners alone, a single spot's range is not."""
+    alarm: bool = False
+    """Error larger than the predicted uncertainty explains; 1 of 1000 sound fits has any alarm."""
+    chi2: float = 0.0
+    """Squared distance of all spots from their prediction, by its covariance."""
+    coordinates: int = 0
+    """Degrees of freedom of `chi2`; 0 in sessions of versions that did not record it."""
+    freedom: float | None = None
+    """Degrees of freedom of the noise, estimated from the other placements; None: the noise is as stated."""
+
+    @property
+    def z(self) -> float:
+        """Range error in predicted standard deviations."""
+        return self.error_mm / self.sd_mm
+
+    @property
+    def range_p(self) -> float:
+        """Two-sided p value of the range error: normal, or Student's t where the noise is estimated."""
+        tail = norm_cdf(-abs(self.z)) if self.freedom is None else t_cdf(-abs(self.z), self.freedom)
+        return float(2 * tail)
+
+    @property
+    def spots_p(self) -> float:
+        """P value of `chi2`: chi-square, or Fisher's F where the noise is estimated; 1 where not recorded."""
+        if not self.coordinates:
+            return 1.0
+        if self.freedom is None:
+            return float(chi2_sf(self.chi2, self.coordinates))
+        return float(f_sf(self.chi2 / self.coordinates, self.coordinates, self.freedom))
 
 
 class Fault(FileModel):
-    """Something wrong with a fit's data, by name; docs/validation.md lists the names."""
+    """Named cause of wrong data; docs/validation.md lists the names."""
 
     name: str
     message: str
 
 
 class ResidualTest(FileModel):
-    """A test of a fit's residuals, and the chance of a value as far out if nothing is wrong."""
+    """Test of a fit's residuals, with the p value of its statistic under the stated noise."""
 
     name: str
     p: float
@@ -86,12 +116,12 @@ class FitFinished(FileModel):
     residuals: tuple[ResidualRecord, ...]
     rms_px: float
     observations: int
-    rejected: tuple[RejectedRecord, ...]
+    rejected: tuple[Rejected, ...]
     verdict: Literal["accepted", "refused"]
     reasons: tuple[str, ...]
     warnings: tuple[str, ...]
     terms: tuple[TermSummary, ...] = ()
-    left_out: tuple[LeftOutRecord, ...] = ()
-    """Cross-validation, a placement each."""
+    left_out: tuple[CrossValidatedPlacement, ...] = ()
+    """Cross-validation, one entry for each placement."""
     faults: tuple[Fault, ...] = ()
     residual_tests: tuple[ResidualTest, ...] = ()

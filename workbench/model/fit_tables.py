@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from workbench.model.calibration import TERM_VERDICTS, TermSummary
-from workbench.model.fit_event import FitFinished, LeftOutRecord, ParameterRecord
+from workbench.model.fit_event import CrossValidatedPlacement, FitFinished, ParameterRecord
 from workbench.model.table import Column, Table
 
-DETERMINED_BY = "joint: the data tie the parameter to others, whose priors do the rest"
+DETERMINED_BY = "joint: by the data together with the priors of other parameters"
 
 
 def parameter_table(parameters: Sequence[ParameterRecord]) -> Table:
@@ -36,7 +36,7 @@ def parameter_table(parameters: Sequence[ParameterRecord]) -> Table:
     )
 
 
-def cross_validation_table(placements: Sequence[LeftOutRecord]) -> Table:
+def cross_validation_table(placements: Sequence[CrossValidatedPlacement]) -> Table:
     """Error of each placement, ranged by the fit without it, against its stated uncertainty."""
     ids = list(dict.fromkeys(laser.laser_id for one in placements for laser in one.lasers))
     return Table(
@@ -53,15 +53,14 @@ def cross_validation_table(placements: Sequence[LeftOutRecord]) -> Table:
         rows=tuple(_placement_row(one, ids) for one in placements),
         caption=(
             "error: range - standoff; u: 1 sigma; %: relative error of each laser alone;"
-            " !: farther off than u explains"
+            " !: error larger than u explains"
         ),
     )
 
 
-def _placement_row(one: LeftOutRecord, ids: Sequence[str]) -> tuple[float | bool | None, ...]:
+def _placement_row(one: CrossValidatedPlacement, ids: Sequence[str]) -> tuple[float | bool | None, ...]:
     relative = {laser.laser_id: laser.error_mm / one.standoff_mm for laser in one.lasers}
-    normalised = one.error_mm / one.sd_mm
-    return (one.standoff_mm, one.error_mm, one.sd_mm, normalised, one.alarm, *(relative.get(i) for i in ids))
+    return (one.standoff_mm, one.error_mm, one.sd_mm, one.z, one.alarm, *(relative.get(i) for i in ids))
 
 
 def term_table(terms: Sequence[TermSummary]) -> Table:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import radians, tan
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -49,6 +50,16 @@ class Prior(FileModel):
 def exactly(value: float) -> Prior:
     """Prior of a constant."""
     return Prior(value=value, sd=0.0)
+
+
+TiltAngle = Annotated[float, Field(ge=-60, le=60)]
+TiltSd = Annotated[float, Field(ge=0, le=45)]
+
+
+def _slope(angle_deg: float, sd_deg: float) -> Prior:
+    """Prior of the tangent of an angle: d tan(a) = (1 + tan^2 a) da."""
+    slope = tan(radians(angle_deg))
+    return Prior(value=slope, sd=radians(sd_deg) * (1.0 + slope**2))
 
 
 class CameraSpec(FileModel):
@@ -126,12 +137,33 @@ class BenchSpec(FileModel):
     placement_sd_mm: NonNegativeFloat = 0.0
     tilt_sd_deg: NonNegativeFloat = 0.0
     """Tilt of a flat target about each of its two axes, independent at every placement."""
+    target_yaw_deg: TiltAngle = 0.0
+    """Tilt about the vertical common to all placements, as measured: the rail or the target's mount is not
+    square to the optical axis. Positive: the target's right side is farther away."""
+    target_pitch_deg: TiltAngle = 0.0
+    """Common tilt about the horizontal. Positive: the target's lower side is farther away."""
+    target_tilt_sd_deg: TiltSd = 0.5
+    """Standard uncertainty of the common tilt about each of the two axes."""
+    drift_u_px: Prior = exactly(0.0)
+    """Shift of the image from the first capture to the last, linear in the order of the captures. With sd 0
+    it is fixed at its value; the fit frees it if the data show a drift."""
+    drift_v_px: Prior = exactly(0.0)
     reach_mm: tuple[PositiveFloat, PositiveFloat] = (100.0, 5000.0)
     """Nearest and farthest standoff at which the target can be placed without saturated spots."""
     print_scale: Prior = Prior(value=0.0, sd=0.002)
     """Relative error of the printed board: true length = nominal length x (1 + print_scale)."""
     board_flatness_sd_mm: Annotated[float, Field(ge=0, le=LARGEST)] = 0.1
     """Deviation of the board's paper from its plane at 100 mm from its centre."""
+
+    @property
+    def target_slope_x(self) -> Prior:
+        """Common tilt about the vertical as a slope."""
+        return _slope(self.target_yaw_deg, self.target_tilt_sd_deg)
+
+    @property
+    def target_slope_y(self) -> Prior:
+        """Common tilt about the horizontal as a slope."""
+        return _slope(self.target_pitch_deg, self.target_tilt_sd_deg)
 
     @field_validator("reach_mm")
     @classmethod

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from workbench.calibration.data.averaging import scatter_chi2, strays, weighted_mean
-from workbench.calibration.estimation.noise_scale import scale_called_for
+from workbench.calibration.data.averaging import outliers, scatter_chi2, weighted_mean
+from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.model.arrays import FloatArray
 from workbench.model.captures import ALL_LASERS, CaptureRow
 from workbench.model.errors import BadInputError
@@ -85,8 +85,8 @@ def _mean_position(ranger: Ranger, rows: Sequence[CaptureRow]) -> tuple[FloatArr
     position = np.array([(u, v) for u, v, _, _ in found])
     stated = np.array([(u_sd, v_sd) for _, _, u_sd, v_sd in found])
     sd = np.where(np.isfinite(stated), stated, ranger.calibration.laser_ranger.noise.spot_sd_px)
-    kept = ~strays(position, sd)
-    scale = float(scale_called_for(*scatter_chi2(position[kept], sd[kept])))
+    kept = ~outliers(position, sd)
+    scale = float(significant_scale(*scatter_chi2(position[kept], sd[kept])))
     return weighted_mean(position[kept], scale * sd[kept])
 
 

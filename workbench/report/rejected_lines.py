@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # rendering needs none of the calibration code
-    from workbench.calibration.data.observations import Rejected
-    from workbench.model.fit_event import RejectedRecord
+if TYPE_CHECKING:  # imported for annotations only: the command starts faster
+    from workbench.model.fit_event import Rejected
 
 
-def rejected_lines(rejected: Iterable[Rejected | RejectedRecord]) -> list[str]:
+def rejected_lines(rejected: Iterable[Rejected]) -> list[str]:
     """Lines such as `row 3 and 2 more: no spot`, in the order in which the reasons occur."""
     sources: dict[str, list[str]] = {}
     for r in rejected:

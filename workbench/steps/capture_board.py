@@ -68,7 +68,8 @@ class CaptureBoardStep(StepModel):
     def run(self, context: Context, name: str) -> str:
         """Capture at every placement; raises the errors of `visit_placements`."""
         from workbench.calibration.data.boards import BoardView, see_board
-        from workbench.calibration.data.observations import PlacementInfo, Rejected
+        from workbench.calibration.data.observations import PlacementInfo
+        from workbench.model.fit_event import Rejected
 
         def work(placement: Placement) -> None:
             frames = [

@@ -35,10 +35,11 @@ class FitStep(StepModel):
             LimitFailedError: the calibration is refused.
         """
         from workbench.calibration.data.boards import BoardView, on_boards
-        from workbench.calibration.data.observations import Observation, Rejected
+        from workbench.calibration.data.observations import Observation
         from workbench.calibration.selection.model_terms import fit_calibration
         from workbench.calibration.verdict.export import calibrate
         from workbench.calibration.verdict.records import fit_finished
+        from workbench.model.fit_event import Rejected
         from workbench.procedure.engine.observed import observe_capture
 
         captures = [c for c in context.captures if c.purpose == "calibration"]
@@ -56,7 +57,7 @@ class FitStep(StepModel):
         context.emit(fit_finished(fitted, assessment))
         if assessment.verdict == "refused":
             raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
-        context.accepted, context.cross_validation = calibration, assessment.left_out
+        context.accepted, context.cross_validation = calibration, assessment.cross_validation
         worst = calibration.laser_ranger.validity.max_relative_range_sd
         return (
             f"accepted: rms {fitted.rms_px:.3f} px over {len(observations)} spots, {len(fitted.rejected)}"

@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.ideal import CX, CY, FISHEYE, F, ideal_rig, laser, moments, painted
 from tests.support.rigs import opencv_pixels
-from workbench.emulator.lens import Lens
+from workbench.emulator.lens import Drift, Lens
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.truth import Truth, draw_truth
 from workbench.model.errors import BadInputError
@@ -98,7 +98,7 @@ def test_points_are_where_opencv_has_them(name: str) -> None:
 def test_a_focal_length_that_drifted_scales_the_picture_about_its_centre() -> None:
     pinhole = Truth(F, CX, CY, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {})
     points = np.array([[60.0, -30.0, 200.0], [-100.0, 80.0, 400.0]])
-    drifted, centred = Lens(pinhole, 1.01).project(points), Lens(pinhole).project(points)
+    drifted, centred = Lens(pinhole, Drift(1.01)).project(points), Lens(pinhole).project(points)
     np.testing.assert_allclose(drifted - [CX, CY], 1.01 * (centred - [CX, CY]))
 
 

@@ -13,7 +13,7 @@ from workbench.calibration.design.tables import range_forecast_table
 from workbench.calibration.verdict.comparison import Difference
 from workbench.calibration.verdict.tables import difference_table
 from workbench.cli.plan import plan_table
-from workbench.model.fit_event import LaserError, LeftOutRecord
+from workbench.model.fit_event import CrossValidatedPlacement, LaserError
 from workbench.model.fit_tables import cross_validation_table, fit_tables
 from workbench.model.table import Column, Table
 from workbench.procedure.engine.durations import StepDurations
@@ -23,7 +23,7 @@ from workbench.report.terminal_table import TerminalTable
 EIGHT = [f"H{i}" for i in range(1, 5)] + [f"V{i}" for i in range(1, 5)]
 RANGES = range_forecast_table(EIGHT, [RangeForecast(i, r, 0.1234, 0.0567) for r in RANGES_MM for i in EIGHT])
 DIFFERENCES = difference_table([Difference(i, r, -12.34, 56.78) for r in RANGES_MM for i in EIGHT])
-LEFT_OUT = LeftOutRecord(
+LEFT_OUT = CrossValidatedPlacement(
     placement="p1",
     standoff_mm=1250.0,
     error_mm=-12.5,

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from math import inf
 from pathlib import Path
 
 import pytest
 
 from tests.support.running import Scripted, running, two_laser_rig
 from tests.support.steps import parse_step, wrong_keys
-from workbench.calibration.checks.cross_validation import LeftOut
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.event import LimitChecked
+from workbench.model.fit_event import CrossValidatedPlacement
 
 BOTH = "worst_relative_error: {in: [0, 0.01]}, worst_z: {in: [0, 3], on_fail: ask}"
 
 
-def left_out(standoff_mm: float, error_mm: float, sd_mm: float) -> LeftOut:
-    return LeftOut(f"{standoff_mm:g}", standoff_mm, error_mm, sd_mm, 1.0, 2, inf, ())
+def left_out(standoff_mm: float, error_mm: float, sd_mm: float) -> CrossValidatedPlacement:
+    return CrossValidatedPlacement(
+        placement=f"{standoff_mm:g}", standoff_mm=standoff_mm, error_mm=error_mm, sd_mm=sd_mm, lasers=()
+    )
 
 
 def test_limits_are_its_own_quantities_and_none_is_retried() -> None:

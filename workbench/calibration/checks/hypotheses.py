@@ -1,10 +1,15 @@
-"""Other ways in which the data may have come about, and how much better each explains them.
+"""Alternative explanations of the data, compared by approximate Bayes factor.
 
-A hypothesis is the fit's problem with other numbers of the same shapes: two lasers exchanged, the picture
-mirrored, a standoff free, a spot left out. It is refitted, and its score is by how much the misfit of data
-and priors falls, less what a hypothesis with that much freedom would gain for nothing: twice the logarithm of
-the room that it has over the width at which the data fix it (the Occam factor; D. J. C. MacKay, Information
-Theory, Inference, and Learning Algorithms, 2003, chapter 28).
+A hypothesis is the fit's problem with other data of the same shapes: two lasers exchanged, the image
+mirrored, a standoff free, a spot left out. Its score is twice the logarithm of its Bayes factor against the
+current explanation: the decrease of the cost (chi-square of data and priors, in units of the remaining noise)
+minus the Occam factor, twice the logarithm of the prior range of its free quantity over the width to which
+the data determine it (Laplace's approximation; D. J. C. MacKay, Information Theory, Inference, and Learning
+Algorithms, 2003, chapter 28).
+
+The search is greedy: the best hypothesis is adopted while it is decisive, and the next are compared with it
+adopted. An early choice can be wrong once a later one is adopted, so at the end each is removed in turn and
+kept only where the rest without it is decisively worse.
 """
 
 from __future__ import annotations
@@ -24,56 +29,59 @@ from workbench.calibration.estimation.refit import Refit, measured, optimum_of, 
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.stats import chi2_sf, f_sf
 
-Kind = Literal["lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "spot"]
+HypothesisKind = Literal["lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "spot"]
 IMPROBABLE = 1e-4
-"""Data less likely than this make the search look further than at single spots."""
+"""P value of a fit below which hypotheses other than single wrong spots are tried."""
 FALSE_REJECTION = 1e-3
-"""Of one sound fit: the chance that any of its spots is rejected."""
+"""Probability that any spot of a sound fit is rejected."""
 DECISIVE = 15.0
-"""Score from which a hypothesis is believed: odds of 1800 to 1."""
+"""Score from which a hypothesis is adopted: exp(15 / 2), odds of 1800 to 1."""
 EXPLAINED = 0.9
-"""Of the excess misfit, for what was found to count as its explanation."""
+"""Share of the excess misfit that the hypotheses found must explain together."""
 TIE = 10.0
-"""Scores that differ by less do not tell two hypotheses apart: the first in order stands for both."""
+"""Difference of scores below which two hypotheses are not distinguished; the first in order is taken."""
 STANDOFF_COST = 2 * log(5000 / 0.5)
-"""Some metres in which a mistyped standoff may lie, over the half millimetre to which spots fix it."""
+"""Occam factor of a free standoff: some metres of prior range, determined to half a millimetre."""
 SPOT_COST = 2 * 2 * log(500 / 0.05)
-"""The picture in which a wrong spot may lie, over its deviation, for u and v."""
-CLEARLY_LESS = 0.5
-"""Of what it takes: where first order says so of a fit that is not improbable, no refit is made."""
+"""Occam factor of a wrong spot: anywhere in the image, determined to its deviation, in u and v."""
+FIRST_ORDER_SHARE = 0.5
+"""Share of the necessary gain; below it, to first order, a fit that is not improbable is not refitted."""
 MINIMA = 4
+"""Local minima of the scan over standoffs that are refined."""
 STEPS = 5
+"""Gauss-Newton steps from each of them."""
 SCAN_MM = np.geomspace(20.0, 50_000.0, 120)
 SPARSE = 6
-"""Of the scan, where a board's corners tell the distance: no other standoff lies as near to fitting them."""
+"""Stride through the scan for a board: its corners determine the distance, with a single wide minimum."""
 MOST_REJECTED = 0.1
-"""Of all spots: more than that are no outliers."""
+"""Largest share of outliers among all spots."""
 FEWEST_SPOTS = 6
 STUDENT_SQUARE = 9.0
-"""Squared distance, in variances, at which a spot weighs half when spots are reweighted."""
+"""Squared distance, in variances, at which a spot weighs half in the reweighted fit."""
 START_WEIGHT = 1e-4
 REWEIGHTINGS = 12
-UNTOLD = 1e-9
-"""Share of a prior's variance by which data narrow it; with less they say nothing of it."""
+LEAST_NARROWING = 1e-9
+"""Least relative decrease of a prior's variance for the data to constrain the parameter."""
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One that has been refitted."""
+    """A refitted hypothesis."""
 
-    kind: Kind
+    kind: HypothesisKind
     subject: tuple[int, ...]
-    """Lasers exchanged; the placement; or the cell."""
+    """Indices of the two lasers, of the placement, or of the cell."""
     state: Refit
+    """The refit with this and all earlier hypotheses adopted."""
     score: float
     significant: bool
 
 
 def explain_misfit(fit: CalibrationFit) -> tuple[Hypothesis, ...]:
-    """The hypotheses, best first, that together explain what the fit does not; none where it is sound.
+    """Hypotheses that together explain the misfit, in the order of adoption; none for a sound fit.
 
-    Spots that lie apart are found whether or not everything else is explained; anything else counts only
-    where the whole explains EXPLAINED of the excess misfit.
+    Outliers (`spot`) are reported whether or not the rest is explained; all others only where everything
+    together explains EXPLAINED of the excess misfit.
     """
     problem = problem_of(fit)
     state = refit(problem, measured(problem), optimum_of(fit))
@@ -93,7 +101,7 @@ def explain_misfit(fit: CalibrationFit) -> tuple[Hypothesis, ...]:
 
 
 def _needed(fit: CalibrationFit, state: Refit, found: list[Hypothesis]) -> list[Hypothesis]:
-    """Those without which the rest explains decisively less: what came first may be a mistake."""
+    """The hypotheses without which the rest explains decisively less."""
     latest = list({(h.kind, h.subject): h for h in found}.values())
     if len(latest) == 1:
         return latest
@@ -105,8 +113,8 @@ def _is_needed(fit: CalibrationFit, state: Refit, h: Hypothesis) -> bool:
     if h.kind == "standoff":
         problem = _problem_at(problem, h.subject[0], fit.cells.placements[h.subject[0]].standoff_mm)
     elif h.kind == "spot":
-        mine = np.isin(np.arange(len(fit.cells.laser)), h.subject)
-        used = used | (rows_of(mine, problem) & measured(problem))
+        own = np.isin(np.arange(len(fit.cells.laser)), h.subject)
+        used = used | (rows_of(own, problem) & measured(problem))
     else:
         return True
     without = _from_priors(problem, used)
@@ -115,46 +123,48 @@ def _is_needed(fit: CalibrationFit, state: Refit, h: Hypothesis) -> bool:
 
 
 def is_improbable(state: Refit) -> bool:
-    """Whether data and priors together fit worse than by chance."""
+    """Whether the cost of data and priors is significantly larger than its degrees of freedom."""
     return bool(chi2_sf(state.cost, state.used.sum()) < IMPROBABLE)
 
 
 def _excess(state: Refit) -> float:
+    """Cost above its expectation (one for each used row), at least 0."""
     return max(state.cost - float(state.used.sum()), 0.0)
 
 
 def _best(candidates: list[Hypothesis]) -> Hypothesis | None:
+    """The first candidate within TIE of the highest score; a significant one where there is any."""
     if not candidates:
         return None
     top = max(c.score for c in candidates)
-    return next(c for c in candidates if c.score >= top - TIE and c.significant >= _any(candidates, top))
-
-
-def _any(candidates: list[Hypothesis], top: float) -> bool:
-    return any(c.significant for c in candidates if c.score >= top - TIE)
+    tied = [c for c in candidates if c.score >= top - TIE]
+    return next((c for c in tied if c.significant), tied[0])
 
 
 def _candidates(fit: CalibrationFit, state: Refit, first: bool) -> Iterator[Hypothesis]:
     improbable = is_improbable(state)
     if improbable and first:
-        yield from _pictures(fit, state)
-        yield from _swaps(fit, state)
+        yield from _flipped_images(fit, state)
+        yield from _exchanged_lasers(fit, state)
     if improbable or first:
-        yield from _standoffs(fit, state)
-    yield from _spots(fit, state)
+        yield from _wrong_standoffs(fit, state)
+    yield from _wrong_spots(fit, state)
 
 
-def _scored(kind: Kind, subject: tuple[int, ...], before: Refit, after: Refit, cost: float) -> Hypothesis:
+def _scored(
+    kind: HypothesisKind, subject: tuple[int, ...], before: Refit, after: Refit, cost: float
+) -> Hypothesis:
+    """The hypothesis with its score; `cost` is its Occam factor."""
     noise = max(1.0, after.chi2 / max(after.freedom, 1.0))
     score = (before.cost - after.cost) / noise - cost
     return Hypothesis(kind, subject, after, score, score > DECISIVE)
 
 
-def _pictures(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
-    """The picture left for right, top for bottom, both."""
+def _flipped_images(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
+    """The image mirrored left to right, top to bottom, both."""
     data = state.problem.data
     edge = np.array([fit.rig.camera.width_px - 1.0, fit.rig.camera.height_px - 1.0])
-    turns: tuple[tuple[Kind, tuple[bool, bool]], ...] = (
+    turns: tuple[tuple[HypothesisKind, tuple[bool, bool]], ...] = (
         ("mirrored", (True, False)),
         ("upside_down", (False, True)),
         ("turned", (True, True)),
@@ -165,7 +175,8 @@ def _pictures(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
         yield _scored(kind, (), state, _from_priors(problem, state.used), 2 * log(3))
 
 
-def _swaps(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
+def _exchanged_lasers(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
+    """Every pair of lasers exchanged."""
     data = state.problem.data
     pairs = list(combinations(range(len(fit.rig.lasers)), 2))
     laser = np.asarray(data.spots.laser)
@@ -178,14 +189,16 @@ def _swaps(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
 
 
 def _from_priors(problem: LeastSquaresProblem, used: BoolArray) -> Refit:
-    """An optimum that wrong data may have led far astray is no place to start from."""
+    """Refit from the prior means: wrong data may have drawn the current optimum into another minimum."""
     return refit(problem, used, np.zeros(len(np.asarray(problem.data.mean))))
 
 
-def _standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
-    """Placements' standoffs free, the most strained first, until one explains everything.
+def _wrong_standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
+    """Standoffs of single placements free, the most strained first, until one explains everything.
 
-    The rest must be better off without the placement by what a free standoff takes.
+    A placement is tried only where leaving it out gains more than the Occam factor of a free standoff. A
+    board has so many corners that their noise alone gains as much; there the strain of its placement error
+    is compared instead.
     """
     cost = STANDOFF_COST + 2 * log(len(fit.cells.placements))
     boards = {view.placement.key for view in fit.boards}
@@ -197,68 +210,81 @@ def _standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
         others = state.used & ~rows
         if not rows.any() or not others.any():
             continue
-        # The noise of a board's corners would pass for a gain: there, what the standoff costs is the measure.
         if on_board and strain[index] < cost + DECISIVE:
             continue
-        if sound and not on_board and _gain_without(state, rows) < CLEARLY_LESS * (cost + DECISIVE):
+        if sound and not on_board and _gain_without(state, rows) < FIRST_ORDER_SHARE * (cost + DECISIVE):
             continue
-        left = _from_priors(state.problem, others)
-        if on_board or state.cost - left.cost > cost + DECISIVE:
-            at_mm = _where_it_stood(fit, left, rows, index, SCAN_MM[::SPARSE] if on_board else SCAN_MM)
-            found = _scored("standoff", (index,), state, _freed(fit, state, left, index, at_mm), cost)
+        reduced = _from_priors(state.problem, others)
+        if on_board or state.cost - reduced.cost > cost + DECISIVE:
+            scan_mm = SCAN_MM[::SPARSE] if on_board else SCAN_MM
+            standoff_mm = _likeliest_standoff(fit, reduced, rows, index, scan_mm)
+            after = _refit_at(fit, state, reduced, index, standoff_mm)
+            found = _scored("standoff", (index,), state, after, cost)
             yield found
             if found.significant and not is_improbable(found.state):
                 return
 
 
 def _strain(fit: CalibrationFit, state: Refit, index: int) -> float:
-    """By how much the cost falls if a placement's error needs no prior, to first order."""
+    """First-order decrease of the cost without the prior of a placement's error: y^2 / (1 - C).
+
+    y is the error in prior deviations and C its posterior variance in units of the prior's.
+    """
     error = _error_index(fit, index)
-    told = 1.0 - state.covariance[error, error]
-    return float(state.y[error] ** 2 / told) if told > UNTOLD else 0.0
+    narrowing = 1.0 - state.covariance[error, error]
+    return float(state.y[error] ** 2 / narrowing) if narrowing > LEAST_NARROWING else 0.0
 
 
 def _gain_without(state: Refit, rows: BoolArray) -> float:
-    """By how much the cost falls without some rows, to first order."""
+    """First-order decrease of the cost without some rows: r^T (1 - J C J^T)^-1 r."""
     own = state.jacobian[rows]
     free = np.eye(len(own)) - own @ state.covariance @ own.T
     return float(state.residual[rows] @ np.linalg.solve(free, state.residual[rows]))
 
 
-def _freed(fit: CalibrationFit, state: Refit, left: Refit, index: int, at_mm: float) -> Refit:
-    """The state with the placement where its spots say that it stood."""
-    problem = _problem_at(left.problem, index, at_mm)
-    found = refit(problem, state.used, left.y)
-    # Once more with the sensor that all of them make: a standoff with no error of its own costs nothing.
-    error = (fit.table.prior_mean + fit.table.prior_sd * found.y)[_error_index(fit, index)]
-    return refit(_problem_at(problem, index, at_mm + float(error)), state.used, found.y)
+def _refit_at(fit: CalibrationFit, state: Refit, reduced: Refit, index: int, standoff_mm: float) -> Refit:
+    """Refit of all used rows with a placement at its likeliest standoff.
+
+    The second refit moves the standoff by the placement error of the first, so that a free standoff costs
+    nothing in the prior of that error.
+    """
+    problem = _problem_at(reduced.problem, index, standoff_mm)
+    found = refit(problem, state.used, reduced.y)
+    error_mm = (fit.table.prior_mean + fit.table.prior_sd * found.y)[_error_index(fit, index)]
+    return refit(_problem_at(problem, index, standoff_mm + float(error_mm)), state.used, found.y)
 
 
-def _where_it_stood(
-    fit: CalibrationFit, left: Refit, rows: BoolArray, index: int, scan_mm: FloatArray
+def _likeliest_standoff(
+    fit: CalibrationFit, reduced: Refit, rows: BoolArray, index: int, scan_mm: FloatArray
 ) -> float:
-    """The standoff that the rest finds likeliest for what was seen of a placement."""
-    scanned = np.nan_to_num([_surprise(_stands(left, index, mm), rows) for mm in scan_mm], nan=np.inf)
+    """Standoff of a placement with the highest predictive likelihood of its rows, by the fit without it.
+
+    The likelihood has several maxima (spots of other lasers lie where those of this one could), so it is
+    scanned, and the MINIMA lowest minima of the deviance are refined.
+    """
+
+    def deviance(standoff_mm: float) -> float:
+        return float(np.nan_to_num(_deviance(_with_standoff(reduced, index, standoff_mm), rows), nan=np.inf))
+
+    scanned = np.array([deviance(mm) for mm in scan_mm])
     low = [n for n in range(1, len(scanned) - 1) if scanned[n] <= min(scanned[n - 1], scanned[n + 1])]
     lowest = sorted(low, key=lambda n: float(scanned[n]))[:MINIMA]
     starts = [fit.cells.placements[index].standoff_mm, *scan_mm[lowest].tolist()]
-    refined = [_nearby(left, rows, index, start) for start in starts]
-    return min(
-        refined, key=lambda mm: float(np.nan_to_num(_surprise(_stands(left, index, mm), rows), nan=np.inf))
-    )
+    return min((_refine_standoff(reduced, rows, index, start) for start in starts), key=deviance)
 
 
-def _nearby(left: Refit, rows: BoolArray, index: int, at_mm: float) -> float:
-    """A standoff made better step by step; the scan's own steps are wider than what spots tell apart."""
+def _refine_standoff(reduced: Refit, rows: BoolArray, index: int, standoff_mm: float) -> float:
+    """Gauss-Newton steps of the standoff, each limited to 30 %: the scan is coarser than the spots' noise."""
     for _ in range(STEPS):
-        there = _stands(left, index, at_mm)
-        at_mm += float(np.clip(range_error(there, rows, by_standoff(there))[0], -0.3 * at_mm, 0.3 * at_mm))
-    return at_mm
+        there = _with_standoff(reduced, index, standoff_mm)
+        limit_mm = 0.3 * standoff_mm
+        standoff_mm += float(np.clip(range_error(there, rows, by_standoff(there))[0], -limit_mm, limit_mm))
+    return standoff_mm
 
 
-def _stands(left: Refit, index: int, standoff_mm: float) -> Refit:
-    """The refit as it is, looking at a placement that stands elsewhere."""
-    return left.with_unused(_problem_at(left.problem, index, standoff_mm))
+def _with_standoff(reduced: Refit, index: int, standoff_mm: float) -> Refit:
+    """The refit, with another standoff of a placement that it does not use."""
+    return reduced.with_unused(_problem_at(reduced.problem, index, standoff_mm))
 
 
 def _problem_at(problem: LeastSquaresProblem, index: int, standoff_mm: float) -> LeastSquaresProblem:
@@ -267,9 +293,9 @@ def _problem_at(problem: LeastSquaresProblem, index: int, standoff_mm: float) ->
     return LeastSquaresProblem(problem.layout, problem.data._replace(standoff_mm=standoff))
 
 
-def _surprise(left: Refit, rows: BoolArray) -> float:
-    """Minus twice the log probability of rows that the refit has not used, but for a constant."""
-    distance, variance = left.residual[rows], predictive(left, rows)
+def _deviance(reduced: Refit, rows: BoolArray) -> float:
+    """Minus twice the log predictive density of rows that the refit does not use, up to a constant."""
+    distance, variance = reduced.residual[rows], predictive(reduced, rows)
     return float(distance @ np.linalg.solve(variance, distance) + np.linalg.slogdet(variance)[1])
 
 
@@ -277,20 +303,21 @@ def _error_index(fit: CalibrationFit, index: int) -> int:
     return [p.name for p in fit.table.parameters].index(f"{fit.cells.placements[index].key}.error_mm")
 
 
-def _spots(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
-    """The spots that lie farthest from where all others put them, each left out."""
+def _wrong_spots(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
+    """The spot farthest from its prediction by all others, left out.
+
+    In an improbable fit outliers may mask one another: the farthest spot of a robust fit is tried too.
+    """
     count = len(fit.cells.laser)
     if count < FEWEST_SPOTS:
         return
-    looks = [state]
-    if is_improbable(state):  # a fit that outliers have drawn to themselves no longer shows them
-        looks.append(_reweighted(state, count))
-    apart = [_apart(look, count) for look in looks]
-    for cell in sorted({int(np.argmax(distance)) for distance in apart if distance.any()}):
+    states = [state, *([_reweighted(state, count)] if is_improbable(state) else [])]
+    distances = [_deletion_distances(one, count) for one in states]
+    for cell in sorted({int(np.argmax(distance)) for distance in distances if distance.any()}):
         yield _without_spot(state, cell, count)
 
 
-def _apart(state: Refit, count: int) -> FloatArray:
+def _deletion_distances(state: Refit, count: int) -> FloatArray:
     """(count,) squared distance of each spot from its prediction by all others, to first order."""
     own = state.jacobian[: 2 * count]
     spread = own @ state.covariance
@@ -303,7 +330,10 @@ def _apart(state: Refit, count: int) -> FloatArray:
 
 
 def _reweighted(state: Refit, count: int) -> Refit:
-    """A fit that outliers do not draw to themselves: spots weighed by Cauchy's law, from the priors."""
+    """Robust fit from the priors: iteratively reweighted least squares with Cauchy weights.
+
+    A spot at squared distance d^2 (in variances) weighs 1 / (1 + d^2 / 9).
+    """
     problem, y = state.problem, np.zeros_like(state.y)
     inverse_sd = np.asarray(problem.data.inverse_sd)
     weight = np.full(len(inverse_sd), START_WEIGHT)
@@ -317,6 +347,10 @@ def _reweighted(state: Refit, count: int) -> Refit:
 
 
 def _without_spot(state: Refit, cell: int, count: int) -> Hypothesis:
+    """A spot left out, with the test of outliers: chi-square, or F where the noise is estimated.
+
+    The rate FALSE_REJECTION is divided among all spots (Bonferroni).
+    """
     used = np.array(state.used)
     used[2 * cell : 2 * cell + 2] = False
     after = _from_priors(state.problem, used) if is_improbable(state) else refit(state.problem, used, state.y)

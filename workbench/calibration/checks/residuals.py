@@ -1,23 +1,22 @@
-"""Do the residuals look like noise? Tests against standoff, laser, u and v, order, and of their variance.
+"""Tests of the residuals for trends, autocorrelation, and unequal variances.
 
-Fitted residuals are neither independent nor alike: parameters, placement errors and tilts have taken their
-share. In standard deviations and under the rig file's priors, the residuals r of a fit have the covariance R
-= 1 - J C J^T (J their derivatives by the parameters, C the posterior covariance: the measurements' own
-covariance is 1 + J J^T, and R is its inverse).
+Fitted residuals are neither independent nor of equal variance: parameters, placement errors and tilts absorb
+part of them. In standard deviations and under the rig file's priors, the residuals r of a fit have the
+covariance R = 1 - J C J^T, with J their derivatives by the parameters and C the posterior covariance. (The
+covariance of the measurements is 1 + J J^T, and R is its inverse.)
 
-A trend W (n x k) that the model lacks has the score W^T r with the covariance W^T R W; the square of the
-whitened score is chi-square of as many degrees as W has directions that the parameters do not absorb (C. R.
-Rao, Proc. Camb. Phil. Soc. 44 (1948) 50).
+A trend W (n x k) that the model lacks has the score W^T r with the covariance W^T R W. The square of the
+whitened score is chi-square, with as many degrees of freedom as W has directions that the parameters do not
+absorb (C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50).
 
 A quadratic form r^T B r (lag, variance) has the mean tr(B R), the variance 2 tr(B R B R) and the third
-central moment 8 tr(B R B R B R); it is approximated by the gamma distribution with these
-three (Pearson's type III).
+central moment 8 tr(B R B R B R). It is approximated by the gamma distribution with these three moments
+(Pearson's type III). B is centred so that its mean vanishes at any noise level, and the form is divided by
+the noise level that the residuals show: a wrong stated noise is tested elsewhere, and must not appear as lag
+or as a difference of variances.
 
-Quadratic forms are taken with their mean at any size of the noise removed, and over that size as the
-residuals show it: noise that is stated wrongly is told elsewhere, and is neither lag nor a difference.
-
-Repeats of a spot share everything but their own noise: their deviations from their mean are tested by
-themselves.
+Repeats of a spot share everything but their own noise: their deviations from their mean are tested
+separately.
 """
 
 from __future__ import annotations
@@ -37,85 +36,88 @@ from workbench.model.fit_event import ResidualTest
 from workbench.model.stats import chi2_sf, gamma_cdf, gamma_sf, norm_cdf
 
 FALSE_ALARM = 0.01
-"""Of one sound fit: the chance that any of its residual tests raises an alarm."""
+"""Probability that any residual test of a sound fit raises an alarm."""
 ABSORBED = 0.02
-"""Directions of a trend of which the parameters leave less than this cannot be tested."""
+"""Least share of a trend's direction that the parameters must not absorb for it to be tested."""
 SEEN_VARIANCE = 1e-3
-"""Of a quadratic form, a degree of freedom, for it to be tested: two repeats of each spot, say, are always as
-much apart as they are and have no lag."""
+"""Least variance of a quadratic form for each degree of freedom; two repeats of each spot, for example, have
+no lag that could vary."""
 LEAST_NOISE = 1e-3
-"""Residuals smaller than this part of their stated deviation are no noise: numbers copied, or made up."""
+"""Ratio of residuals to stated deviation below which they are not noise but copied or invented numbers."""
 MOST_EQUAL = 0.5
-"""Share of pairs of repeats with equal numbers. More are equal where positions are rounded to more than twice
-their deviation: what is left of the noise then depends on where between two numbers a spot lies."""
+"""Largest share of equal pairs among repeats. More are equal where positions are rounded to more than twice
+their deviation; the scatter that remains then depends on where a spot lies between two rounded values."""
 FEWEST_FREE = 20
-"""Degrees of freedom among repeats below which their tests are not made."""
+"""Least degrees of freedom among repeats for their tests."""
 
 
 def residual_tests(fit: CalibrationFit) -> tuple[ResidualTest, ...]:
-    """Every test that the fit has data for."""
+    """All tests for which the fit has data."""
     spots = _Spots.of(fit)
     tests = (*_trends(spots, len(fit.rig.lasers)), *_of_spots(fit, spots), *_of_repeats(fit))
     return tuple(ResidualTest(name=name, p=p) for name, p in tests if np.isfinite(p))
 
 
 def alarms(tests: tuple[ResidualTest, ...]) -> tuple[ResidualTest, ...]:
-    """Those that say that something is wrong, with FALSE_ALARM for all together (Bonferroni)."""
+    """The tests with an alarm, at the rate FALSE_ALARM for all together (Bonferroni)."""
     return tuple(test for test in tests if test.p < FALSE_ALARM / len(tests))
 
 
 def explain(test: ResidualTest) -> str:
-    """What an alarm means and what to do, for the person at the bench."""
-    kind = max((name for name in _WORDS if test.name.startswith(name)), key=len)
+    """Text of an alarm: meaning, remedy, p value."""
+    kind = max((name for name in _TEXTS if test.name.startswith(name)), key=len)
     which = test.name.removeprefix(kind).removeprefix(": ")
-    return f"{_WORDS[kind].format(which)} (by chance in 1 of {1 / max(test.p, 1e-12):.2g} sound fits)"
+    return f"{_TEXTS[kind].format(which)} (by chance in 1 of {1 / max(test.p, 1e-12):.2g} sound fits)"
 
 
-_WORDS = {
-    "standoff": "residuals follow the standoff: check the ruler's zero and scale (bench.offset_mm,"
-    " ruler_scale) and that the target stood square",
-    "laser": "residuals follow the standoff differently for each laser: check that no laser moved in its"
+_TEXTS = {
+    "standoff": "residuals depend on the standoff: check zero and scale of the ruler (bench.offset_mm,"
+    " ruler_scale) and that the target stands square",
+    "laser": "residuals depend on the standoff differently for each laser: check that no laser moved in its"
     " mount and that the target is flat",
-    "u": "residuals follow the place in the picture, left to right: the lens needs another distortion"
-    " coefficient (camera.k3 or another one that the rig file holds constant), or the image is scaled",
-    "v": "residuals follow the place in the picture, top to bottom: the lens needs another distortion"
-    " coefficient (camera.k3 or another one that the rig file holds constant), or the image is scaled",
-    "order": "residuals of successive captures are alike: something drifted; let sensor and lasers warm up,"
+    "u": "residuals depend on u: the lens needs another distortion coefficient (camera.k3, or another that"
+    " the rig file holds constant), or the image is scaled",
+    "v": "residuals depend on v: the lens needs another distortion coefficient (camera.k3, or another that"
+    " the rig file holds constant), or the image is scaled",
+    "order": "residuals of successive captures are correlated, as with drift: let sensor and lasers warm up,"
     " and repeat with the standoffs in another order",
-    "variance over standoff": "residuals scatter more at one end of the standoffs than the other: state spot"
-    " noise and speckle as they are there (u_sd_px, v_sd_px), or improve the exposure",
-    "variance of u and v": "residuals scatter differently in u and v than stated: state u_sd_px and v_sd_px,"
-    " and look at the spots' shape",
-    "variance of laser": "residuals of laser {} scatter differently than the others': look at its spots "
-    "(focus, speckle, a second mode)",
-    "repeats: order": "successive repeats are alike: something moves or lags; wait longer after firing"
+    "variance over standoff": "the variance of the residuals depends on the standoff: state spot noise and"
+    " speckle for each standoff (u_sd_px, v_sd_px), or improve the exposure",
+    "variance of u and v": "the residuals' variances in u and v differ from those stated: state u_sd_px and"
+    " v_sd_px, and look at the shape of the spots",
+    "variance of laser": "the variance of the residuals of laser {} differs from the others': look at its"
+    " spots (focus, speckle, a second mode)",
+    "repeats: order": "successive repeats are correlated, as with motion or lag: wait longer after switching"
     " a laser (frames in flight) and after placing the target",
-    "repeats: over standoff": "repeats scatter more at one end of the standoffs than the other: state u_sd_px"
-    " and v_sd_px as they are there",
-    "repeats: u and v": "repeats scatter differently in u and v than stated: state u_sd_px and v_sd_px",
-    "repeats: laser": "repeats of laser {} scatter differently than the others': look at its mount and its"
+    "repeats: over standoff": "the variance of repeats depends on the standoff: state u_sd_px and v_sd_px for"
+    " each standoff",
+    "repeats: u and v": "the variances of repeats in u and v differ from those stated: state u_sd_px and"
+    " v_sd_px",
+    "repeats: laser": "the variance of repeats of laser {} differs from the others': check its mount and its"
     " supply",
 }
 
 
 @dataclass(frozen=True)
 class _Spots:
-    """Spots' measured coordinates, n of them, in the order of the captures."""
+    """Measured coordinates of all spots, n of them, in the order of the captures."""
 
     residual: FloatArray
     """(n,) in standard deviations."""
     covariance: FloatArray
     """(n, n) of the residuals."""
     sd_px: FloatArray
+    """(n,) 1 sigma."""
     laser: IndexArray
+    """(n,) index of the laser."""
     axis: IndexArray
-    """0 for u, 1 for v."""
+    """(n,) 0 for u, 1 for v."""
     outward: FloatArray
-    """1 or -1 along the laser's axis, as its baseline points; 0 across."""
+    """(n,) 1 or -1 along the laser's axis, in the direction of its baseline; 0 across."""
     distance: FloatArray
-    """Logarithm of the standoff, from -1 to 1."""
+    """(n,) logarithm of the standoff, scaled to -1 to 1."""
     place: FloatArray
-    """(n, 2) where the fit has the spot, -1 to 1 over the picture (where it was seen, its noise is too)."""
+    """(n, 2) fitted position, -1 to 1 over the image; the measured one would correlate with its noise."""
 
     @classmethod
     def of(cls, fit: CalibrationFit) -> _Spots:
@@ -142,7 +144,7 @@ class _Spots:
         )
 
     def trend_p(self, pixels: FloatArray) -> float:
-        """Chance of residuals that follow displacements (n, k) as much as these; NaN if none can be seen."""
+        """P value of the score test of a trend (n, k), px; NaN where the parameters absorb all of it."""
         trend = pixels / self.sd_px[:, None]
         trend = trend[:, (trend**2).sum(axis=0) > 0]
         trend = trend / np.sqrt((trend**2).sum(axis=0))
@@ -152,7 +154,7 @@ class _Spots:
         return float(chi2_sf((score**2 / left[seen]).sum(), seen.sum())) if seen.any() else float("nan")
 
     def quadratic_p(self, weight: FloatArray) -> float:
-        """Two-sided chance of r^T B r, B (n, n), whatever the size of the noise; NaN if it cannot vary."""
+        """Two-sided p value of r^T B r, B (n, n), at any noise level; NaN if the form cannot vary."""
         freedom = float(np.trace(self.covariance))
         if freedom < 1 or self.residual @ self.residual < LEAST_NOISE**2 * freedom:
             return float("nan")
@@ -168,6 +170,7 @@ class _Spots:
 
 
 def _trends(spots: _Spots, lasers: int) -> Iterator[tuple[str, float]]:
+    """P values of trends (Legendre polynomials up to degree 3) over the standoff, by laser, over u and v."""
     over_standoff = legvander(spots.distance, 3)
     by_id = np.eye(lasers)[spots.laser]
     axes = np.eye(2)[spots.axis]
@@ -183,10 +186,11 @@ def _trends(spots: _Spots, lasers: int) -> Iterator[tuple[str, float]]:
 
 
 def _of_spots(fit: CalibrationFit, spots: _Spots) -> Iterator[tuple[str, float]]:
+    """P values of lag 1 between successive spots, and of contrasts of their variance."""
     order = np.zeros(spots.covariance.shape)
     for axis in (0, 1):
-        mine = np.flatnonzero(spots.axis == axis)
-        order[mine[:-1], mine[1:]] = order[mine[1:], mine[:-1]] = 0.5
+        own = np.flatnonzero(spots.axis == axis)
+        order[own[:-1], own[1:]] = order[own[1:], own[:-1]] = 0.5
     yield ("order", spots.quadratic_p(order))
     for name, weight in _contrasts(fit, spots.laser, spots.axis, spots.distance):
         yield (f"variance {name}", spots.quadratic_p(np.diag(weight)))
@@ -195,7 +199,7 @@ def _of_spots(fit: CalibrationFit, spots: _Spots) -> Iterator[tuple[str, float]]
 def _contrasts(
     fit: CalibrationFit, laser: IndexArray, axis: IndexArray, distance: FloatArray
 ) -> Iterator[tuple[str, FloatArray]]:
-    """What a variance may differ by, as weights whose mean is 0."""
+    """Contrasts of variances: over the standoff, of u against v, of each laser; weights with mean 0."""
     candidates = [("over standoff", distance), ("of u and v", np.where(axis == 0, 1.0, -1.0))]
     if len(fit.rig.lasers) > 1:
         candidates += [
@@ -208,7 +212,7 @@ def _contrasts(
 
 
 def _of_repeats(fit: CalibrationFit) -> Iterator[tuple[str, float]]:
-    """Deviations of the repeats from their means."""
+    """P values of lag 1 between successive repeats, and of contrasts of their variance."""
     groups = [
         _Repeats.of(fit, cell, axis)
         for axis in (0, 1)
@@ -237,7 +241,7 @@ def _of_repeats(fit: CalibrationFit) -> Iterator[tuple[str, float]]:
 
 
 def _share_equal(fit: CalibrationFit, axis: int) -> float:
-    """Of all pairs of repeats of a spot, those whose coordinates are the same number; 0 where none are."""
+    """Share of equal numbers among all pairs of repeats of a spot; 0 where there are no pairs."""
     equal = pairs = 0
     for members in fit.cells.members:
         value = positions(members)[:, axis]
@@ -256,7 +260,7 @@ class _Repeats:
     deviation: FloatArray
     """(m,) from their mean, in standard deviations."""
     direction: FloatArray
-    """(m,) unit vector that the mean has taken out."""
+    """(m,) unit vector that subtracting the mean removes."""
 
     @classmethod
     def of(cls, fit: CalibrationFit, cell: int, axis: int) -> _Repeats:
@@ -270,11 +274,11 @@ class _Repeats:
         return cls(cell, axis, white - direction * (direction @ white), direction)
 
     def lag_mean(self) -> float:
-        """Expected sum of products of neighbours."""
+        """Expectation of the sum of products of neighbours, at unit noise."""
         return -float(self.direction[:-1] @ self.direction[1:])
 
     def lag(self, mean: float) -> tuple[float, float, float]:
-        """Sum of products of neighbours less `mean` times that of squares: value, variance, third moment."""
+        """Sum of products of neighbours - `mean` times the sum of squares: value, variance, third moment."""
         count = len(self.deviation)
         form = (np.eye(count, k=1) + np.eye(count, k=-1)) / 2 - mean * np.eye(count)
         product = form @ (np.eye(count) - np.outer(self.direction, self.direction))
@@ -288,7 +292,7 @@ def _by_axis(axes: FloatArray, powers: NDArray[np.floating]) -> FloatArray:
 
 
 def _spread(values: NDArray[np.floating]) -> FloatArray:
-    """Linearly to -1 .. 1, 0 where all are the same."""
+    """Values scaled linearly to -1 .. 1; 0 where all are equal."""
     low, high = np.nanmin(values), np.nanmax(values)
     return np.asarray(
         np.nan_to_num((2 * values - low - high) / (high - low if high > low else np.inf)), np.float64
@@ -296,7 +300,7 @@ def _spread(values: NDArray[np.floating]) -> FloatArray:
 
 
 def _two_sided(value: float, mean: float, variance: float, third: float) -> float:
-    """Chance of a value as far out by the gamma distribution of these moments."""
+    """Two-sided p value by the gamma distribution with these moments; normal at negligible skewness."""
     z, skew = (value - mean) / variance**0.5, third / variance**1.5
     if abs(skew) < 1e-3:
         return float(2 * norm_cdf(-abs(z)))

@@ -1,10 +1,11 @@
-"""Did a placement move while its captures were taken?
+"""Detection of target motion: a step of the target between two captures of one placement.
 
-The fit averages the repeats of a spot; here a placement's captures are looked at one by one, in the order in
-which they were taken, against the fit without the placement. Its standoff is free, so that a wrong one is no
-movement. A step of the target after capture m moves all later spots along their lines by what a standoff
-would: that is one number for each m. What else may have spoilt captures competes: a spot that lies apart in
-all its repeats, and single captures that do. Movement is named where it explains decisively more than either.
+The fit averages the repeats of a spot. Here the captures of a placement are compared one by one, in the order
+in which they were taken, with their prediction by the fit without the placement. The standoff of the
+placement is free, so that a wrong standoff is not motion. A step of the target after capture m moves all
+later spots as a change of the standoff does: one free number for each m, estimated by generalised least
+squares. Other explanations compete: a spot that is wrong in all its repeats, and single wrong captures.
+Motion is reported where its score (see `hypotheses`) is decisively higher than theirs.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.refit import Refit, measured, problem_of, refit_with_scale, rows_of
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 
-ANYWHERE = 10.0
-"""Prior deviation of a standoff that is free, as a factor on the standoff."""
+FREE_STANDOFF = 10.0
+"""Prior deviation of a free standoff, as a factor on the standoff."""
 STEP_COST = 2 * log(100 / 0.1)
-"""Some centimetres that a target may have moved by, over the tenth of a millimetre to which spots fix it."""
+"""Occam factor of a step: some centimetres of prior range, determined to a tenth of a millimetre."""
 FEWEST_BESIDE = 2
-"""Captures on either side of a step: a single one is no movement."""
+"""Least number of captures on either side of a step."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class TargetMotion:
     """A step of the target between two captures of one placement."""
 
     placement: int
+    """Index of the placement."""
     step_mm: float
     sd_mm: float
     last_before: str
@@ -47,34 +49,36 @@ class TargetMotion:
 
 
 def find_target_motion(fit: CalibrationFit, suspects: Sequence[int]) -> tuple[TargetMotion, ...]:
-    """Placements that moved, among those (by index) that something is wrong with."""
+    """Steps of the target among the suspected placements (their indices)."""
     problem = problem_of(fit)
     found = []
     for index in suspects:
-        mine = rows_of(fit.cells.placement == index, problem)
-        others = measured(problem) & ~mine
+        others = measured(problem) & ~rows_of(fit.cells.placement == index, problem)
         captures = _Captures.of(fit, index)
         if len(captures.observations) >= 2 * FEWEST_BESIDE and others.any():
             start = np.zeros(len(fit.table.parameters))
-            left = refit_with_scale(problem, others, start)
-            found.append(_movement(fit, captures, left, index))
-    return tuple(movement for movement in found if movement)
+            reduced = refit_with_scale(problem, others, start)
+            found.append(_best_step(fit, captures, reduced, index))
+    return tuple(motion for motion in found if motion)
 
 
 @dataclass(frozen=True)
 class _Captures:
-    """One placement's captures in their order, n measured coordinates in all."""
+    """Captures of one placement in the order taken, with n measured coordinates in all."""
 
     observations: tuple[Observation, ...]
     capture: IndexArray
-    """(n,) which capture a coordinate is of."""
+    """(n,) index of the capture of each coordinate."""
     axis: IndexArray
+    """(n,) 0 for u, 1 for v."""
     cell: IndexArray
-    """(n,) which cell of the fit it belongs to."""
+    """(n,) index of the cell of each coordinate."""
     position_px: FloatArray
+    """(n,)"""
     sd_px: FloatArray
-    """(n,) as the repeats of the fit scatter; shared errors are apart from it."""
-    stray: BoolArray
+    """(n,) 1 sigma by the scatter of the repeats, without the error that they share."""
+    rejected: BoolArray
+    """(n,) whether the fit rejected the capture."""
 
     @classmethod
     def of(cls, fit: CalibrationFit, index: int) -> _Captures:
@@ -82,31 +86,31 @@ class _Captures:
             fit.rig.laser_ids[fit.cells.laser[n]]: n for n in np.flatnonzero(fit.cells.placement == index)
         }
         key = fit.cells.placements[index].key
-        mine = tuple(s for s in fit.cells.captures if s.placement == key and s.laser_id in cells)
+        own = tuple(s for s in fit.cells.captures if s.placement == key and s.laser_id in cells)
         used = {s.source for n in cells.values() for s in fit.cells.members[n]}
-        position = positions(mine)
+        position = positions(own)
         capture, axis = np.nonzero(np.isfinite(position))
-        cell = np.array([cells[s.laser_id] for s in mine], np.intp)[capture]
+        cell = np.array([cells[s.laser_id] for s in own], np.intp)[capture]
         scale = {int(n): _repeat_scale(fit, int(n)) for n in cells.values()}
         return cls(
-            observations=mine,
+            observations=own,
             capture=capture,
             axis=axis,
             cell=cell,
             position_px=position[capture, axis],
-            sd_px=stated_sd(mine, fit.rig.noise)[capture, axis] * np.array([scale[n] for n in cell.tolist()]),
-            stray=np.array([s.source not in used for s in mine], bool)[capture],
+            sd_px=stated_sd(own, fit.rig.noise)[capture, axis] * np.array([scale[n] for n in cell.tolist()]),
+            rejected=np.array([s.source not in used for s in own], bool)[capture],
         )
 
 
 def _repeat_scale(fit: CalibrationFit, cell: int) -> float:
-    """Factor on the stated deviations of a spot's repeats.
+    """Factor on the stated deviations of a cell's repeats.
 
-    Repeats that scatter more than all others (torn) are as noisy as they are to both sides of the split that
-    leaves the least: a step among them is then no noise, and noise is no step.
+    For an inconsistent cell the scatter about two means is used, before and after the split that leaves the
+    least of it: a step among the repeats must not count as noise, nor noise as a step.
     """
     usual, members = fit.cells.repeat_scale, fit.cells.members[cell]
-    if cell not in fit.cells.torn:
+    if cell not in fit.cells.inconsistent:
         return usual
     position, sd = positions(members), stated_sd(members, fit.rig.noise)
     split = [
@@ -119,12 +123,17 @@ def _repeat_scale(fit: CalibrationFit, cell: int) -> float:
     return max(usual, (chi2 / free) ** 0.5) if free else usual
 
 
-def _movement(fit: CalibrationFit, captures: _Captures, left: Refit, index: int) -> TargetMotion | None:
-    mean, slope, variance = _prediction(fit, captures, left, index)
+def _best_step(fit: CalibrationFit, captures: _Captures, reduced: Refit, index: int) -> TargetMotion | None:
+    """The step with the highest score, if it is decisive.
+
+    With the captures whitened to z and a step of 1 mm after capture m to a_m, the step is a_m z / (a_m a_m)
+    and the decrease of chi-square (a_m z)^2 / (a_m a_m).
+    """
+    mean, slope, variance = _prediction(fit, captures, reduced, index)
     distance = captures.position_px - mean
     try:
         whitened = np.linalg.inv(np.linalg.cholesky(variance))
-    except np.linalg.LinAlgError:  # the others tell so little of it that rounding is larger than the noise
+    except np.linalg.LinAlgError:  # a prediction so uncertain that the noise is lost in rounding
         return None
     lasers = captures.cell[np.searchsorted(captures.capture, np.arange(len(captures.observations)))]
     steps = [
@@ -140,7 +149,7 @@ def _movement(fit: CalibrationFit, captures: _Captures, left: Refit, index: int)
     gain = (columns.T @ white) ** 2 / information
     best = int(np.argmax(gain))
     score = gain[best] - STEP_COST - 2 * log(len(steps))
-    if score < DECISIVE or score < _rival(captures, whitened, white) + DECISIVE:
+    if score < DECISIVE or score < _alternative_score(captures, whitened, white) + DECISIVE:
         return None
     before = steps[best]
     return TargetMotion(
@@ -155,41 +164,48 @@ def _movement(fit: CalibrationFit, captures: _Captures, left: Refit, index: int)
 
 
 def _prediction(
-    fit: CalibrationFit, captures: _Captures, left: Refit, index: int
+    fit: CalibrationFit, captures: _Captures, reduced: Refit, index: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where each coordinate is expected, its change by the standoff (a mm), and (n, n) covariance."""
+    """Prediction of the n coordinates by the fit without the placement, its standoff free.
+
+    Returns:
+        (n,) means, px; (n,) derivatives by the standoff, px/mm; (n, n) covariance, px^2.
+    """
     rows = 2 * captures.cell + captures.axis
-    sd = fit.cells.sd_px.ravel()[rows] * left.scale
-    mean = fit.cells.position_px.ravel()[rows] + left.residual[rows] * sd
-    slope = by_standoff(left)[rows] * sd
-    own = left.jacobian[rows] * sd[:, None]
-    shared = rows[:, None] == rows
-    variance = (
-        np.diag((captures.sd_px * left.scale) ** 2) + shared * (fit.rig.noise.speckle_sd_px * left.scale) ** 2
-    )
-    anywhere = ANYWHERE * fit.cells.placements[index].standoff_mm * slope
-    return mean, slope, variance + own @ left.covariance @ own.T + np.outer(anywhere, anywhere)
+    sd = fit.cells.sd_px.ravel()[rows] * reduced.scale
+    mean = fit.cells.position_px.ravel()[rows] + reduced.residual[rows] * sd
+    slope = by_standoff(reduced)[rows] * sd
+    own = reduced.jacobian[rows] * sd[:, None]
+    speckle_px = fit.rig.noise.speckle_sd_px * reduced.scale
+    shared = (rows[:, None] == rows) * speckle_px**2
+    standoff = FREE_STANDOFF * fit.cells.placements[index].standoff_mm * slope
+    variance = np.diag((captures.sd_px * reduced.scale) ** 2) + shared
+    return mean, slope, variance + own @ reduced.covariance @ own.T + np.outer(standoff, standoff)
 
 
 def _is_one_spot(lasers: IndexArray, step: int) -> bool:
-    """Whether a step only sets all captures of one laser apart: that may be a wrong spot as well."""
+    """Whether a step separates all captures of one laser from the rest, as a wrong spot does too."""
     before, after = lasers[:step], lasers[step:]
     return not set(before.tolist()) & set(after.tolist()) and 1 in {len(set(before)), len(set(after))}
 
 
-def _rival(captures: _Captures, whitened: FloatArray, white: FloatArray) -> float:
-    """Score of the best other account: single captures are wrong, or besides one whole spot is."""
+def _alternative_score(captures: _Captures, whitened: FloatArray, white: FloatArray) -> float:
+    """Score of the best explanation without motion: the rejected captures are wrong, or one spot as well."""
     axes = captures.axis[:, None] == np.arange(2)
-    strays = [captures.capture == k for k in sorted(set(captures.capture[captures.stray].tolist()))]
+    outliers = [captures.capture == k for k in sorted(set(captures.capture[captures.rejected].tolist()))]
     spots = [captures.cell == k for k in sorted(set(captures.cell.tolist()))]
-    accounts = [strays, *([*strays, spot] for spot in spots)]
-    return max(_score(whitened, white, [mask[:, None] & axes for mask in account]) for account in accounts)
+    alternatives = [outliers, *([*outliers, spot] for spot in spots)]
+    return max(_score(whitened, white, [mask[:, None] & axes for mask in one]) for one in alternatives)
 
 
 def _score(whitened: FloatArray, white: FloatArray, wrong: list[BoolArray]) -> float:
+    """Decrease of chi-square with the positions of wrong spots free, minus their Occam factors.
+
+    The decrease is the squared projection of the whitened captures on the columns (n, 2) of each spot.
+    """
     if not wrong:
         return 0.0
     columns = whitened @ np.concatenate(wrong, axis=1).astype(float)
     basis, size, _ = np.linalg.svd(columns, full_matrices=False)
-    told = basis[:, size > 1e-9 * size.max()].T @ white
-    return float(told @ told) - SPOT_COST * len(wrong)
+    projection = basis[:, size > 1e-9 * size.max()].T @ white
+    return float(projection @ projection) - SPOT_COST * len(wrong)

@@ -1,1 +1,1 @@
-"""From captures to the observations that a fit uses."""
+"""Observations of spots and views of the board, from captures."""

@@ -1,4 +1,7 @@
-"""Averaging repeated readings of one spot, coordinate by coordinate. Average pixels, never ranges."""
+"""Averages of repeated observations of one spot, coordinate by coordinate, in pixels.
+
+Positions are averaged, not ranges: a range is a non-linear function of the position, and its mean is biased.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +12,24 @@ import numpy as np
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.stats import chi2_isf, chi2_sf
 
-STRAY_SD = 6.0
-"""A repeat this far from the median of its fellows is no repeat. Of honest Gaussian repeats 1 in 5e8 lies so
-far out when their deviation is stated rightly; stated far too small, 1 in 250 of ten (their own median
-absolute deviation is then the measure, and a rough one)."""
+OUTLIER_SD = 6.0
+"""Distance from the median at which one of 10 or more repeats is rejected. Of Gaussian repeats with the
+stated deviation 1 in 5e8 lies so far out; where the stated deviation is far too small, 1 in 250 of ten,
+because their own median absolute deviation is then used, and it is a rough estimate."""
 FEWEST_FOR_MEDIAN = 10
-STRAY_SD_OF_FEW = 8.0
-"""The same for 3 to 9 repeats, measured by what other spots' repeats scatter: hardly 1 in 1e9 of three."""
+OUTLIER_SD_OF_FEW = 8.0
+"""The same for 3 to 9 repeats, in deviations confirmed by the repeats of other spots: 1 in 1e9 of three."""
 FEWEST_SPOTS = 8
-"""Whose repeats tell what repeats usually scatter."""
-TORN = 1e-9
-"""Repeats that scatter together as improbably as this do not show one spot."""
+"""Number of spots needed to estimate the usual scatter of repeats."""
+INCONSISTENT_P = 1e-9
+"""P value of their scatter below which the repeats of a spot are inconsistent."""
 
 
 def weighted_mean(position: FloatArray, sd: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Mean weighted by 1 / sd^2, and its standard deviation, each (2,).
 
     Args:
-        position: (n, 2) u, v; NaN where a coordinate was not measured: it then counts for nothing.
+        position: (n, 2) u, v; NaN where a coordinate was not measured: it has no weight.
         sd: (n, 2) 1 sigma, finite.
 
     Returns:
@@ -40,34 +43,39 @@ def weighted_mean(position: FloatArray, sd: FloatArray) -> tuple[FloatArray, Flo
     return np.where(known, mean, np.nan), np.where(known, 1.0 / np.sqrt(safe), np.inf)
 
 
-def strays(position: FloatArray, sd: FloatArray) -> BoolArray:
-    """(n,) repeats that lie far from the median of the others in a coordinate that enough of them have."""
+def outliers(position: FloatArray, sd: FloatArray) -> BoolArray:
+    """(n,) repeats more than OUTLIER_SD from their median, in coordinates with at least 10 measurements.
+
+    Args:
+        position: (n, 2) px, NaN where not measured.
+        sd: (n, 2) px, 1 sigma; the median absolute deviation is used where it is larger.
+    """
     measured = np.isfinite(position)
-    stray = np.zeros(position.shape, bool)
+    outlying = np.zeros(position.shape, bool)
     for axis in np.flatnonzero(measured.sum(axis=0) >= FEWEST_FOR_MEDIAN):
         seen = measured[:, axis]
         distance = np.abs(position[seen, axis] - np.median(position[seen, axis]))
         scatter = 1.4826 * np.median(distance)
-        stray[seen, axis] = distance > STRAY_SD * np.maximum(scatter, sd[seen, axis])
-    return np.asarray(stray.any(axis=1))
+        outlying[seen, axis] = distance > OUTLIER_SD * np.maximum(scatter, sd[seen, axis])
+    return np.asarray(outlying.any(axis=1))
 
 
-def strays_of_few(position: FloatArray, sd: FloatArray) -> BoolArray:
-    """(n,) as `strays`, of 3 to 9 repeats whose deviation `sd` other spots have confirmed."""
+def outliers_of_few(position: FloatArray, sd: FloatArray) -> BoolArray:
+    """(n,) as `outliers`, for 3 to 9 repeats with deviations `sd` that the repeats of other spots confirm."""
     measured = np.isfinite(position)
-    stray = np.zeros(position.shape, bool)
+    outlying = np.zeros(position.shape, bool)
     count = measured.sum(axis=0)
     for axis in np.flatnonzero((count >= 3) & (count < FEWEST_FOR_MEDIAN)):
         seen = measured[:, axis]
         distance = np.abs(position[seen, axis] - np.median(position[seen, axis]))
-        stray[seen, axis] = distance > STRAY_SD_OF_FEW * sd[seen, axis]
-    return np.asarray(stray.any(axis=1))
+        outlying[seen, axis] = distance > OUTLIER_SD_OF_FEW * sd[seen, axis]
+    return np.asarray(outlying.any(axis=1))
 
 
 def usual_scale(scatter: Sequence[tuple[float, int]]) -> float:
-    """What repeats usually scatter over what is stated, at least 1; NaN where too few spots tell.
+    """Usual ratio of the scatter of repeats to the stated deviation, at least 1; NaN with too few spots.
 
-    The median over spots: up to half of them may be spoilt.
+    The median over spots, robust against up to half of them.
 
     Args:
         scatter: `scatter_chi2` of each spot.
@@ -78,14 +86,14 @@ def usual_scale(scatter: Sequence[tuple[float, int]]) -> float:
     return max(1.0, float(np.sqrt(np.median(chi2 / chi2_isf(0.5, free)))))
 
 
-def is_torn(scatter: tuple[float, int], usual: float) -> bool:
-    """Whether the repeats of a spot scatter far more than those of others do."""
+def is_inconsistent(scatter: tuple[float, int], usual: float) -> bool:
+    """Whether the repeats of a spot scatter far more than usual (`usual_scale`; NaN: never)."""
     chi2, free = scatter
-    return free > 0 and bool(chi2_sf(chi2 / usual**2, free) < TORN)  # NaN: nothing to compare with
+    return free > 0 and bool(chi2_sf(chi2 / usual**2, free) < INCONSISTENT_P)
 
 
 def scatter_chi2(position: FloatArray, sd: FloatArray) -> tuple[float, int]:
-    """Squared distances of the repeats from their mean in units of sd^2, summed, and how many are free."""
+    """Chi-square of the repeats about their mean (n, 2), and its degrees of freedom."""
     mean, _ = weighted_mean(position, sd)
     chi2 = float(np.nansum(((position - mean) / sd) ** 2))
     seen = np.isfinite(position).sum(axis=0)

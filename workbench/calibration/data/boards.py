@@ -1,4 +1,4 @@
-"""The printed board at a placement: its corners in the image, and a first guess of its pose."""
+"""The printed board at a placement: its corners in the image, and a starting value of its pose."""
 
 from __future__ import annotations
 
@@ -9,27 +9,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.calibration.data.observations import MeanObservations, Observation, PlacementInfo, Rejected
+from workbench.calibration.data.observations import MeanObservations, Observation, PlacementInfo
 from workbench.model.board import Board
 from workbench.model.errors import BadInputError
+from workbench.model.fit_event import Rejected
 from workbench.model.rig import Rig
 from workbench.optics.lens_models import lens_model
 from workbench.optics.undistort import undistort
 
-# OpenCV is imported where there is a board: a fit of spots alone starts without it.
+# OpenCV is imported in the functions that need it: a fit of spots alone starts faster.
 if TYPE_CHECKING:
     from workbench.corners.board import BoardCorners
     from workbench.model.arrays import Image
 
 FEWEST_CORNERS = 4
-"""That determine a pose."""
+"""Number of corners that determine a pose."""
 BAND_EDGE_MM = 3.0
-"""A spot's middle must lie this far inside the band: beams are some 2.5 mm wide where a board is read."""
+"""Least distance of a spot's centre from the edge of the blank band; beams are some 2.5 mm wide there."""
 
 
 @dataclass(frozen=True)
 class BoardView:
-    """What was seen of the board at one placement."""
+    """Corners of the board at one placement."""
 
     placement: PlacementInfo
     corners: BoardCorners
@@ -37,7 +38,7 @@ class BoardView:
 
 @dataclass(frozen=True)
 class PoseGuess:
-    """The board's pose by the rig file's lens: a start for the fit, some millimetres and degrees off."""
+    """Starting value of the board's pose, by the rig file's lens; good to some millimetres and degrees."""
 
     slope_x: float
     slope_y: float
@@ -47,7 +48,7 @@ class PoseGuess:
 
 
 def see_board(frames: Sequence[Image], board: Board, placement: PlacementInfo) -> BoardView | Rejected:
-    """The board in frames of one placement, or why it is not found."""
+    """Corners of the board in the frames of one placement, or the reason why they are not found."""
     from workbench.corners.board import find_board
 
     try:
@@ -57,10 +58,10 @@ def see_board(frames: Sequence[Image], board: Board, placement: PlacementInfo) -
 
 
 def on_band(view: BoardView, board: Board, observation: Observation) -> Observation | Rejected:
-    """The observation of a spot, or its rejection where it lies on the print or beside the board.
+    """The observation, or its rejection where the spot lies on the print or beside the board.
 
-    The spot's place on the board comes from the corners around it; lens distortion over their distance
-    shifts it by less than a millimetre.
+    The position on the board is a homography of the corners; lens distortion between them changes it by less
+    than a millimetre.
     """
     if not np.isfinite([observation.u_px, observation.v_px]).all():
         return observation
@@ -82,12 +83,12 @@ def on_band(view: BoardView, board: Board, observation: Observation) -> Observat
 def on_boards(
     board: Board, seen: Mapping[str, BoardView | Rejected], found: Sequence[Observation | Rejected]
 ) -> list[Observation | Rejected]:
-    """What was found of spots, without those that a board as their target spoils.
+    """Reject observations whose spot lies beside the blank band of a board, or on a board not found.
 
     Args:
         board: the board.
-        seen: by placement, what was seen of the board where it was the target.
-        found: observations of any placement, and what was rejected already.
+        seen: views of the board (or their rejections) by placement; other placements have a flat target.
+        found: observations of any placement, and earlier rejections, which are kept.
     """
     return [_on_board(board, seen.get(f.placement), f) if isinstance(f, Observation) else f for f in found]
 
@@ -100,50 +101,49 @@ def _on_board(
     if isinstance(seen, BoardView):
         return on_band(seen, board, observation)
     where = f"laser {observation.laser_id} at {observation.standoff_mm:g} mm"
-    return Rejected(observation.source, f"{where}: the board that it fell on was not found")
+    return Rejected(observation.source, f"{where}: the board at this placement was not found")
 
 
 def with_placements(cells: MeanObservations, boards: Sequence[BoardView]) -> MeanObservations:
-    """The cells with the boards' placements among theirs.
+    """The mean observations, with the placements of the boards added to theirs.
 
     Raises:
-        BadInputError: two boards at one placement, or a board and a spot that say different things of it.
+        BadInputError: two boards at one placement, or a board and a spot with different settings of it.
     """
     known = {p.key: p for p in cells.placements}
     seen: set[str] = set()
     for view in boards:
-        mine = view.placement
-        first = known.setdefault(mine.key, mine)
-        if mine.key in seen or first.told != mine.told:
+        own = view.placement
+        first = known.setdefault(own.key, own)
+        if own.key in seen or first.setting != own.setting:
             raise BadInputError(
-                f"{mine.source}: standoff_mm: expected what {first.source} says of the same placement"
-                f" {mine.key} ({first.describe}) and one board, got {mine.describe}; give other placements"
-                " other names"
+                f"{own.source}: standoff_mm: placement {own.key}: expected {first.describe} as in"
+                f" {first.source} and one board, got {own.describe}; give each placement its own name"
             )
-        seen.add(mine.key)
+        seen.add(own.key)
     return replace(cells, placements=tuple(known.values()))
 
 
 def guess_pose(rig: Rig, view: BoardView) -> PoseGuess:
-    """The pose that fits the corners best with the rig file's lens.
+    """Pose of the board from its corners, with the rig file's lens (IPPE, planar pose estimation).
 
     Raises:
-        BadInputError: no pose does.
+        BadInputError: too few corners, or no pose in front of the camera with the printed side visible.
     """
     import cv2
 
     lens = np.array([prior.value for prior in rig.camera.lens_priors.values()])
-    sight = undistort(lens_model(rig.camera.lens), lens, view.corners.position_px)
-    shown = np.isfinite(sight).all(axis=1)
-    printed = rig.board.corners_mm[view.corners.ids][shown]
+    directions = undistort(lens_model(rig.camera.lens), lens, view.corners.position_px)
+    known = np.isfinite(directions).all(axis=1)
+    printed = rig.board.corners_mm[view.corners.ids][known]
     points = np.column_stack([printed, np.zeros(len(printed))])
     mistake = BadInputError(
-        f"{view.placement.source}: the board's corners fit no pose; is the image mirrored, or the board"
-        " not the one of the rig file?"
+        f"{view.placement.source}: no pose of the board fits its corners; check that the image is not"
+        " mirrored and that the board is the one in the rig file"
     )
-    if shown.sum() < FEWEST_CORNERS:
+    if known.sum() < FEWEST_CORNERS:
         raise mistake
-    found, turn, shift = cv2.solvePnP(points, sight[shown], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
+    found, turn, shift = cv2.solvePnP(points, directions[known], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
     axes = cv2.Rodrigues(turn)[0]
     if not found or axes[2, 2] <= 0:
         raise mistake

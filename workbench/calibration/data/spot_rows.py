@@ -1,6 +1,6 @@
-"""From captures to observations: the spot of a laser at a standoff, or why it is rejected.
+"""Observations from captures: the spot of a laser at a standoff, or the reason for its rejection.
 
-The search for spots is imported where there are images: positions need none of it.
+The search for spots is imported only where a row has images.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from workbench.calibration.data.boards import BoardView, on_boards, see_board
-from workbench.calibration.data.observations import Observation, PlacementInfo, Rejected
+from workbench.calibration.data.observations import Observation, PlacementInfo, RejectedObservation
 from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
+from workbench.model.fit_event import Rejected
 from workbench.model.rig import LaserSpec, Rig
 from workbench.optics.image import bend_px, inside_px
 from workbench.optics.lens_models import lens_model
@@ -26,9 +27,10 @@ if TYPE_CHECKING:
 
 NO_STANDOFF = "standoff_mm is empty: a calibration needs known standoffs"
 PRIOR_REACH_SD = 4.0
+"""Half width of the search band, in standard deviations of the rig file's priors."""
 BEAM_HALF_WIDTH_PX = 8.0
 LEAST_DEPTH_MM = 1.0
-"""Nearest depth at which a spot is expected: at depth 0 the lens shows none."""
+"""Least depth of a target in front of the pinhole."""
 
 
 def observations_of_rows(
@@ -48,7 +50,13 @@ def observations_of_rows(
 
 
 def observe(finding: Finding, laser: LaserSpec, observation: Observation) -> Observation | Rejected:
-    """The one spot of a capture that fired one laser, put into `observation`, or why there is none."""
+    """`observation` with the position of the only spot of its capture, or its rejection.
+
+    Args:
+        finding: spots of a capture with one laser on.
+        laser: that laser.
+        observation: laser, standoff and source; its position is not yet measured.
+    """
     from workbench.spots import Failure, explain
 
     source = observation.source
@@ -56,9 +64,9 @@ def observe(finding: Finding, laser: LaserSpec, observation: Observation) -> Obs
     if len(finding.spots) != 1:
         cause = explain(finding.failures[0]) if finding.failures else ""
         reason = f"{where}: expected one spot, got {len(finding.spots)}. {cause}"
-        return Rejected(source, reason, None if finding.spots else observation)
+        return Rejected(source, reason) if finding.spots else RejectedObservation(source, reason, observation)
     spot = finding.spots[0]
-    # Cut by the border or grown together with another, its centre is not the laser's.
+    # The centre of a spot cut by the border, or merged with another, is biased.
     if bad := [flag for flag in (Failure.AT_EDGE, Failure.MERGED) if flag in spot.flags]:
         return Rejected(source, f"{where}: {bad[0]}: {explain(bad[0])}")
     return replace(
@@ -85,13 +93,13 @@ def _in_picture(rig: Rig, observation: Observation) -> Observation | Rejected:
 
 
 def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
-    """Band in which the rig file lets the laser's spots lie: along the projection of its baseline."""
+    """Band of the image in which the laser's spots lie, by the rig file: along the image of its baseline."""
     from workbench.spots import Scanline
 
     camera = rig.camera
     x, y = laser.x_mm.value, laser.y_mm.value
     du, dv = x / (x**2 + y**2) ** 0.5, y / (x**2 + y**2) ** 0.5
-    # Spread across the line: principal point and pointing, both in the direction (-dv, du).
+    # Uncertainty across the line: principal point and pointing, projected on the normal (-dv, du).
     across = [
         camera.cx_px.sd * dv,
         camera.cy_px.sd * du,
@@ -113,7 +121,7 @@ def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
 
 
 def _see_boards(rig: Rig, rows: Sequence[CaptureRow]) -> dict[str, BoardView | Rejected]:
-    """By placement, the board in the mean of its frames."""
+    """Views of the board by placement, each from the mean of its frames."""
     placed: dict[str, list[CaptureRow]] = defaultdict(list)
     for row in rows:
         placed[_placement(row)].append(row)

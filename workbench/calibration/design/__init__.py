@@ -1,1 +1,1 @@
-"""What a calibration will determine before any data, and where to place the target."""
+"""Design of a calibration before and during the captures: forecast, standoffs, expected spots."""

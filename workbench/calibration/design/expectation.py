@@ -1,4 +1,4 @@
-"""Information of spots on a sensor's parameters, and of these on ranges: first-order, before any data.
+"""First-order prediction, before any data: information of spots on parameters, and gradients of ranges.
 
 Parameters are counted in units of their prior sd, so that the prior's information is the unit matrix.
 """
@@ -24,15 +24,16 @@ from workbench.optics.image import in_picture
 from workbench.optics.rays import RAY
 
 BLOCK = 4096
-"""Cells that one call of the compiled program evaluates."""
+"""Number of cells that one call of the compiled program evaluates."""
 
 
 @dataclass(frozen=True)
 class Expectation:
-    """First-order view of N sensors of one rig: values (N, S), all S parameters in the order of the table."""
+    """First-order prediction of N sensors of one rig."""
 
     rig: Rig
     sensors: FloatArray
+    """(N, S) values of the S parameters, in the order of the table."""
 
     @property
     def table(self) -> ParameterTable:
@@ -45,10 +46,10 @@ class Expectation:
         return Layout(self.rig.camera.lens)
 
     def spot_rows(self, standoff_mm: FloatArray, sd_px: float) -> FloatArray:
-        """(N, J, 2 L, S) derivatives of spots on a target at standoffs (J,), whitened; 0 if out of frame.
+        """(N, J, 2 L, S) whitened derivatives of spots on a target at standoffs (J,); 0 outside the image.
 
-        The error of a placement and its tilts are noise that its spots share. Rows A are scaled so that
-        A^T A is the placement's information on the parameters.
+        The error of a placement and its tilts are noise that its spots share: with V = 1 + E E^T = L L^T the
+        covariance of the spots, the rows are A = L^-1 J, and A^T A is the placement's information.
 
         Args:
             standoff_mm: by the ruler.
@@ -65,7 +66,7 @@ class Expectation:
         return np.asarray(np.linalg.solve(noise, by_sensor), float)
 
     def range_rows(self, range_mm: FloatArray, sd_px: float) -> tuple[FloatArray, FloatArray]:
-        """How ranges (K,) of each laser depend on the parameters, relative to the range.
+        """Derivatives of ln(range) by the parameters, and its sd by the spot's noise, at ranges (K,).
 
         Args:
             range_mm: from the reference plane.
@@ -73,29 +74,29 @@ class Expectation:
 
         Returns:
             (N, K, L, S) derivatives of ln(range) and (N, K, L) relative sd by the spot's own noise; both NaN
-            where the spot is out of frame.
+            where the spot is outside the image.
         """
         _, slopes, seen = self._cells(range_mm, ranging=True)
         cell = self.cell
         by_range = slopes[..., cell.errors.start]
         strength = (by_range**2).sum(axis=-1)
         gradient = -(by_range[..., None] * slopes[..., cell.sensor]).sum(axis=-2) / strength[..., None]
-        gradient[..., cell.ruler_scale] = 0.0  # a ranger reads no ruler
+        gradient[..., cell.bench_only] = 0.0  # a range depends neither on the ruler nor on a common tilt
         rows = self._spread(gradient[..., None, :])[..., 0, :]
         at = range_mm[:, None]
         own = sd_px / np.sqrt(strength) / at
         return np.where(seen[..., None], rows / at[..., None], np.nan), np.where(seen, own, np.nan)
 
     def in_frame(self, standoff_mm: FloatArray) -> BoolArray:
-        """(N, J, L) whether the spot on a square target is in the picture of a lens that does not fold."""
+        """(N, J, L) whether the spot on a square target is in the image and the lens's valid domain."""
         return self._cells(standoff_mm)[2]
 
     def spots(self, standoff_mm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Spots on a square target at standoffs (J,) by the ruler, px, in the picture or not.
+        """Spots on a square target at standoffs (J,) by the ruler, inside or outside the image.
 
         Returns:
-            (N, J, L, 2) where they are, (N, J, L, 2, S) derivatives by the parameters in prior sd, and
-            (N, J, L, 2) 1 sigma by the error of the placement and its tilt.
+            (N, J, L, 2) positions, px; (N, J, L, 2, S) derivatives by the parameters in prior sd; and
+            (N, J, L, 2) 1 sigma by the error and the tilts of the placement.
         """
         spot, slopes, _ = self._cells(standoff_mm)
         tilt = radians(self.rig.bench.tilt_sd_deg)
@@ -105,11 +106,11 @@ class Expectation:
     def _cells(
         self, standoff_mm: FloatArray, ranging: bool = False
     ) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """(N, J, L, 2) spots, (N, J, L, 2, I) their derivatives by the I inputs, (N, J, L) in frame."""
+        """(N, J, L, 2) spots, (N, J, L, 2, I) derivatives by the I inputs, (N, J, L) in the image."""
         cell = self.cell
         common = np.array(self.sensors[:, cell.common])
         if ranging:
-            common[:, cell.ruler_scale] = 0.0
+            common[:, cell.bench_only] = 0.0
         rays = self.sensors[:, cell.common.stop :].reshape(len(common), -1, len(RAY))
         shape = (len(common), len(standoff_mm), rays.shape[1])
         parts = [
@@ -129,9 +130,9 @@ class Expectation:
         return spot.reshape(*shape, 2), slopes.reshape(*shape, 2, -1), seen
 
     def _spread(self, by_input: FloatArray) -> FloatArray:
-        """(N, J, L, C, I) derivatives by a cell's inputs as (..., S) by all parameters, in prior sd.
+        """Derivatives (N, J, L, C, I) by the sensor's inputs of a cell, as (..., S) by all parameters.
 
-        Of the inputs those of the sensor alone: lens, reference, ray.
+        In prior sd; the inputs are lens, reference and ray.
         """
         layout, cell = Layout(self.rig.camera.lens, by_input.shape[2]), self.cell
         whole = np.zeros((*by_input.shape[:-1], self.sensors.shape[1]))
@@ -144,7 +145,7 @@ class Expectation:
 def _in_blocks(
     inputs: FloatArray, standoff_mm: FloatArray, lens_name: LensName
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """`_slopes` of any number of cells by one compiled program; the last block is filled up."""
+    """`_slopes` of any number of cells by one compiled program; the last block is padded."""
     count = len(inputs)
     indices = np.arange(-(-count // BLOCK) * BLOCK) % count
     chosen = np.split(indices, len(indices) // BLOCK)
@@ -155,10 +156,7 @@ def _in_blocks(
 
 @jit_cached(static=1)
 def _slopes(inputs: Array, standoff_mm: Array, lens_name: LensName) -> tuple[Array, Array, Array]:
-    """(n, 2) spots, (n, 2, I) their derivatives by the inputs, (n,) undistorted radii.
-
-    A radius is infinite at and behind the pinhole.
-    """
+    """(n, 2) spots, (n, 2, I) derivatives by the inputs, (n,) undistorted radii (infinite at depth <= 0)."""
 
     def spot(inputs: Array) -> Array:
         return jnp.stack(predict_cell(lens_name, tuple(inputs.T), standoff_mm), axis=1)

@@ -1,4 +1,4 @@
-"""Where a spot that was not seen should be: by the rig file, and by the spots that were seen so far."""
+"""Expected position of a spot by the rig file and by the observations so far."""
 
 from __future__ import annotations
 
@@ -15,35 +15,37 @@ from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
 ROUNDS = 5
-"""Of Gauss and Newton: the second already moves a spot by less than a pixel."""
+"""Gauss-Newton steps; the second already changes a spot by less than a pixel."""
 SURE_SD = 2.0
-"""A spot this far beyond the edge of the picture, or inside of it, is taken to be there."""
+"""Distance from the image's edge, in standard deviations, from which a spot counts as inside or outside."""
 
 
 @dataclass(frozen=True)
 class ExpectedSpot:
-    """Of one laser's spot. Pixels; sd is 1 sigma."""
+    """Expected position of one laser's spot; px, 1 sigma."""
 
     u_px: float
     v_px: float
     u_sd_px: float
     v_sd_px: float
     place: Literal["inside", "outside", "at the edge"]
-    """With respect to the picture."""
+    """Place with respect to the image."""
 
 
 def expected_spot(
     rig: Rig, observations: Sequence[Observation], laser_id: str, standoff_mm: float
 ) -> ExpectedSpot:
-    """Expect a laser's spot on a square flat target.
+    """Predict a laser's spot on a square flat target.
 
-    A fit of the sensor alone: placements are exact in it but for noise, which suffices for some pixels.
+    The sensor alone is fitted; errors of the placements count as noise of the spots, which is accurate to
+    some pixels. The Gauss-Newton steps are written out, because the noise is renewed in each from the
+    derivatives by the placement errors; a solver with a fixed cost function would converge to another point.
 
     Args:
-        rig: priors, size of the picture.
-        observations: what was seen so far, of flat targets; may be none.
-        laser_id: whose spot.
-        standoff_mm: by the ruler.
+        rig: priors, size of the image.
+        observations: observations of flat targets so far; may be empty.
+        laser_id: the laser.
+        standoff_mm: of the target, by the ruler.
     """
     cells, _ = group(observations, rig.laser_ids, rig.noise)
     standoffs = np.array([*(p.standoff_mm for p in cells.placements), standoff_mm])
@@ -56,12 +58,12 @@ def expected_spot(
         noise = np.hypot(sd[at], cells.sd_px)
         seen = np.isfinite(cells.position_px)
         rows = (slopes[at] / noise[..., None])[seen]
-        missed = ((cells.position_px - spot[at]) / noise)[seen]
+        residual = ((cells.position_px - spot[at]) / noise)[seen]
         covariance = np.linalg.inv(np.eye(len(y)) + rows.T @ rows)
-        y = covariance @ (rows.T @ (missed + rows @ y))
+        y = covariance @ (rows.T @ (residual + rows @ y))
     asked = len(standoffs) - 1, rig.laser_ids.index(laser_id)
-    spread = np.sqrt(((slopes[asked] @ covariance) * slopes[asked]).sum(axis=-1) + sd[asked] ** 2)
-    return _placed(rig, spot[asked], spread)
+    sd_px = np.sqrt(((slopes[asked] @ covariance) * slopes[asked]).sum(axis=-1) + sd[asked] ** 2)
+    return _placed(rig, spot[asked], sd_px)
 
 
 def _placed(rig: Rig, spot: FloatArray, sd: FloatArray) -> ExpectedSpot:

@@ -1,7 +1,7 @@
-"""While captures are taken: how good ranges already are, and which standoff would help most next.
+"""Advice during a calibration: range uncertainty so far, and the best next standoff.
 
-The fit is that of `fit`. What a placement more would tell is worked out to first order, of a square target
-placed as exactly as the rig file says.
+The fit is that of `fit`. The gain of one more placement is computed to first order, for a square target with
+the placement error of the rig file.
 """
 
 from __future__ import annotations
@@ -14,49 +14,51 @@ import numpy as np
 
 from workbench.calibration.data.observations import MeanObservations, Observation, group, positions, stated_sd
 from workbench.calibration.design.expectation import Expectation
-from workbench.calibration.design.standoffs import Aim, Choice, candidates
+from workbench.calibration.design.standoffs import Candidates, RangeGoals, candidate_standoffs
 from workbench.calibration.estimation.batch import as_grid
 from workbench.calibration.estimation.fit import table_of
-from workbench.calibration.estimation.noise_scale import scale_called_for
+from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import measured, refit
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import NoiseSpec, Rig
 
 FEWEST = 2
-"""Placements before there is anything to say."""
+"""Least number of placements for advice."""
 RANGES = 18
+"""Number of ranges over the planned span."""
 SCALE_ROUNDS = 10
+SCALE_TOLERANCE = 1.001
 
 
 @dataclass(frozen=True)
 class Advice:
-    """Relative standard deviations are of a single range, its spot's noise included; 1 sigma."""
+    """Range uncertainty and best next standoff; relative sd of a single range with spot noise, 1 sigma."""
 
     placements: int
     relative_range_sd: float
-    """The largest of any laser over the span that is planned, by the captures so far."""
+    """The largest of any laser over the planned span, by the captures so far."""
     next_standoff_mm: float
     then_relative_range_sd: float
-    """With a placement there, its readings as many and as good as those so far."""
+    """The same with one more placement there, with as many captures and as much noise as those so far."""
     worst_residual_px: float
-    """Of a mean position, in the coordinate in which it is the most deviations of its noise."""
+    """Largest residual of a mean position, by its ratio to its noise."""
     worst_residual_sd: float
-    """The same in those, as far as the residuals called for scaled up."""
+    """The same in standard deviations of the scaled noise."""
     worst_laser_id: str
     worst_standoff_mm: float
 
 
 def advise(rig: Rig, observations: Sequence[Observation], planned_mm: Sequence[float]) -> Advice | None:
-    """Fit what was seen so far, and look for the standoff that makes the worst range best.
+    """Fit the observations so far, and find the standoff that minimises the worst range uncertainty.
 
     Args:
         rig: priors, noise and reach.
         observations: of a flat target.
-        planned_mm: standoffs of the whole procedure: ranges should be good from the nearest to the farthest.
+        planned_mm: standoffs of the whole procedure; ranges between the nearest and the farthest count.
 
     Returns:
-        None: there is too little yet, or it cannot be fitted.
+        None with fewer than FEWEST placements, or where the fit has no finite result.
     """
     cells, _ = group(observations, rig.laser_ids, rig.noise)
     if len(cells.placements) < FEWEST:
@@ -65,48 +67,50 @@ def advise(rig: Rig, observations: Sequence[Observation], planned_mm: Sequence[f
         return None
     noise = _noise(rig, observations, cells.repeat_scale, fitted.noise_scale)
     now = Expectation(rig.model_copy(update={"noise": noise}), fitted.sensor)
-    aim = Aim.of(now, np.geomspace(min(planned_mm), max(planned_mm), RANGES), noise)
+    goals = RangeGoals.of(now, np.geomspace(min(planned_mm), max(planned_mm), RANGES), noise)
     repeats = max(1, round(float(np.mean([len(members) for members in cells.members]))))
-    choice = Choice.of(now, candidates(rig), repeats, aim)
-    best = int(choice.worst_with_one_more(fitted.covariance).argmin())
-    told = choice.rows[:, best]
-    then = np.asarray(np.linalg.inv(np.linalg.inv(fitted.covariance) + np.swapaxes(told, 1, 2) @ told), float)
+    candidates = Candidates.of(now, candidate_standoffs(rig), repeats, goals)
+    best = int(candidates.worst_with_one_more(fitted.covariance).argmin())
+    rows = candidates.rows[:, best]
+    then = np.asarray(np.linalg.inv(np.linalg.inv(fitted.covariance) + np.swapaxes(rows, 1, 2) @ rows), float)
     return Advice(
         placements=len(cells.placements),
-        relative_range_sd=_worst(aim, fitted.covariance),
-        next_standoff_mm=float(choice.standoff_mm[best]),
-        then_relative_range_sd=_worst(aim, then),
+        relative_range_sd=_worst(goals, fitted.covariance),
+        next_standoff_mm=float(candidates.standoff_mm[best]),
+        then_relative_range_sd=_worst(goals, then),
         **_worst_residual(rig, fitted),
     )
 
 
 @dataclass(frozen=True)
 class _Fitted:
+    """Fit of the observations so far, with M cells."""
+
     sensor: FloatArray
-    """(1, S)"""
+    """(1, S) values of the sensor's parameters."""
     covariance: FloatArray
     """(1, F, F) in prior sd."""
     noise_scale: float
-    """On the stated noise."""
+    """Factor on the stated noise."""
     residual_sd: FloatArray
-    """(M, 2) of each cell in deviations of the noise so scaled, 0 where nothing was measured."""
+    """(M, 2) in standard deviations of the scaled noise, 0 where not measured."""
     residual_px: FloatArray
     """(M, 2)"""
     cells: MeanObservations
 
 
 def _fit(rig: Rig, cells: MeanObservations, planned: int) -> _Fitted | None:
-    """As `fit`, the noise scaled to the residuals where they are too large; None: no finite result."""
-    whole = _with_room(cells, len(rig.lasers), planned)
+    """`fit` with the noise scaled to the residuals where they are too large; None: no finite result."""
+    whole = _padded(cells, len(rig.lasers), planned)
     table = table_of(rig, whole.placements)
     problem = LeastSquaresProblem.of(rig, table, whole, ())
     with np.errstate(over="ignore", invalid="ignore"):
         found = refit(problem, measured(problem), np.zeros(len(table.prior_mean)))
         for _ in range(SCALE_ROUNDS):
-            called_for = float(scale_called_for(found.chi2 * found.scale**2, found.freedom))
-            if not called_for > found.scale * 1.001:
+            scale = float(significant_scale(found.chi2 * found.scale**2, found.freedom))
+            if not scale > found.scale * SCALE_TOLERANCE:
                 break
-            found = found.at(called_for)
+            found = found.at(scale)
     if not np.isfinite([*found.y, found.chi2]).all():
         return None
     sensor = int(table.is_sensor.sum())
@@ -124,7 +128,7 @@ def _fit(rig: Rig, cells: MeanObservations, planned: int) -> _Fitted | None:
 
 
 def _worst_residual(rig: Rig, fitted: _Fitted) -> dict[str, Any]:
-    """To three digits, for the same reason as `_worst`."""
+    """The largest residual as fields of `Advice`, rounded to three digits as in `_worst`."""
     cell, axis = np.unravel_index(int(np.abs(fitted.residual_sd).argmax()), fitted.residual_sd.shape)
     placement = fitted.cells.placements[fitted.cells.placement[cell]]
     return {
@@ -135,10 +139,10 @@ def _worst_residual(rig: Rig, fitted: _Fitted) -> dict[str, Any]:
     }
 
 
-def _with_room(cells: MeanObservations, lasers: int, planned: int) -> MeanObservations:
-    """The cells with a place for every spot of the procedure, those not seen without a measurement.
+def _padded(cells: MeanObservations, lasers: int, planned: int) -> MeanObservations:
+    """The mean observations, padded with unmeasured cells for all planned placements and all lasers.
 
-    So the fit after each placement is the same program, that of the fit at the end.
+    The fit after each placement then has the array shapes of the fit at the end: one compiled program.
     """
     first = cells.placements[0]
     room = range(planned - len(cells.placements))
@@ -146,17 +150,23 @@ def _with_room(cells: MeanObservations, lasers: int, planned: int) -> MeanObserv
     position, sd = as_grid(replace(cells, placements=placements), lasers)
     placement, laser = np.indices(position.shape[:2]).reshape(2, -1)
     return MeanObservations(
-        placements, laser, placement, position.reshape(-1, 2), sd.reshape(-1, 2), members=()
+        placements=placements,
+        laser=laser,
+        placement=placement,
+        position_px=position.reshape(-1, 2),
+        sd_px=sd.reshape(-1, 2),
+        time=np.zeros(len(laser)),
+        members=(),
     )
 
 
-def _worst(aim: Aim, covariance: FloatArray) -> float:
-    """To four digits: a session that is resumed must come to the same, word for word."""
-    return float(f"{np.sqrt((aim.variance(covariance) + aim.spot_sd**2).max()):.4g}")
+def _worst(goals: RangeGoals, covariance: FloatArray) -> float:
+    """Largest relative range sd, rounded to four digits: a resumed session must reproduce it exactly."""
+    return float(f"{np.sqrt((goals.variance(covariance) + goals.spot_sd**2).max()):.4g}")
 
 
 def _noise(rig: Rig, observations: Sequence[Observation], repeat_scale: float, scale: float) -> NoiseSpec:
-    """As a calibration would state it."""
+    """Noise as a calibration of these observations states it."""
     seen = np.isfinite(positions(observations))
     own = float(np.sqrt((stated_sd(observations, rig.noise)[seen] ** 2).mean()))
     return NoiseSpec(spot_sd_px=own * repeat_scale * scale, speckle_sd_px=rig.noise.speckle_sd_px * scale)

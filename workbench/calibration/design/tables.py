@@ -1,4 +1,4 @@
-"""Tables of what a calibration is expected to determine."""
+"""Tables of a forecast: parameters and ranges."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from workbench.model.fit_tables import DETERMINED_BY
 from workbench.model.table import Column, Table
 
-if TYPE_CHECKING:  # a table of one of them is made without the rest
+if TYPE_CHECKING:  # imported for annotations alone: commands start faster
     from workbench.calibration.design.forecast import ParameterForecast, RangeForecast
 
 
@@ -44,7 +44,7 @@ def range_forecast_table(laser_ids: Sequence[str], ranges: Sequence[RangeForecas
             (at, *(cell for i in laser_ids for cell in cells[at, i]))
             for at in dict.fromkeys(at for at, _ in cells)
         ),
-        caption="alone: by the calibration, without the noise of the spot; -: the spot is out of the picture",
+        caption="alone: by the calibration, without the noise of the spot; -: the spot is outside the image",
     )
 
 

@@ -1,9 +1,16 @@
-"""Many calibrations of one layout at once: simulation, bootstrap, design of standoffs.
+"""Batch solver: many calibrations of one layout at once, for simulation, bootstrap and design of standoffs.
 
-The posterior is that of `fit`, the solver another: Gauss-Newton on the normal equations, damped as Levenberg
-did where a step would climb. A placement's error and tilts meet only its own spots, so that their blocks are
-eliminated from the normal equations first (Schur complement; F. Zhang, "The Schur Complement and Its
-Applications", 2005) and what is left to solve has the size of the sensor alone.
+The posterior is that of `fit`; the solver is Gauss-Newton on the normal equations, with Levenberg's damping
+where a step would increase the cost. With y = (sensor s, placements p) the equations are
+
+    [H_ss  H_sp] [ds]     [g_s]
+    [H_ps  H_pp] [dp] = - [g_p]
+
+H_pp is block diagonal, because error and tilts of a placement affect its own spots only: 3 x 3 blocks are
+inverted, and ds solves the Schur complement (H_ss - H_sp H_pp^-1 H_ps) ds = H_sp H_pp^-1 g_p - g_s, which has
+the size of the sensor alone; then dp = -H_pp^-1 (g_p + H_ps ds) (F. Zhang, "The Schur Complement and Its
+Applications", 2005). The first steps renew the equations; near the optimum only the gradient is renewed, a
+quasi-Newton iteration that converges linearly and whose steps cost a small part (`_close_in`).
 """
 
 from __future__ import annotations
@@ -20,7 +27,7 @@ from jax import Array
 
 from workbench.calibration.data.observations import MeanObservations, PlacementInfo
 from workbench.calibration.estimation.fit import table_of
-from workbench.calibration.estimation.noise_scale import scale_called_for
+from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.parameters import PLACEMENT, ParameterTable
 from workbench.calibration.model.prediction import predict_cell
@@ -29,21 +36,23 @@ from workbench.model.rig import Rig
 from workbench.optics.rays import RAY
 
 CHUNK = 16
-"""Fits solved in step: enough to fill the vector units, few enough not to wait long for the slowest one."""
+"""Fits solved together: enough to fill the vector units, few enough that none waits long for the slowest."""
 MAX_STEPS = 60
 STEP_TOLERANCE_SD = 1e-7
-"""Of the last step, in posterior standard deviations; each is smaller than the one before by 0.3 or less."""
+"""Length of the last step in posterior standard deviations; each step is at most 0.3 of the one before."""
 NEAR_SD = 10.0
-"""After a step shorter than this the normal equations hardly change any more."""
+"""Length of a step, in posterior sd, below which the normal equations hardly change any more."""
 SCALE_TOLERANCE = 1.001
+"""The noise scale has converged where the residuals ask for less than this factor more."""
 SCALE_ROUNDS = 10
 FIRST_DAMPING = 1e-3
 LEAST_DAMPING = 1e-9
+"""Damping below this becomes 0."""
 
 
 @dataclass(frozen=True)
 class BatchFit:
-    """B calibrations. P parameters (S of the sensor, then 3 of each of J placements), 1 sigma throughout."""
+    """B calibrations: P parameters (S of the sensor, then 3 of each of J placements); sd are 1 sigma."""
 
     table: ParameterTable
     values: FloatArray
@@ -53,7 +62,7 @@ class BatchFit:
     placement_covariance: FloatArray
     """(B, J, 3, 3) posterior of each placement's error and slopes."""
     noise_scale: FloatArray
-    """(B,) as in `Fit`."""
+    """(B,) as in `CalibrationFit`."""
     chi2: FloatArray
     """(B,) of the data at the stated noise."""
     degrees_of_freedom: FloatArray
@@ -84,8 +93,8 @@ def fit_batch(
     """Fit B calibrations of one rig at the same J placements.
 
     Args:
-        rig: priors; its L lasers in the order of the file.
-        placements: J of them, shared by all calibrations.
+        rig: priors, and L lasers in the order of the file.
+        placements: J placements, shared by all calibrations.
         position_px: (B, J, L, 2) mean positions, NaN where not measured.
         sd_px: 1 sigma of the means, speckle included; broadcasts to `position_px`.
     """
@@ -100,7 +109,7 @@ def fit_batch(
     scale = np.ones(len(position))
     solved = _in_chunks(shared, np.zeros((len(position), len(table.prior_mean))), position, inverse_sd)
     for _ in range(SCALE_ROUNDS):
-        called_for = scale_called_for(solved.chi2 * scale**2, solved.freedom)
+        called_for = significant_scale(solved.chi2 * scale**2, solved.freedom)
         again = np.flatnonzero(called_for > scale * SCALE_TOLERANCE)
         if not len(again):
             break
@@ -133,7 +142,7 @@ def as_grid(cells: MeanObservations, lasers: int) -> tuple[FloatArray, FloatArra
 
 
 class _Solved(NamedTuple):
-    """Of each fit, in units of the priors."""
+    """Solutions of B fits in units of the priors; shapes as in `BatchFit`."""
 
     y: FloatArray
     sensor_covariance: FloatArray
@@ -146,7 +155,7 @@ class _Solved(NamedTuple):
 def _in_chunks(
     shared: tuple[Any, ...], start: FloatArray, position: FloatArray, inverse_sd: FloatArray
 ) -> _Solved:
-    """Solve CHUNK fits after CHUNK fits; the last ones are filled up with the first of theirs."""
+    """Solve the fits in chunks of CHUNK; the last chunk is filled with copies of its first fit."""
     parts = []
     for first in range(0, len(position), CHUNK):
         chosen = np.arange(first, first + CHUNK)
@@ -157,14 +166,14 @@ def _in_chunks(
 
 
 class _Shared(NamedTuple):
-    """What the fits of a batch share. P and S count what is solved for: no constants of lens and bench."""
+    """Data that the fits of a batch share. P and S count free parameters only, no constants."""
 
     cell: Layout
-    """Of the inputs of a cell."""
+    """Layout of the inputs of a cell."""
     varied: tuple[int, ...]
-    """Which parameters of lens and reference are no constants: the compiler leaves the others out."""
+    """Indices of the free parameters of lens and reference; the compiler omits the constants."""
     common: Array
-    """Values of lens and reference; those of the constants count."""
+    """Values of lens and reference; only those of the constants are used."""
     mean: Array
     """(P,)"""
     sd: Array
@@ -173,7 +182,7 @@ class _Shared(NamedTuple):
     """(J,)"""
 
     def inputs(self, y: Array) -> list[Array]:
-        """The inputs of every cell: scalars for all, (L,) by the laser, (J, 1) by the placement."""
+        """Inputs of all cells: scalars for lens and reference, (L,) by laser, (J, 1) by placement."""
         values = self.mean + self.sd * y
         common = list(self.common)
         for place, index in enumerate(self.varied):
@@ -181,36 +190,40 @@ class _Shared(NamedTuple):
         return [*common, *self.by_cell(values)[len(self.varied) :]]
 
     def by_cell(self, values: Array) -> list[Array]:
-        """(P,) as the inputs that are varied."""
+        """(P,) values as the free inputs of all cells."""
         shared, sensor = len(self.varied), values.size - len(PLACEMENT) * len(self.standoff_mm)
         rays = values[shared:sensor].reshape(-1, len(RAY))
         errors = values[sensor:].reshape(-1, len(PLACEMENT))
         return [*values[:shared], *rays.T, *(errors[:, i : i + 1] for i in range(len(PLACEMENT)))]
 
     def predict(self, inputs: list[Array]) -> tuple[Array, Array]:
-        """Pixel positions (u, v) of every cell, (J, L)."""
+        """Pixel positions (u, v) of all cells, (J, L)."""
         return predict_cell(self.cell.lens_name, tuple(inputs), self.standoff_mm[:, None])
 
 
 class _State(NamedTuple):
+    """State of the iteration."""
+
     y: Array
     """(P,)"""
     cost: Array
-    """Sum of squares, the prior's included."""
+    """Sum of squared residuals of data and priors."""
     damping: Array
     step_sd: Array
+    """Length of the last step in posterior standard deviations; infinite after a refused step."""
     steps: Array
+    """Number of steps."""
 
 
 class _Normal(NamedTuple):
-    """The normal equations with the placements eliminated, in the units of the priors."""
+    """The normal equations with the placements eliminated, in units of the priors."""
 
     schur: Array
-    """(S, S) information on the sensor, every placement's error and tilts unknown."""
+    """(S, S) information on the sensor, marginalised over the placements."""
     coupling: Array
-    """(J, 3, S) H_p^-1 H_ps: how the placements follow the sensor."""
+    """(J, 3, S) H_pp^-1 H_ps."""
     placement_inverse: Array
-    """(J, 3, 3) H_p^-1."""
+    """(J, 3, 3) H_pp^-1."""
     gradient: Array
     """(P,)"""
 
@@ -243,7 +256,7 @@ def _solve_one(shared: _Shared, start: Array, position: Array, inverse_sd: Array
     state = _State(start, _cost(start, *data), jnp.zeros(()), jnp.full((), jnp.inf), jnp.zeros((), int))
     state = _descend(state, NEAR_SD, *data)
     state = _close_in(state, *data)
-    # Nothing is left to do here but for a fit so bent that the last steps did not close in.
+    # Returns at once unless a strongly non-linear fit did not converge with fixed equations.
     state = _descend(state, STEP_TOLERANCE_SD, *data)
 
     normal = _normal(state.y, *data, jnp.zeros(()))
@@ -261,7 +274,7 @@ def _solve_one(shared: _Shared, start: Array, position: Array, inverse_sd: Array
 def _descend(
     state: _State, tolerance_sd: float, shared: _Shared, position: Array, inverse_sd: Array
 ) -> _State:
-    """Steps until one is shorter than the tolerance."""
+    """Damped Gauss-Newton steps until one is shorter than the tolerance."""
 
     def unfinished(state: _State) -> Array:
         return (state.step_sd > tolerance_sd) & (state.steps < MAX_STEPS)
@@ -270,9 +283,10 @@ def _descend(
 
 
 def _close_in(state: _State, shared: _Shared, position: Array, inverse_sd: Array) -> _State:
-    """Near the optimum: steps with the normal equations kept and the gradient alone renewed.
+    """Steps near the optimum with fixed normal equations and a new gradient each.
 
-    Gauss-Newton converges linearly there anyway, and a gradient is far cheaper than the equations.
+    Gauss-Newton converges linearly near the optimum anyway, and a gradient is far cheaper than the equations.
+    Where the steps do not shrink to the tolerance, the state before them is returned.
     """
     data = (shared, position, inverse_sd)
     normal = _normal(state.y, *data, jnp.zeros(()))
@@ -299,13 +313,13 @@ def _close_in(state: _State, shared: _Shared, position: Array, inverse_sd: Array
 
 
 def _step(state: _State, shared: _Shared, position: Array, inverse_sd: Array) -> _State:
-    """One step, taken if it descends; else the damping grows."""
+    """One step, taken if the cost decreases; otherwise the damping grows."""
     normal = _normal(state.y, shared, position, inverse_sd, state.damping)
     factor = jnp.linalg.cholesky(normal.schur)
     step = _newton_step(normal, factor, normal.gradient)
     trial = state.y + step
     cost = _cost(trial, shared, position, inverse_sd)
-    # At the optimum costs differ by rounding alone: a step of no size may not be refused for that.
+    # At the optimum costs differ by rounding: a step of negligible length must not be refused.
     descends = cost <= state.cost * (1.0 + 1e-12)
     return _State(
         y=jnp.where(descends, trial, state.y),
@@ -318,7 +332,7 @@ def _step(state: _State, shared: _Shared, position: Array, inverse_sd: Array) ->
 
 
 def _newton_step(normal: _Normal, factor: Array, gradient: Array) -> Array:
-    """(P,) minus the inverse of the information times a gradient, by `factor` L of schur = L L^T."""
+    """(P,) step -H^-1 g by the Schur complement, with `factor` L of schur = L L^T."""
     size = len(factor)
     by_placement = gradient[size:].reshape(-1, len(PLACEMENT))
     right = (normal.coupling * by_placement[..., None]).sum(axis=(0, 1)) - gradient[:size]
@@ -339,12 +353,12 @@ def _cost(y: Array, shared: _Shared, position: Array, inverse_sd: Array) -> Arra
 
 
 def _linearise(y: Array, shared: _Shared, position: Array, inverse_sd: Array) -> tuple[Array, Array]:
-    """Residuals (J, L, 2) and their derivatives (varied inputs, J, L, 2), in sd and units of the priors."""
+    """Residuals (J, L, 2) in sd, and derivatives (free inputs, J, L, 2) in units of the priors."""
     inputs = shared.inputs(y)
     varied = [*shared.varied, *range(shared.cell.common.stop, len(inputs))]
 
     def by(index: int, scale: Array) -> Array:
-        """Derivative by one input: all others have none, and the compiler need not work on zeros."""
+        """Derivative by one input; with all others constant the compiler computes no zero tangents."""
 
         def moved(value: Array) -> tuple[Array, Array]:
             return shared.predict([*inputs[:index], value, *inputs[index + 1 :]])
@@ -369,7 +383,7 @@ def _normal(y: Array, shared: _Shared, position: Array, inverse_sd: Array, dampi
     size = len(sensor)
     prior = 1.0 + damping
     rows = sensor.reshape(size, -1)
-    # Sums of products, not matrix products: these are too small for a library call each.
+    # Sums of products, not matrix products: the 3 x 3 blocks are too small for a library call each.
     information = (error[:, None] * error).sum(axis=(3, 4)).transpose(2, 0, 1)
     inverse = _inverse3(information + prior * jnp.eye(len(PLACEMENT)))
     cross = (error[:, None] * sensor).sum(axis=(3, 4)).transpose(2, 0, 1)

@@ -1,8 +1,8 @@
-"""Traced programs kept on disk, so that a second process need not trace them again.
+"""On-disk cache of traced JAX programs.
 
-JAX keeps what it has compiled. It does not keep the tracing and lowering before that, which take longer than
-all else that a cold `workbench fit` does, and for which optimistix has to be imported. `jit_cached` is
-`jax.jit` with the lowered program (StableHLO) kept in the cache folder, beside JAX's own.
+JAX caches compiled programs. It does not cache tracing and lowering, which take longer than everything else
+in a cold `workbench fit`, and which need the import of optimistix. `jit_cached` is `jax.jit` with the lowered
+program (StableHLO) stored in the cache folder, beside JAX's own files.
 """
 
 from __future__ import annotations
@@ -25,19 +25,21 @@ from workbench.session.files import write_atomically
 T = TypeVar("T")
 Program = Callable[..., T]
 TRACED_BY = ("jax", "jaxlib", "optimistix", "lineax", "equinox", "numpy")
-"""Distributions whose version makes another program of the same function."""
+"""Distributions on whose version the lowered program depends."""
 LAPACK = ("lapack_dormqr_ffi",)
-"""What JAX promises for no later version than its own; a program is kept for one version only."""
+"""Calls that JAX does not guarantee for later versions; a stored program serves one version only."""
 SUM_BYTES = hashlib.sha256().digest_size
+"""Length of the checksum before each stored program."""
 
 
 def jit_cached(static: int = 0) -> Callable[[Program[T]], Program[T]]:
-    """Compile a function of arrays as `jax.jit` does, and keep the lowered program on disk.
+    """Compile a function of arrays as `jax.jit` does, and store the lowered program on disk.
 
     The function takes its arguments by position, and returns an array or a tuple of arrays.
 
     Args:
-        static: how many of the last arguments are no arrays but choose the program (hashable, with a `repr`).
+        static: number of trailing arguments that select the program (hashable, with a `repr`); all others are
+            arrays.
     """
 
     def decorate(function: Program[T]) -> Program[T]:
@@ -68,15 +70,15 @@ def jit_cached(static: int = 0) -> Callable[[Program[T]], Program[T]]:
 
 
 def _lowered(function: Program[T], leaves: list[jax.Array], key: str) -> jax.export.Exported:
-    """The function's program, from disk where it is there."""
+    """The lowered program of a function, from the cache or traced and stored there."""
     path = CACHE / "programs" / hashlib.sha256(f"{_origin()}{key}".encode()).hexdigest()
-    # What cannot be read or written is no cache, and nothing worse.
+    # A cache that cannot be read or written only costs time.
     with suppress(OSError):
         stored = path.read_bytes()
         if stored.startswith(_sum(stored[SUM_BYTES:])):
             return jax.export.deserialize(bytearray(stored[SUM_BYTES:]))
-    unpromised = [jax.export.DisabledSafetyCheck.custom_call(name) for name in LAPACK]
-    exported = jax.export.export(jax.jit(function), disabled_checks=unpromised)(*leaves)
+    unchecked = [jax.export.DisabledSafetyCheck.custom_call(name) for name in LAPACK]
+    exported = jax.export.export(jax.jit(function), disabled_checks=unchecked)(*leaves)
     content = bytes(exported.serialize())
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -90,16 +92,16 @@ def _sum(content: bytes) -> bytes:
 
 @cache
 def _origin() -> str:
-    """What a program depends on beside its function's arguments: our maths, the tracers, the processor."""
-    sources = [path for room in (optics, calibration) for path in _sources(room.__path__[0])]
+    """Everything a program depends on beside its arguments: our sources, library versions, the backend."""
+    sources = [path for package in (optics, calibration) for path in _sources(package.__path__[0])]
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
     return repr((digest, [_version(name) for name in TRACED_BY], jax.default_backend()))
 
 
 def _version(name: str) -> str:
-    """Of a distribution; `importlib.metadata.version` parses all that is told of it, and takes far longer."""
-    told = distribution(name).read_text("METADATA") or version(name)
-    return next((line for line in told.splitlines() if line.startswith("Version:")), told)
+    """Version line of a distribution; `importlib.metadata.version` parses all metadata and is far slower."""
+    metadata = distribution(name).read_text("METADATA") or version(name)
+    return next((line for line in metadata.splitlines() if line.startswith("Version:")), metadata)
 
 
 def _sources(folder: str) -> list[Path]:

@@ -1,4 +1,4 @@
-"""When residuals are larger than the stated noise."""
+"""Scale of the noise where residuals are significantly larger than stated."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from workbench.model.arrays import FloatArray
 from workbench.model.stats import chi2_sf
 
 SCATTER_SIGNIFICANCE = 0.01
-"""Residuals less likely than this under the stated noise make the fit estimate the noise from them."""
+"""P value of the residuals, under the stated noise, below which the noise is estimated from them."""
 
 
-def scale_called_for(chi2: ArrayLike, freedom: ArrayLike) -> FloatArray:
-    """Factor on the stated noise that residuals of this chi2 call for, 1 where they agree with it."""
+def significant_scale(chi2: ArrayLike, freedom: ArrayLike) -> FloatArray:
+    """Factor on the stated noise, sqrt(chi2 / freedom) where chi2 is significantly too large, else 1."""
     chi2, freedom = np.asarray(chi2, float), np.asarray(freedom, float)
     countable = np.where(freedom > 0, freedom, 1.0)
     improbable = (freedom > 0) & (chi2_sf(chi2, countable) < SCATTER_SIGNIFICANCE)

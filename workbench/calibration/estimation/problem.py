@@ -1,4 +1,4 @@
-"""The least-squares problem of a fit: what is measured against what is predicted, and its solution."""
+"""Least-squares problem of a fit: residuals of the data and of the priors, and its solution."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jax.typing import ArrayLike
 from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import MeanObservations
 from workbench.calibration.estimation.jit_cache import jit_cached
-from workbench.calibration.estimation.noise_scale import scale_called_for
+from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.parameters import ParameterTable
 from workbench.calibration.model.prediction import (
@@ -31,12 +31,12 @@ from workbench.model.rig import Rig
 
 @dataclass(frozen=True)
 class Solution:
-    """Of a problem with P parameters and M measured positions (spots first, then corners)."""
+    """Solution of a problem with P parameters and M measured positions (spots first, then corners)."""
 
     y: FloatArray
-    """(P,) in units of the priors, counted from their means."""
+    """(P,) (value - prior mean) / prior sd."""
     jacobian: FloatArray
-    """(2 M, P) of the data's residuals, in standard deviations, by `y`."""
+    """(2 M, P) derivatives by `y` of the data's residuals, in standard deviations."""
     covariance: FloatArray
     """(P, P) of `y`."""
     residual_px: FloatArray
@@ -44,12 +44,12 @@ class Solution:
     chi2: float
     """Of the data at the stated noise."""
     degrees_of_freedom: float
-    scale_called_for: float
+    significant_scale: float
     converged: bool
 
 
 class _Data(NamedTuple):
-    """The numbers of one fit, for JAX."""
+    """Arrays of one fit, for JAX."""
 
     mean: ArrayLike
     sd: ArrayLike
@@ -64,7 +64,7 @@ class _Data(NamedTuple):
 
 @dataclass(frozen=True)
 class LeastSquaresProblem:
-    """One fit, ready to be solved at any noise."""
+    """Least-squares problem of one fit, solved at any noise."""
 
     layout: Layout
     data: _Data
@@ -77,7 +77,7 @@ class LeastSquaresProblem:
         cells: MeanObservations,
         boards: Sequence[BoardView],
     ) -> LeastSquaresProblem:
-        """Spots on the cells' placements; every board's placement is one of them."""
+        """Problem of mean observations and boards; every board's placement is among the placements."""
         position = np.concatenate([cells.position_px, *(b.corners.position_px for b in boards)])
         sd = np.concatenate([cells.sd_px, *(b.corners.sd_px for b in boards)])
         measured = np.isfinite(position)
@@ -85,7 +85,7 @@ class LeastSquaresProblem:
             mean=table.prior_mean,
             sd=table.prior_sd,
             standoff_mm=np.array([p.standoff_mm for p in cells.placements]),
-            spots=SpotData(cells.laser, cells.placement),
+            spots=SpotData(cells.laser, cells.placement, cells.time),
             corners=_corner_data(cells, boards, rig.board),
             position_px=np.where(measured, position, 0.0),
             inverse_sd=np.where(measured, 1.0 / sd, 0.0),
@@ -95,17 +95,17 @@ class LeastSquaresProblem:
     def linearise(self, y: FloatArray, scale: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Predicted - measured (2 M,) and its derivatives by y (2 M, P), in `scale` times the stated noise.
 
-        u and v of one position after the other, spots first; 0 where not measured.
+        The order is u, v of each position, spots first; 0 where not measured.
         """
         residual, jacobian, _ = _linearise(y, self.data, self.layout)
         return np.asarray(residual) / scale, np.asarray(jacobian) / scale
 
     def by_standoff(self, y: FloatArray, scale: float = 1.0) -> FloatArray:
-        """(2 M,) derivatives of the residuals of `linearise` by the standoff of their own placement, a mm."""
+        """(2 M,) derivatives of the residuals of `linearise` by the standoff of their placement, 1/mm."""
         return np.asarray(_linearise(y, self.data, self.layout)[2]) / scale
 
     def solve(self, scale: float) -> Solution:
-        """Solve with the pixel noise `scale` times what was stated."""
+        """Solve with `scale` times the stated pixel noise."""
         inverse_sd = np.asarray(self.data.inverse_sd)
         data = self.data._replace(inverse_sd=inverse_sd / scale)
         y, converged = _solve(data, self.layout)
@@ -122,13 +122,13 @@ class LeastSquaresProblem:
             residual_px=pixels,
             chi2=chi2,
             degrees_of_freedom=freedom,
-            scale_called_for=float(scale_called_for(chi2, freedom)),
+            significant_scale=float(significant_scale(chi2, freedom)),
             converged=bool(converged),
         )
 
 
 def layout_of(rig: Rig, cells: MeanObservations, boards: Sequence[BoardView]) -> Layout:
-    """Layout of the parameters of `fit.table_of`."""
+    """Layout of the parameters that `fit.table_of` makes."""
     return Layout(rig.camera.lens, len(rig.lasers), len(cells.placements), len(boards))
 
 
@@ -140,12 +140,21 @@ def _corner_data(cells: MeanObservations, boards: Sequence[BoardView], board: Bo
         board=np.repeat(np.arange(len(boards)), counts),
         placement=np.repeat(np.array([order.index(b.placement.key) for b in boards], np.intp), counts),
         printed_mm=board.corners_mm[ids],
+        time=np.repeat(
+            np.array([_board_time(cells, order.index(b.placement.key)) for b in boards], float), counts
+        ),
     )
+
+
+def _board_time(cells: MeanObservations, placement: int) -> float:
+    """When the spots beside the board were captured, as `SpotData.time`; 0 where there are none."""
+    beside = cells.time[cells.placement == placement]
+    return float(beside.mean()) if len(beside) else 0.0
 
 
 @jit_cached(static=1)
 def _solve(data: _Data, layout: Layout) -> tuple[Array, Array]:
-    """(P,) optimum in units of the prior, and whether the solver converged."""
+    """(P,) optimum in units of the priors, and whether the solver converged."""
     import optimistix as optx
 
     def residuals(y: Array, data: _Data) -> Array:
@@ -161,9 +170,10 @@ def _solve(data: _Data, layout: Layout) -> tuple[Array, Array]:
 
 @jit_cached(static=1)
 def _linearise(y: Array, data: _Data, layout: Layout) -> tuple[Array, Array, Array]:
-    """Residuals of the data (2 M,) in standard deviations, and their derivatives by y and standoff.
+    """Residuals of the data in standard deviations (2 M,), and their derivatives.
 
-    (2 M, P), and (2 M,) a mm: each residual has to do with the standoff of one placement alone.
+    By y (2 M, P), and by the standoff of their placement (2 M,), 1/mm: a residual depends on one placement
+    only, so that all standoffs are moved at once.
     """
 
     def residual(y: Array, farther_mm: Array) -> Array:

@@ -1,7 +1,7 @@
-"""Refits beside the fit: some of its data left out, or another hypothesis about them.
+"""Refits of a fit's problem without some of its data, or under another hypothesis about them.
 
-Every refit linearises the program that the fit has compiled, at other numbers of the same shapes: none
-compiles anything, and started at the fit's optimum it takes a few milliseconds.
+A refit evaluates the program that the fit has compiled, with other arrays of the same shapes. Nothing is
+compiled, and from the fit's optimum a refit takes a few milliseconds.
 """
 
 from __future__ import annotations
@@ -16,14 +16,20 @@ from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.model.arrays import BoolArray, FloatArray
 
 STEP_TOLERANCE_SD = 1e-3
-"""Of the last step, in posterior standard deviations: the next would be shorter by far."""
+"""Length of the last step in posterior standard deviations; convergence is fast, the next is far shorter."""
 MAX_STEPS = 60
 SCALE_ROUNDS = 5
+SCALE_TOLERANCE = 1.01
+FIRST_DAMPING = 1e-4
+LEAST_DAMPING = 1e-6
+"""Damping below this becomes 0: the step is then Gauss-Newton's."""
+MOST_DAMPING = 1e10
+"""Damping above which no step descends: the optimum is reached to rounding."""
 
 
 @dataclass(frozen=True)
 class Refit:
-    """An optimum over the data of `used`. P parameters in units of their priors, R = 2 M rows of data."""
+    """Optimum over the rows `used` of the data: P parameters in units of their priors, R = 2 M rows."""
 
     problem: LeastSquaresProblem
     used: BoolArray
@@ -31,9 +37,9 @@ class Refit:
     y: FloatArray
     """(P,)"""
     scale: float
-    """Factor on the stated noise that the rows used called for."""
+    """Factor on the stated noise."""
     residual: FloatArray
-    """(R,) predicted - measured in standard deviations of that noise, of all rows, used or not."""
+    """(R,) predicted - measured of all rows, used or not, in standard deviations of the scaled noise."""
     jacobian: FloatArray
     """(R, P) of `residual` by y."""
 
@@ -53,56 +59,60 @@ class Refit:
 
     @property
     def chi2(self) -> float:
-        """Of the rows used, at the noise of this refit."""
+        """Chi-square of the used rows at the scaled noise."""
         return float(self.residual[self.used] @ self.residual[self.used])
 
     @property
     def cost(self) -> float:
-        """Misfit of data and priors together; if all is right, chi-square of a degree for each row used."""
+        """Chi-square of data and priors; its expectation is the number of used rows."""
         return self.chi2 + float(self.y @ self.y)
 
     @property
     def freedom(self) -> float:
-        """Rows used minus the parameters that they determine, weighed by how well."""
+        """Number of used rows minus the effective number of parameters, tr(J C J^T)."""
         rows = self.jacobian[self.used]
         return float(self.used.sum() - np.einsum("ij,jk,ik->", rows, self.covariance, rows))
 
     def with_unused(self, problem: LeastSquaresProblem) -> Refit:
-        """The same refit, where only rows that it has not used have other numbers."""
+        """The same optimum in a problem that differs only in rows that are not used."""
         residual, jacobian = problem.linearise(self.y, self.scale)
         other = Refit(problem, self.used, self.y, self.scale, residual, jacobian)
-        vars(other)["covariance"] = self.covariance  # of the rows used: to invert it again is dear
+        vars(other)["covariance"] = self.covariance  # of the used rows, so unchanged: an inversion saved
         return other
 
     def at(self, scale: float) -> Refit:
-        """The same rows fitted at another noise."""
+        """Refit of the same rows at another noise."""
         return refit(self.problem, self.used, self.y, scale)
 
 
 def rows_of(cells: BoolArray, problem: LeastSquaresProblem) -> BoolArray:
-    """(R,) rows of data of the spots' cells (N,), measured or not; corners have none."""
+    """(R,) rows of the selected cells (N,), measured or not; no rows of corners."""
     corners = np.zeros(len(np.asarray(problem.data.inverse_sd)) - len(cells), bool)
     return np.repeat(np.concatenate([cells, corners]), 2)
 
 
 def measured(problem: LeastSquaresProblem) -> BoolArray:
-    """(R,) rows that carry a measurement."""
+    """(R,) rows with a measurement."""
     return np.asarray(problem.data.inverse_sd).ravel() > 0
 
 
 def problem_of(fit: CalibrationFit) -> LeastSquaresProblem:
-    """The problem that a fit has solved."""
+    """The problem that a fit solved."""
     return LeastSquaresProblem.of(fit.rig, fit.table, fit.cells, fit.boards)
 
 
 def optimum_of(fit: CalibrationFit) -> FloatArray:
-    """(P,) of a fit, in units of the priors counted from their means."""
+    """(P,) optimum of a fit, (value - prior mean) / prior sd."""
     sd = fit.table.prior_sd
     return np.where(sd > 0, (fit.values - fit.table.prior_mean) / np.where(sd > 0, sd, 1.0), 0.0)
 
 
 def refit(problem: LeastSquaresProblem, used: BoolArray, start: FloatArray, scale: float = 1.0) -> Refit:
-    """Levenberg-Marquardt on the rows used, at a given noise."""
+    """Levenberg-Marquardt on the used rows, at a given noise.
+
+    Written out, not scipy's: one call of the compiled program gives residuals and derivatives together, and
+    the undamped first steps make it some milliseconds from the fit's optimum.
+    """
     y, damping = np.array(start), 0.0
     residual, jacobian = problem.linearise(y, scale)
     cost = _cost(residual[used], y)
@@ -114,25 +124,25 @@ def refit(problem: LeastSquaresProblem, used: BoolArray, start: FloatArray, scal
         tried, trial_jacobian = problem.linearise(y + step, scale)
         trial = _cost(tried[used], y + step)
         if not trial <= cost * (1 + 1e-12):
-            if damping > 1e10:
+            if damping > MOST_DAMPING:
                 break
-            damping = max(10 * damping, 1e-4)
+            damping = max(10 * damping, FIRST_DAMPING)
             continue
         y, residual, jacobian, cost = y + step, tried, trial_jacobian, trial
         if damping == 0 and abs(step @ gradient) < STEP_TOLERANCE_SD**2:
             break
-        damping = damping / 10 if damping > 1e-6 else 0.0
+        damping = damping / 10 if damping > LEAST_DAMPING else 0.0
     return Refit(problem, used, y, scale, residual, jacobian)
 
 
 def refit_with_scale(problem: LeastSquaresProblem, used: BoolArray, start: FloatArray) -> Refit:
-    """As `refit`, at the noise that the residuals of the rows used show, if that is more than stated."""
+    """`refit` at the noise estimated from the used rows, if that is larger than stated."""
     found = refit(problem, used, start)
     for _ in range(SCALE_ROUNDS):
-        shown = found.scale * (found.chi2 / max(found.freedom, 1.0)) ** 0.5
-        if not shown > found.scale * 1.01:
+        estimated = found.scale * (found.chi2 / max(found.freedom, 1.0)) ** 0.5
+        if not estimated > found.scale * SCALE_TOLERANCE:
             break
-        found = found.at(shown)
+        found = found.at(estimated)
     return found
 
 

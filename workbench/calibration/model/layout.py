@@ -1,4 +1,4 @@
-"""Where each block of parameters stands in the parameter vector of a fit."""
+"""Layout of the parameter vector of a fit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from workbench.calibration.model.parameters import PLACEMENT, POSE, PRINT, REFERENCE
+from workbench.calibration.model.parameters import DRIFT, PLACEMENT, POSE, PRINT, REFERENCE
 from workbench.model.arrays import IndexArray
 from workbench.model.board import BOW
 from workbench.model.lens import LensName
@@ -16,10 +16,10 @@ from workbench.optics.rays import RAY
 
 
 class Layout(NamedTuple):
-    """Lens model and number of lasers, placements and boards: they fix the parameter vector.
+    """Indices of each block of parameters, by lens model and number of lasers, placements and boards.
 
-    In order: lens, reference, rays; print scale if there are boards; placements; sag and poses of the boards.
-    The layout of one laser and one placement is that of the inputs of `prediction.predict_cell`.
+    The order is lens, reference, rays; print scale if there are boards; placements; sag and poses of the
+    boards. The layout of one laser and one placement is that of the inputs of `prediction.predict_cell`.
     """
 
     lens_name: LensName
@@ -30,12 +30,12 @@ class Layout(NamedTuple):
 
     @property
     def model(self) -> LensModel:
-        """Kind of lens."""
+        """The lens model."""
         return lens_model(self.lens_name)
 
     @property
     def lens(self) -> slice:
-        """The lens model's parameters."""
+        """Parameters of the lens."""
         return slice(0, len(self.model.parameters))
 
     @property
@@ -54,8 +54,19 @@ class Layout(NamedTuple):
         return len(self.model.parameters) + REFERENCE.index("ruler_scale")
 
     @property
+    def bench_only(self) -> slice:
+        """REFERENCE without `offset_mm`: the bench during the calibration, of no effect on a range."""
+        return slice(self.offset + 1, self.reference.stop)
+
+    @property
+    def drift(self) -> slice:
+        """DRIFT."""
+        start = len(self.model.parameters) + REFERENCE.index(DRIFT[0])
+        return slice(start, start + len(DRIFT))
+
+    @property
     def common(self) -> slice:
-        """What all lasers share: lens and reference."""
+        """Parameters that all lasers share: lens and reference."""
         return slice(0, self.reference.stop)
 
     @property
@@ -69,17 +80,17 @@ class Layout(NamedTuple):
         return slice(start, start + len(RAY))
 
     def own(self, laser: int) -> IndexArray:
-        """Indices of what a spot of one laser depends on at a given depth: the lens, then its ray."""
+        """Indices of the parameters of one laser's spot curve: the lens, then its ray."""
         return np.asarray(np.r_[self.lens, self.ray(laser)], np.intp)
 
     @property
     def print_scale(self) -> slice:
-        """PRINT; empty if there are no boards."""
+        """PRINT; empty without boards."""
         return slice(self.rays.stop, self.rays.stop + (len(PRINT) if self.boards else 0))
 
     @property
     def sensor(self) -> slice:
-        """The parameters of the calibration; those of placements and boards follow."""
+        """Parameters of the calibration; those of placements and boards follow."""
         return slice(0, self.print_scale.stop)
 
     @property

@@ -1,9 +1,9 @@
-"""The parameters of a calibration, each described once for fit, report and YAML."""
+"""Parameters of a calibration with their units and priors, for fit, report and YAML."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians
 from typing import Literal
 
@@ -14,29 +14,34 @@ from workbench.model.board import BOW
 from workbench.model.rig import Prior, Rig
 from workbench.optics.rays import RAY
 
-REFERENCE = ("offset_mm", "ruler_scale")
+TILT = ("target_slope_x", "target_slope_y")
+"""Tilt of the target that all placements share, as slopes."""
+DRIFT = ("drift_u_px", "drift_v_px")
+"""Shift of the image over the session, from the first capture to the last."""
+REFERENCE = ("offset_mm", "ruler_scale", *TILT, *DRIFT)
+"""Of the bench during the session; `offset_mm` alone is of use afterwards."""
 PLACEMENT = ("error_mm", "slope_x", "slope_y")
 PRINT = ("print_scale",)
-"""Of the printed board. It belongs to the sensor, as the ruler's scale does: both scale its lengths."""
+"""Scale of the printed board. A sensor parameter, as the ruler's scale is: both scale its lengths."""
 POSE = ("board_x_mm", "board_y_mm", "board_roll_rad")
 """Pose of the board on the plane of a placement, see `workbench.optics.board.Pose`."""
 
-Kind = Literal["sensor", "placement"]
+ParameterKind = Literal["sensor", "placement"]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number to be estimated, and its prior (Gaussian, 1 sigma)."""
+    """Parameter of the fit, with its Gaussian prior (1 sigma)."""
 
     name: str
     unit: str
     prior: Prior
-    kind: Kind
-    """`sensor` parameters are the calibration; `placement` ones belong to a target and its placements."""
+    kind: ParameterKind
+    """`sensor`: part of the calibration; `placement`: a nuisance parameter of the target or a placement."""
 
 
 def sensor_parameters(rig: Rig) -> tuple[Parameter, ...]:
-    """The parameters of the sensor and its ruler, in the order lens, reference, rays of each laser."""
+    """Parameters of the sensor and its ruler, in the order lens, reference, rays of each laser."""
     lens = [sensor_parameter(name, prior) for name, prior in rig.camera.lens_priors.items()]
     reference = [sensor_parameter(name, getattr(rig.bench, name)) for name in REFERENCE]
     rays = [
@@ -65,7 +70,7 @@ def board_parameters(rig: Rig) -> tuple[Parameter, ...]:
 
 
 def unit_of(name: str) -> str:
-    """Unit by the suffix of a parameter's name; slopes and distortion coefficients have none ("1")."""
+    """Unit by the suffix of a parameter's name; "1" for slopes and distortion coefficients."""
     if name.endswith("_px"):
         return "px"
     if name.endswith("_mm"):
@@ -77,10 +82,10 @@ def unit_of(name: str) -> str:
 
 @dataclass(frozen=True)
 class ParameterTable:
-    """All parameters of one fit. A parameter whose prior sd is 0 is a constant: not free.
+    """All P parameters of one fit. A parameter with prior sd 0 is a constant.
 
-    The free ones are solved for in units of their prior sd, counted from the prior mean: the prior is then
-    the unit Gaussian, which scales the problem well if the rig file's priors are realistic.
+    The fit solves for y = (value - prior mean) / prior sd: the prior of y is the unit Gaussian, and the
+    problem is well scaled if the rig file's priors are realistic.
     """
 
     parameters: tuple[Parameter, ...]
@@ -100,12 +105,20 @@ class ParameterTable:
         """Indices of the free parameters."""
         return np.flatnonzero(self.prior_sd > 0)
 
+    def with_wider_priors(self, indices: IndexArray, factor: float) -> ParameterTable:
+        """The table with the prior sd of some parameters multiplied."""
+        wider = list(self.parameters)
+        for i in indices.tolist():
+            prior = wider[i].prior
+            wider[i] = replace(wider[i], prior=prior.model_copy(update={"sd": factor * prior.sd}))
+        return ParameterTable(tuple(wider))
+
     @property
     def is_sensor(self) -> BoolArray:
-        """Which of all parameters belong to the sensor, (P,)."""
+        """(P,) whether each parameter belongs to the sensor."""
         return np.array([p.kind == "sensor" for p in self.parameters])
 
 
 def sensor_parameter(name: str, prior: Prior) -> Parameter:
-    """A parameter of the calibration."""
+    """A `sensor` parameter with its unit."""
     return Parameter(name, unit_of(name), prior, "sensor")

@@ -23,6 +23,8 @@ class SpotData(NamedTuple):
     """(N,) index of the laser."""
     placement: ArrayLike
     """(N,) index of the placement."""
+    time: ArrayLike
+    """(N,) when it was captured, from -0.5 (first capture of the session) to 0.5 (last)."""
 
 
 class CornerData(NamedTuple):
@@ -33,22 +35,27 @@ class CornerData(NamedTuple):
     placement: ArrayLike
     """(K,) index of the placement."""
     printed_mm: ArrayLike
-    """(K, 2) where the corner is in the board's file."""
+    """(K, 2) nominal position of the corner on the board."""
+    time: ArrayLike
+    """(K,) as of `SpotData`."""
 
 
 def predict_cell(
-    lens_name: LensName, inputs: tuple[ArrayLike, ...], standoff_mm: ArrayLike
+    lens_name: LensName, inputs: tuple[ArrayLike, ...], standoff_mm: ArrayLike, time: ArrayLike = 0.0
 ) -> tuple[Array, Array]:
     """Pixel position (u, v) of one laser on the target of one placement; shapes broadcast.
 
     Args:
-        lens_name: kind of lens.
-        inputs: the numbers that it depends on, in the order of `Layout` of one laser and one placement.
+        lens_name: lens model.
+        inputs: parameters of one laser and one placement, in the order of `Layout`.
         standoff_mm: of the placement, by the ruler.
+        time: when it was captured, see `SpotData`.
     """
     cell = Layout(lens_name)
     plane = _plane(inputs[cell.reference], inputs[cell.errors], standoff_mm)
-    return spot_on_plane(cell.model, inputs[cell.lens], Ray(*inputs[cell.rays]), plane)
+    u, v = spot_on_plane(cell.model, inputs[cell.lens], Ray(*inputs[cell.rays]), plane)
+    drift_u, drift_v = inputs[cell.drift]
+    return u + drift_u * time, v + drift_v * time
 
 
 def predict_spots(values: Array, layout: Layout, spots: SpotData, standoff_mm: Array) -> Array:
@@ -57,13 +64,14 @@ def predict_spots(values: Array, layout: Layout, spots: SpotData, standoff_mm: A
     Args:
         values: (P,) parameters in the order of `Layout`.
         layout: their layout.
-        spots: which laser on which placement.
-        standoff_mm: standoffs of all placements by the ruler.
+        spots: laser and placement of each spot.
+        standoff_mm: (J,) standoffs of all placements by the ruler.
     """
     rays = values[layout.rays].reshape(layout.lasers, len(RAY))[spots.laser]
     errors = values[layout.errors].reshape(-1, len(PLACEMENT))[spots.placement]
     inputs = (*values[layout.common], *rays.T, *errors.T)
-    return jnp.stack(predict_cell(layout.lens_name, inputs, standoff_mm[spots.placement]), axis=1)
+    standoff_mm = standoff_mm[spots.placement]
+    return jnp.stack(predict_cell(layout.lens_name, inputs, standoff_mm, spots.time), axis=1)
 
 
 def predict_corners(values: Array, layout: Layout, corners: CornerData, standoff_mm: Array) -> Array:
@@ -76,13 +84,20 @@ def predict_corners(values: Array, layout: Layout, corners: CornerData, standoff
     sag_mm = bow[0] * reach[0] ** 2 + bow[1] * reach[1] ** 2 + bow[2] * reach[0] * reach[1]
     across_mm, down_mm = printed * (1.0 + values[layout.print_scale.start])
     x, y, z = point_on_board(pose, across_mm, down_mm, sag_mm)
-    return jnp.stack(layout.model.project(values[layout.lens], x / z, y / z), axis=1)
+    seen = jnp.stack(layout.model.project(values[layout.lens], x / z, y / z), axis=1)
+    return seen + values[layout.drift] * jnp.asarray(corners.time)[:, None]
 
 
 def _plane(
     reference: tuple[ArrayLike, ...] | Array, errors: tuple[ArrayLike, ...] | Array, standoff_mm: ArrayLike
 ) -> Plane:
-    """The target's plane, by REFERENCE and PLACEMENT."""
-    offset_mm, ruler_scale = reference
+    """Plane of the target in the camera frame, from REFERENCE and PLACEMENT."""
+    offset_mm, ruler_scale, common_x, common_y, *_ = reference
     error_mm, slope_x, slope_y = errors
-    return Plane(standoff_mm * (1.0 + ruler_scale) + error_mm + offset_mm, slope_x, slope_y)
+    depth_mm = standoff_mm * (1.0 + ruler_scale) + error_mm + offset_mm
+    return Plane(depth_mm, _sum_of_tilts(slope_x, common_x), _sum_of_tilts(slope_y, common_y))
+
+
+def _sum_of_tilts(a: ArrayLike, b: ArrayLike) -> Array:
+    """Tangent of the sum of two angles given by their tangents."""
+    return jnp.asarray(jnp.add(a, b) / (1.0 - jnp.multiply(a, b)))

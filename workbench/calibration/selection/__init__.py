@@ -1,1 +1,1 @@
-"""Which terms of the model and which observations a fit keeps."""
+"""Selection of terms of the model and rejection of outliers."""

@@ -1,9 +1,10 @@
-"""Evidence on the terms of the model: each is compared with its absence, and none is dropped.
+"""Evidence for the terms of the model, each compared with its absence; no term is dropped.
 
-A term is compared with its absence by the Bayes factor of the two nested models (J. M. Dickey and B. P.
-Lientz, Ann. Math. Statist. 41 (1970) 214: posterior over prior density at the value that is absence), both
-densities Gaussian, and by a chi-square test of the data alone. Dropping terms buys nothing: ranges are the
-same to 0.03 of their standard deviation, and coverage is no better (docs/decisions/0005).
+A term is compared with its absence by the Bayes factor of the two nested models: the ratio of posterior to
+prior density at the value that means absence, both Gaussian (Savage and Dickey's ratio; J. M. Dickey and B.
+P. Lientz, Ann. Math. Statist. 41 (1970) 214), and by a chi-square test of the data alone. Dropping terms has
+no benefit: ranges change by at most 0.03 of their standard deviation, and coverage does not improve
+(docs/decisions/0005).
 """
 
 from __future__ import annotations
@@ -16,12 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.calibration.data.boards import BoardView
-from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import CalibrationFit, fit, fit_cells, table_of
 from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.selection.outliers import fit_without_outliers, without_outliers
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import TermSummary, TermVerdict
+from workbench.model.fit_event import Rejected
 from workbench.model.nested import TILTS
 from workbench.model.rig import Prior, Rig
 from workbench.model.stats import chi2_sf
@@ -31,18 +33,20 @@ from workbench.optics.lens_models import lens_model
 STRONG = 1.0
 """log10 of a Bayes factor that is strong evidence (R. E. Kass and A. E. Raftery, JASA 90 (1995) 773)."""
 CALLED_FOR_P = 0.001
+"""P value below which the data call for a term that the rig file holds constant."""
 GRID = 12
-KNOWN = 1e-6
-"""Information of the data, in units of the prior's, below which they know nothing of a direction."""
+"""Standoffs at which the shift of ranges is evaluated."""
+LEAST_INFORMATION = 1e-6
+"""Information of the data, in units of the prior's, below which they do not constrain a direction."""
 
 
 class _Comparison(NamedTuple):
-    """With a term of T parameters against without it."""
+    """The model with a term of T parameters against the model without it."""
 
     p_value: float
     log10_bayes_factor: float
     change: FloatArray
-    """(P,) of all parameters when the term goes."""
+    """(P,) change of all parameters when the term is removed."""
 
 
 def fit_calibration(
@@ -51,10 +55,11 @@ def fit_calibration(
     rejected: Sequence[Rejected] = (),
     boards: Sequence[BoardView] = (),
 ) -> CalibrationFit:
-    """As `fit`, without outliers, and with the evidence on each term of the model in `terms`.
+    """`fit` without outliers, with the evidence for each term of the model in `terms`.
 
     Args:
-        rig: the model. What it holds constant stays so, but is tried (`verdict` "called for").
+        rig: priors and noise. Its constant terms are freed where the data call for them (`verdict`
+            "called for"), so that spots that need the term are not rejected as outliers.
         observations: as for `fit`.
         rejected: as for `fit`.
         boards: as for `fit`.
@@ -63,7 +68,7 @@ def fit_calibration(
         BadInputError: as `fit`.
         LimitFailedError: as `fit`.
     """
-    # Asked before anything is rejected: spots that the model lacks a term for look like outliers.
+    # Tested before any rejection: spots that need a missing term look like outliers.
     whole = fit(rig, observations, rejected, boards)
     missing = _called_for(whole)
     if missing:
@@ -79,7 +84,7 @@ def fit_calibration(
 
 
 def _weigh(fitted: CalibrationFit, name: str) -> TermSummary:
-    """A term against its absence."""
+    """Evidence for a term against its absence."""
     index = _indices(fitted, name)
     one = _compare(fitted, index)
     verdict: TermVerdict = "open"
@@ -95,14 +100,14 @@ def _weigh(fitted: CalibrationFit, name: str) -> TermSummary:
 
 
 def _freed(rig: Rig, names: Sequence[str]) -> Rig:
-    """The rig with terms of the lens made free, at the scale at which they are tried."""
+    """The rig with constant lens terms free, with the lens model's trial deviations as priors."""
     known, trial_sd = rig.camera.lens_priors, lens_model(rig.camera.lens).trial_sd
     priors = {name: Prior(value=known[name].value, sd=trial_sd[name]) for name in names}
     return rig.model_copy(update={"camera": rig.camera.model_copy(update=priors)})
 
 
 def _candidates(fitted: CalibrationFit) -> list[str]:
-    """Names of the terms of a fit, the first to go first."""
+    """Names of the terms of a fit, the highest order first."""
     names = {p.name for p in fitted.table.parameters if p.prior.sd > 0}
     orders = (*fitted.layout.model.terms, "ruler_scale")
     found = [there for term in orders if (there := " ".join(n for n in term.split() if n in names))]
@@ -110,7 +115,7 @@ def _candidates(fitted: CalibrationFit) -> list[str]:
 
 
 def _indices(fitted: CalibrationFit, name: str) -> IndexArray:
-    """(T,) where the parameters of a term stand among all."""
+    """(T,) indices of the parameters of a term."""
     wanted = set(name.split())
     if TILTS in wanted:
         boards = {view.placement.key for view in fitted.boards}
@@ -120,6 +125,11 @@ def _indices(fitted: CalibrationFit, name: str) -> IndexArray:
 
 
 def _compare(fitted: CalibrationFit, index: IndexArray) -> _Comparison:
+    """Compare a fit with its restriction to zero offset of the parameters `index`, to first order.
+
+    With y the offsets in prior deviations and C their posterior covariance, the log Bayes factor is
+    (y C^-1 y + ln det C) / 2; the data alone have the information C^-1 - 1 and the score C^-1 y.
+    """
     prior_sd = fitted.table.prior_sd[index]
     offset = fitted.values[index] - fitted.table.prior_mean[index]
     posterior = fitted.covariance[np.ix_(index, index)]
@@ -135,22 +145,25 @@ def _compare(fitted: CalibrationFit, index: IndexArray) -> _Comparison:
 
 
 def _p_value(score: FloatArray, information: FloatArray) -> float:
-    """Of a score by its information, both from the data alone."""
+    """P value of a score by its information (chi-square over the directions that the data constrain)."""
     values, vectors = np.linalg.eigh(information)
-    known = values > KNOWN
+    known = values > LEAST_INFORMATION
     chi2 = ((vectors.T @ score)[known] ** 2 / values[known]).sum()
     return float(chi2_sf(chi2, known.sum())) if known.any() else 1.0
 
 
 def _range_shift_sd(fitted: CalibrationFit, comparison: _Comparison) -> float:
-    """Largest shift of a range without a term, in standard deviations of that range."""
+    """Largest shift of any range without the term, in standard deviations of that range."""
     gradient, own_sd = _range_gradients(fitted)
     sd = np.sqrt(np.einsum("np,pq,nq->n", gradient, fitted.covariance, gradient) + own_sd**2)
     return float((np.abs(gradient @ comparison.change) / sd).max(initial=0.0))
 
 
 def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
-    """(n, P) of ln(range) by all parameters, and (n,) what a spot's noise adds, over lasers and standoffs."""
+    """Derivatives of ln(range) by all parameters (n, P), and relative sd by the spot's noise (n,).
+
+    Over all lasers and a grid of standoffs, where the spot is in the image.
+    """
     standoffs = [s.standoff_mm for s in fitted.used]
     grid = np.geomspace(min(standoffs), max(standoffs), GRID)
     noise = fitted.rig.noise
@@ -160,7 +173,7 @@ def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
     layout = fitted.layout
     w = 1.0 / (range_mm + fitted.values[layout.offset])
     spots = fitted.curves.spots(laser, w)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of spots that no picture shows
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # spots outside the image
         found = fitted.curves.invert(laser, spots, np.full(spots.shape, 1.0 / spot_px))
     gradient = np.zeros((len(laser), len(fitted.values)))
     own = np.array([layout.own(n) for n in range(layout.lasers)])
@@ -172,7 +185,11 @@ def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
 
 
 def _called_for(fitted: CalibrationFit) -> list[TermSummary]:
-    """Terms of the lens that the rig file holds constant and the data call for (a score test)."""
+    """Constant lens terms that the data call for, by a score test at the fit.
+
+    With j the derivatives of the residuals by the term, J those by the free parameters and C their posterior
+    covariance, the information on the term is j j - j^T J C J^T j and the score -j r.
+    """
     rig = fitted.rig
     tried = [name for name in fitted.layout.model.trial_sd if rig.camera.lens_priors[name].sd == 0]
     table = table_of(_freed(rig, tried), fitted.cells.placements, fitted.boards)
@@ -189,7 +206,7 @@ def _called_for(fitted: CalibrationFit) -> list[TermSummary]:
         along = within.T @ column
         information = column @ column - along @ covariance @ along
         score = -column @ residual
-        p_value = float(chi2_sf(score**2 / information, 1)) if information > KNOWN else 1.0
+        p_value = float(chi2_sf(score**2 / information, 1)) if information > LEAST_INFORMATION else 1.0
         if p_value < CALLED_FOR_P:
             log_factor = 0.5 * (score**2 / (1 + information) - log(1 + information))
             found.append(

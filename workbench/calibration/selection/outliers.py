@@ -1,4 +1,4 @@
-"""The fit without what is no spot of its laser: test and reject, at a stated rate."""
+"""Fit without outliers: spots are tested and rejected at a stated false-rejection rate."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from workbench.calibration.checks.hypotheses import explain_misfit
 from workbench.calibration.checks.target_motion import find_target_motion
 from workbench.calibration.data.boards import BoardView
-from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.data.observations import Observation, RejectedObservation
 from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.model.fit_event import Rejected
 from workbench.model.rig import Rig
 
 
@@ -20,28 +21,27 @@ def fit_without_outliers(
     rejected: Sequence[Rejected] = (),
     boards: Sequence[BoardView] = (),
 ) -> CalibrationFit:
-    """As `fit`, and then `without_outliers`."""
+    """`fit`, then `without_outliers`."""
     return without_outliers(fit(rig, observations, rejected, boards), rejected)
 
 
 def without_outliers(found: CalibrationFit, rejected: Sequence[Rejected]) -> CalibrationFit:
-    """The fit, repeated without the spots that lie apart from where all the others put them if there are any.
+    """The fit repeated without its outliers, if there are any.
 
-    A spot is the mean of its repeats: they share what is wrong with it. It is rejected where its distance is
-    what one sound fit in 1000 shows in any of its spots, and where no other account (lasers exchanged, a
-    standoff mistyped, a target that moved) explains it better; its captures are
-    listed with the fit's own rejections.
+    A spot (the mean of its repeats, which share its error) is rejected where its distance from the
+    prediction by all others is significant at a rate of 1 in 1000 fits, and where no other hypothesis (lasers
+    exchanged, a wrong standoff, target motion) explains it better.
 
     Args:
-        found: a fit of everything.
-        rejected: what was already rejected before that fit.
+        found: a fit of all observations.
+        rejected: rejections before that fit; they are listed together with the outliers.
 
     Raises:
         LimitFailedError: as `fit`.
     """
     outliers = [h.subject[0] for h in explain_misfit(found) if h.kind == "spot"]
     suspects = sorted({int(found.cells.placement[cell]) for cell in outliers})
-    moved = [movement.placement for movement in find_target_motion(found, suspects)]
+    moved = [motion.placement for motion in find_target_motion(found, suspects)]
     outliers = [
         cell
         for cell in outliers
@@ -49,17 +49,19 @@ def without_outliers(found: CalibrationFit, rejected: Sequence[Rejected]) -> Cal
     ]
     if not outliers:
         return found
-    apart = {s.source: _reason(found, cell) for cell in outliers for s in found.cells.members[cell]}
+    reasons = {s.source: _reason(found, cell) for cell in outliers for s in found.cells.members[cell]}
     observations = found.cells.captures
-    strays = [Rejected(s.source, apart[s.source], stray=s) for s in observations if s.source in apart]
-    kept = [s for s in observations if s.source not in apart]
-    return fit(found.rig, kept, [*rejected, *strays], found.boards)
+    removed = [
+        RejectedObservation(s.source, reasons[s.source], s) for s in observations if s.source in reasons
+    ]
+    kept = [s for s in observations if s.source not in reasons]
+    return fit(found.rig, kept, [*rejected, *removed], found.boards)
 
 
 def _is_most(found: CalibrationFit, placement: int, outliers: Sequence[int]) -> bool:
-    """Whether half the spots of a placement lie apart: then it is the placement that is wrong."""
-    of_it = found.cells.placement == placement
-    return 2 * int(of_it[list(outliers)].sum()) >= int(of_it.sum()) > 1
+    """Whether half or more of a placement's spots are outliers: then the placement itself is wrong."""
+    here = found.cells.placement == placement
+    return 2 * int(here[list(outliers)].sum()) >= int(here.sum()) > 1
 
 
 def _reason(found: CalibrationFit, cell: int) -> str:
@@ -67,6 +69,6 @@ def _reason(found: CalibrationFit, cell: int) -> str:
     standoff = found.cells.placements[found.cells.placement[cell]].standoff_mm
     off = np.nan_to_num(found.residual_px[cell])
     return (
-        f"laser {laser} at {standoff:g} mm: its spot lies apart from where all others put it"
-        f" ({off[0]:+.2f}, {off[1]:+.2f} px from the fit that it took part in)"
+        f"laser {laser} at {standoff:g} mm: outlier, its spot contradicts all others"
+        f" (residual {off[0]:+.2f}, {off[1]:+.2f} px of the fit with it)"
     )

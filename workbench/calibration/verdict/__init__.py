@@ -1,1 +1,1 @@
-"""What a fit amounts to: assessment, null directions, the calibration file."""
+"""Verdict on a fit: assessment, null directions, the calibration file, comparison."""

@@ -1,4 +1,4 @@
-"""Is the calibration good enough, and what can it not tell?"""
+"""Assessment of a fit against limits: verdict, reasons, warnings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from workbench.calibration.checks.cross_validation import LeftOut, alarms, leave_each_out
+from workbench.calibration.checks.cross_validation import alarms, leave_each_out
 from workbench.calibration.checks.faults import find_faults, refuses
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.checks.residuals import explain, residual_tests
@@ -18,55 +18,54 @@ from workbench.calibration.verdict.observability import NullDirection, direction
 from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import DeterminedBy
-from workbench.model.fit_event import Fault, ResidualTest
+from workbench.model.fit_event import CrossValidatedPlacement, Fault, ResidualTest
 
 CONTRADICTION_SD = 5.0
-"""By chance one parameter in 2 million lies so far from its prior."""
+"""Distance from its prior at which a parameter contradicts it; 1 in 2 million lies so far by chance."""
 DATA_SHARE_DETERMINED = 0.9
+"""Information share of the data from which a parameter is determined by them."""
 PRIOR_UNMOVED = 0.9
-"""A posterior sd above this part of the prior's: neither data nor other priors told anything."""
+"""Ratio of posterior to prior sd above which neither data nor other priors constrain the parameter."""
 
 
 @dataclass(frozen=True)
 class Derived:
-    """What a laser's data do determine whatever the priors say. 1 sigma."""
+    """Quantities of a laser that the data determine whatever the priors are. 1 sigma."""
 
     laser_id: str
     f_b_px_mm: float
-    """Focal length times the baseline: its distance from the pinhole, positive on either side."""
+    """Focal length times baseline (distance of the laser from the pinhole, positive on either side)."""
     f_b_sd: float
     infinity_px: float
-    """Where the spot of a target at infinity would lie, along the laser's axis."""
+    """Vanishing point: the spot of a target at infinity, along the laser's axis."""
     infinity_sd: float
 
 
 @dataclass(frozen=True)
 class Assessment:
-    """The verdict on a fit."""
+    """Verdict on a fit, with its evidence."""
 
     verdict: Literal["accepted", "refused"]
     reasons: tuple[str, ...]
-    """Why refused; empty when accepted."""
+    """Reasons of a refusal; empty when accepted."""
     warnings: tuple[str, ...]
-    left_out: tuple[LeftOut, ...] = ()
-    """Cross-validation, a placement each."""
+    cross_validation: tuple[CrossValidatedPlacement, ...] = ()
     faults: tuple[Fault, ...] = ()
     residual_tests: tuple[ResidualTest, ...] = ()
     directions: tuple[NullDirection, ...] = ()
-    """What the data leave open."""
 
 
 def determined_by(fit: CalibrationFit) -> tuple[DeterminedBy, ...]:
-    """For each parameter, what it rests on."""
+    """`basis` of each parameter, (P,)."""
     columns = zip(fit.data_share.tolist(), fit.sd.tolist(), fit.table.prior_sd.tolist(), strict=True)
     return tuple(basis(share, sd, prior_sd) for share, sd, prior_sd in columns)
 
 
 def basis(data_share: float, sd: float, prior_sd: float) -> DeterminedBy:
-    """What a parameter rests on.
+    """What determines a parameter.
 
-    `data`: on the data alone. `prior`: on its own prior, hardly narrowed. `joint`: the data tie it to other
-    parameters and those parameters' priors do the rest.
+    `data`: the data alone. `prior`: its own prior, hardly narrowed. `joint`: the data together with the
+    priors of other parameters.
     """
     if data_share >= DATA_SHARE_DETERMINED:
         return "data"
@@ -74,65 +73,66 @@ def basis(data_share: float, sd: float, prior_sd: float) -> DeterminedBy:
 
 
 def derive(fit: CalibrationFit) -> tuple[Derived, ...]:
-    """`Derived` of every laser, with the full covariance."""
+    """`Derived` of every laser, with standard deviations from the full covariance."""
     return tuple(_derive_one(fit, index) for index in range(len(fit.rig.lasers)))
 
 
-def judge(
+def assess(
     fit: CalibrationFit,
     limits: Acceptance,
     max_relative_range_sd: float,
     directions: Sequence[NullDirection] = (),
 ) -> Assessment:
-    """Hold a fit against the limits.
+    """Compare a fit with the limits, and run all checks of it.
+
+    Where a fault refuses the fit, consequences of it (contradicted priors, alarms, missed limits) are not
+    listed.
 
     Args:
         fit: the fit.
-        limits: what to hold it against.
+        limits: limits of the calibration.
         max_relative_range_sd: as in the calibration's `validity`.
-        directions: what the data leave open, for the warnings.
+        directions: null directions, for the warnings.
     """
     reasons = _too_few_standoffs(fit, limits)
     if not fit.converged:
         reasons.append("the solver did not converge. Do: check the standoffs and the laser ids")
-    left_out = leave_each_out(fit)
-    faults = find_faults(fit, left_out)
+    placements = leave_each_out(fit)
+    faults = find_faults(fit, placements)
     tests = residual_tests(fit)
-    named = [fault.message for fault in faults if refuses(fault)]
+    refusing = [fault.message for fault in faults if refuses(fault)]
     warnings = [fault.message for fault in faults if not refuses(fault)]
-    # What has a name needs no list of its consequences.
-    if named:
-        reasons = [*named, *reasons]
+    if refusing:
+        reasons = [*refusing, *reasons]
     else:
         warnings = [*direction_lines(directions), *warnings, *_warnings(fit)]
         reasons += [
             *_contradictions(fit),
-            *map(_alarm, alarms(left_out)),
-            *_beyond(fit, limits, max_relative_range_sd),
+            *map(_alarm, alarms(placements)),
+            *_missed_limits(fit, limits, max_relative_range_sd),
         ]
         warnings += [explain(test) for test in residual_alarms(tests)]
     return Assessment(
         verdict="refused" if reasons else "accepted",
         reasons=tuple(reasons),
         warnings=tuple(warnings),
-        left_out=left_out,
+        cross_validation=placements,
         faults=faults,
         residual_tests=tests,
         directions=tuple(directions),
     )
 
 
-def _beyond(fit: CalibrationFit, limits: Acceptance, max_relative_range_sd: float) -> list[str]:
-    """The limits' own figures that are not met."""
+def _missed_limits(fit: CalibrationFit, limits: Acceptance, max_relative_range_sd: float) -> list[str]:
     reasons = []
     if not fit.rms_px <= limits.max_rms_px:
         reasons.append(
-            f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px. Do: look at what"
-            f" lies farthest off ({_largest_residual(fit)}), and capture it again"
+            f"residual rms {fit.rms_px:.2f} px, expected at most {limits.max_rms_px:g} px. Do: capture the"
+            f" spot with the largest residual again ({_largest_residual(fit)})"
         )
     if not max_relative_range_sd <= limits.max_relative_range_sd:
         reasons.append(
-            f"standard deviation of a range up to {100 * max_relative_range_sd:.2g} % of it,"
+            f"relative standard deviation of ranges up to {100 * max_relative_range_sd:.2g} %,"
             f" expected at most {100 * limits.max_relative_range_sd:g} %. Do: add standoffs (workbench design"
             " proposes them) or repeats"
         )
@@ -174,30 +174,30 @@ def _too_few_standoffs(fit: CalibrationFit, limits: Acceptance) -> list[str]:
         seen[s.laser_id].add(s.standoff_mm)
     return [
         f"laser {i} was seen at {len(seen[i])} standoffs, expected at least {limits.min_standoffs}."
-        " Do: capture it at more of them"
+        " Do: capture it at more standoffs"
         for i in fit.rig.laser_ids
-        if len(seen[i]) < limits.min_standoffs and (seen[i] or i in captured)  # never lit: a fault by name
+        if len(seen[i]) < limits.min_standoffs and (seen[i] or i in captured)  # else the fault never_lit
     ]
 
 
 def _contradictions(fit: CalibrationFit) -> list[str]:
-    """Priors that the data contradict: a rig file that is wrong, or a standoff that was mistyped."""
+    """Priors that the data contradict: a wrong rig file, or a mistyped standoff."""
     return [
-        f"the data pull {p.name} {abs(pull):.1f} sd away from what the rig file says ({p.prior.value:g} +-"
-        f" {p.prior.sd:g} {p.unit}), to {value:.5g}. Do: check it, and the standoffs"
+        f"{p.name} = {value:.5g} {p.unit} lies {abs(pull):.1f} sd from its prior in the rig file"
+        f" ({p.prior.value:g} +- {p.prior.sd:g} {p.unit}). Do: check this prior, and the standoffs"
         for p, pull, value in zip(fit.table.parameters, fit.prior_pull, fit.values, strict=True)
         if abs(pull) > CONTRADICTION_SD
     ]
 
 
-def _alarm(one: LeftOut) -> str:
+def _alarm(one: CrossValidatedPlacement) -> str:
     if one.range_p <= one.spots_p:
-        off = f"lie {one.error_mm:+.2f} mm off in range, where it promises {one.sd_mm:.2g} mm (1 sigma)"
+        evidence = f"range error {one.error_mm:+.2f} mm, expected 0 +- {one.sd_mm:.2g} mm (1 sigma)"
     else:
-        off = f"lie apart from its prediction (chi2 {one.chi2:.0f} for {one.coordinates} coordinates)"
+        evidence = f"chi2 of the spots {one.chi2:.0f}, expected {one.coordinates}"
     return (
-        f"the captures at {one.standoff_mm:g} mm contradict the others: to the fit without them they {off}."
-        f" Do: check that standoff and its captures, or leave it out (--without-standoff {one.standoff_mm:g})"
+        f"the captures at {one.standoff_mm:g} mm contradict the others: {evidence}, by the fit without them."
+        f" Do: check this standoff and its captures, or leave it out (--without-standoff {one.standoff_mm:g})"
     )
 
 
@@ -214,22 +214,25 @@ def _warnings(fit: CalibrationFit) -> list[str]:
     prior = [p.name for p, by in sensor if by == "prior" and p.kind == "sensor"]
     warnings: list[str] = []
     if prior:
-        warnings.append(f"these captures say nothing of it, the rig file's value stands: {', '.join(prior)}")
+        are, priors = ("is", "prior is") if len(prior) == 1 else ("are", "priors are")
+        warnings.append(
+            f"{', '.join(prior)} {are} not constrained by these captures; the rig file's {priors} used."
+        )
     warnings += [
-        f"the data call for {term.name} (p {term.p_value:.1g}), which the rig file holds constant:"
-        " give it an sd there"
+        f"the data call for {term.name} (p {term.p_value:.1g}), which the rig file holds constant."
+        " Give it an sd in the rig file."
         for term in fit.terms
         if term.verdict == "called for"
     ]
     if fit.cells.repeat_scale > 1:
         warnings.append(
             f"repeats scatter {fit.cells.repeat_scale:.2f} times more than the stated noise of the spots;"
-            " their sd was enlarged to match"
+            " their sd is scaled by this factor."
         )
     if fit.noise_scale > 1:
         warnings.append(
             f"residuals are {fit.noise_scale:.2f} times larger than the stated noise of the spots"
             f" (chi2 {fit.chi2:.1f} for {fit.degrees_of_freedom:.1f} degrees of freedom);"
-            f" every sd was enlarged to match. The largest residual is {_largest_residual(fit)}"
+            f" every sd is scaled by this factor. The largest residual is {_largest_residual(fit)}."
         )
     return warnings

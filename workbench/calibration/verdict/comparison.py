@@ -1,4 +1,4 @@
-"""Two calibrations of one sensor: do they give the same ranges, and if not, what moved?"""
+"""Comparison of two calibrations of one sensor: difference of ranges, significance, likely cause."""
 
 from __future__ import annotations
 
@@ -15,54 +15,56 @@ from workbench.sensor.calibrated import CalibratedSensor
 Pairs = list[tuple[str, FloatArray]]
 """Laser ids, each with ranges in mm."""
 SIGNIFICANCE = 0.01
-"""Differences less likely than this by chance mean that something moved."""
-STANDOFFS = 12
+"""P value of the differences below which the sensor has changed."""
+RANGES = 12
+"""Number of ranges at which the calibrations are compared."""
 GAUSS_NEWTON_STEPS = 5
 SMALLEST_VARIANCE = 1e-6
-"""Directions of the differences with a variance below this part of the largest are left out: what the
-calibrations promise there is finer than what the linearised difference of two of them can hold."""
+"""Share of the largest variance below which directions of the differences are omitted: there the stated
+variances are smaller than the error of linearising the difference."""
 AS_LIKELY_CHI2 = 4.0
-"""Explanations whose chi-square is this near to the best one's (2 sigma) cannot be told from it."""
+"""Difference of chi-square (2 sigma) within which explanations are equally likely."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One laser at one range; mm, 1 sigma."""
+    """Difference of the ranges of one laser at one range; mm, 1 sigma."""
 
     laser_id: str
     range_mm: float
     difference_mm: float
-    """Range by B - range by A, of the spot that A expects."""
+    """Range by B - range by A, of the spot that A predicts."""
     sd_mm: float
     """Combined standard deviation of both calibrations."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """The verdict on two calibrations."""
+    """Verdict on two calibrations."""
 
     differences: tuple[Difference, ...]
     chi2: float
     degrees_of_freedom: int
     probability: float
-    """Of differences as large as these by chance."""
+    """P value of the differences."""
     moved: bool
+    """Whether the differences are significant."""
     explanations: tuple[str, ...]
-    """Parameters of which one alone explains the move, the most likely first; empty: no single one does."""
+    """Parameters each of which explains the differences alone, the most likely first; empty: none does."""
     identical: bool = False
-    """Whether both have the same numbers, to the last digit: copies of one calibration."""
+    """Whether both have the same numbers to the last digit, as copies of one calibration have."""
 
 
 def compare(a: Calibration, b: Calibration) -> Comparison:
-    """Compare two calibrations over the ranges and lasers that both have.
+    """Compare two calibrations over the ranges that both cover.
 
-    What is tested is where the two expect each laser's spot along its axis, which is linear in the parameters
-    where ranges are not, with the covariance of both calibrations added: right for what each session's data
-    determined; for what rests on priors that both share it overstates the deviation. The ranges differ as
-    they do when B ranges the spot that A expects.
+    The test compares the predicted positions of each laser's spot along its axis, which unlike ranges are
+    nearly linear in the parameters. Their covariance is the sum of both calibrations': correct for what the
+    data of each session determine, too large for what rests on priors that both share. The reported
+    difference of ranges is that of B for the spot that A predicts.
 
     Raises:
-        BadInputError: the lasers, the picture's size or the standoffs have nothing in common.
+        BadInputError: different lasers or image sizes, or no common standoffs.
     """
     sensor_a, sensor_b = CalibratedSensor(a), CalibratedSensor(b)
     pairs = _visible(sensor_a, sensor_b, _common_ranges(a, b))
@@ -84,13 +86,13 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
 
 
 def _numbers(calibration: Calibration) -> tuple[object, ...]:
-    """All that a ranger takes from it."""
+    """All numbers that a ranger uses."""
     ours = calibration.laser_ranger
     return calibration.geometry(), ours.lasers, ours.noise, ours.parameters, ours.validity
 
 
 def _spots(sensor: CalibratedSensor, pairs: Pairs) -> FloatArray:
-    """(n,) where the sensor expects the spots along each laser's axis, px."""
+    """(n,) predicted positions of the spots along each laser's axis, px."""
     return np.concatenate([sensor.spot_px(i, r)[:, _axis(sensor, i)] for i, r in pairs])
 
 
@@ -100,7 +102,7 @@ def _spot_gradient(sensor: CalibratedSensor, pairs: Pairs) -> FloatArray:
 
 
 def _spot_covariance(sensor: CalibratedSensor, pairs: Pairs) -> FloatArray:
-    """(n, n) of `_spots`, by the calibration's covariance."""
+    """(n, n) covariance of `_spots` by that of the calibration, px^2."""
     gradient = _spot_gradient(sensor, pairs)
     return gradient @ sensor.calibration.laser_ranger.parameters.covariance_array @ gradient.T
 
@@ -132,7 +134,7 @@ def _common_ranges(a: Calibration, b: Calibration) -> FloatArray:
     nearest, farthest = max(r[0] for r in ranges), min(r[1] for r in ranges)
     if nearest >= farthest:
         raise BadInputError(f"validity: expected standoffs in common, got {ranges[0]} and {ranges[1]} mm")
-    return np.geomspace(nearest, farthest, STANDOFFS)
+    return np.geomspace(nearest, farthest, RANGES)
 
 
 def _laser_ids(calibration: Calibration) -> tuple[str, ...]:
@@ -140,25 +142,25 @@ def _laser_ids(calibration: Calibration) -> tuple[str, ...]:
 
 
 def _visible(a: CalibratedSensor, b: CalibratedSensor, grid: FloatArray) -> Pairs:
-    """Each laser with the ranges at which both calibrations expect its spot in the picture."""
+    """Each laser with the ranges at which both calibrations predict its spot in the image."""
     return [(i, grid[a.in_frame(i, grid) & b.in_frame(i, grid)]) for i in a.ids]
 
 
 def _whitener(covariance: FloatArray) -> FloatArray:
-    """(k, n): from n differences to k independent ones of variance 1."""
+    """(k, n) transformation of n differences to k independent ones of variance 1."""
     variance, direction = np.linalg.eigh(covariance)
     kept = variance > SMALLEST_VARIANCE * variance[-1]
     return np.asarray((direction[:, kept] / np.sqrt(variance[kept])).T)
 
 
 def _explanations(a: CalibratedSensor, b: Calibration, pairs: Pairs, whiten: FloatArray) -> tuple[str, ...]:
-    """Parameters of B of which one alone, put back, brings the difference down to chance."""
+    """Parameters of B each of which, refitted alone, leaves no significant difference from A."""
     expected = _spots(a, pairs)
     parameters = b.laser_ranger.parameters
     remaining: dict[str, float] = {}
     for column, (name, value) in enumerate(zip(parameters.names, parameters.values, strict=True)):
         if name in b.geometry():
-            remaining[name] = _put_back(b, pairs, whiten, expected, column, value)
+            remaining[name] = _refitted_chi2(b, pairs, whiten, expected, column, value)
     best = min(remaining.values())
     if chi2_sf(best, len(whiten) - 1) < SIGNIFICANCE:
         return ()
@@ -166,10 +168,14 @@ def _explanations(a: CalibratedSensor, b: Calibration, pairs: Pairs, whiten: Flo
     return tuple(sorted(likely, key=remaining.__getitem__))
 
 
-def _put_back(
+def _refitted_chi2(
     b: Calibration, pairs: Pairs, whiten: FloatArray, expected: FloatArray, column: int, value: float
 ) -> float:
-    """Chi-square that is left when one parameter of B takes the value that suits A best (Gauss-Newton)."""
+    """Chi-square of the differences with one parameter of B fitted to A (scalar Gauss-Newton from `value`).
+
+    The steps are written out: gradients come from the sensor's JAX curves, and five steps of one parameter
+    are enough for a chi-square that is compared with a threshold.
+    """
     name = b.laser_ranger.parameters.names[column]
     chi2 = float("inf")
     for _ in range(GAUSS_NEWTON_STEPS):

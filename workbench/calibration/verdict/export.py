@@ -1,4 +1,4 @@
-"""From a fit to the calibration YAML on disk."""
+"""Calibration of a fit, and its YAML file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from workbench.calibration.data.observations import positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit
-from workbench.calibration.verdict.assessment import Assessment, determined_by, judge
+from workbench.calibration.verdict.assessment import Assessment, assess, determined_by
 from workbench.calibration.verdict.observability import RangeGradients, null_directions
 from workbench.calibration.verdict.yaml_text import yaml_text
 from workbench.model.acceptance import Acceptance
@@ -32,10 +32,10 @@ from workbench.session.files import write_output
 def calibrate(
     fit: CalibrationFit, limits: Acceptance, provenance: Provenance
 ) -> tuple[Calibration, Assessment]:
-    """The calibration that a fit amounts to, and the verdict on it.
+    """Make the calibration of a fit, and assess it.
 
     Raises:
-        LimitFailedError: by the fit no spot can be ranged.
+        LimitFailedError: no spot in the image has a range with a finite standard deviation.
     """
     values = dict(zip((p.name for p in fit.table.parameters), fit.values.tolist(), strict=True))
     provisional = _calibration(fit, values, provenance, Assessment("accepted", (), ()), 0.0)
@@ -43,8 +43,8 @@ def calibrate(
     worst = float(ranges.sd.max()) if len(ranges.sd) else float("nan")
     if not np.isfinite(worst):
         raise LimitFailedError(
-            "no calibration: between its nearest and farthest standoff the fit gives ranges of no spot in the"
-            " picture. Check the rig file's image size and baselines, and the standoffs"
+            "no calibration: no laser has a range with a finite uncertainty in the image between the nearest"
+            " and the farthest standoff. Check image size and baselines in the rig file, and the standoffs"
         )
     sensor = fit.sensor
     directions = null_directions(
@@ -54,19 +54,19 @@ def calibrate(
         fit.covariance[sensor, sensor],
         ranges,
     )
-    assessment = judge(fit, limits, worst, directions)
+    assessment = assess(fit, limits, worst, directions)
     return _calibration(fit, values, provenance, assessment, worst), assessment
 
 
 def accept_with_reason(calibration: Calibration, reason: str) -> Calibration:
-    """A refused calibration with somebody's reason for using it all the same."""
+    """A refused calibration with the operator's reason for using it."""
     ranger = calibration.laser_ranger
     summary = ranger.fit.model_copy(update={"accepted_because": reason})
     return calibration.model_copy(update={"laser_ranger": ranger.model_copy(update={"fit": summary})})
 
 
 def write_calibration(path: Path, calibration: Calibration) -> None:
-    """Write the YAML where the user wants it.
+    """Write the YAML to a path that the user names.
 
     Raises:
         BadInputError: see `write_output`.
@@ -151,17 +151,17 @@ def _parameters(fit: CalibrationFit) -> Parameters:
 
 
 def _typical_spot_sd(fit: CalibrationFit) -> float:
-    """Root mean square deviation of a single spot, as stated and enlarged to match what was seen."""
+    """Root mean square sd of a single spot, as stated and scaled to the scatter of the data, px."""
     sd, seen = stated_sd(fit.used, fit.rig.noise), np.isfinite(positions(fit.used))
     return float(np.sqrt((sd[seen] ** 2).mean()) * fit.cells.repeat_scale * fit.noise_scale)
 
 
 def _ranges(sensor: CalibratedSensor) -> RangeGradients:
-    """Of every laser, wherever its spot is in frame between the nearest and the farthest standoff."""
+    """Relative sd and gradients of the ranges of all lasers, where their spots are in the image."""
     nearest, farthest = sensor.calibration.laser_ranger.validity.standoff_mm
     grid = np.geomspace(nearest, farthest, 30)
     rows, sd = [], []
-    # The whole grid at once, seen or not: arrays of one shape are one compiled program.
+    # The whole grid at once: arrays of one shape need one compiled program.
     with np.errstate(invalid="ignore", over="ignore"):
         for laser_id in sensor.ids:
             found, seen = sensor.typical_ranges(laser_id, grid), sensor.in_frame(laser_id, grid)

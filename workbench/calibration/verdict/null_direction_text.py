@@ -1,4 +1,4 @@
-"""Null directions in plain words, and what would resolve them."""
+"""Text of null directions and of the measurements that would resolve them."""
 
 from __future__ import annotations
 
@@ -12,33 +12,25 @@ from workbench.model.lens import COEFFICIENTS, PINHOLE
 from workbench.model.rig import Rig
 
 LEAST_PART = 0.3
-"""What moves the spots by less than this part of what the strongest of a combination does is not named."""
+"""Least effect on the spots, as a share of the strongest, for a parameter to be part of the text."""
 LEAST_EFFECT = 0.01
-"""Standard deviations of all spots together: less than this is nothing."""
+"""Effect on all spots together, in standard deviations, below which a parameter has none."""
 OTHERS = 3
-"""More than so many kinds that trade with one are not told apart by reading."""
+"""Largest number of kinds beside the pivot's in one text."""
 BASELINE = "baseline"
-ACROSS = "position across"
+ACROSS = "position across the baseline"
 POINTING = {"tx": "pointing along u", "ty": "pointing along v"}
 REMEDIES = {
-    "ruler_scale": "check the ruler against a better one",
-    **dict.fromkeys(PRINT, "check the board's printed ruler against a steel one"),
+    "ruler_scale": "check the ruler against a more accurate one",
+    **dict.fromkeys(PRINT, "check the board's printed ruler against a steel ruler"),
     "offset_mm": "measure the offset of the reference plane",
-    BASELINE: "measure a baseline more closely",
-    **dict.fromkeys((*PINHOLE, *chain(*COEFFICIENTS.values())), "use the printed board (workbench target)"),
+    BASELINE: "measure one baseline more accurately",
+    **dict.fromkeys((*PINHOLE, *chain(*COEFFICIENTS.values())), "use the printed board"),
 }
-SHARED = {
-    "f_px": "the focal length",
-    **dict.fromkeys(("cx_px", "cy_px"), "the image centre"),
-    "offset_mm": "the reference plane's offset",
-    "ruler_scale": "the ruler's scale",
-    **dict.fromkeys(PRINT, "the board's scale"),
-}
-"""What all lasers share, in words; the other terms are the lens's."""
 LENGTHS = ("ruler_scale", *PRINT)
-"""Where one of these is among what trades, nothing but a better ruler tells them apart."""
+"""Scales of all lengths. Where one takes part, only a more accurate ruler separates the parameters."""
 APART = "place the target at standoffs farther apart"
-UNSEEN = "nothing, as long as no spot depends on it"
+UNSEEN = "none: no spot depends on it"
 
 
 @dataclass(frozen=True)
@@ -47,48 +39,53 @@ class ParameterChange:
 
     name: str
     kind: str
-    """Its own name, or what it is of a laser."""
+    """Its own name, or its role in a laser (BASELINE, ACROSS, POINTING)."""
     laser: str
-    """Empty for what all lasers share."""
+    """Empty for parameters that all lasers share."""
     shown: float
-    """How far it moves, in `unit`."""
+    """Change, in `unit`."""
     unit: str
     effect: float
-    """On all spots together if it moved alone, in standard deviations."""
+    """Change of all spots together by this parameter alone, in standard deviations."""
 
 
 @dataclass(frozen=True)
-class Group:
-    """Parameters of one kind that move together."""
+class ParameterGroup:
+    """Parameters of one kind that change together."""
 
     members: tuple[ParameterChange, ...]
 
     @property
     def kind(self) -> str:
-        """That of all."""
+        """Kind of all members."""
         return self.members[0].kind
 
     @property
     def lasers(self) -> tuple[str, ...]:
-        """Whose they are; empty for what all lasers share."""
+        """Lasers of the members; empty for parameters that all lasers share."""
         return tuple(m.laser for m in self.members if m.laser)
 
     @property
     def effect(self) -> float:
-        """Of all together."""
+        """Effect of all members together (root sum of squares)."""
         return hypot(*(m.effect for m in self.members))
 
     @property
     def size(self) -> str:
-        """How far they move, for people: the mean; `+-` where some go one way and some the other."""
-        unit, shown = self.members[0].unit, [m.shown for m in self.members]
+        """Mean change as text; `+-` for the mean absolute change where the signs differ."""
+        shown = [m.shown for m in self.members]
         one_way = min(shown) * max(shown) > 0 or len(shown) == 1
         mean = sum(shown if one_way else map(abs, shown)) / len(shown)
-        return (f"{mean:+.2g} {unit}" if one_way else f"+-{mean:.2g} {unit}").rstrip()
+        return (f"{mean:+.2g} {self.unit}" if one_way else f"+-{mean:.2g} {self.unit}").rstrip()
+
+    @property
+    def unit(self) -> str:
+        """Unit of all changes."""
+        return self.members[0].unit
 
 
 def parameter_change(rig: Rig, name: str, value: float, change: float, effect: float) -> ParameterChange:
-    """A parameter that moves by `change` from `value`, both in its own unit."""
+    """Change of a parameter by `change` from `value`, both in its own unit."""
     laser, _, own = name.rpartition(".")
     if not laser:
         kind = name
@@ -101,35 +98,36 @@ def parameter_change(rig: Rig, name: str, value: float, change: float, effect: f
     return ParameterChange(name, kind, laser, shown, unit, effect)
 
 
-def group_by_kind(parts: Iterable[ParameterChange]) -> tuple[Group, ...]:
-    """What moves together, by kind: the first part's group and the strongest others, lasers' last."""
+def group_by_kind(parts: Iterable[ParameterChange]) -> tuple[ParameterGroup, ...]:
+    """Groups by kind: that of the first part and the strongest others, those of lasers last."""
     buckets: dict[str, list[ParameterChange]] = {}
     for part in parts:
         buckets.setdefault(part.kind, []).append(part)
-    first, *others = [Group(_strong(members)) for members in buckets.values()]
+    first, *others = [ParameterGroup(_strong(members)) for members in buckets.values()]
     least = max(LEAST_PART * max(group.effect for group in (first, *others)), LEAST_EFFECT)
-    named = sorted((group for group in others if group.effect > least), key=lambda group: -group.effect)
-    return tuple(sorted((first, *named[:OTHERS]), key=lambda group: bool(group.lasers)))
+    strong = sorted((group for group in others if group.effect > least), key=lambda group: -group.effect)
+    return tuple(sorted((first, *strong[:OTHERS]), key=lambda group: bool(group.lasers)))
 
 
-def describe(rig: Rig, groups: Sequence[Group], each: Sequence[str] = ()) -> str:
-    """A sentence without its full stop.
+def describe(rig: Rig, groups: Sequence[ParameterGroup], each: Sequence[str] = ()) -> str:
+    """Sentence about a null direction, without full stop.
 
     Args:
-        rig: how many lasers there are.
-        groups: what trades.
-        each: lasers of each of which this holds by itself.
+        rig: the lasers.
+        groups: the parameters.
+        each: lasers for each of which the direction holds separately.
     """
     names = [_phrase(rig, group, bool(each)) for group in groups]
-    of = f" of {', '.join(each)}{', each by itself' if len(each) > 1 else ''}" if each else ""
-    sizes = _listed([group.size for group in groups])
+    of = f" of {'each of ' if len(each) > 1 else ''}{', '.join(each)}" if each else ""
     if len(names) == 1:
-        return f"{names[0]}{of} cannot be known: changed by {sizes}, it moves no spot by more than its noise"
-    return f"{_listed(names)}{of} cannot be known apart: changed together by {sizes}, they move no spot"
+        return f"{names[0]}{of}: not constrained ({groups[0].size} moves no spot by more than its noise)"
+    how = "scale" if all(group.unit == "%" for group in groups) else "change"
+    sizes = " / ".join(group.size for group in groups)
+    return f"{_listed(names)}{of} {how} together ({sizes} leaves every spot unchanged)"
 
 
-def remedy(groups: Sequence[Group], each: Sequence[str] = ()) -> str:
-    """What would tell the parameters apart."""
+def remedy(groups: Sequence[ParameterGroup], each: Sequence[str] = ()) -> str:
+    """Measurement that would separate the parameters."""
     if len(groups) == 1:
         return UNSEEN
     if each:
@@ -137,11 +135,16 @@ def remedy(groups: Sequence[Group], each: Sequence[str] = ()) -> str:
     kinds = {group.kind for group in groups}
     only_lengths = kinds.intersection(LENGTHS)
     fitting = [text for kind, text in REMEDIES.items() if kind in (only_lengths or kinds)]
-    return ", or ".join(dict.fromkeys(fitting)) or APART
+    return " or ".join(dict.fromkeys(fitting)) or APART
 
 
-def own_laser(rig: Rig, groups: Sequence[Group]) -> str:
-    """The laser whose own affair this is; empty where others or what they share have a part in it."""
+def advice(remedy: str) -> str:
+    """Sentence with a remedy; empty where none is needed."""
+    return "" if remedy == UNSEEN else f"To separate them, {remedy}."
+
+
+def own_laser(rig: Rig, groups: Sequence[ParameterGroup]) -> str:
+    """The only laser with parameters in the groups; empty where several or shared parameters take part."""
     lasers = {m.laser for group in groups for m in group.members}
     return lasers.pop() if len(lasers) == 1 and len(rig.lasers) > 1 else ""
 
@@ -167,12 +170,11 @@ def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def _phrase(rig: Rig, group: Group, each: bool) -> str:
+def _phrase(rig: Rig, group: ParameterGroup, each: bool) -> str:
     if not group.lasers:
-        words = SHARED.get(group.kind)
-        return f"{words} ({group.kind})" if words else f"the lens term {group.kind}"
+        return group.kind
     if each or len(rig.lasers) == 1:
         return f"the {group.kind}"
     if len(group.lasers) < len(rig.lasers):
         return f"the {group.kind} of {', '.join(group.lasers)}"
-    return "all baselines" if group.kind == BASELINE else f"the {group.kind} of all lasers"
+    return "the baselines" if group.kind == BASELINE else f"the {group.kind} of all lasers"

@@ -1,9 +1,10 @@
-"""What the data leave open: changes of several parameters at once that move no spot.
+"""Null directions: combinations of parameters that the data leave open.
 
-The information of the data on the sensor is what its posterior holds beyond the priors. Parameters are taken
-in turn, those that many spots share first. One is open where the data tell less of it than its own prior,
-however freely all others may move. The way the others move to hide it is a null direction. It is named, the
-parameter is held, and the next one taken: so directions that are all equally open do not come out mixed.
+The information of the data is the inverse posterior covariance minus that of the priors. Parameters are taken
+in turn, those that all spots depend on first. A parameter is open where the data constrain it less than its
+own prior does, with all others free. The change of the others that hides a change of it is a null direction.
+The parameter is then held fixed and the next one taken: eigenvectors of the information would mix directions
+that are equally open, and could not be named.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ import numpy as np
 from workbench.calibration.estimation.fit import FLAT_PRIOR_SD
 from workbench.calibration.model.parameters import PRINT, Parameter
 from workbench.calibration.verdict.null_direction_text import (
-    Group,
+    ParameterGroup,
+    advice,
     describe,
     group_by_kind,
     own_laser,
@@ -28,23 +30,24 @@ from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
 REFERENCE_FIRST = ("ruler_scale", *PRINT, "offset_mm")
-"""Parameters that all spots share, in the order in which they are taken; the lens's follow."""
+"""Parameters that all spots depend on, in the order in which they are taken; those of the lens follow."""
 NOT_HURT = 1 / 3
-"""A direction that moves ranges by less than this part of their sd adds at most some 5 % to it."""
+"""Change of ranges, in their sd, below which a direction does not affect them: it adds at most some 5 %."""
 WIDE_PRIOR_SD = 10.0
-"""In the search for what hides a parameter priors count so much less. With their full weight the data's noise
-gets into it, with none the others drift wherever nothing holds them."""
+"""Factor on the priors' sd in the search for the change that hides a parameter. At their full weight noise of
+the data enters the direction; with no priors, parameters that nothing constrains would drift."""
 SHOWN = 4
+"""Number of directions in the warnings."""
 
 
 @dataclass(frozen=True)
 class NullDirection:
-    """Parameters that trade with each other, moved by 1 sigma of what priors and data leave open."""
+    """Change of several parameters that leaves every spot unchanged, at 1 sigma of the posterior."""
 
     change: dict[str, float]
-    """By name, each in its unit; the one that was asked for comes first."""
+    """By name, each in its unit; the pivot comes first."""
     lasers: tuple[str, ...]
-    """Of each of which this holds by itself; empty where they have to do with each other."""
+    """Lasers for each of which the direction holds separately; empty where it involves several or none."""
     words: str
     remedy: str
     relative_range_change: float
@@ -53,33 +56,33 @@ class NullDirection:
 
     @property
     def line(self) -> str:
-        """For people."""
-        if self.hurts_ranges:
-            size = f"{100 * self.relative_range_change:.2g} %"
-            return f"{self.words}. Ranges suffer, by up to {size}. Do: {self.remedy}"
-        return f"{self.words}. Ranges do not suffer. Only to know each by itself: {self.remedy}"
+        """Text of the warning."""
+        size = f"{100 * self.relative_range_change:.2g} %"
+        ranges = f"Ranges change by up to {size}" if self.hurts_ranges else "Ranges are not affected"
+        return f"{self.words}. {ranges}. {advice(self.remedy)}".rstrip()
 
 
 class RangeGradients(NamedTuple):
-    """K ranges of spots that are in frame."""
+    """K ranges of spots in the image."""
 
     by_parameter: FloatArray
     """(K, S) derivatives of ln(range)."""
     sd: FloatArray
-    """(K,) relative, of a single reading."""
+    """(K,) relative sd of a single reading."""
 
 
 @dataclass(frozen=True)
 class _Posterior:
-    """Of the F free parameters, in units of their prior sd."""
+    """Posterior of the F free parameters, in units of their prior sd."""
 
     rig: Rig
     parameters: tuple[Parameter, ...]
     value: FloatArray
-    """In the parameters' units."""
+    """(F,) in the parameters' units."""
     covariance: FloatArray
+    """(F, F)"""
     information: FloatArray
-    """Of the data alone."""
+    """(F, F) of the data alone."""
     ranges: RangeGradients
 
     @property
@@ -99,37 +102,38 @@ def null_directions(
     covariance: FloatArray,
     ranges: RangeGradients,
 ) -> tuple[NullDirection, ...]:
-    """Directions of which priors tell more than the data, those that move ranges most first.
+    """Null directions, those that change ranges most first.
+
+    Directions of the same kind, each of a single laser, are joined into one.
 
     Args:
-        rig: its lasers.
-        parameters: S of the sensor.
-        values: (S,)
+        rig: the lasers.
+        parameters: S parameters of the sensor.
+        values: (S,) their values.
         covariance: (S, S) posterior.
-        ranges: those that matter.
+        ranges: ranges on which the effect of a direction is evaluated.
     """
     posterior = _posterior(rig, parameters, values, covariance, ranges)
-    found: dict[tuple[str, ...], tuple[NullDirection, tuple[Group, ...]]] = {}
+    found: dict[tuple[str, ...], tuple[NullDirection, tuple[ParameterGroup, ...]]] = {}
     for pivot, direction in _directions(posterior):
         groups = _groups(posterior, pivot, direction)
         if groups[0].members[0].shown < 0:
             direction = -direction
             groups = _groups(posterior, pivot, direction)
-        one = _named(posterior, direction, groups)
-        alike = ("each", *(g.kind for g in groups)) if one.lasers else ("", posterior.names[pivot])
-        found[alike] = (_joined(rig, *found[alike], one), groups) if alike in found else (one, groups)
+        one = _described(posterior, direction, groups)
+        key = ("each", *(g.kind for g in groups)) if one.lasers else ("", posterior.names[pivot])
+        found[key] = (_joined(rig, *found[key], one), groups) if key in found else (one, groups)
     return tuple(sorted((one for one, _ in found.values()), key=lambda d: -d.relative_range_change))
 
 
 def direction_lines(directions: Sequence[NullDirection]) -> list[str]:
-    """For people, the few combinations that matter most; what stands alone is seen in the table."""
+    """Warnings of the SHOWN combinations that change ranges most; single parameters are left to the table."""
     lines = [d.line for d in directions if len(d.change) > 1]
-    left = len(lines) - SHOWN
-    return (
-        lines
-        if left <= 0
-        else [*lines[:SHOWN], f"{left} more such combination{'s' * (left > 1)} cannot be known apart"]
-    )
+    more = len(lines) - SHOWN
+    if more <= 0:
+        return lines
+    are = "combination of parameters is" if more == 1 else "combinations of parameters are"
+    return [*lines[:SHOWN], f"{more} more {are} not constrained."]
 
 
 def _posterior(
@@ -153,7 +157,12 @@ def _posterior(
 
 
 def _directions(posterior: _Posterior) -> Iterator[tuple[int, FloatArray]]:
-    """Each pivot, and (F,) how all move: the pivot by its posterior sd, the others to hide it."""
+    """Pivots with their null directions (F,): the pivot changes by its posterior sd, the others hide it.
+
+    With A the information of the data and e the pivot's unit vector, the pivot is open where
+    e (A + 0)^-1 e > 1, the prior's variance. The change of the others that costs the least chi-square is
+    (A + 1 / WIDE_PRIOR_SD^2)^-1 e, normalised at the pivot.
+    """
     names = posterior.names
     order = (*REFERENCE_FIRST, *posterior.rig.camera.lens_priors)
     shared = [names.index(name) for name in order if name in names]
@@ -161,7 +170,7 @@ def _directions(posterior: _Posterior) -> Iterator[tuple[int, FloatArray]]:
     for pivot in [*shared, *(i for i in rest if i not in shared)]:
         information, at = posterior.information[np.ix_(rest, rest)], rest.index(pivot)
         unit = np.eye(len(rest))
-        if np.linalg.inv(information + unit / FLAT_PRIOR_SD**2)[at, at] > 1.0:  # of the prior's variance
+        if np.linalg.inv(information + unit / FLAT_PRIOR_SD**2)[at, at] > 1.0:
             hidden = np.linalg.inv(information + unit / WIDE_PRIOR_SD**2)[:, at]
             direction = np.zeros(len(names))
             direction[rest] = hidden / hidden[at] * np.sqrt(np.linalg.inv(information + unit)[at, at])
@@ -169,7 +178,8 @@ def _directions(posterior: _Posterior) -> Iterator[tuple[int, FloatArray]]:
             rest.remove(pivot)
 
 
-def _groups(posterior: _Posterior, pivot: int, direction: FloatArray) -> tuple[Group, ...]:
+def _groups(posterior: _Posterior, pivot: int, direction: FloatArray) -> tuple[ParameterGroup, ...]:
+    """The parameters of a direction by kind, the pivot's group among them."""
     effect = np.abs(direction) * np.sqrt(np.maximum(np.diag(posterior.information), 0.0))
     order = [pivot, *(i for i in range(len(direction)) if i != pivot)]
     return group_by_kind(
@@ -184,7 +194,9 @@ def _groups(posterior: _Posterior, pivot: int, direction: FloatArray) -> tuple[G
     )
 
 
-def _named(posterior: _Posterior, direction: FloatArray, groups: tuple[Group, ...]) -> NullDirection:
+def _described(
+    posterior: _Posterior, direction: FloatArray, groups: tuple[ParameterGroup, ...]
+) -> NullDirection:
     names = posterior.names
     members = [names.index(m.name) for group in groups for m in group.members]
     sd = [p.prior.sd for p in posterior.parameters]
@@ -201,8 +213,10 @@ def _named(posterior: _Posterior, direction: FloatArray, groups: tuple[Group, ..
     )
 
 
-def _joined(rig: Rig, before: NullDirection, groups: tuple[Group, ...], one: NullDirection) -> NullDirection:
-    """The same of one laser more."""
+def _joined(
+    rig: Rig, before: NullDirection, groups: tuple[ParameterGroup, ...], one: NullDirection
+) -> NullDirection:
+    """A direction extended by the same direction of another laser."""
     each = (*before.lasers, *one.lasers)
     return replace(
         before,

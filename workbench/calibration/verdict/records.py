@@ -1,21 +1,16 @@
-"""A fit as the journal and the viewer see it."""
+"""Records of a fit for the journal, the tables and the viewer."""
 
 from __future__ import annotations
 
-from workbench.calibration.checks.cross_validation import alarms
+from math import isnan
+
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.verdict.assessment import Assessment, determined_by
-from workbench.model.fit_event import (
-    FitFinished,
-    LeftOutRecord,
-    ParameterRecord,
-    RejectedRecord,
-    ResidualRecord,
-)
+from workbench.model.fit_event import FitFinished, ParameterRecord, Rejected, ResidualRecord
 
 
 def parameter_records(fit: CalibrationFit) -> tuple[ParameterRecord, ...]:
-    """The sensor's parameters; constants (prior sd 0) are among them."""
+    """The sensor's parameters in the order of `Layout`, constants (prior sd 0) included."""
     sensor = fit.sensor
     columns = zip(
         fit.table.parameters[sensor],
@@ -41,36 +36,20 @@ def parameter_records(fit: CalibrationFit) -> tuple[ParameterRecord, ...]:
 
 
 def fit_finished(fit: CalibrationFit, assessment: Assessment) -> FitFinished:
-    """The event of a finished fit."""
+    """The event of a finished fit, with plain records only: a resumed session compares events."""
     return FitFinished(
         parameters=parameter_records(fit),
         residuals=_residuals(fit),
         rms_px=fit.rms_px,
         observations=len(fit.used),
-        rejected=tuple(RejectedRecord(source=r.source, reason=r.reason) for r in fit.rejected),
+        rejected=tuple(Rejected(r.source, r.reason) for r in fit.rejected),
         verdict=assessment.verdict,
         reasons=assessment.reasons,
         warnings=assessment.warnings,
         terms=fit.terms,
-        left_out=left_out_records(assessment),
+        left_out=assessment.cross_validation,
         faults=assessment.faults,
         residual_tests=assessment.residual_tests,
-    )
-
-
-def left_out_records(assessment: Assessment) -> tuple[LeftOutRecord, ...]:
-    """The cross-validation."""
-    alarmed = alarms(assessment.left_out)
-    return tuple(
-        LeftOutRecord(
-            placement=one.placement,
-            standoff_mm=one.standoff_mm,
-            error_mm=one.error_mm,
-            sd_mm=one.sd_mm,
-            lasers=one.lasers,
-            alarm=one in alarmed,
-        )
-        for one in assessment.left_out
     )
 
 
@@ -87,14 +66,14 @@ def _residuals(fit: CalibrationFit) -> tuple[ResidualRecord, ...]:
         ResidualRecord(
             laser_id=fit.rig.laser_ids[laser],
             standoff_mm=cells.placements[placement].standoff_mm,
-            u_px=_measured(u),
-            v_px=_measured(v),
-            u_sd_px=_measured(u_sd),
-            v_sd_px=_measured(v_sd),
+            u_px=_none_if_nan(u),
+            v_px=_none_if_nan(v),
+            u_sd_px=_none_if_nan(u_sd),
+            v_sd_px=_none_if_nan(v_sd),
         )
         for laser, placement, (u, v), (u_sd, v_sd) in columns
     )
 
 
-def _measured(value: float) -> float | None:
-    return None if value != value else value
+def _none_if_nan(value: float) -> float | None:
+    return None if isnan(value) else value

@@ -1,4 +1,4 @@
-"""Tables of what the data of a fit determine, and of the difference of two calibrations."""
+"""Tables of derived quantities of a fit, and of the difference of two calibrations."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from workbench.model.table import Column, Table
 
-if TYPE_CHECKING:  # a table of one of them is made without the rest
+if TYPE_CHECKING:  # imported for annotations alone: commands start faster
     from workbench.calibration.verdict.assessment import Derived
     from workbench.calibration.verdict.comparison import Difference
 
 
 def derived_table(derived: Sequence[Derived]) -> Table:
-    """Quantities of each laser that the data determine whatever the priors say."""
+    """Quantities of each laser that the data determine whatever the priors are."""
     return Table(
         name="derived",
         title="Determined by the data (sd: 1 sigma)",
@@ -41,7 +41,7 @@ def difference_table(differences: Sequence[Difference]) -> Table:
             *(column for i in ids for column in _laser_columns(i)),
         ),
         rows=tuple((at, *(c for i in ids for c in cells.get((at, i), (None, None)))) for at in ranges),
-        caption="-: not in the picture",
+        caption="-: not in the image",
     )
 
 

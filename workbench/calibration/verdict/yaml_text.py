@@ -1,12 +1,12 @@
 """The YAML text of a calibration, in the subset that OpenCV, ROS, yaml-cpp and PyYAML read alike.
 
-A writer of YAML in general does not keep to it. OpenCV refuses a plain string that begins with a digit, one
-that goes on in the next line, an empty value, and a list of mappings that is not indented under its key;
-PyYAML takes 1e-05 for a string. So strings are quoted, floats have a decimal point, None is written as `null`
+General YAML writers produce more than this subset. OpenCV refuses a plain string that begins with a digit, a
+plain string over several lines, an empty value, and a list of mappings that is not indented under its key.
+PyYAML reads 1e-05 as a string. So strings are quoted, floats have a decimal point, None is written as `null`
 (OpenCV reads it as a node without a value), and a list of numbers or words is one line.
 
-What no escape or length brings through all of them is not written: a control character becomes a space, and a
-string that is too long for OpenCV, which would read nothing of the whole file, ends with an ellipsis.
+Text that some reader cannot read in any form is changed: a control character becomes a space, and a string
+longer than OpenCV's limit, beyond which it reads nothing of the file, ends with an ellipsis.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from collections.abc import Mapping
 from typing import Any
 
 UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
-"""What YAML wants escaped by a code, which OpenCV does not read; tab and the ends of lines it does."""
+"""Characters that YAML requires as numeric escapes, which OpenCV does not read."""
 LONGEST_BYTES = 4095
-"""Of a string in UTF-8 that OpenCV reads."""
+"""Longest string that OpenCV reads, in bytes of UTF-8."""
 ELLIPSIS = "…"
 
 
 def yaml_text(document: Mapping[str, Any]) -> str:
-    """A document of mappings (none of them empty), lists, strings, finite numbers, booleans and None.
+    """YAML of a document of non-empty mappings, lists, strings, finite numbers, booleans and None.
 
     Raises:
         ValueError: a number is not finite.
@@ -38,7 +38,7 @@ def _mapping(mapping: Mapping[str, Any], indent: str) -> list[str]:
     for key, value in mapping.items():
         if isinstance(value, Mapping):
             lines += [f"{indent}{key}:", *_mapping(value, indent + "  ")]
-        elif isinstance(value, tuple | list) and any(map(_has_its_own_line, value)):
+        elif isinstance(value, tuple | list) and any(map(_needs_own_line, value)):
             lines.append(f"{indent}{key}:")
             for item in value:
                 lines += _item(item, indent + "  ")
@@ -47,8 +47,8 @@ def _mapping(mapping: Mapping[str, Any], indent: str) -> list[str]:
     return lines
 
 
-def _has_its_own_line(item: Any) -> bool:
-    """Mappings, and sentences."""
+def _needs_own_line(item: Any) -> bool:
+    """Whether an item is a mapping or a sentence."""
     return isinstance(item, Mapping) or (isinstance(item, str) and " " in item)
 
 
@@ -65,7 +65,7 @@ def _flow(value: Any) -> str:
     if isinstance(value, float):
         if not math.isfinite(value):
             raise ValueError(f"expected a finite number, got {value}")
-        text = float.__repr__(value)  # numpy's are floats too, with a text of their own
+        text = float.__repr__(value)  # numpy's float64 is a float with another repr
         return text if "." in text else text.replace("e", ".0e")
     if isinstance(value, str):
         return json.dumps(plain(value), ensure_ascii=False)  # JSON's escapes are YAML's as well
@@ -73,7 +73,7 @@ def _flow(value: Any) -> str:
 
 
 def plain(text: str) -> str:
-    """As much of a text as every reader reads."""
+    """A text without unprintable characters, cut at the length that every reader reads."""
     spaced = UNPRINTABLE.sub(" ", text)
     if len(spaced.encode()) <= LONGEST_BYTES:
         return spaced

@@ -23,9 +23,8 @@ from workbench.procedure.engine.step import Step
 from workbench.spots import Finding, Scanline, find_spots
 
 if TYPE_CHECKING:  # types of results: checking a file must not import the solver
-    from workbench.calibration.checks.cross_validation import LeftOut
     from workbench.calibration.data.boards import BoardView
-    from workbench.calibration.data.observations import Rejected
+    from workbench.model.fit_event import CrossValidatedPlacement, Rejected
 
 
 @dataclass
@@ -51,7 +50,7 @@ class Context:
     """Index of the present step in `steps`, from 0."""
     accepted: Calibration | None = None
     """Calibration of the last accepted fit."""
-    cross_validation: tuple[LeftOut, ...] = ()
+    cross_validation: tuple[CrossValidatedPlacement, ...] = ()
     """Cross-validation of the last accepted fit, by placement."""
     calibration: Calibration | None = None
     """Exported calibration, used by trials."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from math import nan
 
-from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.data.observations import Observation
 from workbench.calibration.data.spot_rows import observe
 from workbench.calibration.design.expected_spot import ExpectedSpot, expected_spot
 from workbench.model import event as ev
 from workbench.model.captures import BOARD
+from workbench.model.fit_event import Rejected
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +15,11 @@ from tests.support.rigs import World, board_rig, prior, thesis_rig
 from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.checks.faults import find_faults
 from workbench.calibration.checks.hypotheses import explain_misfit
-from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.data.observations import Observation, RejectedObservation
 from workbench.calibration.selection.outliers import fit_without_outliers
-from workbench.calibration.verdict.assessment import Assessment, judge
+from workbench.calibration.verdict.assessment import Assessment, assess
 from workbench.model.acceptance import Acceptance
-from workbench.model.fit_event import Fault
+from workbench.model.fit_event import Fault, Rejected
 from workbench.model.rig import Rig
 
 RIG = thesis_rig()
@@ -27,15 +27,13 @@ SEEDS = (1, 2)
 SOUND = 20
 
 
-def named(
-    observations: list[Observation], rejected: list[Rejected] | None = None, rig: Rig = RIG
-) -> list[Fault]:
-    fit = fit_without_outliers(rig, observations, rejected or [])
+def named(observations: list[Observation], rejected: Sequence[Rejected] = (), rig: Rig = RIG) -> list[Fault]:
+    fit = fit_without_outliers(rig, observations, rejected)
     return list(find_faults(fit, leave_each_out(fit)))
 
 
 def judged(observations: list[Observation]) -> Assessment:
-    return judge(fit_without_outliers(RIG, observations), Acceptance(), 0.01)
+    return assess(fit_without_outliers(RIG, observations), Acceptance(), 0.01)
 
 
 def the(faults: list[Fault], name: str) -> str:
@@ -100,7 +98,9 @@ class TestFaults:
     def test_a_laser_that_never_lit(self, seed: int) -> None:
         observations = World(RIG, seed).observations()
         dark = [s for s in observations if s.laser_id == "L3"]
-        missing = [Rejected(s.source, "no spot", s) for s in dark]
+        missing = [
+            RejectedObservation(s.source, "no spot", replace(s, u_px=np.nan, v_px=np.nan)) for s in dark
+        ]
         message = the(named([s for s in observations if s not in dark], missing), "never_lit")
         assert laser_ids(message) == ["L3"]
         assert numbers(message) == [len(dark)]
@@ -214,7 +214,7 @@ def test_one_spot_that_flickers_is_no_movement(seed: int) -> None:
         for s in World(RIG, seed).observations(repeats=8)
     ]
     fit = fit_without_outliers(RIG, observations)
-    assert len(fit.cells.torn) == 1
+    assert len(fit.cells.inconsistent) == 1
     assert find_faults(fit, leave_each_out(fit)) == ()
 
 
@@ -230,13 +230,14 @@ def test_one_spot_that_flickers_is_no_movement(seed: int) -> None:
     ],
 )
 @pytest.mark.parametrize("seed", SEEDS)
-def test_strays_agree_only_where_they_were_measured(
+def test_outliers_agree_only_where_they_were_measured(
     seed: int, u_px: tuple[float, ...], v_px: tuple[float, ...], agree: bool
 ) -> None:
     observations = World(RIG, seed).observations(repeats=2)
     template = next(s for s in observations if (s.laser_id, s.standoff_mm) == ("L2", 600.0))
-    strays = [replace(template, u_px=u, v_px=v) for u, v in zip(u_px, v_px, strict=True)]
-    fit = fit_without_outliers(RIG, observations, [Rejected(s.source, "away", stray=s) for s in strays])
+    outliers = [replace(template, u_px=u, v_px=v) for u, v in zip(u_px, v_px, strict=True)]
+    rejected = [RejectedObservation(s.source, "away", s) for s in outliers]
+    fit = fit_without_outliers(RIG, observations, rejected)
     assert [fault.name for fault in find_faults(fit, ())] == ["reflection"] * agree
 
 
@@ -264,7 +265,7 @@ def test_sound_data_of_any_shape_are_judged_without_a_fault(
     seed: int, told: Rig, true: Rig, seen: Callable[[World], list[Observation]]
 ) -> None:
     observations = seen(World(true, seed))
-    assessment = judge(fit_without_outliers(told, observations), Acceptance(), 0.001)
+    assessment = assess(fit_without_outliers(told, observations), Acceptance(), 0.001)
     assert assessment.faults == ()
     few = len({s.standoff_mm for s in observations}) < Acceptance().min_standoffs
     assert (assessment.verdict == "refused") == few

@@ -36,7 +36,7 @@ def test_nothing_is_missed_where_no_refit_is_made(
     observations = told_as(World(RIG, 20_001).observations(), standoff_mm, standoff_mm + off_mm)
     fit = fit_without_outliers(RIG, observations)
     quick = explain_misfit(fit)
-    monkeypatch.setattr(hypotheses, "CLEARLY_LESS", 0.0)
+    monkeypatch.setattr(hypotheses, "FIRST_ORDER_SHARE", 0.0)
     assert [(h.kind, h.subject) for h in quick] == [(h.kind, h.subject) for h in explain_misfit(fit)]
 
 

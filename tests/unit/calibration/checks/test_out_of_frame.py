@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.checks.out_of_frame import name_out_of_frame
-from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.data.observations import Observation, RejectedObservation
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 
 
-@pytest.mark.parametrize(("standoff_mm", "cause"), [(40.0, "outside the picture, at u = "), (700.0, "dark")])
-def test_a_spot_that_cannot_be_in_the_picture_is_not_blamed_on_the_light(
-    standoff_mm: float, cause: str
-) -> None:
+@pytest.mark.parametrize(("standoff_mm", "kept"), [(40.0, False), (700.0, True)])
+def test_the_fit_corrects_the_reason_of_a_spot_outside_the_image(standoff_mm: float, kept: bool) -> None:
     rig = thesis_rig()
     observations = World(rig, 1).observations(repeats=1)
-    missing = Observation("row 9", "L4", "near", standoff_mm, 0, np.nan, np.nan)
-    result = fit(rig, observations, [Rejected("row 9", "too dark", missing)])
-    assert cause in result.rejected[0].reason
+    result = fit(rig, observations, [missing("L4", standoff_mm)])
+    assert (result.rejected[0].reason == "too dark") == kept
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +26,9 @@ def fitted() -> CalibrationFit:
     return fit(thesis_rig(), World(thesis_rig(), 1).observations(repeats=1))
 
 
-def missing(laser_id: str, standoff_mm: float) -> Rejected:
-    return Rejected("row 9", "too dark", Observation("row 9", laser_id, "p", standoff_mm, 0, np.nan, np.nan))
+def missing(laser_id: str, standoff_mm: float) -> RejectedObservation:
+    unseen = Observation("row 9", laser_id, "p", standoff_mm, 0, np.nan, np.nan)
+    return RejectedObservation("row 9", "too dark", unseen)
 
 
 @pytest.mark.parametrize(("laser_id", "side"), [("L1", -0.5), ("L4", 639.5)])
@@ -53,9 +53,10 @@ def test_the_limit_is_the_edge_of_the_outermost_pixel(
     assert inside == told[1]
 
 
-def test_everything_but_the_reason_stays(fitted: CalibrationFit) -> None:
+def test_only_the_reason_changes_and_outliers_keep_theirs(fitted: CalibrationFit) -> None:
     far_out = missing("L4", 40.0)
-    seen = Rejected("row 3", "stray", stray=far_out.missing)
-    renamed, other = name_out_of_frame(fitted.rig, fitted.values, [far_out, seen])
-    assert other == seen
-    assert (renamed.source, renamed.missing) == (far_out.source, far_out.missing)
+    outlier = RejectedObservation("row 3", "outlier", replace(far_out.observation, u_px=700.0))
+    renamed, other = name_out_of_frame(fitted.rig, fitted.values, [far_out, outlier])
+    assert other == outlier
+    assert isinstance(renamed, RejectedObservation)
+    assert (renamed.source, renamed.observation) == (far_out.source, far_out.observation)

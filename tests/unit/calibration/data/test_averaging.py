@@ -7,24 +7,24 @@ import pytest
 from scipy.stats import chi2
 
 from workbench.calibration.data.averaging import (
-    STRAY_SD,
-    STRAY_SD_OF_FEW,
-    TORN,
-    is_torn,
+    INCONSISTENT_P,
+    OUTLIER_SD,
+    OUTLIER_SD_OF_FEW,
+    is_inconsistent,
+    outliers,
+    outliers_of_few,
     scatter_chi2,
-    strays,
-    strays_of_few,
     usual_scale,
     weighted_mean,
 )
 
 
 def test_honest_repeats_are_hardly_ever_rejected() -> None:
-    """As the comment of STRAY_SD says, also where the stated deviation is far too small."""
+    """As the comment of OUTLIER_SD says, also where the stated deviation is far too small."""
     rng = np.random.default_rng(5)
     draws = rng.normal(0.0, 1.0, (4000, 10, 2))
-    far = sum(int(strays(d, np.full((10, 2), 1e-3)).sum()) for d in draws)
-    right = sum(int(strays(d, np.full((10, 2), 1.0)).sum()) for d in draws)
+    far = sum(int(outliers(d, np.full((10, 2), 1e-3)).sum()) for d in draws)
+    right = sum(int(outliers(d, np.full((10, 2), 1.0)).sum()) for d in draws)
     assert right == 0
     assert far < 2 * 4000 * 10 / 250
 
@@ -59,29 +59,31 @@ def test_scatter_is_the_chi_square_about_the_mean_and_its_freedom() -> None:
     assert scatter_chi2(position[:1], np.full((1, 2), 0.5)) == (0.0, 0)
 
 
-@pytest.mark.parametrize(("count", "limit"), [(3, STRAY_SD_OF_FEW), (9, STRAY_SD_OF_FEW), (10, STRAY_SD)])
+@pytest.mark.parametrize(
+    ("count", "limit"), [(3, OUTLIER_SD_OF_FEW), (9, OUTLIER_SD_OF_FEW), (10, OUTLIER_SD)]
+)
 @pytest.mark.parametrize(("beyond", "out"), [(0.99, False), (1.01, True)])
 def test_a_repeat_is_a_stray_beyond_the_limit_for_so_many(
     count: int, limit: float, beyond: float, out: bool
 ) -> None:
     position, sd = np.zeros((count, 2)), np.full((count, 2), 0.1)
     position[0, 1] = beyond * limit * 0.1
-    test = strays_of_few if count < 10 else strays
+    test = outliers_of_few if count < 10 else outliers
     assert test(position, sd).tolist() == [out] + [False] * (count - 1)
 
 
 def test_each_test_leaves_the_other_s_counts_alone() -> None:
     wild = np.zeros((10, 2))
     wild[0] = 1e3
-    assert not strays(wild[:9], np.full((9, 2), 0.1)).any()
-    assert not strays_of_few(wild, np.full((10, 2), 0.1)).any()
-    assert not strays_of_few(wild[:2], np.full((2, 2), 0.1)).any()
+    assert not outliers(wild[:9], np.full((9, 2), 0.1)).any()
+    assert not outliers_of_few(wild, np.full((10, 2), 0.1)).any()
+    assert not outliers_of_few(wild[:2], np.full((2, 2), 0.1)).any()
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("factor", [1.0, 4.0])
 def test_the_usual_scale_is_what_most_spots_scatter(seed: int, factor: float) -> None:
-    """A third of the spots torn changes it by little: the median of 60 is known to some 5 %."""
+    """A third of the spots inconsistent changes it by little: the median of 60 is known to some 5 %."""
     rng = np.random.default_rng(seed)
     position = rng.normal(0.0, factor, (60, 6, 2))
     position[:20] *= 50.0
@@ -97,9 +99,9 @@ def test_quiet_spots_have_scale_one_and_few_spots_none() -> None:
 
 
 def test_a_spot_is_torn_by_what_others_scatter() -> None:
-    far = (chi2.isf(TORN, 8) * 1.01, 8)
-    assert is_torn(far, 1.0)
-    assert not is_torn(far, 1.1)
-    assert not is_torn((chi2.isf(TORN, 8) * 0.99, 8), 1.0)
-    assert not is_torn((1e6, 0), 1.0)
-    assert not is_torn(far, float("nan"))
+    far = (chi2.isf(INCONSISTENT_P, 8) * 1.01, 8)
+    assert is_inconsistent(far, 1.0)
+    assert not is_inconsistent(far, 1.1)
+    assert not is_inconsistent((chi2.isf(INCONSISTENT_P, 8) * 0.99, 8), 1.0)
+    assert not is_inconsistent((1e6, 0), 1.0)
+    assert not is_inconsistent(far, float("nan"))

@@ -12,7 +12,7 @@ from tests.support.board_world import CORNER_SD_PX, BoardWorld
 from tests.support.rigs import PROVENANCE, World, board_rig, prior
 from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.data.boards import BoardView, on_boards
-from workbench.calibration.data.observations import Observation, Rejected
+from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict.assessment import determined_by
@@ -20,6 +20,7 @@ from workbench.calibration.verdict.export import calibrate, render
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError
+from workbench.model.fit_event import Rejected
 from workbench.model.rig import Rig
 
 SEEDS = (1, 2, 3)
@@ -148,12 +149,12 @@ def test_spots_beside_the_band_or_on_a_board_not_found() -> None:
     assert kept == observations
     # 12 mm from the band's middle at 300 mm: 533 / 300 x 12 = 21 px.
     beside = [replace(s, v_px=s.v_px + 40.0) for s in observations if s.placement == "B1"]
-    for rejected in on_boards(rig.board, seen, beside):
-        assert isinstance(rejected, Rejected)
-        assert "blank band" in rejected.reason
+    assert all(isinstance(one, Rejected) for one in on_boards(rig.board, seen, beside))
     lost: dict[str, BoardView | Rejected] = {**seen, "B1": Rejected("B1", "dark")}
-    of_b1 = [s for s in on_boards(rig.board, lost, observations) if isinstance(s, Rejected)]
-    assert [r.reason.split(": ")[1] for r in of_b1] == ["the board that it fell on was not found"] * 4
+    found = on_boards(rig.board, lost, observations)
+    of_b1 = {s.source for s in observations if s.placement == "B1"}
+    assert {s.source for s in found if isinstance(s, Rejected)} == of_b1
+    assert len(of_b1) == 4
 
 
 def test_two_boards_at_one_placement_and_a_board_told_otherwise() -> None:
@@ -162,7 +163,7 @@ def test_two_boards_at_one_placement_and_a_board_told_otherwise() -> None:
     with pytest.raises(BadInputError, match="one board"):
         fit(rig, observations, (), [*views, views[0]])
     moved = replace(views[0], placement=replace(views[0].placement, standoff_mm=250.0))
-    with pytest.raises(BadInputError, match=r"250 mm.*other placements other names"):
+    with pytest.raises(BadInputError, match=r"\b250 mm"):
         fit(rig, observations, (), [moved])
 
 

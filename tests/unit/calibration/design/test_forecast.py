@@ -13,7 +13,7 @@ from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.design.forecast import RANGES_MM, forecast
 from workbench.calibration.design.standoffs import (
     DRAWS,
-    Aim,
+    RangeGoals,
 )
 from workbench.calibration.estimation.batch import fit_batch
 from workbench.model.errors import BadInputError
@@ -37,8 +37,8 @@ def fits() -> tuple[list[str], np.ndarray, np.ndarray]:
     free = sensors.table.free
     sd = sensors.table.prior_sd[free]
     covariance = fitted.sensor_covariance[fair][:, free[:, None], free] / np.outer(sd, sd)
-    aim = Aim.of(sensors, np.array(RANGES_MM), RIG.noise)
-    relative = np.where(aim.spot_sd > 0, np.sqrt(aim.variance(covariance) + aim.spot_sd**2), np.nan)
+    goals = RangeGoals.of(sensors, np.array(RANGES_MM), RIG.noise)
+    relative = np.where(goals.spot_sd > 0, np.sqrt(goals.variance(covariance) + goals.spot_sd**2), np.nan)
     names = [sensors.table.parameters[i].name for i in free]
     return names, fitted.sd[fair][:, free], relative.reshape(len(relative), len(RANGES_MM), -1)
 

@@ -13,7 +13,7 @@ from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World
 from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.design.next_standoff import advise
 from workbench.calibration.design.standoffs import (
-    Aim,
+    RangeGoals,
 )
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.verdict.export import calibrate
@@ -87,8 +87,8 @@ class TestAdvice:
                 "speckle_sd_px": RIG.noise.speckle_sd_px * fitted.noise_scale,
             }
         )
-        aim = Aim.of(sensors, np.geomspace(125.0, 4500.0, 18), spot)
-        return float(np.sqrt((aim.variance(covariance[None]) + aim.spot_sd**2).max()))
+        goals = RangeGoals.of(sensors, np.geomspace(125.0, 4500.0, 18), spot)
+        return float(np.sqrt((goals.variance(covariance[None]) + goals.spot_sd**2).max()))
 
     @pytest.mark.parametrize("seed", [1, 2])
     def test_the_worst_residual_is_named(self, seed: int) -> None:

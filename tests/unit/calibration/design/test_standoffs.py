@@ -13,10 +13,10 @@ from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.design.forecast import RANGES_MM, forecast
 from workbench.calibration.design.standoffs import (
     SPARED,
-    Aim,
-    Choice,
+    Candidates,
+    RangeGoals,
     best_standoffs,
-    candidates,
+    candidate_standoffs,
     drawn_sensors,
     typical_of,
     worst_of,
@@ -43,26 +43,26 @@ class TestProposal:
         rng = np.random.default_rng(99)
         table = drawn_sensors(RIG).table
         sensors = Expectation(RIG, table.prior_mean + table.prior_sd * rng.standard_normal((64, 26)))
-        aim = Aim.of(sensors, np.geomspace(100.0, 5000.0, 25), RIG.noise)
-        choice = Choice.of(sensors, np.array(standoffs), 10, aim)
-        return choice.worst(range(len(standoffs)))
+        goals = RangeGoals.of(sensors, np.geomspace(100.0, 5000.0, 25), RIG.noise)
+        candidates = Candidates.of(sensors, np.array(standoffs), 10, goals)
+        return candidates.worst(range(len(standoffs)))
 
     def test_the_criterion_is_the_worst_range_that_the_forecast_tells(self) -> None:
         """Calibration and the noise of the spot that is ranged together."""
         sensors = drawn_sensors(RIG)
-        aim = Aim.of(sensors, np.array(RANGES_MM), RIG.noise)
-        choice = Choice.of(sensors, np.array(SHIPPED), 10, aim)
+        goals = RangeGoals.of(sensors, np.array(RANGES_MM), RIG.noise)
+        candidates = Candidates.of(sensors, np.array(SHIPPED), 10, goals)
         told = forecast(RIG, SHIPPED, 10).worst_relative_sd
-        assert choice.worst(range(len(SHIPPED))) == pytest.approx(told, rel=1e-12)
+        assert candidates.worst(range(len(SHIPPED))) == pytest.approx(told, rel=1e-12)
 
     def test_noise_that_another_laser_has_changes_the_choice(self) -> None:
         """Two ranges: one hurt by the calibration, the other by its spot, which is the worst in all."""
         by_parameter = np.eye(2)[None]
-        aim = Aim(by_parameter, np.array([[0.0, 10.0]]))
-        choice = Choice(np.array([1.0, 2.0]), 3.0 * np.eye(2)[None, :, None], aim)
-        assert choice.worst([0]) == pytest.approx(np.sqrt(1.0 + 100.0))
-        assert choice.worst([1]) == pytest.approx(np.sqrt(0.1 + 100.0))
-        assert choice.worst_with_one_more(np.eye(2)[None]).argmin() == 1
+        goals = RangeGoals(by_parameter, np.array([[0.0, 10.0]]))
+        candidates = Candidates(np.array([1.0, 2.0]), 3.0 * np.eye(2)[None, :, None], goals)
+        assert candidates.worst([0]) == pytest.approx(np.sqrt(1.0 + 100.0))
+        assert candidates.worst([1]) == pytest.approx(np.sqrt(0.1 + 100.0))
+        assert candidates.worst_with_one_more(np.eye(2)[None]).argmin() == 1
 
     def test_it_beats_the_shipped_procedure(self, proposed: tuple[float, ...]) -> None:
         assert self.worst(proposed) < 0.99 * self.worst(SHIPPED)
@@ -79,22 +79,22 @@ class TestProposal:
         rng = np.random.default_rng(3)
         reached = self.worst(proposed)
         for _ in range(20):
-            random = rng.choice(candidates(RIG), len(proposed), replace=False)
+            random = rng.choice(candidate_standoffs(RIG), len(proposed), replace=False)
             assert reached < self.worst(tuple(random.tolist()))
 
     def test_no_exchange_of_one_betters_it(self, proposed: tuple[float, ...]) -> None:
         """Neither the worst range by more than was spared, nor, within that, all ranges."""
         sensors = drawn_sensors(RIG, 32)
-        aim = Aim.of(sensors, np.geomspace(100.0, 5000.0, 18), RIG.noise)
-        grid = candidates(RIG)
-        choice = Choice.of(sensors, grid, 10, aim)
+        goals = RangeGoals.of(sensors, np.geomspace(100.0, 5000.0, 18), RIG.noise)
+        grid = candidate_standoffs(RIG)
+        candidates = Candidates.of(sensors, grid, 10, goals)
         chosen = [grid.tolist().index(s) for s in proposed]
-        reached = choice.worst(chosen)
-        seen = aim.spot_sd > 0
-        typical = typical_of(aim.total(aim.variance(choice.covariance(chosen)))[:, None], seen)[0]
+        reached = candidates.worst(chosen)
+        seen = goals.spot_sd > 0
+        typical = typical_of(goals.total(goals.variance(candidates.covariance(chosen)))[:, None], seen)[0]
         for place in range(len(chosen)):
             rest = chosen[:place] + chosen[place + 1 :]
-            one_more = choice.with_one_more(choice.covariance(rest))[
+            one_more = candidates.with_one_more(candidates.covariance(rest))[
                 :, [i for i in range(len(grid)) if i not in rest]
             ]
             assert worst_of(one_more).min() >= reached / (1 + SPARED)
@@ -111,7 +111,7 @@ class TestProposal:
             sensors = Expectation(RIG, fitted.sensor)
             free, sd = sensors.table.free, sensors.table.prior_sd[sensors.table.free]
             covariance = fitted.sensor_covariance[:, free[:, None], free] / np.outer(sd, sd)
-            variance = Aim.of(sensors, np.array([5000.0]), RIG.noise).variance(covariance)
+            variance = RangeGoals.of(sensors, np.array([5000.0]), RIG.noise).variance(covariance)
             return float(np.median(np.sqrt(variance.max(axis=-1))))
 
         assert stated(proposed) < 0.9 * stated(SHIPPED)
@@ -125,10 +125,10 @@ class TestProposal:
 
 def test_one_more_placement_is_a_rank_update() -> None:
     sensors = drawn_sensors(RIG, 4)
-    aim = Aim.of(sensors, np.geomspace(100.0, 5000.0, 6), RIG.noise)
-    choice = Choice.of(sensors, np.array([150.0, 300.0, 900.0, 4000.0]), 5, aim)
-    updated = choice.worst_with_one_more(choice.covariance([0, 3]))
-    afresh = [choice.worst([0, 3, more]) for more in range(4)]
+    goals = RangeGoals.of(sensors, np.geomspace(100.0, 5000.0, 6), RIG.noise)
+    candidates = Candidates.of(sensors, np.array([150.0, 300.0, 900.0, 4000.0]), 5, goals)
+    updated = candidates.worst_with_one_more(candidates.covariance([0, 3]))
+    afresh = [candidates.worst([0, 3, more]) for more in range(4)]
     np.testing.assert_allclose(updated, afresh, rtol=1e-8)
 
 

@@ -101,5 +101,5 @@ def test_spots_ask_for_the_noise_that_they_show() -> None:
     problem = problem_of(fit(thesis_rig(0.12, 0.04), louder))
     found = problem.solve(1.0)
     expected = np.sqrt(found.chi2 / found.degrees_of_freedom)
-    assert found.scale_called_for == pytest.approx(expected)
-    assert found.scale_called_for > 1.5
+    assert found.significant_scale == pytest.approx(expected)
+    assert found.significant_scale > 1.5

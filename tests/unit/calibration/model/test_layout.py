@@ -32,7 +32,10 @@ def test_each_block_has_the_names_that_it_should(rig: Rig) -> None:
     table = table_of(rig, cells.placements, boards)
     names = np.array([p.name for p in table.parameters])
     assert names[layout.lens].tolist() == list(rig.camera.lens_priors)
-    assert names[layout.reference].tolist() == ["offset_mm", "ruler_scale"]
+    tilt, drift = ["target_slope_x", "target_slope_y"], ["drift_u_px", "drift_v_px"]
+    assert names[layout.reference].tolist() == ["offset_mm", "ruler_scale", *tilt, *drift]
+    assert names[layout.bench_only].tolist() == ["ruler_scale", *tilt, *drift]
+    assert names[layout.drift].tolist() == drift
     assert (names[layout.offset], names[layout.ruler_scale]) == ("offset_mm", "ruler_scale")
     assert names[layout.ray(2)].tolist() == [f"L3.{name}" for name in ("x_mm", "y_mm", "tx", "ty")]
     assert names[layout.own(1)].tolist() == [*names[layout.lens], *names[layout.ray(1)]]
@@ -50,6 +53,6 @@ def test_each_block_has_the_names_that_it_should(rig: Rig) -> None:
 
 def test_one_laser_and_one_placement_are_the_inputs_of_a_cell() -> None:
     for cell, size in ((Layout("plumb_bob"), 8), (Layout("equidistant"), 7)):
-        assert (cell.lens.stop, cell.common.stop, cell.errors.stop) == (size, size + 2, size + 9)
+        assert (cell.lens.stop, cell.common.stop, cell.errors.stop) == (size, size + 6, size + 13)
         assert cell.ray(0) == cell.rays
         assert cell.sensor.stop == cell.errors.start

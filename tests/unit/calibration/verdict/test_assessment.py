@@ -10,7 +10,7 @@ import pytest
 from tests.support.message_text import laser_ids, numbers
 from tests.support.rigs import World, prior, thesis_rig
 from workbench.calibration.estimation.fit import CalibrationFit, fit
-from workbench.calibration.verdict.assessment import CONTRADICTION_SD, Assessment, basis, derive, judge
+from workbench.calibration.verdict.assessment import CONTRADICTION_SD, Assessment, assess, basis, derive
 from workbench.model.acceptance import Acceptance
 
 
@@ -20,7 +20,7 @@ def fitted() -> CalibrationFit:
 
 
 def judged(fitted: CalibrationFit, worst: float = 0.01, **limits: float) -> Assessment:
-    return judge(fitted, Acceptance.model_validate(limits), worst)
+    return assess(fitted, Acceptance.model_validate(limits), worst)
 
 
 def test_limits_that_fail_are_named(fitted: CalibrationFit) -> None:

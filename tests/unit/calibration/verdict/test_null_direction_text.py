@@ -15,8 +15,8 @@ from workbench.calibration.verdict.null_direction_text import (
     POINTING,
     REMEDIES,
     UNSEEN,
-    Group,
     ParameterChange,
+    ParameterGroup,
     describe,
     group_by_kind,
     own_laser,
@@ -88,7 +88,7 @@ def test_the_size_says_whether_all_go_one_way(signs: tuple[int, int], begins: st
     members = tuple(
         change(f"L{n}.tx", 1.0, sign * 1e-3 * n / 1.5) for n, sign in zip((1, 2), signs, strict=True)
     )
-    assert Group(members).size.split() == [begins, "mrad"]
+    assert ParameterGroup(members).size.split() == [begins, "mrad"]
 
 
 def test_all_lasers_are_not_listed_and_some_are() -> None:
@@ -106,7 +106,7 @@ def test_a_better_ruler_is_the_remedy_wherever_a_length_s_scale_takes_part() -> 
 
 def test_remedies_are_those_of_the_kinds_each_once() -> None:
     groups = group_by_kind([change("f_px", 3.0), change("k1", 3.0), change("L1.x_mm", 3.0)])
-    assert remedy(groups).split(", or ") == [REMEDIES[BASELINE], REMEDIES["f_px"]]
+    assert remedy(groups).split(" or ") == [REMEDIES[BASELINE], REMEDIES["f_px"]]
 
 
 def test_one_kind_has_no_remedy_and_lasers_by_themselves_want_other_standoffs() -> None:
