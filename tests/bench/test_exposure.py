@@ -104,7 +104,7 @@ def test_live_ranging_says_that_it_sets_no_exposure(
             False,
             cast(StopAfterCapture, SimpleNamespace(reason=None)),
         )
-    assert ("exposure stays as the rig file sets it" in " ".join(capsys.readouterr().err.split())) != virtual
+    assert ("exposure of the rig file" in " ".join(capsys.readouterr().err.split())) != virtual
 
 
 def test_a_fixed_exposure_is_left_alone(tmp_path: Path) -> None:

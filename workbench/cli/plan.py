@@ -62,8 +62,8 @@ def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
     )
     if trials := MOST_TRIALS * sum(step.placements for step in steps):
         console.print(
-            f"If the camera's exposure is set, each placement takes up to {MOST_TRIALS} test pairs more, with"
-            f" all lasers on: at most {trials}, {emission(trials, durations, LIT_FRAMES)}.",
+            f"If the camera's exposure is set, each placement takes up to {MOST_TRIALS} trial exposures more,"
+            f" with all lasers on: at most {trials}, {emission(trials, durations, LIT_FRAMES)}.",
             highlight=False,
         )
     console.print(_source_of_times(durations, plan.rig.rig), highlight=False)

@@ -136,7 +136,7 @@ class SessionResumed(FileModel):
 
 
 class ExposureSet(FileModel):
-    """Exposure of the camera for the captures at a placement, found by test pairs with all lasers on."""
+    """Exposure of the camera for the captures at a placement, found by trial exposures with all lasers on."""
 
     kind: Literal["exposure_set"] = "exposure_set"
     key: str
@@ -145,14 +145,14 @@ class ExposureSet(FileModel):
     unit: str
     """Unit of `exposure`; empty: the camera driver's own."""
     peak: float
-    """Brightest pixel of the chosen test pair as a share of full scale, or of a lower clipping level.
+    """Brightest pixel of the chosen trial exposure as a share of full scale, or of a lower clipping level.
 
     The median of the room light if no laser is seen.
     """
     verdict: BrightnessVerdict
     """See `workbench.model.exposure`; other than good if the camera's limits or steps allow no better one."""
     trials: int
-    """Number of test pairs."""
+    """Number of trial exposures."""
 
     @property
     def text(self) -> str:

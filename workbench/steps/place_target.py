@@ -33,7 +33,7 @@ class PlaceTargetStep(StepModel):
 
     def run(self, context: Context, name: str) -> str:
         """Ask for the placement."""
-        # No exposure is set here: before the latency is measured, its test pairs could be stale frames.
+        # No exposure is set here: before the latency is measured, its trial exposures could be stale frames.
         placed = visit_placements(
             context, self.placements(name, context.rig), lambda placement: placement, lights=False
         )

@@ -1,4 +1,4 @@
-"""Brightness of the brightest spot in a test pair; only light of the lasers counts."""
+"""Brightness of the brightest spot in a trial exposure; only light of the lasers counts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OUTLIER_SD = 4.0
 
 @dataclass(frozen=True)
 class Brightness:
-    """Brightness in a test pair, as shares of full scale."""
+    """Brightness in a trial exposure, as shares of full scale."""
 
     peak: float
     """Brightest pixel with laser light; without any, the median of the dark frames."""

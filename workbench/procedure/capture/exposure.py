@@ -2,7 +2,7 @@
 
 The value of a pixel is its pedestal plus irradiance times exposure, until it is clipped. Scaling the exposure
 by (aim / value) therefore converges to the aim: only the pedestal, some hundredths of full scale, is scaled
-wrongly, and the next test pair corrects that. A clipped pixel gives only a bound.
+wrongly, and the next trial exposure corrects that. A clipped pixel gives only a bound.
 
 Not every pixel is clipped at full scale. In a colour camera that converts to grey itself, a red spot is
 clipped at 30 % of full scale. A longer exposure then gives no higher value, which is taken as full scale. If
@@ -28,12 +28,12 @@ from workbench.procedure.capture.brightness import Brightness, measure_brightnes
 from workbench.procedure.capture.latency import LEASE_S
 
 LARGEST_FACTOR = 8.0
-"""Largest ratio between the exposures of consecutive test pairs."""
+"""Largest ratio of consecutive trial exposures."""
 MOST_TRIALS = 9
-"""Largest number of test pairs: four from the middle of a range of 1 : 10^7 to an end, four to converge, one
-to step down below a jump."""
+"""Largest number of trial exposures: four from the middle of a range of 1 : 10^7 to an end, four to converge,
+one to step down below a jump."""
 LIT_FRAMES = 2
-"""Number of frames with lasers on in a test pair."""
+"""Number of frames with lasers on in a trial exposure."""
 DECISIVE_RATIO = 1.4
 """Least ratio of two exposures whose peaks show whether the peak grows with the exposure."""
 LEAST_GROWTH = 0.3
@@ -49,14 +49,14 @@ STEP_DOWN = 0.7
 LARGEST_STEP_DOWN = 0.75
 """Upper bound of that ratio for cameras with coarse exposure steps."""
 SAME = 0.005
-"""Largest relative difference of an exposure from that of its test pair."""
+"""Largest relative difference of an exposure from that of its trial exposure."""
 CLIPPED_SPREAD = 0.03
 """Relative spread of clipped values below full scale, due to averaging or compression."""
 
 
 @dataclass(frozen=True)
 class ExposureTrial:
-    """Test pair: exposure as accepted by the camera, and brightness at this exposure."""
+    """Trial exposure: exposure as accepted by the camera, and brightness at this exposure."""
 
     exposure: float
     seen: Brightness
@@ -67,21 +67,21 @@ def set_exposure(
 ) -> ExposureSet | None:
     """Set the camera's exposure for all lasers of the rig and the present placement of the target.
 
-    All lasers are on together: no single laser is brighter, and one test pair covers all. The first exposure
+    All lasers are on together: no single laser is brighter, and one trial exposure covers all. The first one
     is always the same, so that the result does not depend on the previous placement.
 
     Args:
         bench: bench with camera and lasers.
         rig: rig with the lasers, their scanlines and the camera's full scale.
         placement_key: key of the placement.
-        begin: called before each test pair with its key.
+        begin: called before each trial exposure with its key.
 
     Returns:
         The exposure that was set; None if the camera's exposure cannot or must not be set.
 
     Raises:
         LaserOffNotConfirmedError: a beam stays on.
-        RigNotReadyError: a device does not answer, or takes another exposure than in its test pair.
+        RigNotReadyError: a device does not answer, or takes another exposure than in its trial exposure.
     """
     if (found := settable(bench.camera)) is None:
         return None
@@ -118,7 +118,7 @@ def _next_frame(camera: Camera) -> Image:
 
 
 def _set_again(camera: ExposableCamera, exposure: float) -> None:
-    """Set the exposure of an earlier test pair again.
+    """Set the exposure of an earlier trial exposure again.
 
     Raises:
         RigNotReadyError: the camera accepts another exposure this time.
@@ -126,7 +126,7 @@ def _set_again(camera: ExposableCamera, exposure: float) -> None:
     accepted = camera.set_exposure(exposure)
     if abs(accepted - exposure) > SAME * exposure:
         raise RigNotReadyError(
-            f"camera: exposure: expected {exposure:g} as in a test pair, got {accepted:g}; check that no"
+            f"camera: exposure: expected {exposure:g} as in a trial exposure, got {accepted:g}; check that no"
             " other program sets it; remove exposure_limits from the rig file if the camera does not keep it"
         )
 
@@ -138,10 +138,10 @@ def search_exposure(
 
     Args:
         limits: shortest and longest exposure.
-        look: takes a test pair at an exposure; the second argument is its number, from 0.
+        look: takes a trial exposure at an exposure; the second argument is its number, from 0.
 
     Returns:
-        All test pairs, in order.
+        All trial exposures, in order.
     """
     asked: list[float] = []
     tried: list[ExposureTrial] = []
@@ -179,7 +179,7 @@ def _within(limits: tuple[float, float], exposure: float) -> float:
 
 
 def best_of(tried: Sequence[ExposureTrial]) -> ExposureTrial:
-    """Test pair with the longest exposure that is not too bright, else the shortest; well below a jump."""
+    """Longest trial exposure that is not too bright, else the shortest; well below a jump."""
     longest = _longest(tried)
     if not _below_jump(longest, tried):
         return longest
@@ -192,7 +192,7 @@ def best_of(tried: Sequence[ExposureTrial]) -> ExposureTrial:
 
 
 def _longest(tried: Sequence[ExposureTrial]) -> ExposureTrial:
-    """Longest exposure that is not too bright, among test pairs that show the lasers if there are any."""
+    """Longest trial exposure that is not too bright, among those that show the lasers if there are any."""
     seen = [trial for trial in tried if trial.seen.lit > 0 and share_of(trial, tried) < CLIPPED]
     among = seen or tried
     sound = [trial for trial in among if _level(trial, tried) <= GOOD[1]]
@@ -218,7 +218,7 @@ def _level(trial: ExposureTrial, tried: Sequence[ExposureTrial]) -> float:
 
 
 def share_of(trial: ExposureTrial, tried: Sequence[ExposureTrial]) -> float:
-    """Brightest pixel as a share of the value at which it is clipped, estimated from all test pairs."""
+    """Brightest pixel as a share of the value at which it is clipped, estimated from all trial exposures."""
     ceiling = _ceiling(tried)
     share = trial.seen.peak / ceiling
     return CLIPPED if ceiling < CLIPPED and share >= 1 - CLIPPED_SPREAD else share
@@ -231,7 +231,7 @@ def _ceiling(tried: Sequence[ExposureTrial]) -> float:
 
 
 def _is_decisive(shorter: ExposureTrial, longer: ExposureTrial) -> bool:
-    """Whether two test pairs show if the peak grows: the lasers are seen in both, the exposures differ."""
+    """Whether two trial exposures show if the peak grows: they differ, and both show the lasers."""
     return longer.exposure >= DECISIVE_RATIO * shorter.exposure and min(shorter.seen.lit, longer.seen.lit) > 0
 
 

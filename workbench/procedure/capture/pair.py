@@ -42,11 +42,11 @@ class PairSource:
     """Last frame at the present placement with all lasers off."""
 
     def set_exposure(self, key: str, begin: Callable[[str], None]) -> ev.ExposureSet | None:
-        """Set the exposure for a placement by test pairs; a replay takes it from the journal.
+        """Set the exposure for a placement by trial exposures; a replay takes it from the journal.
 
         Args:
             key: key of the placement.
-            begin: called before each test pair with its key.
+            begin: called before each trial exposure with its key.
 
         Returns:
             The exposure that was set; None if the camera's exposure cannot or must not be set.
