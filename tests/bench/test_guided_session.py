@@ -358,7 +358,7 @@ def test_the_doctor_looks_at_the_latency_first(tmp_path: Path) -> None:
     with too_hopeful(rig, tmp_path / "s") as bench:
         found = {finding.part: finding for finding in examine(rig, bench, Says())}
     assert [part for part, finding in found.items() if not finding.ok] == ["latency"]
-    assert "3 frames, the driver discards 0" in found["latency"].found
+    assert "3 frames" in found["latency"].found
     assert "measure_latency" in found["latency"].found
 
 
@@ -389,7 +389,7 @@ def test_latency_is_counted_whatever_the_driver_believes(tmp_path: Path, latency
         assert isinstance(bench.camera, StreamingCamera)
         assert count_latency(bench.lasers, bench.camera, rig, 10) == latency
         if latency > 1:
-            with pytest.raises(RigNotReadyError, match="at most 1 frames"):
+            with pytest.raises(RigNotReadyError, match="L1 within 1 frames"):
                 count_latency(bench.lasers, bench.camera, rig, 1)
 
 
