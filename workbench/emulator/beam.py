@@ -25,8 +25,8 @@ class Beam:
         """Power per area of the surface (W / mm^2) at points (n, 3) with unit front normals (n, 3).
 
         The profile is a Gaussian. Its 1/e^2 diameter 2 w is exit diameter + divergence x path. The peak is
-        P / (pi w^2 / 2), which makes the integral P. The cosine of incidence multiplies it. On the rear side and
-        behind the origin of the beam the irradiance is 0.
+        P / (pi w^2 / 2), which makes the integral P. The cosine of incidence multiplies it. On the rear side
+        and behind the origin of the beam the irradiance is 0.
         """
         to_point = points - self.origin
         path = to_point @ self._axis
