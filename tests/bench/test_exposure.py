@@ -12,7 +12,7 @@ import pytest
 from tests.bench.sensors import calibration_of
 from tests.crash.short import CALLER, PROCEDURE, go_on, results, story, write_files
 from workbench.cli.live import LiveRequest, _read_all
-from workbench.cli.stopping import StopAfterShot
+from workbench.cli.stopping import StopAfterCapture
 from workbench.devices.registry import open_bench
 from workbench.model import event as ev
 from workbench.model.captures import load_captures
@@ -102,9 +102,9 @@ def test_live_ranging_says_that_it_sets_no_exposure(
             Ranger(calibration_of(rig)),
             request,
             False,
-            cast(StopAfterShot, SimpleNamespace(reason=None)),
+            cast(StopAfterCapture, SimpleNamespace(reason=None)),
         )
-    assert ("exposure stays as the rig file sets it" in " ".join(capsys.readouterr().err.split())) != virtual
+    assert ("exposure of the rig file" in " ".join(capsys.readouterr().err.split())) != virtual
 
 
 def test_a_fixed_exposure_is_left_alone(tmp_path: Path) -> None:

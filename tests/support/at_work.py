@@ -18,7 +18,7 @@ import time
 import numpy as np
 
 from tests.support.lasers import serial_bank
-from workbench.cli.stopping import StopAfterShot
+from workbench.cli.stopping import StopAfterCapture
 from workbench.model.arrays import FloatArray
 
 
@@ -43,7 +43,7 @@ def main(port: str, work: str) -> None:
     held = load() if work == "loaded" else None
     if work == "terminal":
         fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-    StopAfterShot()  # as `workbench run` does
+    StopAfterCapture()  # as `workbench run` does
     bank = serial_bank(port, ("L1", "L2", "L3", "L4"))
     with bank.lit(["L1", "L3"], for_s=60.0):
         print(bank._guardian._process.pid, flush=True)

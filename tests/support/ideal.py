@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.emulator.scene import BenchScene
 from workbench.emulator.spec import emulator_spec
-from workbench.emulator.spot import Spot
+from workbench.emulator.spot import SpotImage
 from workbench.emulator.truth import draw_truth
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
@@ -67,7 +67,7 @@ def scene_of(rig: Rig, folder: Path) -> BenchScene:
     return BenchScene(rig, spec, draw_truth(rig, spec), folder / "truth.yaml")
 
 
-def painted(rig: Rig, folder: Path, standoff_mm: float, target: TargetShape | None = None) -> Spot:
+def painted(rig: Rig, folder: Path, standoff_mm: float, target: TargetShape | None = None) -> SpotImage:
     """The only spot of the first laser."""
     scene = scene_of(rig, folder)
     scene.place(Placement(key="P", standoff_mm=standoff_mm, target=target or FlatTarget()))
@@ -75,7 +75,7 @@ def painted(rig: Rig, folder: Path, standoff_mm: float, target: TargetShape | No
     return spot
 
 
-def moments(spot: Spot) -> tuple[FloatArray, FloatArray]:
+def moments(spot: SpotImage) -> tuple[FloatArray, FloatArray]:
     """Centroid (u, v) px and variances (u, v) px^2."""
     rate = spot.rate.astype(np.float64)
     v, u = np.mgrid[: rate.shape[0], : rate.shape[1]]

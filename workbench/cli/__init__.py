@@ -1,6 +1,6 @@
-"""Commands, terminal output and prompts; nothing else talks to a person."""
+"""Commands, terminal output and prompts; the only package that interacts with a person."""
 
 import gc
 
-# Imports make 10^5 objects that stay: to look for garbage among them is a tenth of a short command.
+# Imports create 10^5 permanent objects; collecting among them takes a tenth of a short command's time.
 gc.set_threshold(100_000)

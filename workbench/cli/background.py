@@ -1,4 +1,4 @@
-"""The recording, made beside the session: it may be slow, fail or hang, and the captures go on."""
+"""Recording in a background thread: captures continue if it is slow, fails or hangs."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from workbench.model import event as ev
 from workbench.viewer.recording import RecordingConsumer
 
 PATIENCE_S = 30.0
-"""The viewer's library waits without end for a file that cannot be written; this is how long we do."""
+"""Time limit for closing the recording: Rerun waits forever for a file that cannot be written."""
 MOST_WAITING = 10_000
+"""Largest number of records in the queue."""
 
 
 class Background:
-    """Hands records to the recording in a thread of its own.
+    """Passes records to the recording in a separate thread.
 
-    Where a placement is captured again, its records count no more: the recording ends there, and `workbench
-    view` makes it again from frames and journal, as it does where it failed.
+    The recording ends when a placement is captured again, because its earlier records become void, or when it
+    fails. `workbench view` then makes it again from frames and journal.
     """
 
     def __init__(self, recording: RecordingConsumer, path: Path, console: Console) -> None:
@@ -49,20 +50,20 @@ class Background:
             self._path.unlink(missing_ok=True)
             with suppress(OSError):
                 self._console.print(
-                    f"note: no recording is kept: {self._given_up}; `workbench view` makes it again",
+                    f"note: the recording is not kept: {self._given_up}; `workbench view` makes it again",
                     highlight=False,
                     markup=False,
                 )
 
     def __call__(self, record: ev.Record) -> None:
-        """Have one record shown."""
+        """Queue one record."""
         if isinstance(record.event, ev.SetAside):
             self._given_up = "a placement was captured again"
         if self._given_up is None:
             with suppress(queue.Full):
                 self._records.put_nowait(record)
                 return
-            self._given_up = "it does not keep up"
+            self._given_up = f"more than {MOST_WAITING} records were waiting"
 
     def _work(self) -> None:
         try:

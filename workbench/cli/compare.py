@@ -15,10 +15,10 @@ from workbench.report.terminal_table import TerminalTable
 
 
 def compare_calibrations(a: Path, b: Path, as_json: bool) -> None:
-    """Compare two calibrations; a line of JSON on standard output, a table and the verdict on standard error.
+    """Compare two calibrations: JSON on standard output, a table and the verdict on standard error.
 
     Raises:
-        BadInputError: a file is wrong, or the two have nothing in common.
+        BadInputError: a file is wrong, or the calibrations have no parameter in common.
     """
     of_a, of_b = load_calibration(a), load_calibration(b)
     result = compare(of_a, of_b)
@@ -32,14 +32,16 @@ def compare_calibrations(a: Path, b: Path, as_json: bool) -> None:
 
 
 def _notes(a: Calibration, b: Calibration, identical: bool) -> list[str]:
-    """What makes the verdict less than it seems."""
+    """Reservations about the verdict."""
     notes = []
     of_a, of_b = a.laser_ranger, b.laser_ranger
     same_captures = of_a.provenance.captures_sha256 == of_b.provenance.captures_sha256
     if same_captures and not identical:
-        notes.append("both come from the same captures: the deviations of two sessions are too wide here")
+        notes.append(
+            "both calibrations use the same captures; the test assumes independent ones and is too lenient"
+        )
     notes += [
-        f"{name} was refused by its limits and kept because: {c.fit.accepted_because or 'no reason given'}"
+        f"{name} failed its limits and was accepted because: {c.fit.accepted_because or 'no reason given'}"
         for name, c in (("A", of_a), ("B", of_b))
         if c.fit.verdict == "refused"
     ]
@@ -47,9 +49,9 @@ def _notes(a: Calibration, b: Calibration, identical: bool) -> list[str]:
 
 
 def verdict(result: Comparison) -> str:
-    """The verdict in words."""
+    """Verdict in words."""
     if result.identical:
-        return "identical: both files have the same numbers, to the last digit"
+        return "identical: both files contain the same numbers to the last digit"
     evidence = (
         f"chi2 {result.chi2:.1f} for {result.degrees_of_freedom} degrees of freedom,"
         f" p = {result.probability:.2g}"

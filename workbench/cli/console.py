@@ -1,4 +1,4 @@
-"""One message on standard error."""
+"""Messages on standard error."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from contextlib import suppress
 import typer
 
 
-def say(message: str, red: bool = False) -> None:
-    """Print it: on a terminal wrapped on words, elsewhere line for line as it is, so that `grep` finds it."""
-    with suppress(OSError):  # a terminal that was closed
-        told = wrapped(message, columns()) if sys.stderr.isatty() else message
-        typer.secho(told, err=True, fg="red" if red else None, bold=red or None)
+def print_message(message: str, red: bool = False) -> None:
+    """Print a message, wrapped at words on a terminal, otherwise unchanged so that `grep` finds it."""
+    with suppress(OSError):  # a closed terminal
+        text = wrapped(message, columns()) if sys.stderr.isatty() else message
+        typer.secho(text, err=True, fg="red" if red else None, bold=red or None)
 
 
 def wrapped(message: str, width: int) -> str:
-    """Each of its lines in as many as it takes, indented as it is; no word, such as a path, is broken."""
+    """Message with long lines wrapped and their indentation kept; words, such as paths, are not broken."""
     return "\n".join(_wrapped(line, width) for line in message.split("\n"))
 
 
 def columns() -> int:
-    """Of the terminal that standard error is, unless COLUMNS says otherwise."""
-    told = os.environ.get("COLUMNS", "")
-    return (
-        int(told) if told.isdigit() and int(told) else os.get_terminal_size(sys.stderr.fileno()).columns or 80
-    )
+    """Width of the terminal on standard error in characters, unless the variable COLUMNS is set."""
+    given = os.environ.get("COLUMNS", "")
+    if given.isdigit() and int(given):
+        return int(given)
+    return os.get_terminal_size(sys.stderr.fileno()).columns or 80
 
 
 def _wrapped(line: str, width: int) -> str:

@@ -17,20 +17,20 @@ from workbench.model.rig import Rig, load_rig
 from workbench.report.terminal_table import TerminalTable
 
 COUNT = 11
-"""As many as procedures/calibrate-flat.yaml has."""
+"""Default number of standoffs: that of procedures/calibrate-flat.yaml."""
 
 
 def design_calibration(
     rig_path: Path, standoffs: str | None, count: int | None, repeats: int, as_json: bool
 ) -> None:
-    """Print what a calibration would determine; JSON on standard output, tables on standard error.
+    """Print the forecast of a calibration: JSON on standard output, tables on standard error.
 
     Raises:
         BadInputError: the rig file or an option is wrong.
     """
     rig = load_rig(rig_path)
     if standoffs is not None and count is not None:
-        raise BadInputError("--count: expected --standoffs or --count, not both: they are counted already")
+        raise BadInputError("--count: expected either --standoffs or --count, got both")
     if standoffs is None:
         chosen = best_standoffs(rig, COUNT if count is None else count, repeats)
     else:
@@ -42,7 +42,7 @@ def design_calibration(
 
 
 def _given(rig: Rig, text: str) -> tuple[float, ...]:
-    """Standoffs separated by commas."""
+    """Parse standoffs separated by commas."""
     nearest, farthest = rig.bench.reach_mm
     found: list[float] = []
     for part in text.split(","):
@@ -59,7 +59,7 @@ def _given(rig: Rig, text: str) -> tuple[float, ...]:
             )
         if standoff in found:
             raise BadInputError(
-                f"--standoffs: expected every standoff once, got {standoff:g} twice; give more --repeats"
+                f"--standoffs: expected every standoff once, got {standoff:g} twice; raise --repeats instead"
             )
         found.append(standoff)
     return tuple(found)
@@ -76,8 +76,8 @@ def _print(rig: Rig, result: CalibrationForecast, proposed: bool) -> None:
     console.print(TerminalTable(parameter_forecast_table(result.parameters)))
     console.print(TerminalTable(range_forecast_table(rig.laser_ids, result.ranges)))
     console.print(
-        f"worst range from 0.1 to 5 m: {100 * result.worst_relative_sd:.2f} %,"
-        f" {100 * result.worst_relative_sd_of_calibration:.2f} % by the calibration alone (1 sigma)",
+        f"largest range uncertainty from 0.1 to 5 m: {100 * result.worst_relative_sd:.2f} %,"
+        f" due to the calibration alone {100 * result.worst_relative_sd_of_calibration:.2f} % (1 sigma)",
         highlight=False,
     )
     for note in (*result.notes, *direction_lines(result.directions)):

@@ -1,4 +1,4 @@
-"""The end of the program."""
+"""Termination of the program."""
 
 from __future__ import annotations
 
@@ -12,23 +12,26 @@ from workbench.cli.stopping import ignore_signals
 from workbench.model.errors import StoppedError
 
 hung = False
-"""Whether a thread hangs in a library that would be waited for at the end."""
+"""Whether a thread hangs in a library, for which the interpreter would wait at the end."""
 
 
 def exit_program(code: int, at_once: bool = False) -> NoReturn:
-    """End with an exit code; `at_once` without taking down, module by module, what was imported.
+    """End the program.
 
-    That is a twentieth of a short command's time, and gains nothing where all that it leaves is on disk.
+    Args:
+        code: exit code.
+        at_once: skip the interpreter's clean-up, which takes a twentieth of a short command's time. All
+            output must be on disk.
     """
-    ignore_signals()  # the interpreter's own end would give them back their default, and end otherwise
+    ignore_signals()  # the interpreter's clean-up would restore the default handlers
     at_once = at_once or hung
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
-        except OSError as error:  # its reader is gone, or its disk full; Python's own end would try again
+        except OSError as error:  # closed pipe or full disk; the interpreter's clean-up would try again
             if code == 0 and error.errno != errno.EPIPE:
                 with suppress(OSError):
-                    print(f"error: what is printed cannot be written: {error.strerror}", file=sys.stderr)
+                    print(f"error: the output cannot be written: {error.strerror}", file=sys.stderr)
             at_once, code = True, code or StoppedError.exit_code
     if at_once:
         os._exit(code)

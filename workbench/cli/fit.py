@@ -24,7 +24,13 @@ from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.invocation import command_line
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Provenance
-from workbench.model.captures import CaptureRow, check_images, of_file, parse_captures, read_captures_file
+from workbench.model.captures import (
+    CaptureRow,
+    check_images,
+    errors_name_file,
+    parse_captures,
+    read_captures_file,
+)
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.fit_event import Rejected
 from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
@@ -38,28 +44,30 @@ from workbench.session.files import check_output
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
 
 MOST_REASONS = 3
+"""Largest number of reasons that a refusal prints."""
 MOST_ROWS = 12
+"""Largest number of rejected rows that an error prints."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What the user asked for."""
+    """Arguments of the command."""
 
     source: Path
-    """A captures file, or a session folder."""
+    """Captures file or session folder."""
     rig: Path | None
-    """None: the session's own."""
+    """Rig file; None: that of the session."""
     output: Path
     accept: str | None
-    """Reason for keeping a calibration that its limits refuse."""
+    """Reason for accepting a calibration that fails its limits."""
     without_mm: tuple[float, ...]
-    """Standoffs to leave out."""
+    """Standoffs to exclude."""
     fixed: tuple[str, ...]
-    """Parameters to hold at the rig file's value."""
+    """Names of parameters to fix at the rig file's value."""
 
 
 def fit_captures(request: Request, as_json: bool) -> None:
-    """Fit, print, and write the calibration if it is accepted.
+    """Fit and print a calibration, and write it if it is accepted.
 
     Raises:
         BadInputError: a file or an option is wrong.
@@ -78,32 +86,32 @@ def fit_captures(request: Request, as_json: bool) -> None:
     refused = assessment.verdict == "refused" and request.accept is None
     if assessment.verdict == "refused" and request.accept is not None:
         calibration = accept_with_reason(calibration, request.accept)
-    if not refused:  # before anything is printed, which may fail: the output's reader may be gone
+    if not refused:  # before printing, which fails if the reader of the output has ended
         write_calibration(request.output, calibration)
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))
     _print_tables(fitted, assessment)
     if refused:
         raise LimitFailedError(_refusal(request.output, assessment.reasons))
-    kept = "" if request.accept is None or assessment.verdict == "accepted" else f", kept: {request.accept}"
+    by_reason = request.accept is not None and assessment.verdict == "refused"
+    reason = f", accepted because: {request.accept}" if by_reason else ""
     Console(stderr=True, markup=False).print(
-        f"{request.output} written{kept}", highlight=False, soft_wrap=True
+        f"{request.output} written{reason}", highlight=False, soft_wrap=True
     )
 
 
 def _check_distinct(request: Request) -> None:
-    """What a calibration comes from is not written over."""
+    """Refuse an output that would overwrite the input of the calibration."""
     target = request.output.resolve()
     if target in {path.resolve() for path in (request.source, request.rig) if path is not None}:
         raise BadInputError(
-            f"--output {request.output}: expected another file than the calibration is made from;"
+            f"--output {request.output}: expected another file than the input of the calibration;"
             " name a new one"
         )
     session = next((folder for folder in target.parents if (folder / MANIFEST).is_file()), None)
     if session is not None and target.is_file():
         raise BadInputError(
-            f"--output {request.output}: expected a new file, this one belongs to the session {session};"
-            " name another"
+            f"--output {request.output}: expected a new file, got one of the session {session}; name another"
         )
 
 
@@ -112,9 +120,9 @@ def _rig(request: Request) -> Rig:
         return load_rig(request.rig)
     source = request.source
     if not source.exists():
-        raise BadInputError(f"{source}: expected a session's folder or a captures file, there is none")
+        raise BadInputError(f"{source}: no such file or folder; expected a captures file or a session folder")
     if not source.is_dir():
-        raise BadInputError(f"{source}: a captures file needs --rig; only a session knows its own")
+        raise BadInputError(f"{source}: a captures file needs --rig; only a session contains its rig file")
     return load_session_rig(source)
 
 
@@ -125,15 +133,15 @@ def _observations(
     if unknown := [s for s in request.without_mm if s not in known]:
         raise BadInputError(f"--without-standoff: no row has the standoff {unknown[0]:g} mm")
     kept = [row for row in rows if row.standoff_mm not in request.without_mm]
-    with of_file(captures):
+    with errors_name_file(captures):
         observations, rejected, boards = observations_of_rows(rig, kept)
-    left_out = [row for row in rows if row.standoff_mm in request.without_mm]
-    rejected += [Rejected(f"row {row.row}", f"left out: standoff {row.standoff_mm:g} mm") for row in left_out]
+    excluded = [row for row in rows if row.standoff_mm in request.without_mm]
+    rejected += [Rejected(f"row {row.row}", f"excluded: standoff {row.standoff_mm:g} mm") for row in excluded]
     if not observations:
-        lines = [f"not used: {line}" for line in rejected_lines(rejected)]
+        lines = [f"rejected: {line}" for line in rejected_lines(rejected)]
         more = [f"and {len(lines) - MOST_ROWS} more"] if len(lines) > MOST_ROWS else []
-        told = [f"{request.source}: no spot is left to fit: do rig file and captures belong together?"]
-        raise BadInputError("\n".join([*told, *lines[:MOST_ROWS], *more]))
+        first = f"{request.source}: no spot to fit; check that the rig file belongs to the captures"
+        raise BadInputError("\n".join([first, *lines[:MOST_ROWS], *more]))
     return observations, rejected, boards
 
 
@@ -177,13 +185,13 @@ def _as_json(fitted: CalibrationFit, assessment: Assessment) -> dict[str, Any]:
 
 
 def _refusal(output: Path, reasons: Sequence[str]) -> str:
-    """What is wrong and what to do, in lines for a terminal: the last thing that is seen."""
-    lines = [f"the calibration is refused and {output} is not written"]
+    """Message of a refusal, wrapped for a terminal: causes and remedies."""
+    lines = [f"the calibration is refused; {output} is not written"]
     for reason in reasons[:MOST_REASONS]:
         wrong, _, remedy = reason.partition(". Do: ")
         lines += _wrapped("wrong", wrong) + (_wrapped("do", remedy) if remedy else [])
-    if (left := len(reasons) - MOST_REASONS) > 0:
-        lines.append(f"and {left} more, which may follow from these; --json tells all")
+    if (others := len(reasons) - MOST_REASONS) > 0:
+        lines.append(f"and {others} more, possibly consequences of these; --json lists all")
     return "\n".join(lines)
 
 
@@ -212,7 +220,7 @@ def _print_tables(fitted: CalibrationFit, assessment: Assessment) -> None:
     if assessment.cross_validation:
         console.print(TerminalTable(cross_validation_table(assessment.cross_validation)))
     for line in rejected_lines(fitted.rejected):
-        console.print(f"not used: {line}", highlight=False)
+        console.print(f"rejected: {line}", highlight=False)
     for warning in assessment.warnings:
         console.print(f"note: {warning}", highlight=False)
     console.print(f"verdict: {assessment.verdict}")

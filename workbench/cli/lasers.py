@@ -8,13 +8,20 @@ from workbench.devices.registry import load_bench_rig, open_lasers, whole_bench
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 from workbench.model.rig import Rig
 
+INTERLOCK = {
+    True: "closed",
+    False: "open: no laser can be switched on",
+    None: "not reported by this driver",
+}
+"""Text for the state of the interlock."""
+
 
 def lasers_off(rig_path: Path) -> str:
-    """Put every laser off; returns who confirmed it.
+    """Switch every laser off; returns a message with the device that confirmed it.
 
     Raises:
-        BadInputError: the rig file is wrong, or names no controller.
-        LaserOffNotConfirmedError: nobody confirmed it, for whatever reason.
+        BadInputError: the rig file is wrong, or names no laser driver.
+        LaserOffNotConfirmedError: the device did not confirm it.
     """
     rig = load_bench_rig(rig_path, kinds=("lasers",))
     if _is_virtual(rig):
@@ -24,7 +31,7 @@ def lasers_off(rig_path: Path) -> str:
         lasers.close()
     except RigNotReadyError as error:
         raise LaserOffNotConfirmedError(
-            f"the lasers may be on: {error}. Treat the beams as on, cut the lasers' supply"
+            f"the lasers may be on: {error}. Treat the beams as on; cut the lasers' power"
         ) from None
     return f"all lasers are off, confirmed by {lasers.identity}"
 
@@ -35,11 +42,11 @@ def _is_virtual(rig: Rig) -> bool:
 
 
 def _virtual(rig: Rig) -> str:
-    return f"rig {rig.rig} is the virtual bench: its lasers end with the command that lights them"
+    return f"rig {rig.rig} is a virtual bench: its lasers go off when the command that uses them ends"
 
 
 def lasers_state(rig_path: Path) -> str:
-    """What the controller tells, once its port is open; that puts every laser off.
+    """State of the laser controller; opening its port switches every laser off.
 
     Raises:
         WorkbenchError: the rig file is wrong, or the controller does not answer.
@@ -52,7 +59,6 @@ def lasers_state(rig_path: Path) -> str:
         state = lasers.state()
     finally:
         lasers.close()
-    told = {True: "closed", False: "open: nothing can be lit", None: "not told by this driver"}
-    interlock = told[state.interlock_closed]
-    lit = ", ".join(state.lit) or "none (opening the port puts all off)"
-    return f"controller: {lasers.identity}\ninterlock:  {interlock}\nlit:        {lit}"
+    interlock = INTERLOCK[state.interlock_closed]
+    lit = ", ".join(state.lit) or "none (opening the port switches all off)"
+    return f"controller: {lasers.identity}\ninterlock:  {interlock}\non:         {lit}"

@@ -1,4 +1,4 @@
-"""`workbench range --rig`: readings from a bench, until as many as asked for or a signal."""
+"""`workbench range --rig`: readings from a bench, up to a number of readings or a signal."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from workbench.cli.console import say
+from workbench.cli.console import print_message
 from workbench.cli.range import usable
 from workbench.cli.reading_json import plain
-from workbench.cli.stopping import StopAfterShot
+from workbench.cli.stopping import StopAfterCapture
 from workbench.devices.protocols import Bench
 from workbench.devices.registry import load_bench_rig, open_bench
 from workbench.devices.watched import watched
@@ -23,38 +23,39 @@ from workbench.ranging.ranger import Ranger, Reading
 from workbench.report.readings import reading_line
 
 FIXED_EXPOSURE = (
-    "the camera's exposure stays as the rig file sets it, whatever stands in the beams; a clipped spot"
-    " is told with its reading, and `workbench doctor` tells what is right at 500 mm"
+    "the camera keeps the exposure of the rig file; a reading with a clipped spot has a note; `workbench"
+    " doctor` measures a suitable exposure at 500 mm"
 )
-"""Sessions set it at each placement; here nobody says when the target has moved."""
+"""Sessions set the exposure at each placement; live ranging does not know when the target has moved."""
 
 
 @dataclass(frozen=True)
 class LiveRequest:
-    """What the user asked for."""
+    """Arguments of the command."""
 
     rig: Path
     calibration: Path
     readings: int | None
-    """None: until a signal."""
+    """Number of readings; None: until a signal."""
     standoff_mm: float | None
-    """Have the bench's target placed there first."""
+    """Standoff at which the bench's target is placed first; None: not placed."""
     stats: bool
+    """Whether to print the latency at the end."""
 
 
 def range_live(request: LiveRequest, as_json: bool) -> None:
-    """Range until the end; a line each on standard output.
+    """Take readings and print one line for each on standard output.
 
     Raises:
-        BadInputError: a file is wrong, or the calibration is another sensor's.
+        BadInputError: a file is wrong, or the calibration belongs to another sensor.
         RigNotReadyError: a device does not answer.
-        StoppedError: a signal came.
+        StoppedError: a signal was received.
         LaserOffNotConfirmedError: a beam may be on.
     """
     rig, calibration = load_bench_rig(request.rig), usable(request.calibration)
     check_same_sensor(rig, calibration)
-    stopping = StopAfterShot()
-    # A bench keeps what it must beside its session; live ranging keeps none.
+    stopping = StopAfterCapture()
+    # A bench may need a session folder for its files; live ranging keeps none.
     with (
         tempfile.TemporaryDirectory(prefix="workbench-range-") as folder,
         watched(open_bench(rig, Path(folder) / "live")) as bench,
@@ -67,16 +68,16 @@ def _read_all(
     ranger: Ranger,
     request: LiveRequest,
     as_json: bool,
-    stopping: StopAfterShot,
+    stopping: StopAfterCapture,
 ) -> None:
     live = LiveRanger(ranger, bench)
     live.warm_up()
     if not bench.virtual:
-        say(f"note: {FIXED_EXPOSURE}")
+        print_message(f"note: {FIXED_EXPOSURE}")
     if request.standoff_mm is not None:
         bench.target.place(Placement(key="live", standoff_mm=request.standoff_mm))
     for warning in live.get_ready():
-        say(f"warning: {warning}")
+        print_message(f"warning: {warning}")
     began = time.monotonic()
     try:
         for number in count() if request.readings is None else range(request.readings):
@@ -85,18 +86,19 @@ def _read_all(
             reading = live.read(f"{number}")
             _show(reading, as_json)
             if number == 0 and reading.status == "no_points":
-                say(f"hint: {_why_nothing(request, bench.virtual)}")
+                print_message(f"hint: {_hint_without_spot(request, bench.virtual)}")
     finally:
         if request.stats:
-            say(latency_words(live.latencies_s, time.monotonic() - began))
+            print_message(latency_words(live.latencies_s, time.monotonic() - began))
 
 
-def _why_nothing(request: LiveRequest, virtual: bool) -> str:
+def _hint_without_spot(request: LiveRequest, virtual: bool) -> str:
     if virtual and request.standoff_mm is None:
-        return "the virtual bench is empty; --standoff MM has a target placed there"
-    return "no spot was seen: do the beams end on a target, within range, and is the exposure long enough?"
+        return "the virtual bench has no target; place one with --standoff MM"
+    return "no spot was seen; check that the beams hit a target within range and that the exposure suffices"
 
 
 def _show(reading: Reading, as_json: bool) -> None:
-    notes = "".join(f"\n   {note}" for note in reading.notes if reading.lasers)  # else the line has them
+    # Without lasers the line itself contains the notes.
+    notes = "".join(f"\n   {note}" for note in reading.notes if reading.lasers)
     print(json.dumps(plain(reading)) if as_json else reading_line(reading) + notes, flush=True)

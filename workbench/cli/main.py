@@ -1,4 +1,4 @@
-"""The command line. Heavy libraries are imported inside the commands, so that `--help` answers at once."""
+"""Command line. Heavy libraries are imported inside the commands, so that `--help` is fast."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from workbench.cli.console import say
+from workbench.cli.console import print_message
 from workbench.cli.exit import exit_program
 from workbench.cli.option_types import millimetres, whole
 from workbench.cli.stdio import fill_closed_streams
@@ -27,12 +27,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-lasers = typer.Typer(help="The rig's lasers, without a session.", no_args_is_help=True)
+lasers = typer.Typer(help="Control a rig's lasers without a session.", no_args_is_help=True)
 app.add_typer(lasers, name="lasers")
 
 INTERNAL_ERROR = 1
-NO_MORE_WRITTEN = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
-"""A disk, a quota or a largest file is full, or a device fails or is gone."""
+WRITE_FAILURES = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+"""Errors of a full disk, an exceeded quota or file size, and a failed device."""
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 
 
@@ -54,10 +54,11 @@ def _common(
 
 
 AnswersFile = Annotated[
-    Path | None, typer.Option(help="Answers to prompts (YAML); not to those that need eyes at the bench.")
+    Path | None,
+    typer.Option(help="Answers to prompts (YAML), except those that need a person at the bench."),
 ]
 NoInput = Annotated[
-    bool, typer.Option("--no-input", help="Ask nobody: an open prompt ends with exit code 6.")
+    bool, typer.Option("--no-input", help="Do not ask: an open prompt ends with exit code 6.")
 ]
 
 
@@ -66,7 +67,7 @@ def new(folder: Annotated[Path, typer.Argument(help="New or empty folder.")]) ->
     """Lay out a laboratory's own folder: procedures, rigs, firmware."""
     from workbench.cli.new import lay_out
 
-    say(lay_out(folder))
+    print_message(lay_out(folder))
 
 
 @app.command()
@@ -77,7 +78,7 @@ def run(
     answers: AnswersFile = None,
     no_input: NoInput = False,
 ) -> None:
-    """Run procedures on a rig, in one session."""
+    """Run procedures on a rig in one session."""
     from workbench.cli.run import Answers, run_procedures
 
     run_procedures(procedures, rig, sessions, Answers(answers, no_input))
@@ -95,19 +96,19 @@ def _reason(given: str | None) -> str | None:
 @app.command()
 def resume(
     session: Annotated[
-        Path | None, typer.Argument(help="Session, by folder or name; the last unfinished one if not given.")
+        Path | None, typer.Argument(help="Session folder or name. Default: the last unfinished session.")
     ] = None,
     sessions: Sessions = Path("sessions"),
     accept_changes: Annotated[
         str | None,
         typer.Option(
-            metavar="REASON", callback=_reason, help="Go on although rig, procedure or versions changed."
+            metavar="REASON", callback=_reason, help="Resume although rig, procedures or versions changed."
         ),
     ] = None,
     answers: AnswersFile = None,
     no_input: NoInput = False,
 ) -> None:
-    """Go on with a session that ended early: nothing that is whole is captured again."""
+    """Resume a session that ended early; complete placements are not captured again."""
     from workbench.cli.run import Answers, resume_session
     from workbench.cli.sessions import find_session
 
@@ -116,7 +117,7 @@ def resume(
 
 @app.command(name="sessions")
 def sessions_(sessions: Sessions = Path("sessions"), json: Json = False) -> None:
-    """List sessions: finished, waiting for an answer, stopped, failed, and how to go on."""
+    """List sessions with their states."""
     from workbench.cli.sessions import list_sessions
 
     list_sessions(sessions, json)
@@ -124,7 +125,7 @@ def sessions_(sessions: Sessions = Path("sessions"), json: Json = False) -> None
 
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Procedure and rig files.")]) -> None:
-    """Look through procedure and rig files: what is wrong is named with file and line."""
+    """Check procedure and rig files; print mistakes with file and line."""
     from workbench.cli.plan import check_files
 
     check_files(files)
@@ -136,7 +137,7 @@ def plan(
     rig: Annotated[Path, typer.Option(help="Rig file.")],
     sessions: Sessions = Path("sessions"),
 ) -> None:
-    """Print every step, the number of shots, seconds of emission, and the time it will take."""
+    """Print the steps of procedures, numbers of captures, laser emission and duration."""
     from workbench.cli.plan import print_plan
 
     print_plan(procedures, rig, sessions)
@@ -147,7 +148,7 @@ def doctor(
     rig: Annotated[Path, typer.Argument(help="Rig file.")],
     no_input: NoInput = False,
 ) -> None:
-    """Try a rig: camera, controller, interlock, each laser seen, exposure, latency."""
+    """Check camera, controller, interlock, latency, exposure and each laser of a rig."""
     from workbench.cli.doctor import examine_rig
 
     examine_rig(rig, no_input)
@@ -157,25 +158,25 @@ def doctor(
 def fit(
     source: Annotated[Path, typer.Argument(help="Captures file (CSV), or a session folder.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Calibration file to write (YAML).")],
-    rig: Annotated[Path | None, typer.Option(help="Rig file; a session has its own.")] = None,
+    rig: Annotated[Path | None, typer.Option(help="Rig file. Default: that of the session.")] = None,
     accept: Annotated[
         str | None,
         typer.Option(
-            metavar="REASON", callback=_reason, help="Write it even if a limit fails, with this reason."
+            metavar="REASON", callback=_reason, help="Reason to write the file even if a limit fails."
         ),
     ] = None,
     without_standoff: Annotated[
         list[float] | None,
-        typer.Option(metavar="MM", parser=millimetres(0), help="Leave this standoff out; may be repeated."),
+        typer.Option(metavar="MM", parser=millimetres(0), help="Exclude this standoff; repeatable."),
     ] = None,
     fix: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="Hold a parameter at the rig's value; repeatable."),
+        typer.Option(metavar="NAME", help="Fix a parameter at the rig file's value; repeatable."),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Calibrate from a captures file or a session: images or pixel positions at known standoffs."""
-    gc.set_threshold(1_000_000)  # more than a fit makes: it ends after a second, and its garbage with it
+    """Fit a calibration to images or pixel positions at known standoffs."""
+    gc.set_threshold(1_000_000)  # more objects than a fit creates: collection would only take time
     from workbench.cli.fit import Request, fit_captures
 
     request = Request(source, rig, output, accept, tuple(without_standoff or ()), tuple(fix or ()))
@@ -187,17 +188,18 @@ def fit(
 def design(
     rig: Annotated[Path, typer.Option(help="Rig file.")],
     standoffs: Annotated[
-        str | None, typer.Option(metavar="MM,MM,...", help="Without them the best ones are proposed.")
+        str | None, typer.Option(metavar="MM,MM,...", help="Standoffs. Default: propose the best ones.")
     ] = None,
     count: Annotated[
-        int | None, typer.Option(metavar="N", parser=whole, help="How many to propose (11).")
+        int | None,
+        typer.Option(metavar="N", parser=whole, help="Number of standoffs to propose. Default: 11."),
     ] = None,
     repeats: Annotated[
-        int, typer.Option(metavar="N", parser=whole, help="Readings of each laser at each standoff.")
+        int, typer.Option(metavar="N", parser=whole, help="Captures of each laser at each standoff.")
     ] = 10,
     json: Json = False,
 ) -> None:
-    """Predict, before any data, what a calibration will determine; propose standoffs."""
+    """Forecast the uncertainty of a calibration before any data; propose standoffs."""
     from workbench.cli.design import design_calibration
 
     design_calibration(rig, standoffs, count, repeats, json)
@@ -206,10 +208,10 @@ def design(
 @app.command()
 def compare(
     a: Annotated[Path, typer.Argument(help="Calibration file (YAML).")],
-    b: Annotated[Path, typer.Argument(help="Another of the same sensor.")],
+    b: Annotated[Path, typer.Argument(help="Another calibration file of the same sensor.")],
     json: Json = False,
 ) -> None:
-    """Tell whether two calibrations give the same ranges, and what moved if not."""
+    """Test whether two calibrations agree within uncertainty; name what moved."""
     from workbench.cli.compare import compare_calibrations
 
     compare_calibrations(a, b, json)
@@ -218,25 +220,25 @@ def compare(
 @app.command(name="range")
 def range_(
     calibration: Annotated[Path, typer.Option(help="Calibration file (YAML).")],
-    captures: Annotated[Path | None, typer.Argument(help="Captures file (CSV), or a session.")] = None,
-    rig: Annotated[Path | None, typer.Option(help="Rig file: range live on its bench instead.")] = None,
+    captures: Annotated[Path | None, typer.Argument(help="Captures file (CSV) or session folder.")] = None,
+    rig: Annotated[Path | None, typer.Option(help="Rig file, for live ranging on its bench.")] = None,
     readings: Annotated[
         int | None,
-        typer.Option(metavar="N", parser=whole, help="Live: stop after so many; else by a signal (Ctrl-C)."),
+        typer.Option(metavar="N", parser=whole, help="Live: number of readings. Default: until Ctrl-C."),
     ] = None,
     standoff: Annotated[
         float | None,
-        typer.Option(metavar="MM", parser=millimetres(1), help="Live: have the bench's target placed there."),
+        typer.Option(metavar="MM", parser=millimetres(1), help="Live: place the bench's target there."),
     ] = None,
     stats: Annotated[bool, typer.Option("--stats", help="Live: print the latency at the end.")] = False,
     json: Json = False,
 ) -> None:
-    """Range the scenes of a captures file, or live on a rig's bench, with a calibration."""
+    """Range the scenes of a captures file, or live on a bench, with a calibration."""
     if (captures is None) == (rig is None):
-        raise typer.BadParameter("expected either a captures file, or --rig for live ranging")
+        raise typer.BadParameter("expected either a captures file or --rig for live ranging")
     if captures is not None:
         if readings is not None or standoff is not None or stats:
-            raise typer.BadParameter("--readings, --standoff and --stats are for live ranging, with --rig")
+            raise typer.BadParameter("--readings, --standoff and --stats require --rig (live ranging)")
         from workbench.cli.range import range_captures
 
         range_captures(captures, calibration, json)
@@ -249,12 +251,12 @@ def range_(
 @app.command()
 def target(
     pdf: Annotated[Path, typer.Option(help="PDF file to write.")],
-    rig: Annotated[Path | None, typer.Option(help="Rig file; its board, not the usual one.")] = None,
+    rig: Annotated[Path | None, typer.Option(help="Rig file with the board. Default: the A4 board.")] = None,
 ) -> None:
-    """Print the board that calibrates the lens: a page of true size, with a ruler to check it."""
+    """Write the page of the printed board that calibrates the lens."""
     from workbench.cli.target import write_target
 
-    say(write_target(pdf, rig))
+    print_message(write_target(pdf, rig))
 
 
 @app.command()
@@ -269,7 +271,7 @@ def view(
 
 @lasers.command(name="off")
 def lasers_off(rig: Annotated[Path, typer.Option(help="Rig file.")]) -> None:
-    """Put every laser off; exit 7 if nobody confirms it."""
+    """Switch every laser off; exit code 7 if that is not confirmed."""
     from workbench.cli.lasers import lasers_off
 
     typer.echo(lasers_off(rig))
@@ -277,54 +279,55 @@ def lasers_off(rig: Annotated[Path, typer.Option(help="Rig file.")]) -> None:
 
 @lasers.command(name="state")
 def lasers_state(rig: Annotated[Path, typer.Option(help="Rig file.")]) -> None:
-    """Tell who the controller is, and its interlock. Opening its port puts every laser off."""
+    """Print the controller's identity and interlock; this switches every laser off."""
     from workbench.cli.lasers import lasers_state
 
     typer.echo(lasers_state(rig))
 
 
 def main() -> None:
-    """Entry point: every expected failure becomes a message and its exit code."""
-    # Before numpy loads: for matrices as small as a fit's a second thread costs more than it gains.
+    """Entry point of the command line: turns every expected error into a message and its exit code."""
+    # Before numpy loads: for the small matrices of a fit a second thread costs more than it gains.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     fill_closed_streams()
     stop_at_once()
     try:
         app()
     except (Exception, SystemExit) as error:
-        ignore_signals()  # one more must not take the place of what is told now
-        exit_program(_tell(error))
+        ignore_signals()  # a further signal must not replace the message
+        exit_program(_report(error))
 
 
-def _tell(error: BaseException) -> int:
-    """Say why the command ends; returns its exit code."""
+def _report(error: BaseException) -> int:
+    """Print why the command ends; returns its exit code."""
     chain = _chain(error)
+    # An unconfirmed laser-off comes first, even if a later error (a stop, a full disk) covers it.
     if unsafe := [e for e in chain if isinstance(e, LaserOffNotConfirmedError)]:
-        say(f"error: {unsafe[0]}", red=True)  # whatever came on top of it: a stop, a full disk
+        print_message(f"error: {unsafe[0]}", red=True)
         return LaserOffNotConfirmedError.exit_code
     if isinstance(error, SystemExit):
-        if any(isinstance(e, BrokenPipeError) for e in chain):  # as with `| head`; typer has made a 1 of it
+        if any(isinstance(e, BrokenPipeError) for e in chain):  # as with `| head`; typer turns it into 1
             return StoppedError.exit_code
         return error.code if isinstance(error.code, int) else int(error.code is not None)
     if isinstance(error, WorkbenchError):
-        say(f"error: {error}")
+        print_message(f"error: {error}")
         return error.exit_code
-    if isinstance(error, OSError) and error.errno in NO_MORE_WRITTEN:
-        say(f"error: {error.filename or 'what is printed, or a file'}: cannot be written: {error.strerror}")
+    if isinstance(error, OSError) and error.errno in WRITE_FAILURES:
+        print_message(f"error: {error.filename or 'output'}: cannot be written: {error.strerror}")
         return StoppedError.exit_code
     with suppress(OSError):
         traceback.print_exception(error)
-    say("internal error: this is a defect of the workbench, please report it with the lines above")
+    print_message("internal error: this is a defect of the workbench; report it with the lines above")
     return INTERNAL_ERROR
 
 
 def _chain(error: BaseException) -> list[BaseException]:
-    """The error and all that it came from, or came on top of."""
+    """The error with all its causes and contexts."""
     found: list[BaseException] = []
-    ahead: list[BaseException | None] = [error]
-    while ahead:
-        each = ahead.pop()
+    remaining: list[BaseException | None] = [error]
+    while remaining:
+        each = remaining.pop()
         if each is not None and each not in found:
             found.append(each)
-            ahead += [each.__context__, each.__cause__]
+            remaining += [each.__context__, each.__cause__]
     return found

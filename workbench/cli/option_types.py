@@ -1,4 +1,4 @@
-"""Numbers on the command line: what is none is told in plain words."""
+"""Parsers of numbers on the command line, with plain error messages."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from math import isfinite
 import typer
 
 MOST_MM = 1e6
-"""A kilometre, as in rig and captures files."""
+"""Largest accepted length, as in rig and captures files."""
 
 
 def whole(text: object) -> int:
-    """A whole number from 1."""
+    """Parse a whole number of at least 1."""
     try:
         value = int(str(text))
     except ValueError:
@@ -23,7 +23,7 @@ def whole(text: object) -> int:
 
 
 def millimetres(least: float) -> Callable[[object], float]:
-    """A parser of lengths from `least` on."""
+    """Parser of a length of at least `least`, mm."""
 
     def parse(text: object) -> float:
         try:

@@ -1,4 +1,4 @@
-"""`workbench check` and `workbench plan`: what will happen, before anybody stands at the bench."""
+"""`workbench check` and `workbench plan`: checks and forecasts before a session."""
 
 from __future__ import annotations
 
@@ -19,62 +19,65 @@ from workbench.report.terminal_table import TerminalTable
 
 
 def check_files(files: list[Path]) -> None:
-    """Print what is wrong with each file, and what is worth knowing.
+    """Check files and print the notes on each; the mistakes of all files are one error.
 
     Raises:
-        BadInputError: one of them is wrong.
+        BadInputError: a file is wrong.
     """
     console = Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
-    wrong = []
+    mistakes: list[str] = []
     for path in files:
         try:
-            notes = check_file(path)
+            result = check_file(path)
         except BadInputError as error:
-            wrong.append(str(error))
+            mistakes.append(str(error))
             continue
-        for note in notes:
+        for note in result.notes:
             console.print(f"note: {note}")
-        console.print(f"{path}: good")
-    if wrong:
-        raise BadInputError("\n".join(wrong))
+        if not result.mistakes:
+            console.print(f"{path}: good")
+        mistakes += result.mistakes
+    if mistakes:
+        raise BadInputError("\n".join(mistakes))
 
 
 def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
-    """Print every step, its captures, their emission, and the time it will take.
+    """Print every step with its captures, emission and duration.
 
     Raises:
         BadInputError: a file is wrong.
     """
     plan = Plan.load(rig_path, procedures)
     if sessions.exists() and not sessions.is_dir():
-        raise BadInputError(f"{sessions}: expected a folder of sessions, this is a file")
-    pace = learn_durations(sessions, plan.rig.rig)
+        raise BadInputError(f"{sessions}: expected a folder of sessions, got a file")
+    durations = learn_durations(sessions, plan.rig.rig)
     steps = plan.steps()
     console = Console(stderr=True, markup=False)
-    console.print(TerminalTable(plan_table(steps, pace)))
+    console.print(TerminalTable(plan_table(steps, durations)))
     total = sum(step.captures for step in steps)
     console.print(
-        f"{total} captures, {emission(total, pace)}; {duration(sum(map(pace.seconds, steps)))} in all",
+        f"{total} captures, {emission(total, durations)}; {duration(sum(map(durations.seconds, steps)))} in"
+        " total",
         highlight=False,
     )
     if trials := MOST_TRIALS * sum(step.placements for step in steps):
         console.print(
-            f"Where the camera's exposure is set, each placement takes up to {MOST_TRIALS} trials more, of"
-            f" all lasers at once: at most {trials}, {emission(trials, pace, LIT_FRAMES)}.",
+            f"If the camera's exposure is set, each placement takes up to {MOST_TRIALS} trial exposures more,"
+            f" with all lasers on: at most {trials}, {emission(trials, durations, LIT_FRAMES)}.",
             highlight=False,
         )
-    console.print(_source_of_times(pace, plan.rig.rig), highlight=False)
+    console.print(_source_of_times(durations, plan.rig.rig), highlight=False)
 
 
-def emission(captures: int, pace: StepDurations, lit_frames: int = 1) -> str:
-    """Seconds of emission, as measured before or as the lease bounds them."""
-    if pace.lit_s is None:
+def emission(captures: int, durations: StepDurations, lit_frames: int = 1) -> str:
+    """Text of the emission time: as measured in earlier sessions, or bounded by the lease."""
+    if durations.lit_s is None:
         return f"at most {captures * LEASE_S:.0f} s of emission (leases of {LEASE_S:g} s)"
-    return f"{lit_frames * captures * pace.lit_s:.1f} s of emission"
+    return f"{lit_frames * captures * durations.lit_s:.1f} s of emission"
 
 
 def plan_table(steps: Sequence[PlannedStep], durations: StepDurations) -> Table:
-    """A row for each step: target placements, captures, seconds of emission, and its duration."""
+    """Table of the steps: placements, captures, seconds of emission, duration."""
     return Table(
         name="plan",
         title="Plan",
@@ -96,11 +99,12 @@ def _plan_row(step: PlannedStep, durations: StepDurations) -> tuple[str | float 
     return (f"{step.procedure}.{step.index}", step.title, *counts, durations.seconds(step))
 
 
-def _source_of_times(pace: StepDurations, rig: str) -> str:
-    if pace.sessions == 0:
+def _source_of_times(durations: StepDurations, rig: str) -> str:
+    if durations.sessions == 0:
         return (
-            f"Times are defaults: {pace.placing_s:g} s to place the target, {pace.exposing_s:g} s for the"
-            f" exposure, {pace.capture_s:g} s a capture; no session of {rig} has measured them yet."
+            f"Times are defaults, because no session of {rig} has measured them:"
+            f" {durations.placing_s:g} s to place the target, {durations.exposing_s:g} s to set the exposure,"
+            f" {durations.capture_s:g} s per capture."
         )
-    sessions = "the last session" if pace.sessions == 1 else f"the last {pace.sessions} sessions"
-    return f"Times are means of {sessions} of {rig}, without breaks while the target was placed."
+    sessions = "the last session" if durations.sessions == 1 else f"the last {durations.sessions} sessions"
+    return f"Times are means of {sessions} of {rig}, without breaks between placements."

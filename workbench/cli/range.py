@@ -9,7 +9,7 @@ from rich.console import Console
 
 from workbench.cli.reading_json import plain
 from workbench.model.calibration import Calibration, load_calibration
-from workbench.model.captures import check_images, load_captures, of_file
+from workbench.model.captures import check_images, errors_name_file, load_captures
 from workbench.model.errors import BadInputError
 from workbench.ranging.captures import read_captures
 from workbench.ranging.live import check_same_sensor
@@ -20,7 +20,7 @@ from workbench.session.manifest import MANIFEST, load_session_rig
 
 
 def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
-    """Range every scene; a line of JSON each on standard output, a list on standard error.
+    """Range every scene: one line of JSON each on standard output, a list on standard error.
 
     Raises:
         BadInputError: a file is wrong.
@@ -32,7 +32,7 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
     table = _table(captures)
     rows = load_captures(table)
     check_images(table, rows)
-    with of_file(table):
+    with errors_name_file(table):
         for reading in read_captures(ranger, rows):
             readings.append(reading)
             if as_json:
@@ -42,7 +42,7 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
 
 
 def _table(captures: Path) -> Path:
-    """The captures file, or that of a session folder: its trial's before its calibration's."""
+    """Captures file itself, or that of a session folder: of its trials, else of its calibration."""
     if not captures.is_dir():
         return captures
     tables = [captures / name for name in (TRIAL_TABLE, CALIBRATION_TABLE)]
@@ -50,22 +50,22 @@ def _table(captures: Path) -> Path:
     if found is None:
         raise BadInputError(
             f"{captures}: expected a captures file, or a session folder with {TRIAL_TABLE} or"
-            f" {CALIBRATION_TABLE} in it, got a folder without; give the file itself"
+            f" {CALIBRATION_TABLE}, got a folder with neither; name the file itself"
         )
     return found
 
 
 def usable(path: Path) -> Calibration:
-    """Read a calibration that was accepted, or kept for a reason.
+    """Read a calibration that was accepted, by its limits or with a reason.
 
     Raises:
-        BadInputError: the file is wrong, or it holds one that was refused.
+        BadInputError: the file is wrong, or the calibration was refused.
     """
     calibration = load_calibration(path)
     summary = calibration.laser_ranger.fit
     if not summary.usable:
         raise BadInputError(
-            f"{path}: laser_ranger.fit.verdict: expected a calibration that was accepted, got one refused"
-            f" because {'; '.join(summary.reasons)}; if it must be used, fit it again with --accept REASON"
+            f"{path}: laser_ranger.fit.verdict: expected an accepted calibration, got one refused because"
+            f" {'; '.join(summary.reasons)}; to use it nevertheless, fit it again with --accept REASON"
         )
     return calibration

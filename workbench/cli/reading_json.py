@@ -1,4 +1,4 @@
-"""A reading of the ranger as a line of JSON."""
+"""Readings of the ranger as JSON."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from workbench.ranging.shape import Shape
 
 
 def plain(reading: Reading) -> dict[str, Any]:
-    """Plain numbers and words; millimetres, degrees, 1 sigma, intervals of 95 % (null: no upper end)."""
+    """Reading as plain numbers and texts: mm, degrees, 1 sigma, 95 % intervals (null: no upper end)."""
     shapes = [line.shape for line in reading.lines]
     nearest = min(shapes, key=lambda shape: shape.closest_mm) if shapes else None
     return {
@@ -51,24 +51,24 @@ def _line(line: Line, reading: Reading) -> dict[str, Any]:
 
 
 def _shape(shape: Shape) -> dict[str, Any]:
-    told: dict[str, Any] = {"kind": shape.kind}
+    data: dict[str, Any] = {"kind": shape.kind}
     if shape.kind != "unknown":
-        told["probability"] = shape.probability
+        data["probability"] = shape.probability
     if shape.degree is not None:
-        told |= {"degree": shape.degree, "coefficients": list(shape.coefficients)}
+        data |= {"degree": shape.degree, "coefficients": list(shape.coefficients)}
     if shape.angle_rad is not None and shape.angle_sigma_rad is not None:
-        told |= {
+        data |= {
             "angle_deg": math.degrees(shape.angle_rad),
             "angle_sigma_deg": math.degrees(shape.angle_sigma_rad),
         }
     if shape.cylinder is not None:
-        told["cylinder"] = {
+        data["cylinder"] = {
             "radius_mm": shape.cylinder.radius_mm,
             "radius_sigma_mm": shape.cylinder.radius_sigma_mm,
             "axis_x_mm": shape.cylinder.axis_x_mm,
             "axis_range_mm": shape.cylinder.axis_range_mm,
         }
-    return told
+    return data
 
 
 def _interval(interval_mm: tuple[float, float] | None) -> list[float | None] | None:

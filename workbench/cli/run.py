@@ -1,4 +1,4 @@
-"""`workbench run` and `workbench resume`: progress on the terminal, the recording beside it."""
+"""`workbench run` and `workbench resume`: a session with progress on the terminal and a recording."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pathlib import Path
 from rich.console import Console
 
 from workbench.cli.background import Background
-from workbench.cli.console import say
+from workbench.cli.console import print_message
 from workbench.cli.invocation import command_line
-from workbench.cli.stopping import StopAfterShot
+from workbench.cli.stopping import StopAfterCapture
 from workbench.cli.terminal import FaultTolerantConsumer, Terminal
 from workbench.cli.terminal_operator import choose_operator
 from workbench.devices.protocols import Operator
@@ -29,7 +29,7 @@ from workbench.procedure.engine.operator import ScriptedOperator
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.progress import TimeLeft
 from workbench.procedure.engine.resume import files_now, plan_of, resume
-from workbench.procedure.engine.run import NOBODY, Invocation, run
+from workbench.procedure.engine.run import NO_OPERATOR, Invocation, run
 from workbench.report.figure_writer import FigureWriter
 from workbench.session.caller import now, operator
 from workbench.session.manifest import MANIFEST, load_manifest
@@ -39,15 +39,17 @@ from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
 
 @dataclass(frozen=True)
 class Answers:
-    """Who answers, as the user asked for it."""
+    """Options for answers to prompts."""
 
     file: Path | None = None
+    """Answers file."""
     no_input: bool = False
+    """Whether no person is asked."""
 
 
 @dataclass(frozen=True)
-class Screen:
-    """What a session is run with: who sees its records, who stops it, who answers."""
+class SessionInterface:
+    """Connections of a session to the user: consumers of its records, stop requests, operator."""
 
     consumers: tuple[ev.Consumer, ...]
     stopping: Callable[[], str | None]
@@ -55,56 +57,56 @@ class Screen:
 
 
 def run_procedures(procedures: list[Path], rig_path: Path, sessions: Path, answers: Answers) -> None:
-    """Run, show the progress, and say where everything is.
+    """Run procedures in a new session with progress on the terminal.
 
     Raises:
         WorkbenchError: see `workbench.procedure.engine.run.run`.
     """
     plan = Plan.load(rig_path, procedures)
     session_dir = plan.new_session(sessions)
-    with shown(session_dir, plan, answers) as screen:
-        run(plan, session_dir, screen.consumers, _caller(), screen.stopping, screen.operator)
+    with session_interface(session_dir, plan, answers) as ui:
+        run(plan, session_dir, ui.consumers, _caller(), ui.stopping, ui.operator)
 
 
 def resume_session(session_dir: Path, accept_changes: str | None, answers: Answers) -> None:
-    """Go on with a session that ended early.
+    """Resume a session that ended early.
 
     Raises:
         WorkbenchError: see `workbench.procedure.engine.resume.resume`.
     """
     now, _ = files_now(session_dir, load_manifest(session_dir))
     plan = plan_of(session_dir, now)
-    with shown(session_dir, plan, answers) as screen:
-        resume(session_dir, screen.consumers, _caller(), screen.stopping, screen.operator, accept_changes)
+    with session_interface(session_dir, plan, answers) as ui:
+        resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes)
 
 
 @contextmanager
-def shown(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[Screen]:
-    """Show a session on the terminal and in a recording while it runs, then say where everything is."""
+def session_interface(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[SessionInterface]:
+    """Terminal, recording, figures and operator for a session; prints its paths at the end."""
     console = Console(stderr=True, markup=False)
-    asked = StopAfterShot()
+    stop = StopAfterCapture()
     script = None
     if answers.file is not None:
-        script = ScriptedOperator.load(answers.file, plan.prompts(), NOBODY)
+        script = ScriptedOperator.load(answers.file, plan.prompts(), NO_OPERATOR)
     steps = plan.steps()
     if not is_compiled():
-        say("note: the search for spots is compiled at the first capture: a minute or two, this once")
+        print_message("note: the first capture compiles the search for spots, once, in one or two minutes")
     forecast = TimeLeft(steps, learn_durations(session_dir.parent, plan.rig.rig))
     recording = RecordingConsumer(session_dir, plan.rig)
     file = session_dir / RECORDING_FILE
     with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
-        person = choose_operator(answers.no_input, console, lambda: asked.reason, terminal.quiet)
+        person = choose_operator(answers.no_input, console, lambda: stop.reason, terminal.quiet)
         operator = person if script is None else replace(script, other=person)
         writer = FigureWriter(session_dir, laser_colors(plan.rig.laser_ids))
         figures = FaultTolerantConsumer(writer, "drawing figures", console)
         consumers = (FaultTolerantConsumer(terminal, "the progress", console), figures, beside)
         try:
-            yield Screen(consumers, lambda: asked.reason, operator)
+            yield SessionInterface(consumers, lambda: stop.reason, operator)
         except (RigNotReadyError, StoppedError, AnswerNeededError, LaserOffNotConfirmedError):
             if (session_dir / MANIFEST).exists():
-                with suppress(OSError):  # a terminal that was closed
+                with suppress(OSError):  # a closed terminal
                     console.print(
-                        f"go on:   workbench resume {session_dir}",
+                        f"resume:  workbench resume {session_dir}",
                         highlight=False,
                         soft_wrap=True,
                         markup=False,

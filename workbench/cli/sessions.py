@@ -1,4 +1,4 @@
-"""`workbench sessions`, and which session is meant by its name."""
+"""`workbench sessions`, and the look-up of a session by name."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from workbench.session.manifest import MANIFEST
 from workbench.session.state import SessionStatus, session_statuses
 
 SHOWN = 20
+"""Number of latest sessions that are listed."""
 WHY_LINES = 2
-"""For how a session ended; all of it is in `--json`, and in the session's journal."""
+"""Number of lines for the cause of an end; `--json` and the journal contain the full text."""
 CUT_AT = 20
-"""Lines are broken between words, this far before their end at most."""
+"""Allowance in characters for lines that are broken between words."""
 
 
 def list_sessions(sessions: Path, as_json: bool) -> None:
-    """Print where every session stands, and how to go on with the last unfinished one.
+    """Print the status of every session, and the command that resumes the last unfinished one.
 
     Raises:
         BadInputError: there is no such folder.
@@ -41,39 +42,43 @@ def list_sessions(sessions: Path, as_json: bool) -> None:
     if len(found) > SHOWN:
         console.print(f"and {len(found) - SHOWN} older ones")
     if unfinished := [each for each in found if each.unfinished]:
-        console.print(f"go on: workbench resume {unfinished[-1].session_dir}", soft_wrap=True)
+        console.print(f"resume: workbench resume {unfinished[-1].session_dir}", soft_wrap=True)
 
 
 def find_session(name: Path | None, sessions: Path) -> Path:
-    """The folder of the session `name`, a path or a name in `sessions`; without one the last unfinished.
+    """Folder of a session.
+
+    Args:
+        name: path of the session, or its name in `sessions`; None: the last unfinished session.
+        sessions: folder of sessions.
 
     Raises:
-        BadInputError: there is none.
+        BadInputError: there is no such session.
     """
     if name is not None:
         known = [path for path in (name, sessions / name) if (path / MANIFEST).is_file()]
-        if known:  # `.` is the folder that somebody stands in, and its name is told by its path alone
+        if known:  # `.` and `..` are resolved, because the folder's name is needed
             return known[0] if known[0].name not in {"", ".."} else known[0].resolve()
         raise BadInputError(f"{name}: expected a session folder, or the name of one in {sessions}")
     found = session_statuses(sessions)
     unfinished = [each for each in found if each.unfinished]
     if not unfinished:
         if running := [each for each in found if each.state == "running"]:
-            raise BadInputError(f"{running[-1].session_dir}: the session is running, in another program")
+            raise BadInputError(f"{running[-1].session_dir}: the session is running in another program")
         raise BadInputError(f"{sessions}: no unfinished session to resume")
     return unfinished[-1].session_dir
 
 
 def _show(found: list[SessionStatus], console: Console) -> None:
-    """A line each, two where a name is too long; how it ended stands below, where it did not end well."""
-    counted = [
+    """Print one line per session, two for a long name, and the cause of the end of unfinished ones."""
+    columns = [
         f"{each.state:{max(len(e.state) for e in found)}}  {each.captures:6} captures" for each in found
     ]
-    room = console.width - max(map(len, counted)) - 2
+    room = console.width - max(map(len, columns)) - 2
     names = [each.session_dir.name for each in found]
     width = max((len(name) for name in names if len(name) <= room), default=0)
-    for each, name, told in zip(found, names, counted, strict=True):
-        line = f"{name:{width}}  {told}" if len(name) <= room else f"{name}\n    {told}"
+    for each, name, rest in zip(found, names, columns, strict=True):
+        line = f"{name:{width}}  {rest}" if len(name) <= room else f"{name}\n    {rest}"
         console.print(line, highlight=False, soft_wrap=True)
         if each.state != "finished":
             why = shorten(each.why, WHY_LINES * (console.width - 4) - CUT_AT, placeholder=" ...")

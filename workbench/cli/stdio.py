@@ -1,4 +1,4 @@
-"""Standard input, output and error, where one of them was closed (`2>&-`)."""
+"""Replacement of closed standard streams (`2>&-`)."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 
 def fill_closed_streams() -> None:
-    """Put the null device in the place of each.
+    """Open the null device for each closed standard stream.
 
-    Else the next file opened gets its number, and what a library prints goes into a session's journal.
+    Otherwise the next opened file would get its number, and output of a library could go into a journal.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:

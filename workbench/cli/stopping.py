@@ -1,4 +1,4 @@
-"""Signals that stop the workbench, in good order."""
+"""Handling of the signals that stop the workbench."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def stop_at_once() -> None:
-    """From now on a signal raises `StoppedError` wherever the program is."""
+    """Make signals raise `StoppedError` immediately."""
     for number in SIGNALS:
         signal.signal(number, _raise)
 
 
 def ignore_signals() -> None:
-    """From now on nothing stops the program: it is about to end."""
+    """Ignore further signals while the program ends."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 
-class StopAfterShot:
-    """The first signal asks for a stop between two shots, the second raises, more are ignored.
+class StopAfterCapture:
+    """Stop requests: the first signal stops between two captures, the second at once; others are ignored.
 
-    What is raised inside a library's callback may get lost there; what was asked for does not.
+    An exception may be lost in a library's callback; the request of the first signal is not.
     """
 
     def __init__(self) -> None:
         self.reason: str | None = None
-        """Why to stop; None while nobody asked."""
+        """Reason to stop; None without a request."""
         for number in SIGNALS:
-            signal.signal(number, self._ask)
+            signal.signal(number, self._request)
 
-    def _ask(self, number: int, frame: FrameType | None) -> None:
+    def _request(self, number: int, frame: FrameType | None) -> None:
         first = self.reason is None
         self.reason = f"stopped by {signal.Signals(number).name}"
         if not first:
-            ignore_signals()  # what puts the lasers off must not be stopped by a third one
+            ignore_signals()  # a third signal must not interrupt switching the lasers off
             raise StoppedError(self.reason)
 
 

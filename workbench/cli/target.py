@@ -11,7 +11,7 @@ from workbench.session.files import write_output
 
 
 def write_target(pdf: Path, rig: Path | None) -> str:
-    """Write the board's page, and return what to do with it.
+    """Write the page of the board; returns instructions for printing it.
 
     Raises:
         BadInputError: the rig file is wrong, or the file cannot be written.
@@ -20,4 +20,4 @@ def write_target(pdf: Path, rig: Path | None) -> str:
     write_output(pdf, board_page(board))
     width, height = board.page_mm
     page = f"{pdf}: {width:g} x {height:g} mm"
-    return f"{page}. Print it at 100 % and measure the ruler of {ruler_mm(board)} mm on it"
+    return f"{page}. Print it at 100 % and measure its {ruler_mm(board)} mm ruler"

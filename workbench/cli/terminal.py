@@ -1,4 +1,4 @@
-"""What a running session shows on the terminal."""
+"""Progress of a running session on the terminal."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from workbench.report.terminal_table import TerminalTable
 
 
 class Terminal:
-    """Shows the records of a session as they come."""
+    """Consumer that shows the records of a session."""
 
     def __init__(self, console: Console, forecast: TimeLeft) -> None:
         self._console, self._forecast = console, forecast
@@ -45,12 +45,12 @@ class Terminal:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(OSError):  # a terminal that was closed
+        with suppress(OSError):  # a closed terminal
             self._progress.stop()
 
     @contextmanager
     def quiet(self) -> Iterator[None]:
-        """No progress while somebody is asked."""
+        """Context without progress display, for prompts."""
         self._progress.stop()
         try:
             yield
@@ -81,9 +81,9 @@ class Terminal:
                 self._show_capture(self._captures.pop(e.key), e)
             case ev.PlacementFinished() as e if self._spots:
                 self._print(self._placement)
-                self._print(self.how_far())
+                self._print(self.progress_text())
             case ev.LimitChecked() as e if e.verdict != "pass":
-                value = "needs a spot" if e.value is None else f"{e.value:.3g}"
+                value = "not measured" if e.value is None else f"{e.value:.3g}"
                 self._print(f"{e.verdict}: {e.of}: {e.quantity} {value}, limit {e.limit}", style="yellow")
             case ev.SetAside() as e:
                 self._print(e.text, style="yellow")
@@ -97,7 +97,7 @@ class Terminal:
                 for table in fit_tables(e):
                     self._console.print(TerminalTable(table))
                 for line in rejected_lines(e.rejected):
-                    self._print(f"not used: {line}")
+                    self._print(f"rejected: {line}")
                 for warning in e.warnings:
                     self._print(f"note: {warning}")
             case ev.TrialFinished() as e:
@@ -108,13 +108,13 @@ class Terminal:
             case _:
                 pass
 
-    def how_far(self) -> str:
-        """`placement 7 of 48 done, about 11 min left`."""
+    def progress_text(self) -> str:
+        """Text such as `placement 7 of 48 done, about 11 min left`."""
         left = about(self._forecast.seconds_left)
         return f"placement {self._forecast.done} of {self._forecast.total} done, {left} left"
 
     def _show_capture(self, capture: ev.CaptureTaken, found: ev.SpotsFound) -> None:
-        """The live line: this laser here, over its repeats so far."""
+        """Update the live line: quality of this laser at this placement, over its repeats so far."""
         self._spots[capture.laser_id].append(found.spots)
         self._placement = f"{capture.standoff_mm:g} mm: {_summary(self._spots)}"
         if self._task is not None:
@@ -136,29 +136,29 @@ class Terminal:
 
 
 class FaultTolerantConsumer:
-    """A consumer that may fail without stopping the session: frames and journal are the record, not it."""
+    """Consumer whose failure does not end the session, because frames and journal are the record."""
 
     def __init__(self, consumer: ev.Consumer, name: str, console: Console) -> None:
         self._consumer: ev.Consumer | None = consumer
         self._name, self._console = name, console
 
     def __call__(self, record: ev.Record) -> None:
-        """Hand the record on; after a failure, never again."""
+        """Pass the record on, unless the consumer has failed before."""
         if self._consumer is None:
             return
         try:
             self._consumer(record)
         except StoppedError:
-            raise  # a signal that came while the consumer was at work
+            raise  # a signal during the consumer's work
         except Exception as error:
             self._consumer = None
             with suppress(OSError):
-                self._console.print(Text(f"warning: {self._name} stops here: {error}", style="yellow"))
-                self._console.print("Captures go on.")
+                self._console.print(Text(f"warning: {self._name} failed: {error}", style="yellow"))
+                self._console.print("Captures continue.")
 
 
 def about(seconds: float) -> str:
-    """For people, no finer than an estimate is."""
+    """Text of an estimated duration, rounded to its accuracy."""
     if seconds < 10:
         return "a few seconds"
     if seconds < 95:
@@ -167,7 +167,7 @@ def about(seconds: float) -> str:
 
 
 def _counts(capture: ev.CaptureTaken) -> bool:
-    """Whether a capture is one of those that the step announced; alternative captures come on top."""
+    """Whether the step announced the capture; captures of single lasers in trials are extra."""
     return capture.purpose == "calibration" or capture.laser_id == "all"
 
 
@@ -180,7 +180,7 @@ def _live(quality: Quality) -> str:
 
 
 def _summary(spots: dict[str, list[Sequence[Spot]]]) -> str:
-    """All lasers of a placement, the worst of each; of those lit together only how many spots they made."""
+    """Summary of a placement: worst quality over the lasers; for all lasers together the number of spots."""
     if "all" in spots:
         each = spots["all"]
         return f"{len(each)} readings, {min(map(len, each))} spots or more"

@@ -1,4 +1,4 @@
-"""A person at the terminal answers a procedure's questions."""
+"""Operator at the terminal, who answers the prompts of a procedure."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from workbench.model.prompt import Answer, Prompt
 from workbench.procedure.engine.operator import NoOperator
 
 LOOK_S = 0.1
-"""A stop that is asked for while nobody types is seen after this."""
+"""Interval at which stop requests are checked while waiting for input, s."""
 ACTIONS = ("redo", "skip", "abort")
 
 
@@ -30,7 +30,7 @@ def choose_operator(
     stopping: Callable[[], str | None],
     quiet: Callable[[], AbstractContextManager[None]],
 ) -> Operator:
-    """The person at the terminal; nobody where there is none, on CI, or with --no-input."""
+    """Operator at the terminal; `NoOperator` without a terminal, on CI, or with --no-input."""
     if no_input:
         return NoOperator("--no-input was given")
     if os.environ.get("CI"):
@@ -41,7 +41,7 @@ def choose_operator(
 
 
 class TerminalOperator:
-    """One question at a time; what was typed before it is asked does not answer it."""
+    """Operator at the terminal. Input typed before a prompt is discarded."""
 
     def __init__(
         self,
@@ -52,11 +52,11 @@ class TerminalOperator:
         self._console, self._stopping, self._quiet = console, stopping, quiet
 
     def ask(self, prompt: Prompt) -> Answer:
-        """Show the question and wait for an answer that fits.
+        """Show a prompt and wait for a valid answer.
 
         Raises:
-            StoppedError: a stop was asked for.
-            AnswerNeededError: the terminal was closed, or its end typed (^D).
+            StoppedError: a stop was requested.
+            AnswerNeededError: the terminal was closed, or end-of-file was typed (^D).
         """
         with self._quiet():
             self._show(prompt)
@@ -67,7 +67,7 @@ class TerminalOperator:
                 elif (wrong := prompt.refuse(answer)) is None:
                     return answer
                 else:
-                    self._say(wrong)
+                    self._print(wrong)
 
     def _show(self, prompt: Prompt) -> None:
         self._console.print(Padding(Text(prompt.do, style="bold"), (1, 0, 0, 2)))
@@ -78,7 +78,7 @@ class TerminalOperator:
             self._console.print(Padding(Text(text, style="dim"), (0, 0, 0, 2)))
 
     def _read(self, prompt: Prompt) -> Answer | None:
-        """What is answered; None where it was taken back."""
+        """Answer as typed; None for an action that was cancelled."""
         typed = self._line(prompt)
         if typed.lower() in ACTIONS:
             return self._action(prompt, typed.lower())
@@ -89,7 +89,7 @@ class TerminalOperator:
         instead = _instead(prompt)
         if action not in instead:
             return answer
-        self._say(f"why {action} ({instead[action]})? The reason is kept; Enter alone takes it back.")
+        self._print(f"Reason for {action} ({instead[action]})? It is journalled. Enter alone cancels.")
         reason = self._line(prompt)
         return answer.model_copy(update={"reason": reason}) if reason else None
 
@@ -103,15 +103,15 @@ class TerminalOperator:
                 break
         typed = sys.stdin.readline()
         if not typed:
-            time.sleep(LOOK_S)  # where the terminal was closed, its signal may still be on the way
+            time.sleep(LOOK_S)  # the signal of a closed terminal may still be pending
             if (reason := self._stopping()) is not None:
                 raise StoppedError(reason)
             raise AnswerNeededError(
-                f"prompt {prompt.key}: {prompt.do} -- the terminal was closed, or its end typed (^D)"
+                f"prompt {prompt.key}: {prompt.do} -- the terminal was closed, or end-of-file typed (^D)"
             )
         return typed.strip()
 
-    def _say(self, text: str) -> None:
+    def _print(self, text: str) -> None:
         self._console.print(Padding(Text(text, style="yellow"), (0, 0, 0, 2)))
 
 
@@ -131,12 +131,12 @@ def _or(prompt: Prompt) -> str:
 
 
 def _instead(prompt: Prompt) -> dict[str, str]:
-    """Everything that can be done instead of an answer, and what it does here."""
+    """Actions instead of an answer, with their effects."""
     return {**{str(action): what for action, what in prompt.may.items()}, "abort": "end the session"}
 
 
 def _answer(prompt: Prompt, typed: str) -> Answer:
-    """What was typed, where it can be an answer; else one that the prompt refuses."""
+    """Typed text as an answer, which the prompt may refuse."""
     if prompt.quantity is not None:
         if not typed and prompt.quantity.usual is not None:
             return Answer(value=prompt.quantity.usual)
@@ -146,5 +146,5 @@ def _answer(prompt: Prompt, typed: str) -> Answer:
             return Answer(value=typed)
     if prompt.choices:
         return Answer(value=typed)
-    # A key pressed by chance confirms nothing.
+    # Only `yes` confirms, not an accidental key.
     return Answer(value=None if typed.lower() == "yes" else typed)

@@ -11,9 +11,9 @@ from workbench.viewer.window import open_viewer
 
 
 def view_session(session: Path) -> int:
-    """Show the session's recording until the window is closed; the viewer's exit code.
+    """Show a session's recording until the window is closed; returns the viewer's exit code.
 
-    A recording that is missing is made again from frames and journal.
+    A missing recording is made again from frames and journal.
 
     Raises:
         BadInputError: `session` is not a session folder, or a frame in it is damaged.

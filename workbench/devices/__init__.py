@@ -1,1 +1,1 @@
-"""Device protocols and their real drivers."""
+"""Device protocols, drivers of real devices, and the guardian that switches lasers off."""

@@ -1,7 +1,7 @@
-"""The laser driver `nidaqmx`: lasers on the lines of a digital output board, by NI-DAQmx.
+"""Laser driver `nidaqmx`: lasers on the lines of a digital output board, through NI-DAQmx.
 
-The board has no lease of its own: what was written stays until something else is written. The guardian, which
-holds nothing longer than its lease, is all that puts the lasers off (docs/laser-controller.md).
+The board has no leases: a level stays until another one is written. Only the guardian, with its own clock,
+ends an emission (docs/laser-controller.md).
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ PACKAGE = "nidaqmx"
 
 
 class DigitalOutputBlock(DeviceBlock):
-    """The block `devices: lasers:` of the rig file."""
+    """Block `devices: lasers:` of the rig file."""
 
     port: str
-    """The board's lines, as `Dev1/port0/line0:3`."""
+    """Lines of the board, such as `Dev1/port0/line0:3`."""
 
 
 class DigitalOutputLine:
-    """See `guarded_line.GuardedLine`; laser 1 is the first line."""
+    """Laser driver, see `guarded_line.GuardedLine`; laser 1 is the first line."""
 
     settings_type: ClassVar = DigitalOutputBlock
     has_leases: ClassVar[bool] = False
@@ -34,7 +34,7 @@ class DigitalOutputLine:
         """Reserve the board's lines and set them low.
 
         Raises:
-            BadInputError: there are fewer of them than lasers.
+            BadInputError: there are fewer lines than lasers.
             RigNotReadyError: the package or its driver is missing, or there are no such lines.
         """
         self._lines = lines = settings.port
@@ -44,7 +44,7 @@ class DigitalOutputLine:
         except ImportError as error:
             raise RigNotReadyError(
                 f"lasers at {lines}: expected the package {PACKAGE}, got: {error};"
-                f" install it with `pip install 'laser-range-workbench[{PACKAGE}]'`, and NI's driver with it"
+                f" install it with `pip install 'laser-range-workbench[{PACKAGE}]'`, and NI's driver"
             ) from None
         with self._asked("reserve the lines"):
             self._task: Any = package.Task()
@@ -53,17 +53,17 @@ class DigitalOutputLine:
             self._write(0)
         if self._count < lasers:
             raise BadInputError(
-                f"lasers at {lines}: expected a line for each of the rig's {lasers} lasers, the board has"
-                f" {self._count} there; name as many lines in the rig file (devices: lasers: port)"
+                f"lasers at {lines}: expected a line for each of the rig's {lasers} lasers, got"
+                f" {self._count}; name {lasers} lines in the rig file (devices: lasers: port)"
             )
 
     def identify(self, boot_s: float) -> str:
-        """Product and name of the board; it needs no time to boot.
+        """Product and name of the board, which needs no time to boot.
 
         Raises:
-            RigNotReadyError: it does not answer.
+            RigNotReadyError: the board does not answer.
         """
-        with self._asked("tell its name"):
+        with self._asked("return its name"):
             boards = [f"{device.product_type} {device.name}" for device in self._task.devices]
         return f"{', '.join(boards)}, {self._count} lines"
 
@@ -77,43 +77,43 @@ class DigitalOutputLine:
             self._write(mask)
 
     def all_off(self) -> None:
-        """Set every line low and read them back; tried twice.
+        """Set every line low and read the lines back; tried twice.
 
         Raises:
-            LaserOffNotConfirmedError: they do not read low.
+            LaserOffNotConfirmedError: a line does not read low.
         """
-        came = ""
+        cause = ""
         for _ in range(2):
             try:
                 self._write(0)
                 mask = self._read()
-            except Exception as error:  # a foreign driver's, of any kind: the guardian must not end on it
-                came = str(error)
+            except Exception as error:  # the vendor's package may raise anything; the guardian must not end
+                cause = str(error)
             else:
                 if mask == 0:
                     return
-                came = f"lines read back as {mask:b} (binary)"
+                cause = f"the lines read {mask:b} (binary), expected 0"
         raise LaserOffNotConfirmedError(
-            f"the lasers at {self._lines} may be on: {came}; treat the beams as on, cut the lasers' supply"
+            f"the lasers at {self._lines} may be on: {cause}; treat the beams as on; cut the lasers' power"
         )
 
     def state(self) -> tuple[int, bool | None]:
         """Mask of the lines that are high; the board has no interlock.
 
         Raises:
-            RigNotReadyError: it does not answer.
+            RigNotReadyError: the board does not answer.
         """
         with self._asked("read the lines"):
             return self._read(), None
 
     def _write(self, mask: int) -> None:
         levels = [bool(mask >> line & 1) for line in range(self._count)]
-        # One line takes one level, several take a list.
+        # NI-DAQmx expects a single value for one line, a list for several.
         self._task.write(levels if self._count > 1 else levels[0], auto_start=True)
 
     def _read(self) -> int:
-        came = self._task.read()
-        levels = came if isinstance(came, list) else [came]
+        read = self._task.read()
+        levels = read if isinstance(read, list) else [read]
         return sum(1 << line for line, high in enumerate(levels) if high)
 
     @contextmanager
@@ -124,5 +124,5 @@ class DigitalOutputLine:
         except Exception as error:
             raise RigNotReadyError(
                 f"lasers at {self._lines}: expected the board to {what}, got: {error};"
-                " check that NI-DAQmx is installed, the board is plugged in, and its lines are named right"
+                " check that NI-DAQmx is installed, the board is connected, and the names of its lines"
             ) from None

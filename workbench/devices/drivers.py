@@ -1,4 +1,4 @@
-"""Drivers of devices, found by entry point: each is one module, of whatever package is installed."""
+"""Look-up of device drivers by entry point, in this and other installed packages."""
 
 from __future__ import annotations
 
@@ -16,55 +16,55 @@ from workbench.model.yamlfile import FileModel
 
 
 class CameraDriver(Protocol):
-    """A class named by an entry point in the group `workbench.cameras`."""
+    """Protocol of a class named by an entry point in the group `workbench.cameras`."""
 
     settings_type: ClassVar[Any]
-    """The block `devices: camera:` of the rig file, a `DeviceBlock`."""
+    """Block `devices: camera:` of the rig file, a `DeviceBlock`."""
 
     @classmethod
     def open(cls, settings: Any, rig: Rig, beat: Callable[[], None]) -> Camera:
         """Open the camera.
 
         Args:
-            settings: the validated block, an instance of `settings_type`.
-            rig: the rig; `rig.camera` is the format that frames must have.
-            beat: to be called at least every 0.1 s while a frame is waited for, in the thread that asks for
-                it; without beats the guardian takes the workbench for hung and switches the lasers off.
+            settings: validated block, an instance of `settings_type`.
+            rig: rig; `rig.camera` is the required format of frames.
+            beat: must be called at least every 0.1 s while waiting for a frame, in the same thread. Without
+                beats the guardian assumes that the workbench hangs and switches the lasers off.
 
         Raises:
-            RigNotReadyError: the camera is missing, silent, or contradicts the rig file.
+            RigNotReadyError: the camera is missing, does not answer, or contradicts the rig file.
         """
 
 
 class TargetDriver(Protocol):
-    """A class named by an entry point in the group `workbench.targets`."""
+    """Protocol of a class named by an entry point in the group `workbench.targets`."""
 
     settings_type: ClassVar[Any]
-    """The block `devices: target:` of the rig file, a `DeviceBlock`."""
+    """Block `devices: target:` of the rig file, a `DeviceBlock`."""
 
     @classmethod
     def open(cls, settings: Any, rig: Rig) -> Target:
-        """Open what places the target.
+        """Open the device that places the target.
 
         Raises:
-            RigNotReadyError: it is missing or does not answer.
+            RigNotReadyError: the device is missing or does not answer.
         """
 
 
 @dataclass(frozen=True)
 class BenchDriver:
-    """What an entry point in the group `workbench.benches` names: devices that cannot be opened apart."""
+    """Driver of a bench whose devices are opened together (entry-point group `workbench.benches`)."""
 
     open: Callable[[Rig, Path], Bench]
-    """From the rig and the session's folder to the opened bench."""
+    """Function that opens the bench for a rig and a session folder."""
     blocks: Mapping[str, type[FileModel]]
-    """Blocks of the rig file that it reads, by their key."""
+    """Models of the rig file's blocks that the driver reads, by key."""
     virtual: bool
-    """Whether its lasers are simulated, and end with the process that switches them on."""
+    """Whether the lasers are simulated and end with the process that uses them."""
 
 
 class DriverUnusableError(Exception):
-    """No such driver is installed, or the installed one cannot be used."""
+    """A driver is not installed or cannot be used."""
 
 
 BENCHES = "workbench.benches"
@@ -73,7 +73,7 @@ PROTOCOLS: Mapping[str, type] = {
     "workbench.lasers": GuardedLine,
     "workbench.targets": TargetDriver,
 }
-"""What a driver of a device has to be, by its entry-point group."""
+"""Protocols of device drivers by entry-point group."""
 
 
 def installed(group: str) -> list[str]:
@@ -82,11 +82,11 @@ def installed(group: str) -> list[str]:
 
 
 def load_driver(group: str, name: str) -> Any:
-    """What the entry point `name` of a group names.
+    """Load the driver with the entry point `name` in a group.
 
     Raises:
-        DriverUnusableError: it is not installed, two distributions have one of that name, it cannot be
-            imported, or it is no driver of that group.
+        DriverUnusableError: the driver is not installed, is installed by two distributions, cannot be
+            imported, or does not implement the protocol of the group.
     """
     driver = _loaded(_only_point(group, name))
     problem = _contradiction(group, driver)
@@ -100,10 +100,10 @@ def load_driver(group: str, name: str) -> Any:
 def _only_point(group: str, name: str) -> EntryPoint:
     points = tuple(entry_points(group=group, name=name))
     if not points:
-        known = ", ".join(installed(group)) or "there is none"
+        known = ", ".join(installed(group)) or "none"
         raise DriverUnusableError(
             f"expected an installed driver of the group {group} ({known}), got {name}; install the package"
-            " that has it"
+            " that provides it"
         )
     if len(points) > 1:
         named = " and ".join(f"{_distribution(point)} ({point.value})" for point in points)
@@ -120,15 +120,15 @@ def _distribution(point: EntryPoint) -> str:
 def _loaded(point: EntryPoint) -> Any:
     try:
         return point.load()
-    except (Exception, SystemExit) as error:  # a foreign module's, of any kind, such as a missing library
+    except (Exception, SystemExit) as error:  # code of other packages may raise anything
         raise DriverUnusableError(
             f"driver {point.name}: expected {point.value} to be importable, got {type(error).__name__}:"
-            f" {error}; install its package anew, with the libraries that it needs"
+            f" {error}; reinstall its package with the libraries that it needs"
         ) from None
 
 
 def _contradiction(group: str, driver: Any) -> str | None:
-    """Where a driver contradicts its group's protocol; None: nowhere."""
+    """Description of how a driver contradicts the protocol of its group; None if it does not."""
     if group == BENCHES:
         return None if isinstance(driver, BenchDriver) else f"expected a BenchDriver, got {driver!r}"
     protocol = PROTOCOLS[group]

@@ -1,6 +1,6 @@
-"""The lasers of a rig, whatever their driver.
+"""Lasers of a rig, with any driver.
 
-A guardian process holds the device, and switches the lasers off when this process no longer can
+A guardian process holds the device and switches the lasers off when this process no longer can
 (docs/laser-controller.md).
 """
 
@@ -18,14 +18,15 @@ from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import BadInputError
 
 HANG_S = 0.5
-"""Time without a beat after which whatever is lit goes off, s."""
+"""Time without a beat after which lasers are switched off, s."""
 BOOT_S = 3.0
-"""Time for a controller that boots when its port is opened, as an Arduino does, s."""
+"""Time for a controller that boots when its port is opened, such as an Arduino, s."""
 LONGEST_LEASE_S = 60.0
+"""Longest accepted lease, s."""
 
 
 class GuardedLaserBank:
-    """The lasers `ids`, in the order of the device's lines 1, 2, ...; see `protocols.LaserBank`."""
+    """Lasers `ids`, in the order of the device's lines 1, 2, ...; see `protocols.LaserBank`."""
 
     def __init__(
         self,
@@ -39,18 +40,18 @@ class GuardedLaserBank:
         """Start the guardian, which opens the device and switches every laser off.
 
         Args:
-            line_type: the laser driver.
-            settings: its block of the rig file.
+            line_type: class of the laser driver.
+            settings: block of the rig file.
             ids: lasers in the order of the lines.
-            boot_s: time in which the device has to answer, s.
-            hang_s: time without a beat after which lasers go off, s.
+            boot_s: time in which the device must answer, s.
+            hang_s: time without a beat after which lasers are switched off, s.
             virtual: whether the beams are simulated.
 
         Raises:
             BadInputError: the device has fewer outputs than there are lasers.
-            RigNotReadyError: no such device, another program holds it, or it could not be identified and
-                confirmed that all are off.
-            LaserOffNotConfirmedError: the device was opened, and does not confirm that all are off.
+            RigNotReadyError: the device is missing or held by another program; or it was not identified, but
+                confirmed that all lasers are off.
+            LaserOffNotConfirmedError: the opened device does not confirm that all lasers are off.
         """
         self.ids = tuple(ids)
         self._guardian = GuardianClient(line_type, settings, len(ids), boot_s, hang_s, virtual)
@@ -59,11 +60,11 @@ class GuardedLaserBank:
 
     @contextlib.contextmanager
     def lit(self, ids: Sequence[str], for_s: float) -> Iterator[None]:
-        """Hold `ids` lit inside the block, for at most `for_s` seconds; see `protocols.LaserBank`."""
+        """Hold `ids` on inside the block, for at most `for_s` seconds; see `protocols.LaserBank`."""
         mask = self._mask(ids)
         if not 0 < for_s <= LONGEST_LEASE_S:
             raise BadInputError(
-                f"a lease: expected more than 0 and at most {LONGEST_LEASE_S:g} s, got {for_s:g}"
+                f"lease: expected more than 0 and at most {LONGEST_LEASE_S:g} s, got {for_s:g}"
             )
         try:
             self._guardian.ask(f"LIT {mask} {math.ceil(for_s * 1000)}")
@@ -73,22 +74,22 @@ class GuardedLaserBank:
             self.all_off()
 
     def beat(self) -> None:
-        """See `protocols.LaserBank`; without effect while all are off."""
+        """Renew the lease, see `protocols.LaserBank`; without effect while all lasers are off."""
         if self._lit:
-            self._guardian.tell("BEAT")
+            self._guardian.send("BEAT")
 
     def all_off(self) -> None:
         """Switch every laser off and verify it at the device.
 
         Raises:
             LaserOffNotConfirmedError: the device does not confirm it.
-            RigNotReadyError, StoppedError: they are off, but went off before this was called.
+            RigNotReadyError, StoppedError: the lasers are off, but were switched off before this call.
         """
         self._lit = False
         self._guardian.ask("OFF")
 
     def state(self) -> LaserState:
-        """What is on at this moment, and the interlock.
+        """Present state of lasers and interlock.
 
         Raises:
             RigNotReadyError: the device does not answer.
@@ -98,7 +99,7 @@ class GuardedLaserBank:
         return LaserState(lit, interlock_closed)
 
     def close(self) -> None:
-        """All off, then release the device; the errors of `all_off`."""
+        """Switch all lasers off, then release the device; raises the errors of `all_off`."""
         if not self._guardian.is_open:
             return
         try:
@@ -109,5 +110,6 @@ class GuardedLaserBank:
     def _mask(self, ids: Sequence[str]) -> int:
         unknown = [name for name in ids if name not in self.ids]
         if unknown or not ids:
-            raise BadInputError(f"lasers to light: expected some of {', '.join(self.ids)}, got {list(ids)}")
+            got = ", ".join(ids) or "none"
+            raise BadInputError(f"lasers to switch on: expected some of {', '.join(self.ids)}, got {got}")
         return sum(1 << self.ids.index(name) for name in set(ids))

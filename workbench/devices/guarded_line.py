@@ -1,10 +1,10 @@
-"""What a laser driver is: a line of outputs, held by the guardian process alone.
+"""Protocol of a laser driver: outputs that only the guardian process holds.
 
-A laser driver is one class with the members of `GuardedLine`, named by an entry point in the group
+A laser driver is a class with the members of `GuardedLine`, named by an entry point in the group
 `workbench.lasers`. The workbench reads its `settings_type` and `has_leases`; an instance exists only in the
-guardian, which imports the class by its module and name. So the driver's module must be importable by both,
-light (the guardian starts with it), and free of effects when it is imported; a vendor's package is imported
-in the constructor.
+guardian, which imports the class by module and name. The driver's module must therefore be importable by
+both, import little (the guardian starts with it), and have no effects on import. Import a vendor's package in
+the constructor.
 """
 
 from __future__ import annotations
@@ -17,55 +17,54 @@ from typing import Any, ClassVar, Protocol
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, WorkbenchError
 
 TRY_BOARD_S = 60.0
-"""Time for which a guardian without its workbench tries to put off lasers that no lease of the hardware
-ends, s."""
+"""Time for which a guardian without its workbench tries to switch off hardware that has no leases, s."""
 
 
 class GuardedLine(Protocol):
     """Outputs that switch lasers: bit n of a mask is laser n + 1 of the rig file.
 
-    Every call returns within about a second. An error that is none of the workbench's, `SystemExit` included,
-    becomes a `RigNotReadyError`, from `all_off` a `LaserOffNotConfirmedError`.
+    Every call must return within about a second. Exceptions other than the workbench's, including
+    `SystemExit`, become a `RigNotReadyError`, in `all_off` a `LaserOffNotConfirmedError`.
     """
 
     settings_type: ClassVar[Any]
-    """The block `devices: lasers:` of the rig file, a `DeviceBlock`. Its validators find the `Rig` as their
-    context in the workbench, and no context in the guardian."""
+    """Block `devices: lasers:` of the rig file, a `DeviceBlock`. The context of its validators is the `Rig`
+    in the workbench, and None in the guardian."""
     has_leases: ClassVar[bool]
-    """Whether the hardware switches off by itself when a lease ends. Where it does not, the guardian's clock
-    is all that ends an emission, and an off that is not confirmed is tried again for `TRY_BOARD_S`."""
+    """Whether the hardware switches off by itself when a lease ends. If not, only the guardian's clock ends
+    an emission, and an unconfirmed off is tried again for `TRY_BOARD_S`."""
 
     def __init__(self, settings: Any, lasers: int, alarm: Callable[[], bool]) -> None:
-        """Open the device, which nothing else may hold, and switch nothing on.
+        """Open the device exclusively, without switching anything on.
 
         Args:
-            settings: the validated block, an instance of `settings_type`.
+            settings: validated block, an instance of `settings_type`.
             lasers: number of lasers of the rig.
-            alarm: whether the lasers have to go off at once. A call of `light` that waits longer than some
-                20 ms asks it meanwhile, and switches off and raises when it says so.
+            alarm: whether the lasers must be switched off at once. If `light` waits longer than about 20 ms,
+                it must call this meanwhile; on true it must switch off and raise an error.
 
         Raises:
-            BadInputError: the settings do not suit the device, such as fewer outputs than lasers.
+            BadInputError: the settings do not fit the device, for example fewer outputs than lasers.
             RigNotReadyError: the device is missing or held by another program.
         """
 
     def identify(self, boot_s: float) -> str:
-        """Name of the device. A device that boots when it is opened has `boot_s` to answer.
+        """Name of the device, which has `boot_s` to boot after it was opened.
 
-        The guardian calls this first, then `all_off`, also where this fails. A device that may have been left
-        on is switched off here or in the constructor, before it is asked anything.
+        The guardian calls this first, then `all_off`, even after a failure. A device that may have been left
+        on must be switched off here or in the constructor, before other requests.
 
         Raises:
-            RigNotReadyError: it does not answer as expected.
+            RigNotReadyError: there is no valid answer.
         """
 
     def light(self, mask: int, lease_ms: int) -> None:
         """Switch the lasers of `mask` on and the others off, for a lease.
 
-        Hardware with leases switches off when `lease_ms` have gone without another call.
+        Hardware with leases switches off `lease_ms` after the last call.
 
         Raises:
-            RigNotReadyError: refused, as by an open interlock, or not answered.
+            RigNotReadyError: the request is refused (open interlock) or not answered.
         """
 
     def all_off(self) -> None:
@@ -76,7 +75,7 @@ class GuardedLine(Protocol):
         """
 
     def state(self) -> tuple[int, bool | None]:
-        """Mask of the lasers that are on; whether the interlock is closed, None where that is not known.
+        """Mask of the lasers that are on, and whether the interlock is closed (None: unknown).
 
         Raises:
             RigNotReadyError: the device does not answer.
@@ -84,40 +83,40 @@ class GuardedLine(Protocol):
 
 
 class CheckedLine:
-    """A line whose every failure is the workbench's error: a defect of a driver must not end the guardian."""
+    """Laser driver whose failures are errors of the workbench: a defect of it must not end the guardian."""
 
     def __init__(self, line: GuardedLine) -> None:
         self._line = line
         self.has_leases = line.has_leases
 
     def identify(self, boot_s: float) -> str:
-        """As the line's."""
+        """See `GuardedLine`."""
         with driver_errors():
             return str(self._line.identify(boot_s))
 
     def light(self, mask: int, lease_ms: int) -> None:
-        """As the line's.
+        """See `GuardedLine`.
 
         Raises:
-            RigNotReadyError: it failed, however.
+            RigNotReadyError: the driver failed in any way.
         """
         with driver_errors(only=RigNotReadyError):
             self._line.light(mask, lease_ms)
 
     def all_off(self) -> None:
-        """As the line's.
+        """See `GuardedLine`.
 
         Raises:
-            LaserOffNotConfirmedError: it failed, however.
+            LaserOffNotConfirmedError: the driver failed in any way.
         """
         with driver_errors(only=LaserOffNotConfirmedError, raised=LaserOffNotConfirmedError):
             self._line.all_off()
 
     def state(self) -> tuple[int, bool | None]:
-        """As the line's.
+        """See `GuardedLine`.
 
         Raises:
-            RigNotReadyError: it failed, however.
+            RigNotReadyError: the driver failed in any way.
         """
         with driver_errors(only=RigNotReadyError):
             mask, interlock_closed = self._line.state()
@@ -135,11 +134,11 @@ def open_line(
     """Import a laser driver and open its device.
 
     Args:
-        reference: of the driver, see `line_reference`.
-        settings_json: its block.
+        reference: reference to the driver, see `line_reference`.
+        settings_json: block of the rig file.
         lasers: number of lasers.
         alarm: see `GuardedLine`.
-        ready: called between the import and the opening.
+        ready: called after the import and before opening the device.
 
     Raises:
         WorkbenchError: see `GuardedLine`.
@@ -158,20 +157,20 @@ def open_line(
 def driver_errors(
     only: type[WorkbenchError] = WorkbenchError, raised: type[WorkbenchError] = RigNotReadyError
 ) -> Iterator[None]:
-    """Let errors of the kind `only` pass; every other one is `raised` in its place."""
+    """Pass errors of the type `only`; replace every other exception by one of the type `raised`."""
     try:
         yield
     except only:
         raise
-    except BaseException as error:  # SystemExit, too: a driver must not end the guardian with a laser on
+    except BaseException as error:  # including SystemExit, which would end the guardian with a laser on
         raise raised(
             f"laser driver: {_error_text(error)}; check the device, its settings, and the driver"
         ) from None
 
 
 def _error_text(error: BaseException) -> str:
-    """Message of an error of the workbench; of another one with its kind."""
+    """Message of an exception, with the type of one that is not the workbench's."""
     try:
         return str(error) if isinstance(error, WorkbenchError) else f"{type(error).__name__}: {error}"
-    except Exception:  # a foreign package's error whose own text fails
+    except Exception:  # an exception of another package whose text cannot be formatted
         return type(error).__name__

@@ -1,23 +1,23 @@
-"""The guardian: a process of its own that holds the lasers' device for the workbench.
+"""Guardian: a separate process that holds the lasers' device for the workbench.
 
-It is called with the laser driver (`module:name` of a `GuardedLine`) and its settings, and stays light: it
-imports that driver, the base of settings, and the errors.
+Its arguments are the laser driver (`module:name` of a `GuardedLine`) and its settings. It imports only that
+driver, the base class of settings, and the errors, so that it starts quickly.
 
-It takes commands on standard input, one a line, and answers on standard output, one JSON object a line, which
-repeats the command's number:
+It reads commands from standard input, one per line, and writes answers to standard output, one JSON object
+per line with the command's number:
 
-    <n> LIT <mask> <ms>   light these lasers, for a lease
-    <n> OFF               all off, verified; reports what went wrong since LIT
-    <n> STATE             what is lit, and the interlock
-    BEAT                  the workbench is at work; no answer
+    <n> LIT <mask> <ms>   switch these lasers on, for a lease
+    <n> OFF               switch all off and verify; reports failures since LIT
+    <n> STATE             lasers that are on, and the interlock
+    BEAT                  the workbench is working; no answer
 
-The first answer, number 0 and unasked, is the device's identity. A second descriptor brings the numbers of
-signals that the workbench got, one byte each, written by its C-level signal handler.
+The first answer, number 0 without a command, is the device's identity. A second descriptor receives the
+numbers of signals to the workbench, one byte each, written by its C-level signal handler.
 
-It switches everything off when the workbench ends in whatever way, when a signal ends it (SIGTERM, SIGHUP),
-and when no beat came for `hang_s` while something was lit. The last is left to the device's clock: it never
-gets a lease longer than `hang_s`, and each beat renews that. For a device without leases, such as a digital
-output board, it is the guardian's clock.
+The guardian switches all lasers off when the workbench ends in any way or gets SIGTERM or SIGHUP. It also
+does so when no beat has come for `hang_s` while a laser was on. The device's clock enforces the last rule: it
+never gets a lease longer than `hang_s`, and each beat renews the lease. For a device without leases, such as
+a digital output board, the guardian's clock enforces it.
 """
 
 from __future__ import annotations
@@ -38,21 +38,22 @@ from workbench.devices.guarded_line import TRY_BOARD_S, CheckedLine, driver_erro
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError, WorkbenchError
 
 LOOK_S = 0.02
-"""Time between two checks that the workbench is alive, while something is lit, s. They find an end that the
-pipe does not show: a stray child holds it open, or the workbench has had no turn to end."""
+"""Interval of checks that the workbench is alive while a laser is on, s. They detect an end that the pipe
+does not show: a child process keeps it open, or the workbench has not been scheduled."""
 TRY_ALONE_S = 1.0
-"""Time for which the guardian tries to switch off once the workbench is gone, s: twice the longest lease."""
+"""Time for which the guardian tries to switch off after the workbench's end, s: twice the longest lease."""
 RENEW = 5
-"""A lease is renewed when this fraction of it, 1/RENEW, has gone."""
+"""A lease is renewed after the fraction 1/RENEW of its duration."""
 AT_ONCE = {int(signal.SIGTERM), int(signal.SIGHUP)}
+"""Signals to the workbench on which the lasers are switched off at once."""
 STAT_FLAGS = 6
-"""In /proc/PID/stat, counted from what comes after the process's name."""
+"""Index of the flags in /proc/PID/stat, counted after the process's name."""
 ENDING = 0x4 | 0x200 | 0x400
 """PF_EXITING, PF_DUMPCORE, PF_SIGNALED of the kernel's include/linux/sched.h."""
 
 
 class Workbench:
-    """The process that started the guardian, as the guardian sees it."""
+    """Process that started the guardian, observed by the guardian."""
 
     def __init__(self, commands: int, signals: int) -> None:
         self._commands, self._signals = commands, signals
@@ -60,15 +61,15 @@ class Workbench:
         self._heard = b""
         self.gone = False
         self.end_signal: str | None = None
-        """Name of the signal that ends it."""
+        """Name of the signal that ends the workbench; None without one."""
 
     def alarm(self) -> bool:
-        """Whether the lasers have to go off at once."""
+        """Whether the lasers must be switched off at once."""
         self._look(0.0)
         return self.gone or self.end_signal is not None
 
     def command(self, wait_s: float | None) -> str | None:
-        """The next command; None when something else came, or nothing in `wait_s` (None: no limit)."""
+        """Next command; None after another event or without one in `wait_s` (None: no limit)."""
         if b"\n" not in self._heard:
             self._look(wait_s)
         line, found, rest = self._heard.partition(b"\n")
@@ -83,23 +84,23 @@ class Workbench:
             for number in AT_ONCE & set(os.read(self._signals, 64)):
                 self.end_signal = signal.Signals(number).name
         if self._commands in ready:
-            came = os.read(self._commands, 4096)
-            self._heard += came
-            self.gone = self.gone or not came
-        gone, pending = _end_to_come(self._pid)
+            received = os.read(self._commands, 4096)
+            self._heard += received
+            self.gone = self.gone or not received
+        gone, pending = _pending_end(self._pid)
         self.end_signal = self.end_signal or pending
         self.gone = self.gone or gone or os.getppid() != self._pid
 
 
-def _end_to_come(pid: int) -> tuple[bool, str | None]:
-    """Whether a process is about to end, and a signal that is pending for it.
+def _pending_end(pid: int) -> tuple[bool, str | None]:
+    """Whether a process is about to end, and the name of a pending signal.
 
-    A process ends, and takes a signal, when the computer lets it run, and its pipes close after its core is
-    dumped and its memory given back. The kernel shows both before, in /proc (proc(5)).
+    A process handles signals and ends only when it is scheduled, and its pipes close only after its core is
+    dumped and its memory released. The kernel shows both earlier in /proc (proc(5)).
     """
     try:
         if Path("/proc/self").readlink() != Path(str(os.getpid())):
-            return False, None  # of another namespace: that number is another process there
+            return False, None  # /proc of another namespace, where the number is another process
         status = Path(f"/proc/{pid}/status").read_bytes()
         stat = Path(f"/proc/{pid}/stat").read_bytes()
     except OSError:
@@ -117,26 +118,27 @@ def _end_to_come(pid: int) -> tuple[bool, str | None]:
 
 @dataclass
 class Lease:
-    """What is lit, and until when. Times are of the monotonic clock, s."""
+    """Lasers that are on, and until when. Times are of the monotonic clock, s."""
 
     mask: int
     ends: float
-    """End that the workbench asked for."""
+    """End that the workbench requested."""
     renewed: float = 0.0
+    """Time of the last renewal."""
     held_until: float = 0.0
-    """End of the device's own lease."""
+    """End of the device's lease."""
 
 
 class Guardian:
-    """Serves one workbench on one device."""
+    """Server of one workbench on one device."""
 
     def __init__(self, workbench: Workbench, line: CheckedLine, answers: int, hang_s: float) -> None:
         self._workbench, self._line, self._answers, self._hang_s = workbench, line, answers, hang_s
         self._lease: Lease | None = None
         self._failure: WorkbenchError | None = None
-        """Why lasers went off that the workbench takes for lit; reported with the next OFF."""
+        """Cause of an off that the workbench does not know of; reported with the next OFF."""
         self._may_be_on = False
-        """Whether an off was not confirmed that no lease of the hardware makes good: it is tried again."""
+        """Whether an off was not confirmed and no lease of the hardware replaces it; it is tried again."""
 
     def serve(self) -> int:
         """Serve until the workbench is gone, then switch off; returns the exit code."""
@@ -150,7 +152,7 @@ class Guardian:
         while not self._workbench.gone:
             command = self._workbench.command(self._wait_s())
             if self._workbench.gone:
-                break  # what it asked for last is not done any more
+                break  # the last command is not executed
             if self._lease is not None and self._workbench.end_signal is not None:
                 self._put_off(self._stopped())
             if command is not None:
@@ -161,7 +163,7 @@ class Guardian:
                 self._put_off(self._failure)
 
     def _wait_s(self) -> float | None:
-        """Time until something has to be checked, s; None: nothing is lit."""
+        """Time until the next check, s; None: no laser is on."""
         if self._lease is None:
             return LOOK_S if self._may_be_on else None
         return min(LOOK_S, max(0.0, self._lease.held_until - time.monotonic()))
@@ -195,7 +197,7 @@ class Guardian:
         if lease is None or lease.held_until >= lease.ends:
             return
         if now >= lease.held_until:
-            self._end_of_lease(lease)  # what has gone off is not lit again
+            self._end_of_lease(lease)  # an expired lease is not renewed
         elif now >= lease.renewed + self._hang_s / RENEW:
             try:
                 self._renew(lease)
@@ -206,15 +208,15 @@ class Guardian:
         lease.renewed = time.monotonic()
         hold_s = min(self._hang_s, lease.ends - lease.renewed)
         lease.held_until = lease.renewed + hold_s
-        # A hair less than a whole millisecond is not one more.
+        # The tolerance keeps rounding errors from adding a millisecond.
         self._line.light(lease.mask, max(1, math.ceil(hold_s * 1000 - 1e-3)))
 
     def _end_of_lease(self, lease: Lease) -> None:
         hung = lease.held_until < lease.ends
         self._put_off(
             RigNotReadyError(
-                f"the lasers were put off: the workbench was silent for {self._hang_s:g} s while they were"
-                " lit. Was it suspended, or the computer too busy? Take this capture anew"
+                f"the lasers were switched off: no sign of life from the workbench for {self._hang_s:g} s"
+                " while they were on; it was suspended, or the computer too busy. Take this capture again"
             )
             if hung
             else None
@@ -240,10 +242,10 @@ class Guardian:
         self._may_be_on = False
 
     def _stopped(self) -> StoppedError:
-        return StoppedError(f"stopped by {self._workbench.end_signal}; the lasers were put off at once")
+        return StoppedError(f"stopped by {self._workbench.end_signal}; the lasers were switched off at once")
 
     def leave(self) -> int:
-        """Switch off, trying for a while: the workbench is gone. Returns the exit code."""
+        """Switch off after the workbench's end, repeatedly if necessary. Returns the exit code."""
         try:
             keep_trying_off(self._line, TRY_ALONE_S if self._line.has_leases else TRY_BOARD_S)
         except LaserOffNotConfirmedError as error:
@@ -254,10 +256,10 @@ class Guardian:
 
 
 def keep_trying_off(line: CheckedLine, for_s: float) -> None:
-    """Switch every laser off; an off that is not confirmed is tried again for `for_s` seconds.
+    """Switch every laser off; an unconfirmed off is tried again for `for_s` seconds.
 
     Raises:
-        LaserOffNotConfirmedError: the last try failed, too.
+        LaserOffNotConfirmedError: the last attempt failed.
     """
     deadline = time.monotonic() + for_s
     while True:
@@ -272,7 +274,7 @@ def keep_trying_off(line: CheckedLine, for_s: float) -> None:
 
 
 def identify_dark(line: CheckedLine, boot_s: float) -> str:
-    """Identity of a device that has just been opened; whatever `identify` does, every laser is off then.
+    """Identity of a newly opened device; every laser is off afterwards, even if `identify` fails.
 
     Raises:
         LaserOffNotConfirmedError: the off is not confirmed, and no lease of the hardware ends an emission.
@@ -284,7 +286,7 @@ def identify_dark(line: CheckedLine, boot_s: float) -> str:
         try:
             keep_trying_off(line, TRY_ALONE_S)
         except LaserOffNotConfirmedError as unconfirmed:
-            if line.has_leases:  # the hardware ends an emission by itself, if this is that hardware at all
+            if line.has_leases:  # the hardware ends an emission by itself
                 raise error from None
             raise LaserOffNotConfirmedError(
                 f"{unconfirmed}. The device was not identified: {error}"
@@ -295,31 +297,31 @@ def identify_dark(line: CheckedLine, boot_s: float) -> str:
 
 
 def answer(answers: int, number: int, act: Callable[[], object]) -> int:
-    """Do something and write the outcome to the workbench, which may be gone; returns an exit code.
+    """Call a function and write its result to the workbench, which may have ended; returns an exit code.
 
-    A value that has no JSON is the driver's defect, and is answered as such.
+    A result that JSON cannot represent is a defect of the driver and is answered as an error.
     """
     code = 0
     try:
         value = act()
         with driver_errors():
-            said = json.dumps({"to": number, "value": value})
+            line = json.dumps({"to": number, "value": value})
     except WorkbenchError as error:
-        said = json.dumps({"to": number, "error": public_name(error), "text": str(error)})
+        line = json.dumps({"to": number, "error": public_name(error), "text": str(error)})
         code = error.exit_code
     with suppress(OSError):
-        os.write(answers, said.encode() + b"\n")
+        os.write(answers, line.encode() + b"\n")
     return code
 
 
 def public_name(error: WorkbenchError) -> str:
-    """Name in `workbench.model.errors` of an error's class, or of its base where a driver derived it."""
+    """Name in `workbench.model.errors` of an error's class, or of its base class if a driver derived one."""
     return next(kind.__name__ for kind in type(error).__mro__ if kind.__module__ == WorkbenchError.__module__)
 
 
 def main(line: str, settings: str, lasers: int, boot_s: float, hang_s: float, signals: int) -> int:
-    """Hold the device until the workbench is gone."""
-    # What a terminal, or a system that goes down, sends to everybody. The workbench's end is what counts.
+    """Hold the device until the workbench ends; returns the exit code."""
+    # Signals that a terminal or a system shutdown sends to all processes: only the workbench's end counts.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
         signal.signal(number, signal.SIG_IGN)
     answers = _keep_answers()
@@ -338,17 +340,17 @@ def main(line: str, settings: str, lasers: int, boot_s: float, hang_s: float, si
 
 
 def _hurry() -> None:
-    """Run before all else on a busy computer, where that is allowed: the guardian sleeps nearly always."""
+    """Set real-time priority if permitted; the guardian sleeps almost always."""
     with suppress(AttributeError, OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
 
 
 def _keep_answers() -> int:
-    """Descriptor for answers. What a driver's libraries print goes nowhere: it would pass for an answer."""
+    """Descriptor for answers; standard output is redirected, so that a driver's output is no answer."""
     answers = os.dup(sys.stdout.fileno())
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, sys.stdout.fileno())
+    os.close(null)
     return answers
 
 

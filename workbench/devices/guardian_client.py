@@ -1,4 +1,4 @@
-"""The workbench's end of the guardian: start it, exchange commands and answers, pass signals on to it."""
+"""Client of the guardian in the workbench: starts it, exchanges commands and answers, passes signals on."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from workbench.model.errors import (
 )
 
 ANSWER_S = 10.0
-"""Longest time to wait for an answer, s: twice two requests of a second, and a busy computer."""
+"""Longest wait for an answer, s: two attempts of two requests of a second, and a busy computer."""
 LET_GO_S = 3.0
-"""Time for a guardian to end where no lease ends an emission and the off is not confirmed, s."""
-DARK = {0, BadInputError.exit_code, RigNotReadyError.exit_code}
-"""A guardian's exit codes that need no warning: the off was confirmed, or the device could not be opened."""
+"""Time for a guardian to end if the hardware has no leases and the off is not confirmed, s."""
+SAFE_CODES = {0, BadInputError.exit_code, RigNotReadyError.exit_code}
+"""Exit codes of a guardian that need no warning: the off was confirmed, or the device was not opened."""
 
 
 class GuardianClient:
-    """A guardian process, see `guardian.py`. It holds the device until this is closed or its process ends."""
+    """Guardian process, see `guardian.py`, which holds the device until this client is closed or ends."""
 
     def __init__(
         self,
@@ -42,21 +42,21 @@ class GuardianClient:
         hang_s: float,
         virtual: bool = False,
     ) -> None:
-        """Start it, and wait until every laser is off.
+        """Start the guardian and wait until every laser is off.
 
         Args:
-            line_type: the laser driver.
-            settings: its block of the rig file.
+            line_type: class of the laser driver.
+            settings: block of the rig file.
             lasers: number of lasers.
-            boot_s: time in which the device has to answer, s.
-            hang_s: time without a beat after which lasers go off, s.
-            virtual: whether the beams are simulated: the guardian then writes nothing to the terminal.
+            boot_s: time in which the device must answer, s.
+            hang_s: time without a beat after which lasers are switched off, s.
+            virtual: whether the beams are simulated; the guardian then writes nothing to the terminal.
 
         Raises:
             BadInputError: the device has fewer outputs than there are `lasers`.
-            RigNotReadyError: no such device, another program holds it, or it could not be identified and
-                confirmed that all are off.
-            LaserOffNotConfirmedError: the device was opened, and does not confirm that all are off.
+            RigNotReadyError: the device is missing or held by another program; or it was not identified, but
+                confirmed that all lasers are off.
+            LaserOffNotConfirmedError: the opened device does not confirm that all lasers are off.
         """
         commands, self._commands = os.pipe()
         self._answers, answers = os.pipe()
@@ -64,17 +64,17 @@ class GuardianClient:
         os.set_blocking(self._signals, False)
         line = [line_reference(line_type), settings.model_dump_json(by_alias=True, exclude_unset=True)]
         call = [*line, str(lasers), str(boot_s), str(hang_s), str(signals)]
-        # -P: what lies in the current folder is not imported. A session of its own: no terminal reaches it.
-        said = os.open(os.devnull, os.O_WRONLY) if virtual else _last_words()
+        # -P excludes the current folder from imports. A new session shields it from the terminal's signals.
+        messages = os.open(os.devnull, os.O_WRONLY) if virtual else _open_terminal()
         self._process = subprocess.Popen(  # noqa: S603 - this very program
             [sys.executable, "-P", "-m", "workbench.devices.guardian", *call],
             stdin=commands,
             stdout=answers,
-            stderr=said,
+            stderr=messages,
             pass_fds=[signals],
             start_new_session=True,
         )
-        for theirs in (commands, answers, signals, said):
+        for theirs in (commands, answers, signals, messages):
             os.close(theirs)
         self._has_leases = line_type.has_leases
         self.is_open = True
@@ -83,7 +83,7 @@ class GuardianClient:
         self._unconfirmed = (
             "the lasers may be on: it was not confirmed that they are off; treat the beams as on"
         )
-        """Reason that the guardian gave last for an off that was not confirmed."""
+        """Last reason of the guardian for an unconfirmed off."""
         self._before: int | None = None
         try:
             self.identity = str(self._answer(0, ANSWER_S + boot_s))
@@ -91,35 +91,35 @@ class GuardianClient:
             self.close()
             raise
         if threading.current_thread() is threading.main_thread():
-            # The interpreter's C-level handler writes a signal's number there, whatever Python code is at.
+            # The interpreter's C-level handler writes signal numbers there, independent of Python code.
             self._before = signal.set_wakeup_fd(self._signals, warn_on_full_buffer=False)
 
     def ask(self, command: str) -> object:
-        """The answer to a command.
+        """Send a command and return its answer.
 
         Raises:
-            WorkbenchError: what the guardian could not do, by its name.
+            WorkbenchError: the guardian reports an error of this class.
             LaserOffNotConfirmedError: the guardian does not answer.
         """
-        # Numbered: a signal may have raised while an earlier answer was awaited, which is still to come.
+        # Numbered, because a signal may have interrupted the wait for an earlier answer.
         self._asked += 1
-        self.tell(f"{self._asked} {command}")
+        self.send(f"{self._asked} {command}")
         return self._answer(self._asked, ANSWER_S)
 
-    def tell(self, command: str) -> None:
-        """A command without an answer. A guardian that is gone shows at the next `ask`."""
+    def send(self, command: str) -> None:
+        """Send a command without an answer. The next `ask` detects a guardian that has ended."""
         if not self.is_open:
-            raise ValueError("the guardian was let go: its descriptors may belong to another file now")
+            raise ValueError("the client is closed: its descriptors may belong to another file now")
         with contextlib.suppress(BrokenPipeError):
             os.write(self._commands, f"{command}\n".encode())
 
     def close(self) -> None:
-        """Let it go: it switches everything off and ends.
+        """Have the guardian switch all lasers off and end.
 
-        Where no lease of the hardware ends an emission, a guardian that does not end is left trying.
+        If the hardware has no leases, a guardian that does not end in time continues to try.
 
         Raises:
-            LaserOffNotConfirmedError: it is, or it ended without having confirmed that all are off.
+            LaserOffNotConfirmedError: the guardian continues to try, or ended without a confirmed off.
         """
         if not self.is_open:
             return
@@ -133,7 +133,7 @@ class GuardianClient:
         except LaserOffNotConfirmedError:
             raise
         except BaseException:
-            # Another stop was asked for. An off that is not confirmed counts more than that.
+            # A further stop request: an unconfirmed off has priority over it.
             self._wait_for_off()
             raise
 
@@ -142,15 +142,15 @@ class GuardianClient:
             code = self._process.wait(ANSWER_S if self._has_leases else LET_GO_S)
         except subprocess.TimeoutExpired:
             if not self._has_leases:
-                # Its exit status has to be collected.
+                # A thread collects its exit status.
                 threading.Thread(target=self._process.wait, daemon=True).start()
                 raise LaserOffNotConfirmedError(
-                    f"{self._unconfirmed}. The guardian (process {self._process.pid}) goes on trying for some"
-                    f" {TRY_BOARD_S:g} s, and holds the board as long; then run `workbench lasers off`"
+                    f"{self._unconfirmed}. The guardian (process {self._process.pid}) holds the board and"
+                    f" tries again for {TRY_BOARD_S:g} s; then run `workbench lasers off`"
                 ) from None
             self._process.kill()
             code = self._process.wait()
-        if code not in DARK:
+        if code not in SAFE_CODES:
             raise LaserOffNotConfirmedError(self._unconfirmed)
 
     def _answer(self, number: int, wait_s: float) -> object:
@@ -167,23 +167,23 @@ class GuardianClient:
     def _next_answer(self, deadline: float) -> dict[str, object]:
         while b"\n" not in self._heard:
             ready, _, _ = select.select([self._answers], [], [], max(0.0, deadline - time.monotonic()))
-            came = os.read(self._answers, 4096) if ready else b""
-            if not came:
+            received = os.read(self._answers, 4096) if ready else b""
+            if not received:
                 raise LaserOffNotConfirmedError(
-                    f"the guardian of the laser controller {'does not answer' if not ready else 'is gone'};"
-                    " a controller's lease ends by itself, but nobody verified it: treat the beams as on,"
-                    " then run `workbench lasers off`"
+                    f"the guardian of the laser controller {'does not answer' if not ready else 'has ended'};"
+                    " the controller's lease ends by itself, but that was not verified: treat the beams as"
+                    " on, then run `workbench lasers off`"
                 )
-            self._heard += came
+            self._heard += received
         line, _, self._heard = self._heard.partition(b"\n")
         answer: dict[str, object] = json.loads(line)
         return answer
 
 
-def _last_words() -> int:
-    """Descriptor for what the guardian has to say after this process ended: the terminal, if there is one.
+def _open_terminal() -> int:
+    """Descriptor for messages of the guardian after the end of this process: the terminal, if there is one.
 
-    Not our standard error: the guardian outlives us, and a reader of that stream would wait for its end.
+    Not standard error, because the guardian ends later and a reader of that stream would wait for it.
     """
     try:
         return os.open("/dev/tty", os.O_WRONLY | os.O_NOCTTY)

@@ -1,4 +1,4 @@
-"""The camera driver `opencv`: a device, a network stream or a video file that OpenCV opens."""
+"""Camera driver `opencv`: a device, a network stream or a video file that OpenCV opens."""
 
 from __future__ import annotations
 
@@ -21,41 +21,40 @@ from workbench.model.exposure import WIDEST
 from workbench.model.rig import CameraSpec, Name, PositiveFloat, Rig
 
 SILENT_S = 1.5
-"""Time without a frame after which a camera counts as unplugged, s: it is reported within two seconds."""
+"""Time without a frame after which a camera counts as unplugged, s; reported within two seconds."""
 LOOK_S = 0.05
-"""Time between two beats while a frame is awaited, s."""
+"""Interval of beats while waiting for a frame, s."""
 BACKLOG = 32
-"""Number of frames kept for a caller that reads them one by one."""
+"""Number of frames that are kept for a caller that reads them one by one."""
 MANUAL_EXPOSURE = 1.0
 """Value of V4L2's `exposure_auto`."""
 COARSEST_STEP = 2.0
-"""Largest factor between a requested exposure and the one that the camera sets."""
+"""Largest ratio between a requested exposure and the one that the camera sets."""
 SAME = 0.005
 """Relative difference below which a setting counts as set as requested."""
 
 
 class OpenCvBlock(DeviceBlock):
-    """The block `devices: camera:` of the rig file. Settings are in the camera's units, and are read back."""
+    """Block `devices: camera:` of the rig file. Settings are in the camera's units and are read back."""
 
     source: Name
-    """Number of a device, its path, the URL of a stream, or a video file."""
+    """Number or path of a device, URL of a stream, or a video file."""
     pixel_format: Annotated[str, Field(pattern=r"^[ -~]{4}$")] | None = None
-    """Four letters, as YUYV or GREY."""
+    """Four letters, such as YUYV or GREY."""
     exposure: float | None = None
     exposure_limits: tuple[PositiveFloat, PositiveFloat] | None = None
-    """Shortest and longest to choose from at each placement, beginning with `exposure`; None: `exposure` is
-    kept."""
+    """Shortest and longest exposure of the search at each placement; None: `exposure` is kept."""
     ambient_exposure: float | None = None
-    """For frames of room light alone, as of the printed board; None: exposed as all others."""
+    """Exposure for frames in room light, as of the printed board; None: the same as for spots."""
     gain: float | None = None
     buffer_frames: Annotated[int, Field(ge=1)] | None = None
     latency_frames: Annotated[int, Field(ge=0)] = 2
-    """Number of frames under way, or being exposed, when a laser is switched: they are discarded."""
+    """Number of frames in transfer or exposure when a laser is switched, which are discarded."""
 
     @model_validator(mode="after")
-    def _has_an_exposure_to_go_back_to(self) -> OpenCvBlock:
+    def _has_an_exposure_for_spots(self) -> OpenCvBlock:
         if self.ambient_exposure is not None and self.exposure is None:
-            raise ValueError("ambient_exposure needs an exposure to go back to")
+            raise ValueError("ambient_exposure: expected exposure to be set too, got none")
         return self
 
     @model_validator(mode="after")
@@ -64,43 +63,43 @@ class OpenCvBlock(DeviceBlock):
             shortest, longest = self.exposure_limits
             if self.exposure is None or not shortest <= self.exposure <= longest or shortest == longest:
                 raise ValueError(
-                    "exposure_limits: expected [shortest, longest], with an exposure to begin with between"
-                    f" them, got {list(self.exposure_limits)} and {self.exposure}"
+                    "exposure_limits: expected [shortest, longest] with `exposure` between them, got"
+                    f" {list(self.exposure_limits)} and {self.exposure}"
                 )
             if longest > WIDEST * shortest:
                 raise ValueError(
                     f"exposure_limits: expected the longest to be at most {WIDEST:g} times the shortest, got"
-                    f" {list(self.exposure_limits)}; no camera's spots differ by more"
+                    f" {list(self.exposure_limits)}"
                 )
         return self
 
 
 class OpenCvCamera:
-    """See `protocols.StreamingCamera` and `protocols.ExposableCamera`.
+    """Camera through OpenCV, see `protocols.StreamingCamera` and `protocols.ExposableCamera`.
 
-    A thread of its own takes the frames as they come, so that none is older than necessary; from a file it
-    takes one when the one before has been read.
+    A separate thread reads frames as they arrive, so that none is older than necessary. It reads the next
+    frame of a video file when the previous one has been taken.
     """
 
     settings_type: ClassVar = OpenCvBlock
 
     @classmethod
     def open(cls, settings: OpenCvBlock, rig: Rig, beat: Callable[[], None]) -> OpenCvCamera:
-        """Open it, see `drivers.CameraDriver`; the errors of the constructor."""
+        """Open the camera, see `drivers.CameraDriver`; raises the errors of the constructor."""
         return cls(settings, rig.camera, beat)
 
     def __init__(
         self, device: OpenCvBlock, camera: CameraSpec, beat: Callable[[], None] = lambda: None
     ) -> None:
-        """Open it, make its settings and check that they were taken, and look at a first frame.
+        """Open the camera, make and verify its settings, and check a first frame.
 
         Args:
-            device: what to open, and the settings.
-            camera: the format that the frames must have.
-            beat: called by `grab` and `read`, in the thread that calls these, at least every 0.1 s.
+            device: source and settings.
+            camera: required format of frames.
+            beat: called by `grab` and `read`, in their thread, at least every 0.1 s.
 
         Raises:
-            RigNotReadyError: no such camera, it does not deliver, or a setting or the format is another.
+            RigNotReadyError: the camera is missing or delivers no frame, or a setting or the format differs.
         """
         self.discard_frames = device.latency_frames
         self._device, self._format, self._beat = device, camera, beat
@@ -108,11 +107,11 @@ class OpenCvCamera:
         self.exposure_limits, self.exposure_unit = device.exposure_limits, ""
         self._exposure = self._for_spots = device.exposure
         self._wish: float | None = None
-        """An exposure to take as near as the camera can."""
+        """Requested exposure that the thread has not set yet."""
         self._frames: deque[Frame] = deque(maxlen=BACKLOG)
         self._changed = threading.Condition()
         self._ended: str | None = None
-        """Why no more frames come."""
+        """Reason why no more frames arrive; None while the camera delivers."""
         self._closing = False
         self._capture = _open(device, camera)
         self._thread = threading.Thread(target=self._take, name="camera", daemon=True)
@@ -124,7 +123,7 @@ class OpenCvCamera:
             raise
 
     def grab(self) -> Frame:
-        """A frame whose exposure began after this call: what came before, and `discard_frames`, are dropped.
+        """Frame whose exposure began after this call; earlier frames and `discard_frames` are dropped.
 
         Raises:
             RigNotReadyError: the camera does not deliver.
@@ -137,40 +136,40 @@ class OpenCvCamera:
         return self.read()
 
     def grab_ambient(self) -> Frame:
-        """As `grab`, with `ambient_exposure` where the rig file has one."""
+        """Frame as from `grab`, with `ambient_exposure` if the rig file states one."""
         if self._device.ambient_exposure is None:
             return self.grab()
         self._exposure = self._device.ambient_exposure
         try:
-            self.read()  # the frame under way when the setting is made
+            self.read()  # the frame in exposure during the change
             return self.grab()
         finally:
             self._exposure = self._for_spots
             self.read()
 
     def set_exposure(self, exposure: float) -> float:
-        """Expose so, as near as the camera can; returns the exposure that it says it has.
+        """Set the exposure as close as the camera can; returns the exposure that it reports.
 
         Raises:
-            RigNotReadyError: it is another, or the camera does not answer.
+            RigNotReadyError: the reported exposure differs too much, or the camera does not answer.
         """
         with self._changed:
             self._wish = exposure
             self._changed.wait_for(lambda: self._wish is None or self._ended is not None, SILENT_S)
             if self._ended is not None or self._wish is not None:
                 raise RigNotReadyError(self._ended or self._silent(f"nothing for {SILENT_S:g} s"))
-            came = self._for_spots
+            reported = self._for_spots
             self._frames.clear()
-        if came is None or not exposure / COARSEST_STEP <= came <= exposure * COARSEST_STEP:
+        if reported is None or not exposure / COARSEST_STEP <= reported <= exposure * COARSEST_STEP:
             raise RigNotReadyError(
-                f"camera {self._device.source}: exposure: asked for {exposure:g}, the camera says {came};"
-                " put limits into the rig file that it can keep, or leave exposure_limits out"
+                f"camera {self._device.source}: exposure: requested {exposure:g}, the camera reports"
+                f" {reported}; state exposure_limits in the rig file that it supports, or remove them"
             )
-        self.read()  # the frame under way when the setting is made
-        return came
+        self.read()  # the frame in exposure during the change
+        return reported
 
     def read(self) -> Frame:
-        """The next frame of the stream, with the wall clock when it arrived.
+        """Next frame of the stream, with the wall clock time of its arrival.
 
         Raises:
             RigNotReadyError: the camera does not deliver.
@@ -190,7 +189,7 @@ class OpenCvCamera:
             self._beat()
 
     def close(self) -> None:
-        """Release the device. One that hangs in its driver is left to the end of the program."""
+        """Release the device; one that hangs in its driver is released at the end of the program."""
         self._closing = True
         with self._changed:
             self._changed.notify_all()
@@ -199,7 +198,7 @@ class OpenCvCamera:
             self._capture.release()
 
     def _take(self) -> None:
-        """Frames, until the camera ends or is closed; only this thread touches the device."""
+        """Read frames until the camera ends or is closed; only this thread uses the device."""
         made = self._exposure
         while not self._closing:
             try:
@@ -208,8 +207,8 @@ class OpenCvCamera:
                 if self._exposure != made:
                     made = self._exposure
                     _set(self._capture, self._device.source, cv2.CAP_PROP_EXPOSURE, "exposure", made)
-                came, image = self._capture.read()
-                frame = Frame(_grey(image, 2**self._format.bits - 1), time.time_ns()) if came else None
+                ok, image = self._capture.read()
+                frame = Frame(_grey(image, 2**self._format.bits - 1), time.time_ns()) if ok else None
             except (RigNotReadyError, cv2.error) as error:
                 self._end(str(error))
                 return
@@ -224,31 +223,32 @@ class OpenCvCamera:
 
     def _grant(self, wish: float) -> float:
         self._capture.set(cv2.CAP_PROP_EXPOSURE, wish)
-        came = self._capture.get(cv2.CAP_PROP_EXPOSURE)
+        reported = self._capture.get(cv2.CAP_PROP_EXPOSURE)
         with self._changed:
-            self._exposure = self._for_spots = came
+            self._exposure = self._for_spots = reported
             self._wish = None
             self._changed.notify_all()
-        return came
+        return reported
 
     def _end(self, why: str) -> None:
         with self._changed:
             self._ended = why
             self._changed.notify_all()
 
-    def _silent(self, came: str) -> str:
+    def _silent(self, got: str) -> str:
         return (
-            f"camera {self._device.source}: expected a frame, got {came};"
-            " check its cable, and whether another program holds it"
+            f"camera {self._device.source}: expected a frame, got {got};"
+            " check its cable and whether another program holds it"
         )
 
     def _check_format(self, image: Image) -> None:
-        asked = (self._format.height_px, self._format.width_px, "8" if self._format.bits == 8 else "16")
-        came = (*image.shape, str(8 * image.dtype.itemsize))
-        if asked != came:
+        expected = (self._format.height_px, self._format.width_px, "8" if self._format.bits == 8 else "16")
+        got = (*image.shape, str(8 * image.dtype.itemsize))
+        if expected != got:
             raise RigNotReadyError(
-                f"camera {self._device.source}: expected frames of {asked[1]} x {asked[0]} px in {asked[2]}"
-                f" bits, as in the rig file, got {came[1]} x {came[0]} in {came[2]}"
+                f"camera {self._device.source}: expected frames of {expected[1]} x {expected[0]} px with"
+                f" {expected[2]} bits (rig file), got {got[1]} x {got[0]} px with {got[2]} bits; correct the"
+                " rig file or the camera's settings"
             )
 
 
@@ -263,7 +263,7 @@ def _open(device: OpenCvBlock, camera: CameraSpec) -> cv2.VideoCapture:
         capture = cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)
     if not capture.isOpened():
         raise RigNotReadyError(
-            f"camera {source}: expected a device, a stream or a video file, could not open it;"
+            f"camera {source}: cannot be opened; expected a device, a stream or a video file;"
             " check its cable, its address, and whether another program holds it"
         )
     try:
@@ -277,7 +277,7 @@ def _open(device: OpenCvBlock, camera: CameraSpec) -> cv2.VideoCapture:
 def _make_settings(
     capture: cv2.VideoCapture, device: OpenCvBlock, camera: CameraSpec, is_device: bool
 ) -> None:
-    """Every setting is read back. The picture's size is asked of a device; streams and files have one."""
+    """Make the settings and read each back. The image size is set only for devices."""
     fourcc = device.pixel_format
     automatic = MANUAL_EXPOSURE if device.exposure is not None else None
     settings: list[tuple[int, str, float | None]] = [
@@ -295,23 +295,23 @@ def _make_settings(
 
 
 def _set(capture: cv2.VideoCapture, source: str, number: int, name: str, value: float | None) -> None:
-    """Make one setting, unless it is None, and read it back."""
+    """Make one setting, unless it is None, and verify it."""
     if value is None:
         return
     capture.set(number, value)
-    came = capture.get(number)
-    if abs(came - value) > SAME * abs(value):
+    reported = capture.get(number)
+    if abs(reported - value) > SAME * abs(value):
         raise RigNotReadyError(
-            f"camera {source}: {name}: asked for {value:g}, the camera says {came:g}; put a value into the"
-            " rig file that it takes, or leave the setting out"
+            f"camera {source}: {name}: requested {value:g}, the camera reports {reported:g}; state a"
+            " supported value in the rig file, or remove the setting"
         )
 
 
 def _grey(image: np.ndarray[Any, Any], full_scale: int) -> Image:
-    """Of colours their weighted mean, which is linear in the light and sharper than any of them by itself.
+    """Grey image: the weighted mean of the colours, which is linear in the light and sharper than one colour.
 
-    Where one of them is clipped it is not linear any more: such a pixel is given as clipped. (The mean of a
-    red spot that was clipped long ago is at 30 % of full scale.)
+    The mean is not linear if a colour is clipped: such a pixel is set to full scale. (Otherwise a red spot
+    clips unnoticed at 30 % of full scale.)
     """
     if image.ndim == 2:
         return image

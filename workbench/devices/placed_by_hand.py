@@ -1,4 +1,4 @@
-"""The target driver `by_hand`: the operator places the target when a prompt asks for it."""
+"""Target driver `by_hand`: the operator places the target when a prompt requests it."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from workbench.model.target import Placement
 
 
 class ByHandBlock(DeviceBlock):
-    """The block `devices: target:` of the rig file: it has no settings."""
+    """Block `devices: target:` of the rig file, without settings."""
 
 
 class PlacedByHand:
-    """See `protocols.Target`. The operator has placed the target, and read the ruler, before it is asked."""
+    """Target that the operator has already placed, with its standoff read; see `protocols.Target`."""
 
     settings_type: ClassVar = ByHandBlock
 
     @classmethod
     def open(cls, settings: ByHandBlock, rig: Rig) -> PlacedByHand:
-        """There is nothing to open."""
+        """Return the driver; there is no device to open."""
         return cls()
 
     def place(self, placement: Placement) -> Placement:
-        """The placement as the operator confirmed it."""
+        """Placement as the operator confirmed it."""
         return placement

@@ -1,4 +1,4 @@
-"""What procedures and ranging need of a bench, whatever its drivers."""
+"""Protocols of a bench for procedures and ranging, independent of drivers."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from workbench.model.target import Placement
 
 @dataclass(frozen=True)
 class Frame:
-    """One grey frame, (height, width), uint8 or uint16, and the wall clock at its exposure, ns since 1970."""
+    """Grey frame, (height, width), uint8 or uint16, with the wall clock time of exposure, ns since 1970."""
 
     image: Image
     time_ns: int
 
 
 class Camera(Protocol):
-    """A grey camera."""
+    """Grey camera."""
 
     def grab(self) -> Frame:
-        """A frame whose exposure began after this call.
+        """Frame whose exposure began after this call.
 
         Raises:
             RigNotReadyError: the camera does not deliver.
         """
 
     def grab_ambient(self) -> Frame:
-        """As `grab`, exposed for room light rather than for spots, which are some 1000 times brighter.
+        """Frame as from `grab`, exposed for room light instead of spots, which are 1000 times brighter.
 
         Raises:
             RigNotReadyError: the camera does not deliver.
@@ -44,13 +44,13 @@ class Camera(Protocol):
 
 @runtime_checkable
 class StreamingCamera(Camera, Protocol):
-    """A camera whose stream can be read, so that its latency can be measured."""
+    """Camera whose stream can be read, so that its latency can be measured."""
 
     discard_frames: int
-    """Number of frames that `grab` drops as too old."""
+    """Number of frames that `grab` drops as stale."""
 
     def read(self) -> Frame:
-        """The next frame of the stream, as old as it is.
+        """Next frame of the stream, which may be stale.
 
         Raises:
             RigNotReadyError: the camera does not deliver.
@@ -59,23 +59,23 @@ class StreamingCamera(Camera, Protocol):
 
 @runtime_checkable
 class ExposableCamera(Camera, Protocol):
-    """A camera whose exposure can be set; its numbers are linear in it until they are clipped."""
+    """Camera whose exposure can be set; pixel values are linear in it until they are clipped."""
 
     exposure_limits: tuple[float, float] | None
-    """Shortest and longest that may be set; None where the rig file fixes the exposure."""
+    """Shortest and longest exposure; None if the rig file fixes the exposure."""
     exposure_unit: str
-    """Empty for a driver's own."""
+    """Unit of exposures; empty: the driver's own."""
 
     def set_exposure(self, exposure: float) -> float:
-        """Expose so from the next `grab` on; returns the exposure as the camera took it.
+        """Set the exposure from the next `grab` on; returns the exposure that the camera accepted.
 
         Raises:
-            RigNotReadyError: the camera does not take it.
+            RigNotReadyError: the camera does not accept the exposure.
         """
 
 
 def settable(camera: Camera) -> tuple[ExposableCamera, tuple[float, float]] | None:
-    """The camera and its exposure's limits, where the rig lets it be set."""
+    """Camera and limits of its exposure; None if the exposure cannot or must not be set."""
     if not isinstance(camera, ExposableCamera) or camera.exposure_limits is None:
         return None
     return camera, camera.exposure_limits
@@ -88,73 +88,73 @@ class LaserState:
     lit: tuple[str, ...]
     """Ids of the lasers that are on."""
     interlock_closed: bool | None
-    """None where the driver does not know."""
+    """Whether the interlock is closed; None if the driver does not report it."""
 
 
 class LaserBank(Protocol):
-    """The lasers. There is one way to switch one on, and it ends by itself."""
+    """Lasers of a rig. The only way to switch lasers on is a context that ends by itself."""
 
     ids: tuple[str, ...]
     identity: str
-    """Name of the device that switches them, as it reports it."""
+    """Name of the switching device, as it reports it."""
 
     def lit(self, ids: Sequence[str], for_s: float) -> AbstractContextManager[None]:
-        """Hold the lasers `ids` lit inside the `with` block, for at most `for_s` seconds.
+        """Hold the lasers `ids` on inside the `with` block, for at most `for_s` seconds.
 
         Leaving the block switches every laser off and verifies it at the device.
 
         Raises:
             RigNotReadyError: the controller refuses or does not answer.
-            LaserOffNotConfirmedError: the controller did not confirm that all are off.
+            LaserOffNotConfirmedError: the controller did not confirm that all lasers are off.
         """
 
     def beat(self) -> None:
-        """Renew the lease of what is on. To be called by the thread that does the work."""
+        """Renew the lease; must be called by the thread that uses the lasers."""
 
     def all_off(self) -> None:
-        """Switch every laser off and verify it; the errors of `lit`."""
+        """Switch every laser off and verify it; raises the errors of `lit`."""
 
     def state(self) -> LaserState:
-        """What is on at this moment, and the interlock.
+        """Present state of lasers and interlock.
 
         Raises:
             RigNotReadyError: the device does not answer.
         """
 
     def close(self) -> None:
-        """All off, then release the device."""
+        """Switch all lasers off, then release the device."""
 
 
 class Target(Protocol):
-    """What places the target: a person, a rail, an emulated bench."""
+    """Positioning of the target: by a person, a rail, or an emulated bench."""
 
     def place(self, placement: Placement) -> Placement:
         """Place the target; returns the placement as measured by the ruler."""
 
 
 class Operator(Protocol):
-    """Who answers a procedure's prompts."""
+    """Operator of the bench, who answers prompts."""
 
     def ask(self, prompt: Prompt) -> Answer:
-        """Ask one question and wait for its answer, which fits (`Prompt.refuse`).
+        """Show a prompt and wait for a valid answer (`Prompt.refuse`).
 
         Raises:
-            AnswerNeededError: there is nobody to answer.
+            AnswerNeededError: there is no answer.
         """
 
 
 @dataclass(frozen=True)
 class Bench:
-    """The devices of one rig, opened together and closed together."""
+    """Devices of one rig, opened and closed together."""
 
     camera: Camera
     lasers: LaserBank
     target: Target
     mark: Callable[[str], None] = lambda key: None
-    """Called with the key of the capture about to be taken. An emulated bench keys its noise by it, so that a
-    capture taken again after a stop is the same to the bit; a real bench has no use for it."""
+    """Called with the key of the next capture. An emulated bench derives its noise from the key, so that a
+    capture taken again after a stop is identical; a real bench ignores it."""
     operator: Operator | None = None
-    """Operator of an emulated bench, who does what prompts ask for; None: a person answers."""
+    """Operator of an emulated bench, which answers prompts itself; None: a person answers."""
     virtual: bool = False
     """Whether the beams are simulated."""
 
@@ -167,7 +167,7 @@ class Bench:
         self.close()
 
     def close(self) -> None:
-        """Lasers off first, whatever the camera does."""
+        """Close the lasers first, then the camera, even after an error."""
         try:
             self.lasers.close()
         finally:

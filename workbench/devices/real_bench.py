@@ -1,4 +1,4 @@
-"""A bench of separate devices: any camera with any lasers and any target, each opened by its own driver."""
+"""Bench of separate devices (camera, lasers, target), each opened by its own driver."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from workbench.model.yamlfile import schema_problems
 
 
 @dataclass(frozen=True)
-class Kind:
-    """A kind of device."""
+class DeviceKind:
+    """Kind of device."""
 
     group: str
-    """Entry-point group of its drivers."""
+    """Entry-point group of the drivers."""
     default: str
-    """Driver where the rig file names none."""
+    """Driver if the rig file names none."""
 
 
 KINDS = {
-    "camera": Kind("workbench.cameras", "opencv"),
-    "lasers": Kind("workbench.lasers", "serial"),
-    "target": Kind("workbench.targets", "by_hand"),
+    "camera": DeviceKind("workbench.cameras", "opencv"),
+    "lasers": DeviceKind("workbench.lasers", "serial"),
+    "target": DeviceKind("workbench.targets", "by_hand"),
 }
-"""Kinds of devices, by their key in the block `devices`."""
+"""Kinds of devices by their key in the block `devices`."""
 
 
 def open_bench(rig: Rig) -> Bench:
-    """Open the rig's devices. The lasers come first: whatever else fails, they are off.
+    """Open the rig's devices, the lasers first, so that they are off if another device fails.
 
     Raises:
         BadInputError: a driver is not installed, or its block is wrong.
-        RigNotReadyError, LaserOffNotConfirmedError: a device does not answer as it should.
+        RigNotReadyError, LaserOffNotConfirmedError: a device fails.
     """
     refuse_problems(rig, tuple(KINDS))
     camera: CameraDriver
@@ -59,7 +59,7 @@ def open_bench(rig: Rig) -> Bench:
 
 
 def open_lasers(rig: Rig) -> GuardedLaserBank:
-    """Open the lasers alone, all off; the other devices' blocks are not read.
+    """Open only the lasers, all off; the blocks of other devices are not read.
 
     Raises:
         BadInputError: the driver is not installed, or its block is wrong.
@@ -72,27 +72,27 @@ def open_lasers(rig: Rig) -> GuardedLaserBank:
 
 
 def refuse_problems(rig: Rig, kinds: Sequence[str]) -> None:
-    """Raise where the blocks of these kinds of devices are wrong.
+    """Check the blocks of these kinds of devices.
 
     Raises:
-        BadInputError: they are, a line for each problem.
+        BadInputError: a block is wrong; one line for each problem.
     """
-    found = [one.told for kind in kinds for one in block_problems(kind, _block(rig, kind), rig)]
+    found = [one.message for kind in kinds for one in block_problems(kind, _block(rig, kind), rig)]
     if found:
         raise BadInputError("\n".join(f"rig {rig.rig}: {one}" for one in found))
 
 
 def block_problems(kind: str, block: Mapping[str, Any], rig: Rig | None) -> Iterator[SchemaProblem]:
-    """What is wrong with one device's block.
+    """Problems of one device's block.
 
     Args:
-        kind: a key of `KINDS`.
-        block: as it stands in the rig file.
-        rig: the whole rig, where that is right: the context of the block's validators.
+        kind: key in `KINDS`.
+        block: block of the rig file.
+        rig: valid rig, the context of the block's validators; None if the rig is not valid.
     """
     name = block.get("driver") or KINDS[kind].default
     if not isinstance(name, str):
-        return  # a mistake that the rig's own schema finds
+        return  # the rig's own schema reports this mistake
     place = ("devices", kind)
     try:
         driver = load_driver(KINDS[kind].group, name)
@@ -110,7 +110,7 @@ def _block(rig: Rig, kind: str) -> dict[str, Any]:
 
 
 def _driver(rig: Rig, kind: str) -> tuple[Any, Any]:
-    """The driver of a block that is right, and its settings."""
+    """Driver and settings of a valid block."""
     block = _block(rig, kind)
     driver = load_driver(KINDS[kind].group, block.get("driver") or KINDS[kind].default)
     return driver, driver.settings_type.model_validate(block, context=rig)

@@ -1,4 +1,4 @@
-"""From a rig file to an opened bench: of separate devices, or of devices that are opened as a whole."""
+"""Opening of the bench that a rig file names: separate devices, or a driver of a whole bench."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from workbench.model.rig import Rig, load_rig
 from workbench.model.yamlfile import read_document, refuse, schema_problems
 
 SEPARATE = "opencv+serial"
-"""`driver` of a rig whose devices are opened each by its own driver; also where there are `devices` alone."""
+"""Value of `driver` for separate devices; a rig with `devices` and no `driver` means the same."""
 
 
 def open_bench(rig: Rig, session_dir: Path) -> Bench:
@@ -23,7 +23,7 @@ def open_bench(rig: Rig, session_dir: Path) -> Bench:
 
     Raises:
         BadInputError: a driver is not installed, or its block of the rig file is wrong.
-        RigNotReadyError, LaserOffNotConfirmedError: a device does not answer as it should.
+        RigNotReadyError, LaserOffNotConfirmedError: a device fails.
     """
     check_driver(rig)
     whole = whole_bench(rig)
@@ -31,11 +31,11 @@ def open_bench(rig: Rig, session_dir: Path) -> Bench:
 
 
 def open_lasers(rig: Rig) -> LaserBank:
-    """Open the lasers of separate devices alone, all off.
+    """Open only the lasers of separate devices, all off.
 
     Raises:
-        BadInputError: the rig has none, or the driver is not installed or its block wrong.
-        RigNotReadyError, LaserOffNotConfirmedError: the device does not answer as it should.
+        BadInputError: the rig has no devices, the driver is not installed, or its block is wrong.
+        RigNotReadyError, LaserOffNotConfirmedError: the device fails.
     """
     if rig.devices is None:
         check_driver(rig)
@@ -43,7 +43,7 @@ def open_lasers(rig: Rig) -> LaserBank:
 
 
 def whole_bench(rig: Rig) -> BenchDriver | None:
-    """The driver that opens all devices of the rig together; None where each has its own."""
+    """Driver that opens all devices of the rig together; None for separate devices."""
     if rig.driver not in installed(BENCHES):
         return None
     driver: BenchDriver = load_driver(BENCHES, rig.driver)
@@ -54,24 +54,24 @@ def check_driver(rig: Rig) -> None:
     """Refuse a rig that cannot be run.
 
     Raises:
-        BadInputError: it has no devices, or names a driver that is not installed.
+        BadInputError: the rig has no devices, or names a driver that is not installed.
     """
     if not has_bench(rig.driver, rig.devices):
         raise BadInputError(
             f"rig {rig.rig}: expected `devices`, or a `driver` that opens a whole bench, got none; a rig"
             " without them can be fitted but not run"
         )
-    found = [one.told for one in _driver_problems(rig.driver)]
+    found = [one.message for one in _driver_problems(rig.driver)]
     if found:
         raise BadInputError("\n".join(f"rig {rig.rig}: {one}" for one in found))
 
 
 def load_bench_rig(path: Path, kinds: Sequence[str] = tuple(real_bench.KINDS)) -> Rig:
-    """Read the file of a rig that is to be run, and check the blocks that its drivers read.
+    """Read a rig file for a run and check the blocks that its drivers read.
 
     Args:
-        path: the file.
-        kinds: of separate devices, those that are to be opened.
+        path: rig file.
+        kinds: kinds of separate devices that will be opened.
 
     Raises:
         BadInputError: see `load_yaml_model`.
@@ -82,19 +82,19 @@ def load_bench_rig(path: Path, kinds: Sequence[str] = tuple(real_bench.KINDS)) -
 
 
 def has_bench(driver: object, devices: object) -> bool:
-    """Whether a rig file with these values says how its bench is reached."""
+    """Whether a rig file with these values names a bench."""
     return driver is not None or devices is not None
 
 
 def bench_problems(
     data: Mapping[str, Any], rig: Rig | None, kinds: Sequence[str] = tuple(real_bench.KINDS)
 ) -> Iterator[SchemaProblem]:
-    """What is wrong with a rig file's `driver`, and with the blocks that its drivers read.
+    """Problems of a rig file's `driver` and of the blocks that its drivers read.
 
     Args:
-        data: the file's.
-        rig: as it was read, where it could be.
-        kinds: of separate devices, those that are looked at.
+        data: content of the file.
+        rig: valid rig; None if the file is not valid.
+        kinds: kinds of separate devices to check.
     """
     driver, devices = data.get("driver"), data.get("devices")
     if not has_bench(driver, devices) or not isinstance(driver, str | None):
@@ -114,7 +114,7 @@ def bench_problems(
 def _devices_problems(devices: object, rig: Rig | None, kinds: Sequence[str]) -> Iterator[SchemaProblem]:
     blocks = {} if devices is None else devices
     if not isinstance(blocks, dict):
-        return  # a mistake that the rig's own schema finds
+        return  # the rig's own schema reports this mistake
     for kind in kinds:
         block = blocks.get(kind) or {}
         if isinstance(block, dict):

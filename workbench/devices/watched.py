@@ -1,4 +1,4 @@
-"""A camera with a time limit on every call."""
+"""Camera with a time limit on every call."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from workbench.model.errors import RigNotReadyError
 T = TypeVar("T")
 B = TypeVar("B", bound=Bench)
 PATIENCE_S = 0.75
-"""Longest wait for a frame, s: with the time that ending takes, less than two seconds."""
+"""Longest wait for a frame, s; together with the end of the program less than two seconds."""
 FIRST_PATIENCE_S = 5.0
-"""Longest wait for the first frame, s: cameras are slow to start."""
+"""Longest wait for the first frame, s, because cameras start slowly."""
 
 
 @dataclass
 class WatchedCamera:
-    """Calls the camera in a thread of its own and gives it up when it does not answer.
+    """Camera whose calls run in a separate thread; after a call without an answer it is abandoned.
 
-    A call that hangs cannot be interrupted; its thread is left behind and ends with the program.
+    A call that hangs cannot be interrupted; its thread ends with the program.
     """
 
     camera: Camera
@@ -36,32 +36,32 @@ class WatchedCamera:
         threading.Thread(target=self._serve, name="camera", daemon=True).start()
 
     def grab(self) -> Frame:
-        """As the camera's; see `protocols.Camera`.
+        """Frame of the camera, see `protocols.Camera`.
 
         Raises:
-            RigNotReadyError: no frame within `FIRST_PATIENCE_S`, after the first within `PATIENCE_S`.
+            RigNotReadyError: no first frame within `FIRST_PATIENCE_S`, or no later one within `PATIENCE_S`.
         """
         return self._ask(self.camera.grab)
 
     def grab_ambient(self) -> Frame:
-        """As the camera's; the errors of `grab`."""
+        """Frame in room light, see `protocols.Camera`; raises the errors of `grab`."""
         return self._ask(self.camera.grab_ambient)
 
     def close(self) -> None:
-        """Release the camera; one that hangs is left to the end of the program."""
+        """Release the camera; one that hangs is released at the end of the program."""
         if not self._gone:
             self._ask(self.camera.close)
 
     def _ask(self, call: Callable[[], T]) -> T:
-        if self._gone:  # its late answer would be mistaken for the answer to this call
-            raise RigNotReadyError("camera: it stopped delivering before; end this run, check its cable")
+        if self._gone:  # a late answer would be taken for the answer to this call
+            raise RigNotReadyError("camera: no answer to an earlier call; end this run and check its cable")
         self._asked.put(call)
         try:
             answer = self._answers.get(timeout=self._patience_s)
         except queue.Empty:
             self._gone = True
             raise RigNotReadyError(
-                f"camera: expected an answer within {self._patience_s:g} s, got none: it stopped delivering;"
+                f"camera: expected an answer within {self._patience_s:g} s, got none;"
                 " check its cable and whether another program holds it"
             ) from None
         if isinstance(answer, BaseException):
@@ -79,5 +79,5 @@ class WatchedCamera:
 
 
 def watched(bench: B) -> B:
-    """The bench with its camera watched."""
+    """Bench with time limits on its camera's calls."""
     return replace(bench, camera=WatchedCamera(bench.camera))

@@ -1,4 +1,4 @@
-"""The virtual bench, reached only by its name in a rig file."""
+"""Virtual bench, used only through its name in a rig file."""
 
 from workbench.devices.drivers import BenchDriver
 from workbench.emulator.bench import EmulatedBench, open_bench

@@ -1,21 +1,21 @@
-"""A Gaussian laser beam in free space."""
+"""Gaussian laser beam in free space."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from workbench.emulator.spec import BeamSpec
-from workbench.emulator.truth import Ray
+from workbench.emulator.truth import TrueRay
 from workbench.model.arrays import FloatArray
 
 
 class Beam:
-    """One laser's beam. Camera frame, mm."""
+    """Beam of one laser, camera frame, mm."""
 
-    def __init__(self, ray: Ray, spec: BeamSpec) -> None:
+    def __init__(self, ray: TrueRay, spec: BeamSpec) -> None:
         self.origin = np.array([ray.x_mm, ray.y_mm, 0.0])
         self.direction = np.array([ray.tx, ray.ty, 1.0])
-        """Third component 1, as everywhere; not a unit vector."""
+        """Direction with third component 1; not a unit vector."""
         self._axis = self.direction / np.linalg.norm(self.direction)
         self._power_w = spec.power_mw * 1e-3
         self._exit_mm = spec.exit_diameter_mm
@@ -24,9 +24,9 @@ class Beam:
     def irradiance(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Power per area of the surface (W / mm^2) at points (n, 3) with unit front normals (n, 3).
 
-        Gaussian of 1/e^2 diameter exit + divergence x path, 2 P / (pi w^2) on its axis so that its integral
-        over any cross-section is P; times the cosine of incidence, 0 where the surface looks away. Beams
-        begin at their origin: nothing behind it is lit.
+        The profile is a Gaussian. Its 1/e^2 diameter 2 w is exit diameter + divergence x path. The peak is
+        P / (pi w^2 / 2), which makes the integral P. The cosine of incidence multiplies it. On the rear side
+        and behind the origin of the beam the irradiance is 0.
         """
         to_point = points - self.origin
         path = to_point @ self._axis
@@ -39,7 +39,7 @@ class Beam:
     def outline(self, radii: float, count: int) -> tuple[FloatArray, FloatArray]:
         """Rays (origins (n, 3), directions (n, 3)) on the cone at `radii` times the beam's 1/e^2 radius.
 
-        The radius grows linearly with the path, so this outline is made of straight lines.
+        The radius grows linearly with the path, so the outline consists of straight lines.
         """
         angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
         across = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1) * radii / 2

@@ -1,4 +1,4 @@
-"""The virtual bench's devices, opened together."""
+"""Devices of the virtual bench, opened together."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from workbench.model.rig import Rig
 
 @dataclass(frozen=True, kw_only=True)
 class EmulatedBench(Bench):
-    """A bench whose parts tests can reach: the camera, the controller behind the port, the port itself."""
+    """Virtual bench with parts that tests use: camera, controller behind the port, server of the port."""
 
     camera: EmulatedCamera
     lasers: GuardedLaserBank
@@ -34,7 +34,7 @@ class EmulatedBench(Bench):
         return self
 
     def close(self) -> None:
-        """As every bench, then hang up the controller's line."""
+        """Close camera and lasers, then disconnect the controller's line."""
         try:
             super().close()
         finally:
@@ -42,11 +42,11 @@ class EmulatedBench(Bench):
 
 
 def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
-    """Open the virtual bench of `rig`; its truth goes to the file beside `session_dir`.
+    """Open the virtual bench of `rig`; its truth is written to a file beside `session_dir`.
 
     Raises:
         BadInputError: the rig's `emulator:` block is wrong.
-        RigNotReadyError, LaserOffNotConfirmedError: the emulated controller's fault shows at connect.
+        RigNotReadyError, LaserOffNotConfirmedError: the emulated controller has a fault.
     """
     spec = emulator_spec(rig)
     truth = draw_truth(rig, spec)
@@ -56,7 +56,7 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
     camera = EmulatedCamera(spec, scene, sensor, controller.lit)
     server = PtyServer(controller.receive)
     try:
-        # A frame of this bench is computed, however long that takes: no beats within half a second.
+        # Computing a frame may take longer than the usual time between beats.
         lasers = GuardedLaserBank(
             ControllerLine,
             SerialBlock(port=server.port),

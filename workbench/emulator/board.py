@@ -1,8 +1,8 @@
-"""The printed board on the virtual bench: where beams meet it, and what room light shows of it.
+"""Printed board on the virtual bench: its intersection with rays, and its image in room light.
 
-Room light falls on it evenly. A pixel's brightness is the mean of the print over the pixel, blurred by the
-lens: the print's integral (exact for black rectangles) is read at the outline of every sample, so that edges
-lie where they belong to some 1e-3 px however coarse the samples are.
+Room light is uniform on the board. The brightness of a pixel is the mean of the print over the pixel, blurred
+by the lens. The integral of the print (exact for black rectangles) is evaluated at the outline of every
+sample, so that edges are accurate to about 1e-3 px even with coarse samples.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from workbench.model.target import BoardTarget
 
 CELLS_PER_MM = 10
 SAMPLES = 3
-"""Along a pixel's side."""
+"""Samples along a pixel's side."""
 SAG_STEPS = 3
-"""Fixed-point steps on a sag of a fraction of a millimetre: each gains three digits."""
+"""Number of fixed-point steps for the sag; each gains three digits for a sag below a millimetre."""
 
 
 class Print:
-    """The print as an image: 1 is paper, `ink` is ink; board frame, mm."""
+    """Image of the print: 1 is paper, `ink` is ink; board frame, mm."""
 
     def __init__(self, board: Board, ink: float) -> None:
         self._half = np.array(board.page_mm) / 2
@@ -61,26 +61,26 @@ class Print:
         return np.asarray(total / (4 * half_x * half_y * CELLS_PER_MM**2), np.float64)
 
     def _sum(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Integral of the tone from the page's corner; exact, the tone being constant in every cell."""
+        """Integral of the tone from the page's corner, exact because the tone is constant in every cell."""
         at = np.array([(y + self._half[1]) * CELLS_PER_MM, (x + self._half[0]) * CELLS_PER_MM])
         return np.asarray(map_coordinates(self._integral, at, order=1, mode="nearest"), np.float64)
 
 
 @dataclass(frozen=True)
 class BoardSurface:
-    """The board as it stands. Camera frame, mm; front is the side that faces the sensor."""
+    """Placed board, camera frame, mm; the front side faces the sensor."""
 
     origin_mm: FloatArray
-    """(3,) the middle of its band."""
+    """Centre of the band, (3,)."""
     axes: FloatArray
-    """(3, 3) rows: its x, its y, and its z into the paper."""
+    """Rows (3, 3): x axis, y axis, and z axis into the paper."""
     scale: float
-    """True length over printed length."""
+    """True length / nominal length."""
     bow_mm: FloatArray
-    """(3,) see `sag_mm`."""
+    """Sag coefficients (3,), see `sag_mm`."""
     print: Print
     albedo: float
-    """Of its paper."""
+    """Diffuse reflectance of the paper."""
 
     def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Surface`."""
@@ -95,7 +95,7 @@ class BoardSurface:
             return np.where((t > 0) & self.print.on_page(x, y), t, np.nan)
 
     def normal(self, points: FloatArray) -> FloatArray:
-        """See `Surface`; the slope of the sag, a thousandth, is left out."""
+        """See `Surface`; the slope of the sag, about 1e-3, is neglected."""
         return np.broadcast_to(-self.axes[2], points.shape)
 
     def shade(self, points: FloatArray) -> FloatArray:
@@ -103,7 +103,7 @@ class BoardSurface:
         return self.print.tone(*self._on_board(points))
 
     def lit_by_room(self, lens: Lens, image: ImageFormat, blur_px: float) -> Float32Array:
-        """(height, width) brightness in room light; that of the paper, and of all beside the board, is 1."""
+        """Brightness (height, width) in room light, 1 for the paper and for everything beside the board."""
         n = SAMPLES
         offsets = (np.arange(n) + 0.5) / n - 0.5
         u = (np.arange(image.width)[:, None] + offsets).ravel()
@@ -123,7 +123,7 @@ class BoardSurface:
         return np.asarray(tone.reshape(image.height, n, image.width, n).mean(axis=(1, 3)), np.float32)
 
     def _on_board(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """x, y as printed, mm, of points (n, 3)."""
+        """Nominal board coordinates x, y (mm) of points (n, 3)."""
         along = (points - self.origin_mm) @ self.axes[:2].T / self.scale
         return along[:, 0], along[:, 1]
 
@@ -137,7 +137,7 @@ def stand(
     printed: Print,
     finish: SurfaceSpec,
 ) -> BoardSurface:
-    """The board on the plane z = z_mm + tan(yaw) x + tan(pitch) y, its middle and turn by `aside`."""
+    """Board on the plane z = z_mm + tan(yaw) x + tan(pitch) y, with centre and roll of `aside`."""
     slope_x = math.tan(math.radians(target.yaw_deg + error.yaw_deg))
     slope_y = math.tan(math.radians(target.pitch_deg + error.pitch_deg))
     across = np.array([1.0, 0.0, slope_x]) / math.hypot(1, slope_x)
@@ -158,7 +158,7 @@ def stand(
 
 @dataclass(frozen=True)
 class _Covered:
-    """Cells of a raster that an interval covers, and how much of each."""
+    """Raster cells that an interval covers, with the covered share of each."""
 
     first: int
     last: int

@@ -1,4 +1,4 @@
-"""The emulated camera: a stream of frames that follow one another, and the driver that grabs from it."""
+"""Emulated camera: a stream of frames, and the driver that grabs from it."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from workbench.emulator.lens import Drift
 from workbench.emulator.scene import BenchScene
 from workbench.emulator.sensor import ImageSensor
 from workbench.emulator.spec import EmulatorSpec
-from workbench.emulator.spot import Spot
+from workbench.emulator.spot import SpotImage
 from workbench.model.arrays import Float32Array, Image
 
 
 @dataclass(frozen=True)
 class Exposure:
-    """What one frame was exposed to."""
+    """Light and settings of one frame."""
 
-    spots: tuple[Spot, ...]
+    spots: tuple[SpotImage, ...]
     picture: Float32Array | None
-    """What room light shows, see `BenchScene.picture`."""
+    """Board in room light, see `BenchScene.picture`."""
     lit: bool
     key: str
     number: int
-    """Counts the frames of one capture key from 0."""
+    """Number of the frame within its capture key, from 0."""
     exposure_s: float
     gain: float
 
@@ -40,9 +40,9 @@ MICRO = 1e-6
 class EmulatedCamera:
     """Camera of the virtual bench.
 
-    `exposure_s` (None: metered at every placement) and `gain` may be set at any time and hold from the next
-    frame on; `set_exposure` sets it in microseconds, unless the rig file fixes it. `discard_frames` is what
-    the driver believes the latency to be: `grab` throws that many away.
+    `exposure_s` (None: metered at every placement) and `gain` may be set at any time. They apply from the
+    next frame on. `set_exposure` sets the exposure in microseconds, unless the rig file fixes it.
+    `discard_frames` is the assumed latency: the number of frames that `grab` discards.
     """
 
     def __init__(
@@ -67,17 +67,17 @@ class EmulatedCamera:
         self._queue: deque[Exposure] = deque(self._expose(()) for _ in range(spec.camera.latency_frames))
 
     def mark(self, key: str) -> None:
-        """Name the capture about to be taken; its frames' noise belongs to the name."""
+        """Set the key of the next capture, from which the noise of its frames is derived."""
         self._key, self._number = key, 0
 
     def grab(self) -> Frame:
-        """A frame whose exposure began after this call, `discard_frames` frames being on their way."""
+        """Frame after discarding `discard_frames` frames."""
         for _ in range(self.discard_frames):
             self._next()
         return self.read()
 
     def grab_ambient(self) -> Frame:
-        """As `grab`, metered for room light alone whatever `exposure_s` says."""
+        """Frame as from `grab`, metered for room light regardless of `exposure_s`."""
         self._for_room_light = True
         try:
             return self.grab()
@@ -85,7 +85,7 @@ class EmulatedCamera:
             self._for_room_light = False
 
     def read(self) -> Frame:
-        """The next frame of the stream, as old as the latency makes it."""
+        """Next frame of the stream, delayed by the latency."""
         while True:
             exposure = self._next()
             chance = generator(self._spec.seed, "stream", exposure.key, exposure.number).random(2)
@@ -96,14 +96,14 @@ class EmulatedCamera:
         return self._last
 
     def set_exposure(self, exposure: float) -> float:
-        """See `protocols.ExposableCamera`; microseconds."""
+        """Set the exposure in microseconds, see `protocols.ExposableCamera`."""
         self.exposure_s = exposure * MICRO
         return exposure
 
     def meter(self) -> float:
-        """Exposure (s) that puts the brightest spot of the present placement at `metered_peak`, gain as set.
+        """Exposure (s) at which the brightest spot of the present placement is at `metered_peak`.
 
-        As an automatic exposure does with all lasers lit, speckle and ambient light included; within the
+        Like an automatic exposure with all lasers on, including speckle and ambient light, within the
         shortest and the longest exposure of the camera.
         """
         if self._metered is None or self._metered[:2] != (self._scene.moves, self.gain):
@@ -112,9 +112,9 @@ class EmulatedCamera:
         return self._metered[2]
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Return at once: there is no device to release."""
 
-    def _metered_for(self, spots: Sequence[Spot]) -> float:
+    def _metered_for(self, spots: Sequence[SpotImage]) -> float:
         spec = self._spec.camera
         exposure = self._sensor.metered_exposure(spots, self.gain, spec.metered_peak)
         return min(max(exposure, spec.shortest_exposure_s), spec.longest_exposure_s)
@@ -125,7 +125,7 @@ class EmulatedCamera:
         return self.meter() if self.exposure_s is None else self.exposure_s
 
     def _next(self) -> Exposure:
-        """Expose a frame and take the oldest one that is on its way."""
+        """Expose a frame and return the oldest one in the stream."""
         self._queue.append(self._expose(self._lasers()))
         return self._queue.popleft()
 
@@ -156,7 +156,7 @@ class EmulatedCamera:
         return Frame(_mirrored(image) if self._spec.camera.mirrored else image, time.time_ns())
 
     def _ambient(self, exposure: Exposure, phase: float) -> float:
-        """Ambient light of one exposure: lamps at twice the mains frequency, averaged over it."""
+        """Relative ambient light, averaged over one exposure; lamps flicker at twice the mains frequency."""
         spec = self._spec.ambient
         cycles = 2 * spec.mains_hz * exposure.exposure_s
         flicker = 1 + spec.flicker_depth * float(np.sinc(cycles)) * float(np.cos(2 * np.pi * phase))
@@ -164,5 +164,5 @@ class EmulatedCamera:
 
 
 def _mirrored(image: Image) -> Image:
-    """Left and right exchanged."""
+    """Image with left and right exchanged."""
     return image[:, ::-1].copy()

@@ -1,4 +1,4 @@
-"""The laser controller's firmware, emulated: the line protocol of docs/laser-controller.md."""
+"""Emulated firmware of the laser controller: the line protocol of docs/laser-controller.md."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ IDENTITY = "laser-range-workbench,emulated laser controller,emulated-1,1"
 
 
 class Refusal(Exception):  # noqa: N818 - an answer, not a failure
-    """A request that is answered with ERR."""
+    """Refusal of a request, answered with ERR."""
 
 
 class Controller:
-    """Lease and mask of the lasers. Boots off. Safe to ask from any thread."""
+    """Controller with lease and mask of the lasers, off at start. Thread-safe."""
 
     def __init__(
         self, ids: Sequence[str], spec: ControllerSpec, clock: Callable[[], float] = time.monotonic
@@ -30,17 +30,17 @@ class Controller:
         self._ends = 0.0
         self._line = bytearray()
         self.fault: Fault = spec.fault
-        """May be set while the controller runs: a part that breaks."""
+        """Present fault; tests may set it while the controller runs."""
         self.interlock_closed = spec.interlock_closed
 
     def lit(self) -> tuple[str, ...]:
-        """Ids of the lasers that shine at this moment, whatever the controller says of them."""
+        """Ids of the lasers that truly emit, independent of what the controller reports."""
         with self._lock:
             mask = self._shining()
         return tuple(name for bit, name in enumerate(self._ids) if mask >> bit & 1)
 
     def receive(self, data: bytes) -> bytes:
-        """Bytes from the line to the bytes that answer them; unfinished lines are kept."""
+        """Answer to bytes from the line; incomplete lines are kept."""
         answers = bytearray()
         for byte in data:
             if byte == ord("!"):
@@ -69,7 +69,7 @@ class Controller:
         return reply.encode() + b"\n"
 
     def _obey(self, line: str) -> str:
-        """What follows the OK. Every reply repeats its verb, so that a late one is not taken for another."""
+        """Reply after OK. It repeats the verb, so that a late reply is not taken for another."""
         if len(line) > LONGEST_LINE:
             raise Refusal("4 line too long")
         verb, *words = line.split(" ")

@@ -1,4 +1,4 @@
-"""Random numbers by name: the same seed and key give the same numbers, whatever was drawn before."""
+"""Random numbers by key: the same seed and key give the same numbers, independent of earlier draws."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from numpy.random import SFC64, Generator, SeedSequence
 
 
 def generator(seed: int, *key: str | int) -> Generator:
-    """A generator that belongs to `key` alone; each part of the key counts, and so does their order.
+    """Random generator for a key, which depends on the parts of the key and their order.
 
-    The key is hashed with its parts' lengths, so that ("ab", "c") and ("a", "bc") differ; Python's own
-    `hash` would change from run to run.
+    The hash includes the lengths of the parts, so that ("ab", "c") and ("a", "bc") differ. Python's `hash`
+    would differ between runs.
     """
     digest = hashlib.sha256(str(seed).encode())
     for part in key:

@@ -1,4 +1,4 @@
-"""The lens: forward by OpenCV's pinhole with Brown-Conrady distortion or its fisheye, backward by Newton."""
+"""Lens: projection by OpenCV (pinhole with distortion, or fisheye), inverse by Newton's method."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FORWARD: dict[LensName, tuple[Callable[..., Any], int]] = {
 
 @dataclass(frozen=True)
 class LinesOfSight:
-    """Where pixels look: x = X/Z and y = Y/Z of their lines of sight, and area = |d(x, y)/d(u, v)|."""
+    """Lines of sight of pixels: x = X/Z, y = Y/Z, and area = |d(x, y)/d(u, v)|."""
 
     x: FloatArray
     y: FloatArray
@@ -47,7 +47,7 @@ STEADY = Drift()
 
 
 class Lens:
-    """Camera frame of OpenCV; the centre of the top-left pixel is (0, 0)."""
+    """Lens in OpenCV's camera frame; the centre of the top-left pixel is (0, 0)."""
 
     def __init__(self, truth: Truth, drift: Drift = STEADY) -> None:
         f, cx, cy = truth.f_px * drift.f_scale, truth.cx_px + drift.u_px, truth.cy_px + drift.v_px
@@ -62,12 +62,12 @@ class Lens:
     def back_project(self, u_px: FloatArray, v_px: FloatArray) -> LinesOfSight:
         """Lines of sight of pixels (n,), by Newton's method on OpenCV's projection.
 
-        OpenCV's own inverse is a fixed-point iteration that need not converge for a strongly curved lens.
-        Started at the undistorted pixel, Newton's steps approach the root from one side on any radial curve
-        that climbs, be it convex or concave.
+        OpenCV's own inverse is a fixed-point iteration, which may diverge for strong distortion. Newton's
+        method, started at the undistorted pixel, converges on any increasing radial curve that is convex or
+        concave.
 
         Raises:
-            BadInputError: no line of sight leads to some of the pixels: the lens folds.
+            BadInputError: some pixels have no line of sight, because the lens folds.
         """
         target = np.stack([u_px, v_px], axis=1)
         xy = (target - self._matrix[:2, 2]) / self._matrix[0, 0]
@@ -91,8 +91,8 @@ class Lens:
     ) -> LinesOfSight:
         """Lines of sight (rows of v, columns of u) on a fine grid, by cubic splines between whole pixels.
 
-        `u_px`, `v_px` are whole pixels around the samples. A lens bends over hundreds of pixels: the
-        spline's error, of fourth order in 1 / f, is below 1e-9 px.
+        `u_px`, `v_px` are whole pixels around the samples. Distortion varies over hundreds of pixels: the
+        error of the spline, of fourth order in 1 / f, is below 1e-9 px.
         """
         uu, vv = np.meshgrid(u_px, v_px)
         nodes = self.back_project(uu.ravel(), vv.ravel())
@@ -103,14 +103,14 @@ class Lens:
         return LinesOfSight(x, y, area)
 
     def _miss(self, xy: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Target minus projection, u and v, and the projection's Jacobian d(u, v)/d(x, y), (2, 2, n)."""
-        # At depth 1 a translation is a step of (x, y).
+        """Target - projection in u and v, and the Jacobian d(u, v)/d(x, y) of the projection, (2, 2, n)."""
+        # At depth 1 a translation equals a step of (x, y).
         pixels, by_translation = self._derived(np.column_stack([xy, np.ones(len(xy))]))
         miss = target - pixels
         return miss[:, 0], miss[:, 1], by_translation[:, :, :2].transpose(1, 2, 0)
 
     def _derived(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Pixels (n, 2) of points (n, 3), and their derivatives (n, 2, 3) by a translation of the points."""
+        """Pixels (n, 2) of points (n, 3), with derivatives (n, 2, 3) by a translation of the points."""
         coefficients = np.array(list(self._coefficients.values()))
         forward, column = self._forward
         pixels, jacobian = forward(points.reshape(-1, 1, 3), ZERO, ZERO, self._matrix, coefficients)

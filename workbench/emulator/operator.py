@@ -1,4 +1,4 @@
-"""The operator of the virtual bench: does at once what a prompt asks for, and reads what he should."""
+"""Operator of the virtual bench, which answers every prompt immediately with the expected value."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from workbench.model.prompt import Answer, Prompt
 
 
 class EmulatedOperator:
-    """Says that all is as it should be; where the usual is not known, the middle or the first choice."""
+    """Operator that confirms, or answers with the default, the middle of an interval or the first choice."""
 
     def ask(self, prompt: Prompt) -> Answer:
-        """Answer at once."""
+        """Answer immediately."""
         value: float | str | None = prompt.choices[0] if prompt.choices else None
         if (quantity := prompt.quantity) is not None:
             middle = (quantity.low + quantity.high) / 2

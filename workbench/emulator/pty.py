@@ -1,4 +1,4 @@
-"""A serial line without a cable: a thread that lets a controller speak on a pseudo-terminal."""
+"""Serial line without hardware: a thread that connects a controller to a pseudo-terminal."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 
 class PtyServer:
-    """Serves `receive` (bytes in, bytes out) on a pseudo-terminal until it is closed."""
+    """Server of `receive` (bytes in, bytes out) on a pseudo-terminal."""
 
     def __init__(self, receive: Callable[[bytes], bytes]) -> None:
         self._receive = receive
@@ -19,13 +19,13 @@ class PtyServer:
         tty.setraw(self._theirs)
         os.set_blocking(self._ours, False)
         self.port = os.ttyname(self._theirs)
-        """Device path for the other side."""
+        """Device path for the client."""
         self._wake, self._waker = os.pipe()
         self._thread = threading.Thread(target=self._serve, name="laser controller", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Hang up. The other side sees the line go dead. Closing again does nothing."""
+        """Disconnect, which the client sees as a line failure. A second call has no effect."""
         if not self._thread.is_alive():
             return
         os.write(self._waker, b"x")
@@ -40,6 +40,6 @@ class PtyServer:
             if self._wake in ready:
                 return
             answer = self._receive(os.read(self._ours, 4096))
-            # What nobody reads is lost, as on a real line; it must not hold the thread up.
+            # Unread answers are lost, as on a real line, and must not block the thread.
             with contextlib.suppress(BlockingIOError):
                 os.write(self._ours, answer)

@@ -1,4 +1,4 @@
-"""What stands in front of the emulated sensor, and what the sensor sees of each laser on it."""
+"""Scene in front of the emulated sensor: target surfaces, and the image of each laser on them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,14 @@ from workbench.emulator.beam import Beam
 from workbench.emulator.board import BoardSurface, Print, stand
 from workbench.emulator.lens import STEADY, Drift, Lens
 from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
-from workbench.emulator.spot import ImageFormat, Spot, SpotPainter
-from workbench.emulator.surfaces import Cylinder, Plane, Polynomial, Surface, wall_in_mirror
+from workbench.emulator.spot import ImageFormat, SpotImage, SpotPainter
+from workbench.emulator.surfaces import (
+    CylinderSurface,
+    PlaneSurface,
+    PolynomialSurface,
+    Surface,
+    wall_in_mirror,
+)
 from workbench.emulator.truth import (
     PlacementError,
     Truth,
@@ -33,11 +39,11 @@ from workbench.model.target import (
 )
 
 DRIFT_STEP = Drift(f_scale=4e-6, u_px=1e-3, v_px=1e-3)
-"""Spots are painted anew when the camera has drifted by this: 1e-3 px at the edge."""
+"""Drift of the camera after which spots are painted again: 1e-3 px at the edge of the image."""
 
 
 class BenchScene:
-    """The target bench: puts targets where they are asked for, with the errors of the hidden truth."""
+    """Target of the virtual bench, placed with the errors of the hidden truth."""
 
     def __init__(self, rig: Rig, spec: EmulatorSpec, truth: Truth, truth_file: Path) -> None:
         self._rig, self._spec, self._truth = rig, spec, truth
@@ -47,18 +53,18 @@ class BenchScene:
         self._surfaces: list[tuple[Surface, float]] = []
         self._key = ""
         self._drift = STEADY
-        self._spots: dict[str, list[Spot]] = {}
+        self._spots: dict[str, list[SpotImage]] = {}
         self._picture: Float32Array | None = None
         self.moves = 0
-        """Counts placements."""
+        """Number of placements."""
 
     @property
     def laser_ids(self) -> tuple[str, ...]:
-        """Every laser of the rig."""
+        """Ids of all lasers of the rig."""
         return tuple(self._beams)
 
     def place(self, placement: Placement) -> Placement:
-        """Put the target there; the ruler shows what was asked for, the truth is something else.
+        """Place the target; the ruler shows the requested standoff, from which the truth differs.
 
         Raises:
             BadInputError: a flat target or the board is turned by 90 degrees or more.
@@ -80,15 +86,15 @@ class BenchScene:
         self.moves += 1
         return placement
 
-    def spots(self, laser_id: str, drift: Drift = STEADY) -> list[Spot]:
-        """What one laser alone adds to the image (a mirror-like target shows two spots)."""
+    def spots(self, laser_id: str, drift: Drift = STEADY) -> list[SpotImage]:
+        """Spots of one laser (two on a mirror-like target), with the camera's drift."""
         self._drift_to(drift)
         if laser_id not in self._spots:
             self._spots[laser_id] = self._paint(laser_id)
         return self._spots[laser_id]
 
     def picture(self, drift: Drift = STEADY) -> Float32Array | None:
-        """(height, width) what room light shows of a board; None for all other targets."""
+        """Board in room light (height, width), with the camera's drift; None for other targets."""
         board = self._surfaces[0][0] if self._surfaces else None
         if not isinstance(board, BoardSurface):
             return None
@@ -121,7 +127,7 @@ class BenchScene:
         self._surfaces = [(board, 1.0)]
         self._file.add(key, error, aside)
 
-    def _paint(self, laser_id: str) -> list[Spot]:
+    def _paint(self, laser_id: str) -> list[SpotImage]:
         painter = SpotPainter(self._spec, self._lens(), self._image, self._truth.f_px)
         painted = [
             painter.paint(self._beams[laser_id], surface, gain, (self._key, laser_id, str(index)))
@@ -133,21 +139,21 @@ class BenchScene:
 def _surfaces(
     target: TargetShape, z_mm: float, error: PlacementError, finish: SurfaceSpec
 ) -> list[tuple[Surface, float]]:
-    """The target's surfaces, each with the share of light that reaches it and comes back."""
+    """Surfaces of the target, each with its share of light after reflections."""
     if isinstance(target, FlatTarget):
         return _flat(target, z_mm, error, finish)
     if isinstance(target, CylinderTarget):
         radius = target.diameter_mm / 2
-        return [(Cylinder(target.shift_mm, z_mm + radius, radius, finish.albedo), 1.0)]
+        return [(CylinderSurface(target.shift_mm, z_mm + radius, radius, finish.albedo), 1.0)]
     if isinstance(target, PolynomialTarget):
-        return [(Polynomial(z_mm, target.coefficients, target.shift_mm, finish.albedo), 1.0)]
+        return [(PolynomialSurface(z_mm, target.coefficients, target.shift_mm, finish.albedo), 1.0)]
     return []
 
 
 def _check_turn(what: str, yaw_deg: float, pitch_deg: float) -> None:
     if max(abs(yaw_deg), abs(pitch_deg)) >= 90:
         raise BadInputError(
-            f"{what} target: expected a turn of less than 90 deg (tilt of the placement included),"
+            f"{what} target: expected a rotation below 90 deg (including the tilt error),"
             f" got yaw {yaw_deg:.3g} and pitch {pitch_deg:.3g}"
         )
 
@@ -162,7 +168,7 @@ def _flat(
         "absorbent": finish.absorbent_albedo,
         "mirror": finish.mirror_albedo,
     }
-    face = Plane(
+    face = PlaneSurface(
         z_mm,
         math.tan(math.radians(yaw)),
         math.tan(math.radians(pitch)),

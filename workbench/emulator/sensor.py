@@ -1,4 +1,4 @@
-"""From electrons to numbers: noise, hot pixels, ambient light, gain, saturation, quantisation."""
+"""Image sensor: noise, hot pixels, ambient light, gain, saturation, quantisation."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from numpy.random import Generator
 
 from workbench.emulator.keyed import generator
 from workbench.emulator.spec import EmulatorSpec
-from workbench.emulator.spot import ImageFormat, Spot
+from workbench.emulator.spot import ImageFormat, SpotImage
 from workbench.model.arrays import Float32Array, Image
 
 CLUTTER_THINGS = 40
 
 
 class ImageSensor:
-    """A grey sensor of a linear response; numbers are clipped to [0, 2^bits - 1]."""
+    """Grey sensor with linear response; pixel values are clipped to [0, 2^bits - 1]."""
 
     def __init__(self, spec: EmulatorSpec, image: ImageFormat, bits: int) -> None:
         self._spec = spec.sensor
@@ -27,17 +27,25 @@ class ImageSensor:
 
     def expose(
         self,
-        spots: Sequence[Spot],
+        spots: Sequence[SpotImage],
         exposure_s: float,
         gain: float,
         ambient: float,
         rng: Generator,
         picture: Float32Array | None = None,
     ) -> Image:
-        """One frame; `ambient` multiplies the ambient light, and `picture` (height, width) does so by pixel.
+        """Expose one frame.
 
-        Shot noise is Poisson's where a spot shines and its Gaussian approximation elsewhere, where the read
-        noise drowns the difference: both have the right mean and variance.
+        Shot noise is Poisson noise in the windows of spots, and its Gaussian approximation elsewhere, where
+        the read noise dominates; both have the correct mean and variance.
+
+        Args:
+            spots: images of spots.
+            exposure_s: exposure.
+            gain: gain, 1 at the full well.
+            ambient: factor of the ambient light.
+            rng: generator of the noise.
+            picture: further factor of the ambient light for each pixel, (height, width).
         """
         mean = self._ambient * np.float32(ambient * exposure_s)
         if picture is not None:
@@ -53,8 +61,8 @@ class ImageSensor:
             _window(noise, spot)[:] = rng.poisson(_window(mean, spot)) + of_reading
         return self._digitise(noise, gain)
 
-    def metered_exposure(self, spots: Sequence[Spot], gain: float, peak: float) -> float:
-        """Exposure (s) that puts the brightest pixel of all `spots` at the fraction `peak` of full scale."""
+    def metered_exposure(self, spots: Sequence[SpotImage], gain: float, peak: float) -> float:
+        """Exposure (s) at which the brightest pixel of `spots` is at the fraction `peak` of full scale."""
         rate = max((float(spot.rate.max()) for spot in spots), default=0.0) + self._brightest_ambient
         level = (peak - self._spec.black_level) * self._spec.full_well_e / gain
         return level / rate if rate > 0 else float("inf")
@@ -67,7 +75,7 @@ class ImageSensor:
         return electrons.astype(np.uint8) if self._full_scale < 256 else electrons.astype(np.uint16)
 
 
-def _window(image: Float32Array, spot: Spot) -> Float32Array:
+def _window(image: Float32Array, spot: SpotImage) -> Float32Array:
     height, width = spot.rate.shape
     return image[spot.top : spot.top + height, spot.left : spot.left + width]
 

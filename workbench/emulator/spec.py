@@ -1,4 +1,4 @@
-"""The `emulator:` block of a rig file: what the virtual bench is made of. Every parameter has a default."""
+"""Schema of the `emulator:` block of a rig file; all parameters of the virtual bench have defaults."""
 
 from __future__ import annotations
 
@@ -16,82 +16,82 @@ from workbench.model.yamlfile import FileModel
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=0)]
 Fault = Literal["none", "ignores_off", "hides_stuck_beam", "garbles", "silent", "stutters"]
-"""Of the laser controller: `docs/emulator.md` tells what each does."""
+"""Fault of the laser controller; docs/emulator.md describes each."""
 
 
 class BeamSpec(FileModel):
-    """Laser beams, all alike: Gaussian, 1/e^2 diameter = exit diameter + divergence x path."""
+    """Laser beams, all equal: Gaussian, 1/e^2 diameter = exit diameter + divergence x path."""
 
     power_mw: PositiveFloat = 1.0
     exit_diameter_mm: PositiveFloat = 1.5
     divergence_mrad: NonNegativeFloat = 1.6
-    """Full angle."""
+    """Full angle of the divergence."""
     wavelength_nm: PositiveFloat = 650.0
     speckle_contrast: Fraction = 1.0
-    """Before the pixel averages over grains: 1 for a target that keeps the polarisation, 0 for no speckle."""
+    """Contrast before pixel averaging: 1 for a target that keeps the polarisation, 0 for no speckle."""
 
 
 class LensSpec(FileModel):
-    """What the pinhole does not tell about the lens."""
+    """Optical properties of the lens beyond its projection."""
 
     f_number: PositiveFloat = 2.0
     blur_px: NonNegativeFloat = 0.7
-    """Standard deviation of the Gaussian point spread, without the pixel's own width."""
+    """Standard deviation of the Gaussian PSF before pixel integration."""
     transmission: Fraction = 0.6
-    """Lens and band-pass filter at the laser's wavelength."""
+    """Transmission of lens and band-pass filter at the laser's wavelength."""
 
 
 class SensorSpec(FileModel):
-    """Sensor. The defaults are a 1/3" CCD of 45 dB: full well / read noise = 10^(45 / 20)."""
+    """Image sensor. The defaults are a 1/3" CCD of 45 dB: full well / read noise = 10^(45 / 20)."""
 
     pitch_um: PositiveFloat = 7.5
     quantum_efficiency: Fraction = 0.3
     full_well_e: PositiveFloat = 40_000.0
-    """Electrons that make the largest number at gain 1."""
+    """Number of electrons at full scale with gain 1."""
     read_noise_e: NonNegativeFloat = 225.0
     black_level: Annotated[float, Field(ge=0, lt=0.5)] = 0.03
-    """Pedestal as a fraction of full scale; keeps the noise of a dark pixel from being cut at 0."""
+    """Pedestal as a fraction of full scale; prevents clipping of dark noise at 0."""
     hot_pixels: Count = 20
     hot_pixel_e_per_s: NonNegativeFloat = 3e5
-    """Mean dark current of a hot pixel; the currents are spread exponentially."""
+    """Mean dark current of a hot pixel; the distribution is exponential."""
 
 
 class AmbientSpec(FileModel):
     """Room light that passes the band-pass filter."""
 
     level_e_per_s: NonNegativeFloat = 5e4
-    """At the image centre: some 500 lx of room light on white paper through an 11 nm filter at f/2."""
+    """Level at the image centre; default: about 500 lx on white paper through an 11 nm filter at f/2."""
     gradient_u: Annotated[float, Field(ge=-1, le=1)] = 0.2
     """Relative change over the image's full width."""
     gradient_v: Annotated[float, Field(ge=-1, le=1)] = 0.1
     """Relative change over the image's full height."""
     clutter: Fraction = 0.0
-    """Things in the room: 40 rectangles, each brighter or darker than what is behind it by at most this."""
+    """Objects in the room: largest relative contrast of 40 rectangles against their background."""
     flicker_depth: Fraction = 0.1
     mains_hz: PositiveFloat = 60.0
-    """Light flickers at twice this."""
+    """Mains frequency; light flickers at twice this."""
     off_jump: Annotated[float, Field(ge=-1)] = 0.0
-    """Relative change of the ambient light whenever no laser is lit."""
+    """Relative change of the ambient light while no laser is on."""
 
 
 class StreamSpec(FileModel):
-    """Exposure, and how the frames arrive."""
+    """Exposure and transfer of frames."""
 
     exposure_s: PositiveFloat | None = None
-    """Fixed exposure; without one the camera meters at every placement."""
+    """Fixed exposure; None: metered at every placement."""
     gain: Annotated[float, Field(ge=1)] = 1.0
     metered_peak: Annotated[float, Field(gt=0, lt=1)] = 0.7
-    """Where metering puts the brightest pixel, as a fraction of full scale."""
+    """Brightest pixel after metering, as a fraction of full scale."""
     shortest_exposure_s: PositiveFloat = 2e-6
     longest_exposure_s: PositiveFloat = 0.033
     mirrored: bool = False
-    """The image arrives with left and right exchanged."""
+    """Whether left and right are exchanged."""
     latency_frames: Count = 0
-    """Frames between a laser command and the first one that shows it."""
+    """Number of frames between a laser command and the first frame that shows it."""
     dropped: Annotated[float, Field(ge=0, le=0.9)] = 0.0
-    """Share of frames that are lost on their way."""
+    """Share of frames that are lost in transfer."""
     repeated: Annotated[float, Field(ge=0, le=0.9)] = 0.0
-    """Share of frames in whose place the one before arrives again."""
+    """Share of frames that are replaced by the previous one."""
 
 
 class WarmUpSpec(FileModel):
@@ -109,18 +109,18 @@ class DriftSpec(FileModel):
 
 
 class SurfaceSpec(FileModel):
-    """Finishes of the targets."""
+    """Surface finishes of targets."""
 
     albedo: Fraction = 0.8
     """Diffuse reflectance of paper."""
     absorbent_albedo: Fraction = 0.01
     ink_albedo: Fraction = 0.04
-    """Of what is black on the printed board."""
+    """Diffuse reflectance of black parts of the printed board."""
     mirror_albedo: Fraction = 0.05
-    """Diffuse reflectance that a mirror-like target keeps (dust, scratches)."""
+    """Diffuse reflectance of a mirror-like target (dust, scratches)."""
     mirror_reflectance: Fraction = 0.8
     wall_behind_mm: PositiveFloat = 1500.0
-    """From the pinhole back to the wall that a mirror-like target shows the camera."""
+    """Distance from the pinhole back to the wall that is visible in a mirror-like target."""
 
 
 class LaserTruth(FileModel):
@@ -141,7 +141,7 @@ class PlacementTruth(FileModel):
 
 
 class TruthSpec(FileModel):
-    """Values that are pinned instead of drawn from the rig's tolerances."""
+    """Values that are pinned instead of drawn from the rig's priors."""
 
     f_px: PositiveFloat | None = None
     cx_px: float | None = None
@@ -165,14 +165,14 @@ class TruthSpec(FileModel):
 
 
 class ControllerSpec(FileModel):
-    """Laser controller, and the fault that it has."""
+    """Laser controller and its fault."""
 
     fault: Fault = "none"
     interlock_closed: bool = True
 
 
 class EmulatorSpec(FileModel):
-    """The `emulator:` block."""
+    """Block `emulator:` of the rig file."""
 
     seed: Count
     beam: BeamSpec = BeamSpec()
@@ -186,7 +186,7 @@ class EmulatorSpec(FileModel):
     truth: TruthSpec = TruthSpec()
     controller: ControllerSpec = ControllerSpec()
     answers: bool = True
-    """Whether the bench answers the procedures' questions; without it a person can practise on it."""
+    """Whether the bench answers prompts itself; false lets a person practise."""
 
     @field_validator("truth")
     @classmethod
@@ -215,12 +215,12 @@ def emulator_spec(rig: Rig) -> EmulatorSpec:
     """Validate the rig's `emulator:` block.
 
     Raises:
-        BadInputError: one line for each problem, with the key, what was expected and what came.
+        BadInputError: the block is wrong; one line for each problem with key, expected and actual value.
     """
     block: dict[str, Any] = {} if rig.emulator is None else rig.emulator
     try:
         return EmulatorSpec.model_validate(block, context=rig)
     except ValidationError as error:
         found = problems(EmulatorSpec, block, error.errors())
-        lines = [f"rig {rig.rig}: emulator.{one.told}" for one in found]
+        lines = [f"rig {rig.rig}: emulator.{one.message}" for one in found]
         raise BadInputError("\n".join(lines)) from None

@@ -1,4 +1,4 @@
-"""Speckle on the sensor: the interference pattern of a rough surface seen through the lens's pupil."""
+"""Speckle on the sensor: interference pattern of a rough surface imaged through the lens's pupil."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from workbench.model.arrays import FloatArray
 
 
 def subsamples(grain_px: float) -> int:
-    """Samples along a pixel's side: 1.5 to a grain of lambda N (in pixels), no fewer than 4, no more than 16.
+    """Number of samples along a pixel's side: 1.5 per grain of lambda N (in pixels), from 4 to 16.
 
-    The pattern's amplitude holds frequencies up to 0.5 / (lambda N); its intensity, up to 1 / (lambda N).
+    The amplitude contains frequencies up to 0.5 / (lambda N), the intensity up to 1 / (lambda N).
     """
     return int(np.clip(np.ceil(1.5 / grain_px), 4, 16))
 
@@ -19,12 +19,13 @@ def subsamples(grain_px: float) -> int:
 def speckle_field(
     shape: tuple[int, int], step_px: float, grain_px: float, contrast: float, rng: Generator
 ) -> FloatArray:
-    """Relative intensity of a speckle pattern, every `step_px`: mean 1, standard deviation `contrast`.
+    """Relative intensity of a speckle pattern at intervals of `step_px`: mean 1, sd `contrast`.
 
-    A circular pupil of diameter 1 / (lambda N) in spatial frequency passes random, independent amplitudes;
-    the squared modulus of their transform has the negative exponential statistics of fully developed speckle
-    and grains of area (4 / pi) (lambda N)^2 (J. W. Goodman, Speckle Phenomena in Optics, 2007, sections 3.2
-    and 4.4). A contrast below 1 stands for a surface that depolarises.
+    A circular pupil of diameter 1 / (lambda N) in spatial frequency passes random, independent amplitudes.
+    The squared modulus of their transform has the negative exponential statistics of fully developed speckle,
+    and grains of area (4 / pi) (lambda N)^2. A contrast below 1 models a depolarising surface.
+
+    Source: J. W. Goodman, Speckle Phenomena in Optics, 2007, sections 3.2 and 4.4.
     """
     frequency_v = np.fft.fftfreq(shape[0], step_px)[:, None]
     frequency_u = np.fft.fftfreq(shape[1], step_px)[None, :]

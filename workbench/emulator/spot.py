@@ -1,12 +1,12 @@
-"""The image of one beam on one surface, in electrons per second and pixel, before any noise.
+"""Image of one beam on one surface, in electrons per second and pixel, without noise.
 
 Radiometry. A surface patch under irradiance E (W/mm^2 of surface) has the radiance L = albedo E / pi in
-every direction (Lambert). A pixel whose lines of sight cover d(x, y) in the plane z = 1, at angle alpha off
-the axis, sees the solid angle cos^3(alpha) d(x, y); the pupil of area A shows it A cos(alpha). So the pixel
-takes in L A cos^4(alpha) d(x, y). Obliquity of the surface to the camera is not a factor of its own: a pixel
-sees a longer patch of a tilted surface, but the patch is foreshortened as much. Integrated over the whole
-spot this is P albedo A cos(alpha) cos(theta) / (pi r^2), theta between the line of sight and the normal, r
-the distance.
+every direction (Lambert). Let the lines of sight of a pixel, at angle alpha to the axis, cover d(x, y) in the
+plane z = 1. Their solid angle is cos^3(alpha) d(x, y). The projected area of the pupil is A cos(alpha). The
+pixel therefore receives L A cos^4(alpha) d(x, y). The obliquity of the surface adds no factor: a pixel sees a
+longer patch of a tilted surface, which is foreshortened by the same factor. Integrated over the whole spot
+this is P albedo A cos(alpha) cos(theta) / (pi r^2), with theta between the line of sight and the normal, and
+r the distance.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from workbench.emulator.surfaces import Surface
 from workbench.model.arrays import Float32Array, FloatArray
 
 OUTLINE_RADII = 3.0
-"""A window ends where the beam is down to exp(-18) of its peak, and five sigma of blur beyond."""
+"""Half size of a window in beam radii: there the beam is at exp(-18) of its peak; 5 sd of blur are added."""
 LARGEST_WINDOW = 1_500_000
-"""Samples: a spot smeared across the whole image by grazing incidence is sampled more coarsely."""
+"""Largest number of samples; larger spots, from grazing incidence, are sampled more coarsely."""
 
 
 @dataclass(frozen=True)
-class Spot:
-    """Electrons per second, (height, width), its first pixel at (`left`, `top`) of the image."""
+class SpotImage:
+    """Window of a spot: electrons per second, (height, width), with its first pixel at (`left`, `top`)."""
 
     left: int
     top: int
@@ -50,7 +50,7 @@ class ImageFormat:
 
 
 class SpotPainter:
-    """Paints beams on surfaces as one camera sees them."""
+    """Renderer of beams on surfaces as seen by the camera."""
 
     def __init__(self, spec: EmulatorSpec, lens: Lens, image: ImageFormat, f_px: float) -> None:
         self._spec = spec
@@ -62,10 +62,10 @@ class SpotPainter:
         electrons_per_joule = spec.sensor.quantum_efficiency * wavelength_mm * 1e-3 / (h * c)
         self._response = pupil_mm2 * spec.lens.transmission * electrons_per_joule / np.pi
 
-    def paint(self, beam: Beam, surface: Surface, gain: float, key: Sequence[str]) -> Spot | None:
-        """The spot, its speckle drawn by `key`; None where the camera does not see it.
+    def paint(self, beam: Beam, surface: Surface, gain: float, key: Sequence[str]) -> SpotImage | None:
+        """Image of a beam's spot with speckle by `key`; None if the camera does not see it.
 
-        `gain` multiplies the surface's albedo (a mirror in between takes its share).
+        `gain` multiplies the surface's albedo, for reflections in a mirror.
         """
         box = self._window(beam, surface)
         if box is None:
@@ -84,7 +84,7 @@ class SpotPainter:
         rate = samples.reshape(height, n, width, n).mean(axis=(1, 3)) * (
             self._response * surface.albedo * gain
         )
-        return Spot(left, top, rate.astype(np.float32)) if rate.max() > 0 else None
+        return SpotImage(left, top, rate.astype(np.float32)) if rate.max() > 0 else None
 
     def _window(self, beam: Beam, surface: Surface) -> tuple[int, int, int, int] | None:
         """Left, top, width, height of the pixels that the spot may touch; None if there are none."""
@@ -104,7 +104,7 @@ class SpotPainter:
         return (left, top, right - left, bottom - top) if right > left and bottom > top else None
 
     def _samples(self, beam: Beam, surface: Surface, box: tuple[int, int, int, int], n: int) -> FloatArray:
-        """Power from each of n x n points a pixel, as if it filled the pixel: E cos^4(alpha) d(x, y)."""
+        """Power of n x n points per pixel, each as if it filled the pixel: E cos^4(alpha) d(x, y)."""
         left, top, width, height = box
         offsets = (np.arange(n) + 0.5) / n - 0.5
         u = (np.arange(left, left + width)[:, None] + offsets).ravel()

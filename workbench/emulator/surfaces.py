@@ -1,4 +1,4 @@
-"""Surfaces that beams and lines of sight meet. Camera frame, mm; front is the side that faces the sensor."""
+"""Surfaces and their intersections with rays. Camera frame, mm; the front side faces the sensor."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 
 NODES = 2049
+"""Number of nodes for the interpolation of depths."""
 FARTHEST_INVERSE = 1e-6
-"""1/mm: what lies a kilometre away is not there."""
+"""Inverse of the largest distance of an intersection, 1/mm."""
 
 
 class Surface(Protocol):
-    """Something opaque in front of the sensor."""
+    """Opaque surface in front of the sensor."""
 
     @property
     def albedo(self) -> float:
         """Diffuse reflectance."""
 
     def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
-        """First t > 0 at which origin + t direction meets the surface, NaN where it does not.
+        """First t > 0 at which origin + t direction meets the surface; NaN if it does not.
 
         Shapes: origin (3,) or (n, 3), direction (n, 3) with third component 1, result (n,).
         """
@@ -31,11 +32,11 @@ class Surface(Protocol):
         """Unit normals (n, 3) towards the front at points (n, 3) on the surface."""
 
     def shade(self, points: FloatArray) -> FloatArray | float:
-        """Diffuse reflectance at points (n, 3) on the surface over `albedo`."""
+        """Diffuse reflectance at points (n, 3) on the surface, relative to `albedo`."""
 
 
 class Plain:
-    """A surface of one colour."""
+    """Surface of uniform reflectance."""
 
     def shade(self, points: FloatArray) -> float:
         """See `Surface`."""
@@ -43,8 +44,8 @@ class Plain:
 
 
 @dataclass(frozen=True)
-class Plane(Plain):
-    """z = z0 + slope_x x + slope_y y, bounded at half sizes from (centre_x, 0) where they are finite."""
+class PlaneSurface(Plain):
+    """Plane z = z0 + slope_x x + slope_y y, bounded by half sizes around (centre_x, 0)."""
 
     z0_mm: float
     slope_x: float
@@ -73,10 +74,10 @@ class Plane(Plain):
 
 @dataclass(frozen=True)
 class SeenInMirror(Plain):
-    """A surface's image in a plane mirror: behind it, where the beam would go on through the mirror."""
+    """Mirror image of a surface: behind the mirror, on the continuation of the beam."""
 
-    image: Plane
-    mirror: Plane
+    image: PlaneSurface
+    mirror: PlaneSurface
 
     @property
     def albedo(self) -> float:
@@ -84,7 +85,7 @@ class SeenInMirror(Plain):
         return self.image.albedo
 
     def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
-        """See `Surface`; rays that pass the mirror by see nothing in it."""
+        """See `Surface`; rays that miss the mirror do not meet the image."""
         through = np.isfinite(self.mirror.depth(origin, direction))
         return np.where(through, self.image.depth(origin, direction), np.nan)
 
@@ -93,10 +94,10 @@ class SeenInMirror(Plain):
         return self.image.normal(points)
 
 
-def wall_in_mirror(mirror: Plane, wall_z_mm: float, albedo: float) -> SeenInMirror | None:
-    """Image of the wall z = `wall_z_mm` (behind the sensor) in `mirror`; None if that looks elsewhere.
+def wall_in_mirror(mirror: PlaneSurface, wall_z_mm: float, albedo: float) -> SeenInMirror | None:
+    """Mirror image of the wall z = `wall_z_mm` behind the sensor; None if the mirror does not show it.
 
-    A mirror turned by 45 degrees throws the beam to the side: no wall behind the sensor is seen in it.
+    A mirror turned by 45 degrees or more deflects the beam to the side, not to the wall.
     """
     normal = np.array([-mirror.slope_x, -mirror.slope_y, 1.0]) / np.hypot(
         np.hypot(mirror.slope_x, mirror.slope_y), 1
@@ -108,12 +109,12 @@ def wall_in_mirror(mirror: Plane, wall_z_mm: float, albedo: float) -> SeenInMirr
         return None
     slope_x, slope_y = float(-turned[0] / turned[2]), float(-turned[1] / turned[2])
     z0 = float(point[2] - slope_x * point[0] - slope_y * point[1])
-    return SeenInMirror(Plane(z0, slope_x, slope_y, albedo), mirror)
+    return SeenInMirror(PlaneSurface(z0, slope_x, slope_y, albedo), mirror)
 
 
 @dataclass(frozen=True)
-class Cylinder(Plain):
-    """Vertical cylinder, its axis through (axis_x, axis_z)."""
+class CylinderSurface(Plain):
+    """Vertical cylinder with its axis through (axis_x, axis_z)."""
 
     axis_x_mm: float
     axis_z_mm: float
@@ -137,8 +138,8 @@ class Cylinder(Plain):
 
 
 @dataclass(frozen=True)
-class Polynomial(Plain):
-    """z = z0 + sum of c[k] (x - shift)^(k + 1), the same at every height."""
+class PolynomialSurface(Plain):
+    """Vertical surface z = z0 + sum of c[k] (x - shift)^(k + 1)."""
 
     z0_mm: float
     coefficients: tuple[float, ...]
@@ -148,9 +149,8 @@ class Polynomial(Plain):
     def depth(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Surface`.
 
-        Rays of one origin meet a surface that is the same at every height at a depth that depends on their
-        first component alone: many of them are interpolated between `NODES`, a few hundredths of a pixel
-        apart, of which each is solved.
+        For rays with a common origin the depth depends only on their first component. Many rays are therefore
+        interpolated between `NODES` exact solutions, a few hundredths of a pixel apart.
         """
         if origin.ndim > 1 or len(direction) <= NODES:
             return self._first_crossing(origin, direction)
@@ -165,11 +165,11 @@ class Polynomial(Plain):
         return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
 
     def _first_crossing(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
-        """`depth` of each ray for itself.
+        """Exact `depth` of each ray.
 
-        Every crossing is an eigenvalue of a companion matrix, so that the first one is the first. The unknown
-        is 1/t: the leading coefficient is then the gap at the ray's origin, which does not vanish, and a
-        degree lost along a ray of constant x shows as 1/t = 0 instead of a division by it.
+        All crossings are eigenvalues of a companion matrix, so that none is missed. The unknown is 1/t. Its
+        leading coefficient is the gap at the ray's origin, which does not vanish. A degree that is lost along
+        a ray of constant x appears as 1/t = 0 instead of a division by zero.
         """
         p = self._along(origin, direction)
         degree = p.shape[1] - 1
@@ -182,7 +182,7 @@ class Polynomial(Plain):
         return np.where(first > FARTHEST_INVERSE, 1 / np.maximum(first, FARTHEST_INVERSE), np.nan)
 
     def _along(self, origin: FloatArray, direction: FloatArray) -> FloatArray:
-        """Coefficients (n, degree + 1) of surface minus ray in powers of t."""
+        """Coefficients (n, degree + 1) of surface - ray in powers of t."""
         x0 = np.broadcast_to(origin[..., 0] - self.shift_mm, len(direction))
         total = np.zeros((len(direction), len(self.coefficients) + 1))
         total[:, 0] = self.z0_mm - origin[..., 2]

@@ -1,4 +1,4 @@
-"""The hidden truth of a virtual bench: drawn once by seed, written where only tests look."""
+"""Hidden truth of a virtual bench: drawn from its seed, and written to a file that only tests read."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from workbench.model.yamlfile import FileModel
 
 BOARD_SHIFT_SD_MM = 2.0
 BOARD_ROLL_SD_DEG = 1.0
-"""How well a hand puts the blank band on the spots. 1 sigma."""
+"""Errors of placing the blank band on the spots by hand, 1 sigma."""
 RADIAL: dict[LensName, tuple[str, ...]] = {
     "plumb_bob": ("k1", "k2", "k3"),
     "equidistant": ("k1", "k2", "k3", "k4"),
 }
-"""Coefficients of the radial polynomial, of powers 2, 4, ... beside 1."""
+"""Coefficients of the radial polynomial 1 + k1 a^2 + k2 a^4 + ..."""
 WIDEST_RAD = np.radians(88.0)
-"""Widest angle off the axis at which the bench's fisheye can see anything."""
+"""Largest angle to the axis in the image of the bench's fisheye."""
 
 
 @dataclass(frozen=True)
-class Ray:
-    """A laser: origin (x, y, 0) mm, direction (tx, ty, 1), camera frame."""
+class TrueRay:
+    """True laser ray: origin (x, y, 0) mm, direction (tx, ty, 1), camera frame."""
 
     x_mm: float
     y_mm: float
@@ -45,7 +45,7 @@ class Ray:
 
 @dataclass(frozen=True)
 class PlacementError:
-    """How far a placement is off: along the axis, and a flat target's turn about its two axes."""
+    """Error of a placement along the axis, and tilts of a flat target about its two axes."""
 
     error_mm: float
     yaw_deg: float
@@ -54,7 +54,7 @@ class PlacementError:
 
 @dataclass(frozen=True)
 class BoardError:
-    """Where the middle of the board's band stands, and how far the board is turned in its plane."""
+    """Centre of the board's band, and rotation of the board in its plane."""
 
     x_mm: float
     y_mm: float
@@ -63,7 +63,7 @@ class BoardError:
 
 @dataclass(frozen=True)
 class Truth:
-    """True values of the bench. Units and frames as in the rig file; what the lens has not is 0."""
+    """True values of the bench, units and frames as in the rig file; unused lens coefficients are 0."""
 
     f_px: float
     cx_px: float
@@ -75,7 +75,7 @@ class Truth:
     k3: float
     offset_mm: float
     ruler_scale: float
-    lasers: dict[str, Ray]
+    lasers: dict[str, TrueRay]
     lens: LensName = "plumb_bob"
     k4: float = 0.0
     target_yaw_deg: float = 0.0
@@ -83,7 +83,7 @@ class Truth:
     target_pitch_deg: float = 0.0
     print_scale: float = 0.0
     bow_x_mm: float = 0.0
-    """This and the next two: sag of the board's paper, see `workbench.model.board.sag_mm`."""
+    """First of three coefficients of the sag of the board's paper, see `workbench.model.board.sag_mm`."""
     bow_y_mm: float = 0.0
     bow_xy_mm: float = 0.0
 
@@ -91,11 +91,11 @@ class Truth:
 def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
     """Draw every value from its prior in the rig file, unless `emulator.truth` pins it.
 
-    Each value has a key of its own, so that pinning one leaves the others as they were. Lens coefficients
-    are drawn again, all together, while the lens would fold inside the image: no such lens is sold.
+    Each value has its own key, so that pinning one does not change the others. Lens coefficients are drawn
+    again, all together, while the lens would fold inside the image, which real lenses do not.
 
     Raises:
-        BadInputError: the tolerances (or pins) of the lens leave none that does not fold.
+        BadInputError: all draws of the lens fold.
     """
     pins = spec.truth
     camera = rig.camera
@@ -114,7 +114,7 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
         print_scale=_value(spec.seed, "print_scale", rig.bench.print_scale, pins),
         **{name: _value(spec.seed, name, bow, pins) for name in BOW},
         lasers={
-            laser.id: Ray(
+            laser.id: TrueRay(
                 **{
                     name: _value(
                         spec.seed,
@@ -132,7 +132,7 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
 
 
 def draw_placement_error(rig: Rig, spec: EmulatorSpec, key: str) -> PlacementError:
-    """Errors of the placement `key` by itself, the same whenever the target is put there again."""
+    """Errors of the placement `key` itself, equal whenever the same key is placed again."""
     rng = generator(spec.seed, "placement", key)
     error, yaw, pitch = rng.standard_normal(3)
     pins = spec.truth.placements.get(key, PlacementTruth())
@@ -144,7 +144,7 @@ def draw_placement_error(rig: Rig, spec: EmulatorSpec, key: str) -> PlacementErr
 
 
 def draw_board_error(truth: Truth, spec: EmulatorSpec, key: str, z_mm: float) -> BoardError:
-    """Where a hand puts the board at depth `z_mm`: its band on the spots, by eye."""
+    """Position of a board placed by hand at depth `z_mm`: its band on the spots, with random errors."""
     spots = np.array([(r.x_mm + r.tx * z_mm, r.y_mm + r.ty * z_mm) for r in truth.lasers.values()])
     x_mm, y_mm = spots.mean(axis=0)
     right, down, roll = generator(spec.seed, "board", key).standard_normal(3)
@@ -156,14 +156,14 @@ def draw_board_error(truth: Truth, spec: EmulatorSpec, key: str, z_mm: float) ->
 
 
 def truth_path(session_dir: Path) -> Path:
-    """Where the truth lies: beside the session, not in it."""
+    """Path of the truth's file, beside the session folder."""
     return session_dir.with_name(session_dir.name + ".truth.yaml")
 
 
 class TruthFile:
-    """The truth on disk: one YAML document, to which every placement adds a line with its errors.
+    """File of the truth: one YAML document, to which every placement adds a line with its errors.
 
-    Opening a session again keeps the placements that its file knows, if the truth is the same.
+    Opening a session again keeps the placements in its file, if the truth is the same.
     """
 
     def __init__(self, path: Path, spec: EmulatorSpec, truth: Truth) -> None:
@@ -172,7 +172,7 @@ class TruthFile:
         YAML(typ="safe", pure=True).dump({"seed": spec.seed, **asdict(truth)}, text)
         head = text.getvalue() + "placements:\n"
         before = path.read_text(encoding="utf-8") if path.exists() else ""
-        # A line that a stop has torn ends without a newline.
+        # A line that a kill interrupted ends without a newline.
         lines = before[len(head) :].splitlines(keepends=True) if before.startswith(head) else []
         lines = [line for line in lines if line.endswith("\n")]
         self._known = {json.loads(line.split(": {")[0].strip()) for line in lines}
@@ -180,7 +180,7 @@ class TruthFile:
         _replace(path, head + "".join(lines))
 
     def add(self, key: str, *errors: PlacementError | BoardError) -> None:
-        """Note a placement, once for each key."""
+        """Append a placement, once for each key."""
         if key in self._known:
             return
         self._known.add(key)
@@ -191,7 +191,7 @@ class TruthFile:
 
 
 def _replace(path: Path, text: str) -> None:
-    """Write, sync, rename: the file is the old or the new one, never half of either."""
+    """Replace a file atomically: write, sync, rename."""
     part = path.with_name(path.name + ".part")
     with part.open("w", encoding="utf-8") as file:
         file.write(text)
@@ -213,22 +213,22 @@ def _draw_lens(camera: CameraSpec, spec: EmulatorSpec, focal: dict[str, float]) 
             return lens
     raise BadInputError(
         f"emulator.truth: expected lens coefficients {', '.join(RADIAL[camera.lens])} (pinned, or drawn from"
-        " the rig's camera) whose radial curve climbs to the image corner at"
-        f" {corner:.3g} focal lengths; none of 1000 draws does"
+        " the rig's camera) with a radial curve that increases up to the image corner at"
+        f" {corner:.3g} focal lengths; got none in 1000 draws"
     )
 
 
 def _corner_radius(camera: CameraSpec, focal: dict[str, float]) -> float:
-    """Distorted radius of the farthest image corner and a few pixels more, in focal lengths."""
+    """Distorted radius of the farthest image corner with a margin of 3 px, in focal lengths."""
     du = max(focal["cx_px"], camera.width_px - 1 - focal["cx_px"]) + 3
     dv = max(focal["cy_px"], camera.height_px - 1 - focal["cy_px"]) + 3
     return float(np.hypot(du, dv)) / focal["f_px"]
 
 
 def _reaches_corner(name: LensName, lens: dict[str, float], corner: float) -> bool:
-    """Whether a (1 + k1 a^2 + k2 a^4 + ...) climbs, at a slope of 0.3 or more, to the corner.
+    """Whether a (1 + k1 a^2 + k2 a^4 + ...) increases with a slope of at least 0.3 up to the corner.
 
-    The argument a is the undistorted radius of a pinhole, and the angle of a fisheye, up to 88 degrees.
+    The argument a is the undistorted radius of a pinhole lens, or the angle of a fisheye up to 88 degrees.
     """
     a = np.linspace(0.0, 3.0 * corner if name == "plumb_bob" else WIDEST_RAD, 3001)
     powers = [(2 * n, lens[coefficient]) for n, coefficient in enumerate(RADIAL[name], start=1)]

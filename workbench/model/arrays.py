@@ -1,4 +1,4 @@
-"""Array types by their element; shapes and units are in the docstrings of what uses them."""
+"""Array types by element type. Functions that use them state shapes and units in their docstrings."""
 
 from __future__ import annotations
 

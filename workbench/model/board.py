@@ -17,20 +17,20 @@ from workbench.model.yamlfile import FileModel
 
 Millimetres = Annotated[float, Field(gt=0)]
 PAGE_MARGIN_MM = 5.0
-"""No printer reaches the edge of the paper."""
+"""Margin on each side that printers leave blank."""
 BELOW_MM = 13.0
-"""For the ruler and the instructions, above and below the blocks."""
+"""Height above and below the blocks for the instructions and the ruler."""
 BOW_RADIUS_MM = 100.0
-"""Where a sag of the paper is stated: at this distance from the board's middle."""
+"""Distance from the board's centre at which the sag of the paper is stated."""
 BOW = ("bow_x_mm", "bow_y_mm", "bow_xy_mm")
 
 
 class Board(FileModel):
-    """A board as it was meant to be printed. The defaults fill an A4 page that lies on its side."""
+    """Nominal dimensions of the printed board. The defaults fill an A4 page in landscape format."""
 
     columns: Annotated[int, Field(ge=3, le=1000)] = 13
     rows: Annotated[int, Field(ge=2, le=1000)] = 4
-    """Of each of the two blocks."""
+    """Rows of squares in each of the two blocks."""
     square_mm: Millimetres = 20.0
     marker_mm: Millimetres = 15.0
     band_mm: Millimetres = 24.0
@@ -58,7 +58,7 @@ class Board(FileModel):
 
     @property
     def markers(self) -> int:
-        """In each block: one in every second square, the top left square being black."""
+        """Number of markers in each block: one in every white square; the top left square is black."""
         return self.columns * self.rows // 2
 
     @property
@@ -81,7 +81,7 @@ class Board(FileModel):
 
     @property
     def corners_per_block(self) -> int:
-        """Half of all: corner ids of the lower block begin here."""
+        """Number of inner corners of one block; corner ids of the lower block start at this number."""
         return (self.columns - 1) * (self.rows - 1)
 
     def black_mm(self) -> FloatArray:
@@ -101,7 +101,7 @@ class Board(FileModel):
         return np.array([*squares, *self._marker_cells()])
 
     def _marker_cells(self) -> list[tuple[float, float, float, float]]:
-        import cv2  # only where markers are drawn: the command line's help shall not wait for it
+        import cv2  # imported here: the command line's help does not need it
 
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.dictionary))
         modules = dictionary.markerSize + 2
@@ -121,10 +121,13 @@ class Board(FileModel):
 
 
 def sag_mm(bow_mm: FloatArray, points_mm: FloatArray) -> FloatArray:
-    """(n,) how far the paper at board points (n, 2) lies behind the plane that it should be.
+    """Sag of the paper at board points: (n,) distances behind the nominal plane, mm.
 
-    A quadratic, whatever bends a sheet that is fixed all over; `bow_mm` (3,) are its values, in the order of
-    `BOW`, of x^2, y^2 and x y at `BOW_RADIUS_MM`.
+    The sag is modelled as a quadratic form of the position.
+
+    Args:
+        bow_mm: (3,) coefficients of x^2, y^2 and x y at `BOW_RADIUS_MM`, in the order of `BOW`.
+        points_mm: (n, 2) points of the board.
     """
     x, y = points_mm[:, 0] / BOW_RADIUS_MM, points_mm[:, 1] / BOW_RADIUS_MM
     return np.asarray(bow_mm[0] * x * x + bow_mm[1] * y * y + bow_mm[2] * x * y)

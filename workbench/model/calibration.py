@@ -1,7 +1,7 @@
-"""The calibration YAML, format 1: what a ranger needs, and everything that tells how far to trust it.
+"""Schema of the calibration YAML, format 1: sensor parameters, their uncertainty, and provenance.
 
-ROS's camera_info keys stand at the top, everything of ours under `laser_ranger`. docs/calibration-format.md
-describes it for people who write another reader.
+The top level has the keys of ROS's camera_info; the workbench's own keys are under `laser_ranger`.
+docs/calibration-format.md describes the format for authors of other readers.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ TermVerdict = Literal["shown", "open", "unneeded", "called for", "below", "asked
 """The last four were written by version 0.1.0, which dropped terms."""
 TERM_VERDICTS: dict[TermVerdict, str] = {
     "shown": "the data show it",
-    "open": "the data cannot tell",
-    "unneeded": "the data speak against it",
-    "called for": "MISSING: the data call for it",
-    "below": "kept: a higher order stays",
-    "asked for": "kept: asked for",
-    "absent": "left out: shown to be absent",
-    "idle": "left out: no range depends on it",
+    "open": "the data do not decide",
+    "unneeded": "the data favour the model without it",
+    "called for": "MISSING: the data require it",
+    "below": "kept: a higher order is kept",
+    "asked for": "kept: requested",
+    "absent": "dropped: shown to be absent",
+    "idle": "dropped: no range depends on it",
 }
 """Verdict on a term of the model, in words."""
 Vector3 = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 AGREEMENT = 1e-9
-"""Relative difference that two copies of one number in the file may have."""
+"""Largest relative difference between two copies of one number in the file."""
 
 
 class Matrix(FileModel):
-    """A matrix as OpenCV and ROS write it, row by row."""
+    """Matrix in the notation of OpenCV and ROS, row by row."""
 
     rows: Annotated[int, Field(gt=0)]
     cols: Annotated[int, Field(gt=0)]
@@ -52,14 +52,14 @@ class Matrix(FileModel):
 
 
 class ReferencePlane(FileModel):
-    """Where ranges are counted from."""
+    """Plane from which ranges are measured."""
 
     offset_mm: float
-    """The pinhole lies this far behind the plane: z = range + offset."""
+    """Distance of the pinhole behind the plane: z = range + offset."""
 
 
 class LaserRay(FileModel):
-    """A beam: the points origin + z direction, camera frame, z in mm."""
+    """Laser ray: the points origin + z direction in the camera frame, z in mm."""
 
     id: LaserId
     axis: Literal["u", "v"]
@@ -76,16 +76,16 @@ class LaserRay(FileModel):
 
 
 class Noise(FileModel):
-    """What a ranger adds to a spot's stated deviation, pixels, 1 sigma."""
+    """Noise of spot centres that a ranger takes into account, pixels, 1 sigma."""
 
     spot_sd_px: Annotated[float, Field(gt=0, le=LARGEST)]
-    """For a spot whose own deviation is not known."""
+    """Standard deviation of a spot that states none of its own."""
     speckle_sd_px: NonNegativeFloat
-    """In every spot, however often a target that stands still is read."""
+    """Speckle noise of every spot; repeats at the same placement do not average it out."""
 
 
 class Parameters(FileModel):
-    """All parameters of the sensor with their posterior; lists in the order of `names`, 1 sigma."""
+    """Posterior of all parameters of the sensor, 1 sigma. Every list is in the order of `names`."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
@@ -109,12 +109,12 @@ class Parameters(FileModel):
 
     @property
     def covariance_array(self) -> FloatArray:
-        """(P, P)."""
+        """Posterior covariance, (P, P)."""
         return np.array(self.covariance.data).reshape(self.covariance.rows, self.covariance.cols)
 
 
 class Validity(FileModel):
-    """Where the calibration was measured, and what it promises there."""
+    """Interval of standoffs that the calibration covers, and the stated uncertainty in it."""
 
     standoff_mm: Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
     max_relative_range_sd: NonNegativeFloat
@@ -129,21 +129,21 @@ class Validity(FileModel):
 
 
 class TermSummary(FileModel):
-    """A term of the model, compared with its absence: its parameters at the rig file's values."""
+    """Comparison of the model with and without one term (its parameters fixed at the rig file's values)."""
 
     name: str
     """`k2`, `p1 p2`, `ruler_scale`, or `tilts` (of all placements together)."""
     verdict: TermVerdict
     p_value: float
-    """Of what the data show, were the term absent; its own prior takes no part."""
+    """Probability of such data if the term were absent; the term's prior is not used."""
     log10_bayes_factor: float
-    """For the model with the term, by its prior, over the model without."""
+    """Bayes factor of the model with the term (and its prior) over the model without it."""
     range_shift_sd: float | None
-    """Largest change of a range without it, in standard deviations; null where the model lacks it."""
+    """Largest change of a range without the term, in standard deviations; null if the model lacks it."""
 
 
 class FitSummary(FileModel):
-    """How the fit went."""
+    """Quality, verdict and warnings of the fit."""
 
     rms_px: NonNegativeFloat
     observations: int
@@ -152,20 +152,20 @@ class FitSummary(FileModel):
     placement_scale: Annotated[float, Field(ge=1)] = 1.0
     verdict: Literal["accepted", "refused"]
     reasons: tuple[str, ...] = ()
-    """Why refused."""
+    """Reasons for a refusal."""
     accepted_because: str = ""
-    """Why somebody kept it all the same."""
+    """Reason of a person for accepting a refused fit."""
     warnings: tuple[str, ...] = ()
     terms: tuple[TermSummary, ...] = ()
 
     @property
     def usable(self) -> bool:
-        """Accepted by its limits, or by somebody with a reason."""
+        """Whether the fit was accepted, by its limits or by a person with a reason."""
         return self.verdict == "accepted" or bool(self.accepted_because)
 
 
 class Provenance(FileModel):
-    """Where the calibration comes from."""
+    """Origin of the calibration."""
 
     session: str
     captures_sha256: str
@@ -178,7 +178,7 @@ class Provenance(FileModel):
 
 
 class LaserRanger(FileModel):
-    """Everything beyond the camera."""
+    """The workbench's own part of a calibration file: everything beyond the camera."""
 
     format: Literal[1]
     reference_plane: ReferencePlane
@@ -193,7 +193,7 @@ class LaserRanger(FileModel):
 class Calibration(FileModel):
     """A calibration file."""
 
-    told_by = "laser_ranger"
+    kind_key = "laser_ranger"
 
     image_width: Annotated[int, Field(gt=0, le=MOST_PX)]
     image_height: Annotated[int, Field(gt=0, le=MOST_PX)]
@@ -206,7 +206,7 @@ class Calibration(FileModel):
     laser_ranger: LaserRanger
 
     @model_validator(mode="after")
-    def _says_one_thing(self) -> Calibration:
+    def _copies_agree(self) -> Calibration:
         parameters = self.laser_ranger.parameters
         stated = dict(zip(parameters.names, parameters.values, strict=True))
         for name, value in self.geometry().items():
@@ -226,7 +226,7 @@ class Calibration(FileModel):
             raise ValueError("projection_matrix: expected the camera_matrix and a column of zeros")
 
     def geometry(self) -> dict[str, float]:
-        """Every number that a range depends on, by the name of its parameter."""
+        """Numbers that a range depends on, by parameter name."""
         k, d = self.camera_matrix.data, self.distortion_coefficients.data
         coefficients = COEFFICIENTS[self.distortion_model]
         if len(k) != 9 or len(d) != len(coefficients):
@@ -264,6 +264,8 @@ def _check_covariance(covariance: FloatArray) -> None:
     scale = np.sqrt(np.diag(covariance))
     safe = np.where(scale > 0, scale, 1.0)
     smallest = float(np.linalg.eigvalsh(covariance / np.outer(safe, safe))[0])
-    # Rounding leaves a singular direction at +- some 1e-15 of the largest; anything below is a wrong matrix.
+    # Rounding puts the eigenvalue of a singular direction at about +-1e-15; a lower one is a wrong matrix.
     if smallest < -1e-9:
-        raise ValueError(f"covariance: expected no negative eigenvalue, got correlation's {smallest:.3g}")
+        raise ValueError(
+            f"covariance: expected no negative eigenvalue of the correlation matrix, got {smallest:.3g}"
+        )

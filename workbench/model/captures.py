@@ -1,4 +1,4 @@
-"""captures.csv: the door for anyone's data, one row a capture. The format is in docs/captures-format.md."""
+"""Reader of captures.csv, one row per capture, for data of any origin (docs/captures-format.md)."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from workbench.model.yamlfile import FileModel
 
 ALL_LASERS = "all"
 BOARD = "board"
-"""In the place of a laser's id: a frame of the printed board in room light, no laser lit."""
+"""Value of `laser_id` for a frame of the printed board in room light, all lasers off."""
 REQUIRED = ("laser_id", "standoff_mm", "repeat")
 IMAGES = ("on", "off")
 POSITION = ("u_px", "v_px")
 OPTIONAL = ("scene", "standoff_sd_mm", "u_sd_px", "v_sd_px", "tilt_deg", "exposure", "exposure_unit")
 LARGEST = 1e6
-"""Of any millimetres or pixels: a kilometre, and beyond every camera."""
+"""Largest accepted number of millimetres or pixels."""
 NEAREST_MM = 1e-3
 SMALLEST_SD_PX = 1e-6
 MOST_REPEATS = 99_999_999
 SEPARATORS = {";": "semicolons (;)", "\t": "tabs", "|": "bars (|)"}
-"""Of other tables, and what people call them."""
+"""Column separators of other table formats, with their names for messages."""
 COLUMNS = (*REQUIRED, *IMAGES, *POSITION, *OPTIONAL)
 
 
@@ -40,10 +40,10 @@ PixelSd = Annotated[float, Field(ge=SMALLEST_SD_PX, le=LARGEST)]
 
 
 class CaptureRow(FileModel):
-    """One row. NaN where a number was left empty; `on` is None for a row that gives the position itself."""
+    """One row. Empty numbers are NaN; `on` is None for a row that states a position instead of images."""
 
     row: int
-    """Line of the file; the header is row 1."""
+    """Line number in the file; the header is row 1."""
     laser_id: str
     standoff_mm: Annotated[Millimetres, Field(ge=NEAREST_MM)] = nan
     repeat: Annotated[int, Field(ge=0, le=MOST_REPEATS)]
@@ -52,31 +52,31 @@ class CaptureRow(FileModel):
     u_px: Pixels = nan
     v_px: Pixels = nan
     scene: str = ""
-    """Empty when not given."""
+    """Empty if not stated."""
     standoff_sd_mm: Annotated[Millimetres, Field(ge=0)] = nan
     u_sd_px: PixelSd = nan
     v_sd_px: PixelSd = nan
     tilt_deg: Annotated[float, Field(gt=-90, lt=90)] = nan
     exposure: Annotated[float, Field(gt=0, le=LARGEST)] = nan
-    """Records how a frame was made; nothing is computed from it."""
+    """Exposure of the frames, for the record only."""
     exposure_unit: str = ""
-    """Empty for the camera driver's own."""
+    """Unit of `exposure`; empty: the camera driver's own."""
 
     @model_validator(mode="after")
     def _has_an_image_or_a_position(self) -> CaptureRow:
         measured = isfinite(self.u_px) or isfinite(self.v_px)
         if (self.on is not None) == measured:
-            came = "both" if measured else "neither"
-            raise ValueError(f"on: expected either an image, or a position in u_px or v_px, got {came}")
+            got = "both" if measured else "neither"
+            raise ValueError(f"on: expected either an image, or a position in u_px or v_px, got {got}")
         if measured and self.laser_id in {ALL_LASERS, BOARD}:
             raise ValueError(
-                f"laser_id: expected one laser's id where a position is given, got {self.laser_id}"
+                f"laser_id: expected the id of one laser in a row with a position, got {self.laser_id}"
             )
         return self
 
 
 def load_captures(path: Path) -> tuple[CaptureRow, ...]:
-    """Read a captures file; image paths come back relative to the current folder.
+    """Read a captures file; the image paths returned are relative to the current folder.
 
     Raises:
         BadInputError: see `read_captures_file` and `parse_captures`.
@@ -85,31 +85,35 @@ def load_captures(path: Path) -> tuple[CaptureRow, ...]:
 
 
 def read_captures_file(path: Path) -> bytes:
-    """The file's bytes.
+    """Bytes of a captures file.
 
     Raises:
-        BadInputError: it cannot be read.
+        BadInputError: the file cannot be read.
     """
     try:
         return path.read_bytes()
     except FileNotFoundError:
         raise BadInputError(
-            f"{path}: No such file; expected a captures file. A session has one once it came to its fit:"
-            " `workbench resume` goes on with one that was stopped before"
+            f"{path}: no such file; expected a captures file. A session writes it at its first fit step;"
+            " resume a session that ended before that step with `workbench resume`"
         ) from None
     except (OSError, ValueError) as error:
         raise BadInputError(f"{path}: expected a captures file: {error}") from None
 
 
 def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
-    """The rows in `content`; `path` is where it comes from, and image paths are relative to.
+    """Rows of a captures file.
+
+    Args:
+        path: file that `content` was read from; image paths are relative to its folder.
+        content: bytes of the file.
 
     Raises:
-        BadInputError: no such columns, no rows, or a wrong value; every wrong value is listed with its row
-            and column, what was expected and what came.
+        BadInputError: a column is missing or unknown, there are no rows, or values are wrong; one line for
+            each wrong value, with row, column, expected value and actual value.
     """
-    if (came := not_text(content)) is not None:
-        raise BadInputError(f"{path}: expected a captures file (CSV), got {came}")
+    if (got := not_text(content)) is not None:
+        raise BadInputError(f"{path}: expected a captures file (CSV), got {got}")
     try:
         reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""))
         _check_header(path, reader.fieldnames or [])
@@ -129,13 +133,13 @@ def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
 
 
 def check_images(path: Path, rows: Sequence[CaptureRow]) -> None:
-    """See that all images are there.
+    """Check that all images exist.
 
     Raises:
-        BadInputError: some are not; a line for each.
+        BadInputError: images are missing; one line for each.
     """
     wrong = [
-        f"{path}: row {row.row}, column {column}: expected an image, there is no file {image}"
+        f"{path}: row {row.row}, column {column}: no such file: {image}; expected an image"
         for row in rows
         for column, image in (("on", row.on), ("off", row.off))
         if image is not None and not image.is_file()
@@ -145,11 +149,11 @@ def check_images(path: Path, rows: Sequence[CaptureRow]) -> None:
 
 
 @contextmanager
-def of_file(path: Path) -> Iterator[None]:
-    """What is said of rows is said with the file that they stand in.
+def errors_name_file(path: Path) -> Iterator[None]:
+    """Prefix every line of an error about rows with the file that contains them.
 
     Raises:
-        BadInputError: as within.
+        BadInputError: raised within the context.
     """
     try:
         yield
@@ -166,23 +170,23 @@ def _check_header(path: Path, names: object) -> None:
         )
     if len(present) == 1 and (others := [name for mark, name in SEPARATORS.items() if mark in present[0]]):
         raise BadInputError(
-            f"{where}: expected columns separated by commas, got {others[0]}; save it as CSV with commas, and"
-            " with points in its numbers"
+            f"{where}: expected columns separated by commas, got {others[0]}; save the table as CSV with"
+            " commas as separators and decimal points in numbers"
         )
     if len(present) == 1 and (
         present[0].startswith("%YAML") or present[0].rstrip().endswith(":") or ": " in present[0]
     ):
         raise BadInputError(
-            f"{path}: expected a captures file (CSV), got YAML; its columns are {', '.join(COLUMNS)}"
+            f"{path}: expected a captures file (CSV) with the columns {', '.join(COLUMNS)}; got YAML"
         )
     if missing := [name for name in REQUIRED if name not in present]:
-        needed, came = ", ".join(REQUIRED), ", ".join(map(str, present))
+        needed, got = ", ".join(REQUIRED), ", ".join(map(str, present))
         raise BadInputError(
-            f"{where}: expected the columns {needed}; missing: {', '.join(missing)}; got {short(came)}"
+            f"{where}: expected the columns {needed}; missing: {', '.join(missing)}; got {short(got)}"
         )
     if unknown := [str(name) for name in present if name not in COLUMNS]:
-        told = "; ".join(f"no such column: {name}; {one_of(name, COLUMNS)}" for name in unknown)
-        raise BadInputError(f"{where}: {told}")
+        found = "; ".join(f"no such column: {name}; {one_of(name, COLUMNS)}" for name in unknown)
+        raise BadInputError(f"{where}: {found}")
     if len(set(present)) != len(present):
         raise BadInputError(f"{where}: expected every column once, got {', '.join(present)}")
     if "on" not in present and not set(POSITION) & set(present):
@@ -190,20 +194,20 @@ def _check_header(path: Path, names: object) -> None:
 
 
 def _row(path: Path, number: int, cells: dict[str | None, Any]) -> CaptureRow:
-    """One row's cells as a `CaptureRow`.
+    """Validate the cells of one row.
 
     Raises:
-        BadInputError: some are wrong; a line for each, with row and column.
+        BadInputError: values are wrong; one line for each, with row and column.
     """
     where = f"{path}: row {number}"
     if None in cells or None in cells.values():
-        raise BadInputError(f"{where}: expected as many values as the header has columns, got another number")
+        raise BadInputError(f"{where}: the number of values differs from the number of columns in the header")
     given = {str(name): value.strip() for name, value in cells.items() if value.strip()}
     images = {name: path.parent / given[name] for name in IMAGES if name in given}
     try:
         return CaptureRow.model_validate(given | images | {"row": number})
     except ValidationError as error:
         found = problems(CaptureRow, given, error.errors())
-        # A rule about the whole row names its column itself.
-        lines = [one.told if one.location else one.text for one in found]
+        # A rule about the whole row names its column in its own text.
+        lines = [one.message if one.location else one.text for one in found]
         raise BadInputError("\n".join(f"{where}, column {line}" for line in lines)) from None

@@ -12,21 +12,21 @@ from workbench.model.finite import finite_or_none
 from workbench.model.yamlfile import FileModel
 
 Number = Annotated[float | None, BeforeValidator(finite_or_none)]
-"""None makes a gap, as does a number that is not finite."""
+"""A number, or a gap: None or a number that is not finite."""
 OUTLIER_SIGMA = 3.0
 PALETTE = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00", "#0072b2")
-"""Okabe and Ito's colours, which people with any colour vision can tell apart, without their black."""
+"""Colours of Okabe and Ito without black: distinguishable with every kind of colour vision."""
 
 
 class Axis(FileModel):
     """One axis."""
 
     label: str
-    """Without the unit."""
+    """Label without the unit."""
     unit: str = ""
     scale: Literal["linear", "log"] = "linear"
     limits: tuple[float, float] | None = None
-    """None: from the data."""
+    """Ends of the axis; None: derived from the data."""
 
     @model_validator(mode="after")
     def _limits_make_an_axis(self) -> Axis:
@@ -39,25 +39,26 @@ class Axis(FileModel):
 
     @property
     def text(self) -> str:
-        """Label and unit."""
+        """Label with the unit in brackets."""
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
 
 class Series(FileModel):
-    """Points of one kind, joined by a line or not."""
+    """Series of points, drawn as points or as a line."""
 
     name: str
-    """In the legend. A series named as a laser has the laser's colour, see `series_colors`."""
+    """Name in the legend. A series with the name of a laser gets the laser's colour (`series_colors`)."""
     x: tuple[float, ...]
     y: tuple[Number, ...]
     sd: tuple[Number, ...] = ()
-    """1 sigma, drawn as a bar; none at all where it is empty."""
+    """Standard deviations (1 sigma) drawn as bars; empty: no bars."""
     expected_sd: tuple[Number, ...] = ()
-    """1 sigma of everything that moves y from zero. Beyond 3 of these a point is marked as an outlier."""
+    """Expected standard deviation of y about zero (1 sigma); points beyond 3 of these are outliers."""
     style: Literal["points", "line"] = "points"
     color: Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")] = ""
-    """`#rrggbb`; empty: as `series_colors` chooses."""
+    """`#rrggbb`; empty: chosen by `series_colors`."""
     dashed: bool = False
+    """Whether a line is dashed; without effect on points."""
 
     @model_validator(mode="after")
     def _lengths_agree(self) -> Series:
@@ -70,27 +71,37 @@ class Series(FileModel):
         return self
 
     def bar(self, index: int) -> tuple[float, ...]:
-        """Lower and upper end of a point's bar; the point itself without a bar, nothing at a gap."""
+        """Lower and upper end of a point's bar; the point alone if it has no bar; empty at a gap."""
         y = self.y[index]
         if y is None:
             return ()
         sd = self.sd[index] if self.sd else None
         return (y,) if sd is None else (y - sd, y + sd)
 
+    def runs(self) -> list[list[int]]:
+        """Indices of the points between gaps, one list for each run of consecutive points."""
+        runs: list[list[int]] = [[]]
+        for index, y in enumerate(self.y):
+            if y is not None:
+                runs[-1].append(index)
+            elif runs[-1]:
+                runs.append([])
+        return [run for run in runs if run]
+
     def sigmas(self, index: int) -> float | None:
-        """Distance of a point from zero in its expected standard deviations; None where it is not known."""
+        """Distance of a point from zero in expected standard deviations; None if either is unknown."""
         y = self.y[index]
         expected = self.expected_sd[index] if self.expected_sd else None
         return abs(y) / expected if y is not None and expected else None
 
     def is_outlier(self, index: int) -> bool:
-        """Whether a point lies farther from zero than its expected standard deviation explains."""
+        """Whether a point lies more than `OUTLIER_SIGMA` expected standard deviations from zero."""
         sigmas = self.sigmas(index)
         return sigmas is not None and sigmas > OUTLIER_SIGMA
 
 
 class Band(FileModel):
-    """An area between two curves: an interval, or what is tolerated."""
+    """Area between two curves: an interval or a tolerance."""
 
     name: str
     x: tuple[float, ...]
@@ -101,22 +112,22 @@ class Band(FileModel):
     def _lengths_agree(self) -> Band:
         if not len(self.x) == len(self.low) == len(self.high):
             lengths = len(self.x), len(self.low), len(self.high)
-            raise ValueError(f"band {self.name}: expected as many x, low and high, got {lengths}")
+            raise ValueError(f"band {self.name}: expected x, low and high of equal length, got {lengths}")
         return self
 
 
 class LimitLine(FileModel):
-    """A horizontal line that y is held against."""
+    """Horizontal line at a limit on y."""
 
     name: str
     y: float
 
 
 class Chart(FileModel):
-    """What is drawn over two axes."""
+    """Chart of series, bands and limits over two axes."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$")]
-    """Names the chart's file and its place in the recording."""
+    """Name of the chart's file and of its entity in the recording."""
     title: str
     x: Axis
     y: Axis
@@ -138,15 +149,15 @@ class Chart(FileModel):
 
     @property
     def is_empty(self) -> bool:
-        """Whether no series has a point."""
+        """Whether the series contain no point."""
         return all(y is None for series in self.series for y in series.y)
 
     def x_values(self) -> list[float]:
-        """Where series have points; ascending, each once."""
+        """Distinct values of x at which series have points, ascending."""
         return sorted({x for s in self.series for x, y in zip(s.x, s.y, strict=True) if y is not None})
 
     def y_values(self) -> list[float]:
-        """Everything that is drawn: points, ends of their bars, bands, limits; ascending, each once."""
+        """Distinct values of y of points, ends of bars, bands and limits, ascending."""
         values = {limit.y for limit in self.limits}
         for band in self.bands:
             values.update(band.low, band.high)
@@ -156,7 +167,7 @@ class Chart(FileModel):
 
 
 def laser_colors(laser_ids: Sequence[str]) -> dict[str, str]:
-    """One colour (`#rrggbb`) a laser, in the order of the rig file; they repeat after seven."""
+    """Colour (`#rrggbb`) of each laser, in the order of the rig file; colours repeat after seven lasers."""
     return dict(zip(laser_ids, cycle(PALETTE), strict=False))
 
 
@@ -164,8 +175,8 @@ def series_colors(series: Sequence[Series], named: Mapping[str, str]) -> list[st
     """Colour (`#rrggbb`) of each series: its own, else that of its name, else the next unused of the palette.
 
     Args:
-        series: of one chart.
-        named: colours by name, such as those of lasers.
+        series: all series of one chart.
+        named: colours by series name, for example of lasers.
     """
     known = [one.color or named.get(one.name, "") for one in series]
     used = {color.lower() for color in known}

@@ -1,4 +1,4 @@
-"""Scale of a chart's axis: its ends, places along it, and round ticks, the same for every renderer."""
+"""Scale of a chart's axis: ends, positions and round ticks, the same for every renderer."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from math import ceil, floor, log10
 from workbench.model.chart import Axis, Chart
 
 MARGIN = 0.05
-"""Part of the axis that stays free at each end, where the data give its ends."""
+"""Share of the axis left blank at each end if the ends are derived from the data."""
 MOST_TICKS = 8
 LEAST_LOG_TICKS = 2
-"""With fewer than these within a logarithmic axis its ticks are those of a linear one."""
+"""Minimum number of logarithmic ticks; an axis with fewer gets linear ticks."""
 MOST_LABELLED = 30
-"""Different values of x up to which each has a tick, as standoffs do; with more, ticks are round numbers."""
+"""Largest number of distinct x values that each get a tick; with more, ticks are round numbers."""
 
 
 @dataclass(frozen=True)
@@ -26,23 +26,23 @@ class Scale:
     is_log: bool
 
     def share(self, value: float) -> float:
-        """Place along the axis: 0 at its low end, 1 at its high end; not below it on a logarithmic axis."""
+        """Position along the axis: 0 at the low end, 1 at the high end; at least 0 on a logarithmic axis."""
         if self.is_log:
             return log10(max(value, self.low) / self.low) / log10(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
     def round_ticks(self) -> list[float]:
-        """Round numbers along the axis, at most some ten."""
+        """Round numbers along the axis, about ten at most."""
         return _log_ticks(self.low, self.high) if self.is_log else linear_ticks(self.low, self.high)
 
 
 def x_scale(chart: Chart) -> Scale:
-    """Scale of x: the axis' limits, or what holds the data with a margin."""
+    """Scale of x: the limits of the axis, or the extent of the data with a margin."""
     return _scale(chart.x, sorted({*chart.x_values(), *(x for band in chart.bands for x in band.x)}))
 
 
 def y_scale(chart: Chart) -> Scale:
-    """Scale of y; symmetric where values lie on both sides of zero, as errors do."""
+    """Scale of y; symmetric if values lie on both sides of zero, as errors do."""
     values = chart.y_values()
     if chart.y.limits is None and chart.y.scale == "linear" and values and values[0] < 0 < values[-1]:
         largest = max(-values[0], values[-1])
@@ -51,10 +51,10 @@ def y_scale(chart: Chart) -> Scale:
 
 
 def x_ticks(chart: Chart, scale: Scale, least_distance: float) -> tuple[list[float], list[float]]:
-    """Values of x to label, in two rows: the data's own where they are few, else round numbers.
+    """Values of x to label, in two rows: the data's own values if they are few, else round numbers.
 
-    Neighbours in a row are at least `least_distance` apart (a share of the axis). The first row has the first
-    and the last value; the second one, below it, has values between for which the first has no room.
+    Neighbours in a row are at least `least_distance` apart (a share of the axis). The first row contains the
+    first and the last value; the second row, below it, contains values that do not fit into the first.
     """
     own = [x for x in chart.x_values() if 0 <= scale.share(x) <= 1]
     if not 0 < len(own) <= MOST_LABELLED:
@@ -85,7 +85,7 @@ def _scale(axis: Axis, values: Sequence[float]) -> Scale:
 
 
 def _padded(low: float, high: float, least_half: float) -> tuple[float, float]:
-    """The ends with their margin; about a single value `least_half` to each side."""
+    """Ends with margin; a single value gets `least_half` on each side."""
     if high == low:
         return low - least_half, high + least_half
     margin = MARGIN * (high - low) / (1 - 2 * MARGIN)
@@ -101,11 +101,11 @@ def _log_ticks(low: float, high: float) -> list[float]:
 
 
 def _thinned(values: Sequence[float], scale: Scale, least_distance: float) -> list[float]:
-    """Values at least `least_distance` apart, with the first and the last among them."""
+    """Values at least `least_distance` apart, including the first and the last."""
     kept = list(values[:1])
     for value in values[1:]:
         if scale.share(value) - scale.share(kept[-1]) >= least_distance:
             kept.append(value)
-        elif value == values[-1]:  # it takes the place of its neighbour, unless that is the first
+        elif value == values[-1]:  # replaces its neighbour, unless that is the first
             kept[max(1, len(kept) - 1) :] = [value]
     return kept

@@ -1,4 +1,4 @@
-"""What a file is that was expected to be text, by how it begins."""
+"""Identification of files that are not UTF-8 text, by their first bytes."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ BEGINNINGS = {
     b"II*\0": "a TIFF image",
     b"MM\0*": "a TIFF image",
     b"%PDF": "a PDF document",
-    b"PK\x03\x04": "an archive, as spreadsheets are (.xlsx, .ods)",
-    b"\xd0\xcf\x11\xe0": "a document of an old Excel or Word",
+    b"PK\x03\x04": "a zip archive or a spreadsheet (.xlsx, .ods)",
+    b"\xd0\xcf\x11\xe0": "an Excel or Word document (.xls, .doc)",
     b"\x1f\x8b": "a compressed file (gzip)",
     b"\x93NUMPY": "a NumPy array",
     b"RRF": "a Rerun recording",
@@ -20,11 +20,11 @@ BEGINNINGS = {
     b"\xfe\xff": "text in UTF-16",
 }
 TEXT = {"text in UTF-16"}
-"""Only its encoding is wrong; a bitmap's two letters may begin a text, too."""
+"""Kinds that are text in another encoding."""
 
 
 def not_text(content: bytes) -> str | None:
-    """What `content` is, for people, with what to do about it; None where it is text in UTF-8."""
+    """Kind of a file's `content` and a remedy, for messages; None for text in UTF-8."""
     try:
         content.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -1,4 +1,4 @@
-"""Base of a device's block in the rig file. Light to import: the guardian needs it."""
+"""Base class of a device's block in the rig file. It imports little, because the guardian needs it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from workbench.model.yamlfile import FileModel
 
 
 class DeviceBlock(FileModel):
-    """The block `devices: <kind>:` of one device; each driver derives its own and adds its settings."""
+    """Block `devices: <kind>:` of one device; each driver derives its own block and adds its settings."""
 
     driver: str | None = None
-    """Entry point in the group of the device's kind; None: the default of that kind."""
+    """Name of an entry point in the group of the device's kind; None: the default driver of that kind."""

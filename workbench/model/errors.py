@@ -1,7 +1,7 @@
-"""The errors a person can meet, each with the exit code that the command line ends with.
+"""Expected errors, each with the exit code of the command line.
 
-Whoever raises one says what was expected, what came, where, and what to do. Anything else that escapes
-is a defect of the workbench and ends with exit code 1.
+A message states what happened and where, the expected and the actual value, and what to do. Any other
+exception that reaches the command line is a defect of the workbench and ends with exit code 1.
 """
 
 from __future__ import annotations
@@ -10,37 +10,37 @@ from typing import ClassVar
 
 
 class WorkbenchError(Exception):
-    """Base of every expected failure."""
+    """Base class of every expected failure."""
 
     exit_code: ClassVar[int] = 1
 
 
 class BadInputError(WorkbenchError):
-    """A file, an option or a value that the user gave is wrong (exit 2)."""
+    """A file, an option or a value from the user is wrong (exit 2)."""
 
     exit_code = 2
 
 
 class LimitFailedError(WorkbenchError):
-    """The work was done and a limit on its result failed (exit 3)."""
+    """A limit on the result of completed work failed (exit 3)."""
 
     exit_code = 3
 
 
 class RigNotReadyError(WorkbenchError):
-    """A device is missing, silent or contradicts the rig file (exit 4)."""
+    """A device is missing, does not answer or contradicts the rig file (exit 4)."""
 
     exit_code = 4
 
 
 class StoppedError(WorkbenchError):
-    """Stopped before the end; what was captured is safe (exit 5)."""
+    """The command was stopped before its end; all captures are on disk (exit 5)."""
 
     exit_code = 5
 
 
 class AnswerNeededError(WorkbenchError):
-    """A question needs an answer and nobody is there to give it (exit 6)."""
+    """A prompt needs an answer and there is no operator to give one (exit 6)."""
 
     exit_code = 6
 

@@ -1,8 +1,8 @@
-"""What happens in a session, one typed record each: the journal's lines and the viewer's only input.
+"""Events of a session, one typed record each: the journal's lines and the viewer's only input.
 
-A consumer is anything callable with a `Record`. Records name frames by their path in the session folder, so
-that every view (the recording, a table, a report) can be made again from the folder alone. What a fit and a
-trial tell is in modules of their own, and reached by this one.
+A consumer is anything callable with a `Record`. Records refer to frames by their path in the session folder,
+so every view (recording, table, report) can be made again from the folder alone. Events of fits and trials
+are defined in modules of their own and exported here.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ class ProcedureStarted(FileModel):
 
     @property
     def length(self) -> str:
-        """For people."""
+        """Number of steps with its noun."""
         return f"{self.steps} step" if self.steps == 1 else f"{self.steps} steps"
 
 
 class StepStarted(FileModel):
-    """A step is about to run. `index` counts from 1 within its procedure."""
+    """A step is about to run. `index` counts from 1 within the procedure."""
 
     kind: Literal["step_started"] = "step_started"
     procedure: str
@@ -65,11 +65,11 @@ class StepStarted(FileModel):
     step: str
     title: str
     shots: int
-    """Captures that the step will take, 0 for a step that takes none."""
+    """Number of captures that the step will take."""
 
 
 class StepFinished(FileModel):
-    """A step has ended well; a step that failed ends the session instead."""
+    """A step has succeeded; a step that fails ends the session instead."""
 
     kind: Literal["step_finished"] = "step_finished"
     procedure: str
@@ -78,52 +78,52 @@ class StepFinished(FileModel):
 
 
 class TargetPlaced(FileModel):
-    """The target stands where it was asked to, or where the technician says that it stands."""
+    """The target has been placed; the standoff is as requested or as the technician entered it."""
 
     kind: Literal["target_placed"] = "target_placed"
     placement: Placement
     by: By | None = None
-    """Who says so."""
+    """Source of the confirmation."""
 
 
 class Answered(FileModel):
-    """A question has been answered. A target that was placed is told by `TargetPlaced` instead."""
+    """A prompt has been answered. The answer that the target is placed is `TargetPlaced` instead."""
 
     kind: Literal["answered"] = "answered"
     key: str
-    """Of the prompt: the step's name, a placement's key, or `safety`."""
+    """Key of the prompt: the step's name, a placement's key, or `safety`."""
     question: str
     answer: Answer
 
 
 class PlacementFinished(FileModel):
-    """Everything that was to be captured at a placement is captured; a resumed session keeps it."""
+    """All captures at a placement are complete; a resumed session keeps them."""
 
     kind: Literal["placement_finished"] = "placement_finished"
     key: str
 
 
 class SetAside(FileModel):
-    """The records from `from_n` on count no more: a placement is captured again, or left out."""
+    """The records from `from_n` on are void: a placement is captured again or skipped."""
 
     kind: Literal["set_aside"] = "set_aside"
     key: str
-    """The placement's."""
+    """Key of the placement."""
     from_n: int
     reason: str
     retry: bool = False
-    """Whether a limit asked for it by itself (`on_fail: retry`): that is done a few times at most."""
+    """Whether a failed limit with `on_fail: retry` is the cause; the number of such retries is limited."""
     left_out: bool = False
-    """Whether the placement is left out, and not captured again."""
+    """Whether the placement is skipped instead of captured again."""
 
     @property
     def text(self) -> str:
-        """For people, one line."""
-        return f"{self.key} is {'left out' if self.left_out else 'captured again'}: {self.reason}"
+        """Summary in one line."""
+        return f"{self.key} is {'skipped' if self.left_out else 'captured again'}: {self.reason}"
 
 
 class SessionResumed(FileModel):
-    """A session that ended early goes on; its records from `from_n` on count no more."""
+    """A session that ended early is resumed; its records from `from_n` on are void."""
 
     kind: Literal["session_resumed"] = "session_resumed"
     from_n: int
@@ -131,83 +131,84 @@ class SessionResumed(FileModel):
     command: str
     created: str
     changes: tuple[str, ...] = ()
-    """What was different from the session's files: rig, procedure, version of the workbench."""
+    """Differences from the session's start: rig file, procedure files, versions."""
     accepted_because: str | None = None
 
 
 class ExposureSet(FileModel):
-    """The camera's exposure for what is captured at a placement, found by trial pairs with all lasers lit."""
+    """Exposure of the camera for the captures at a placement, found by trial exposures with all lasers on."""
 
     kind: Literal["exposure_set"] = "exposure_set"
     key: str
-    """The placement's."""
+    """Key of the placement."""
     exposure: float
     unit: str
-    """Empty for the camera driver's own."""
+    """Unit of `exposure`; empty: the camera driver's own."""
     peak: float
-    """Brightest pixel of that trial as a share of full scale, or of where trials were clipped below it.
+    """Brightest pixel of the chosen trial exposure as a share of full scale, or of a lower clipping level.
 
-    The room's median where no laser is seen.
+    The median of the room light if no laser is seen.
     """
     verdict: BrightnessVerdict
-    """By `workbench.model.exposure`; not good where the camera's limits or steps give no better."""
+    """See `workbench.model.exposure`; other than good if the camera's limits or steps allow no better one."""
     trials: int
+    """Number of trial exposures."""
 
     @property
     def text(self) -> str:
-        """One line for people."""
-        spelt = f"exposure {self.exposure:g} {self.unit}".rstrip()
+        """Summary in one line."""
+        setting = f"exposure {self.exposure:g} {self.unit}".rstrip()
         if self.verdict == "unseen":
             return (
-                f"{spelt}, no laser seen, the room is at {100 * self.peak:.0f} % of full scale: do the lasers"
-                " shine on the target, where the rig file expects them? Darken the room if it is bright"
+                f"{setting}: no laser seen, room light at {100 * self.peak:.0f} % of full scale; check that"
+                " the lasers hit the target where the rig file expects them; darken a bright room"
             )
         share = f"brightest spot at {100 * self.peak:.0f} % of full scale"
         remarks = {
-            "clipped": ", clipped: take a darker target or a filter",
-            "bright": ", bright: no shorter exposure; a darker target or a filter would help",
-            "dim": ", dim: no longer exposure is good; does every spot lie on the target?",
+            "clipped": ", clipped: use a darker target or a filter",
+            "bright": ", bright: the exposure cannot be shortened; use a darker target or a filter",
+            "dim": ", dim: the exposure cannot be lengthened; check that every spot lies on the target",
         }
-        return f"{spelt}, {share}{remarks.get(self.verdict, '')}"
+        return f"{setting}, {share}{remarks.get(self.verdict, '')}"
 
 
 class FrameRef(FileModel):
-    """A stored frame."""
+    """Reference to a stored frame."""
 
     path: str
-    """Relative to the session folder."""
+    """Path relative to the session folder."""
     sha256: str
     time_ns: int
-    """Wall clock at exposure, nanoseconds since 1970 (UTC)."""
+    """Wall clock time of the exposure, nanoseconds since 1970 (UTC)."""
 
 
 class CaptureTaken(FileModel):
-    """A pair of frames, lasers on and off. Its frames are on disk before this is written."""
+    """A pair of frames, lasers on and off. The frames are on disk before this event is written."""
 
     kind: Literal["capture_taken"] = "capture_taken"
     key: str
-    """Unique in the session."""
+    """Key of the capture, unique in the session."""
     purpose: Literal["calibration", "trial"]
     scene: str | None = None
     laser_id: str
-    """`all` when every laser is lit; `board` for a frame of the board in room light, with no laser lit."""
+    """`all` if every laser is on; `board` for a frame of the board in room light, all lasers off."""
     placement_key: str
     standoff_mm: float
     standoff_sd_mm: float | None = None
-    """1 sigma, where the placement states one."""
+    """Standard uncertainty of the standoff; None: that of the rig file."""
     repeat: int
     on: FrameRef
     off: FrameRef | None = None
     exposure: float | None = None
-    """None where it was not set."""
+    """None if no exposure was set."""
     exposure_unit: str | None = None
-    """None for the camera driver's own."""
+    """Unit of `exposure`; None: the camera driver's own."""
     lit_s: float | None = None
-    """How long a laser was lit for it, switching included; None for a frame in room light."""
+    """Emission time, switching included; None for a frame in room light."""
 
 
 class SpotsFound(FileModel):
-    """The spots of one capture, and why others were not found."""
+    """Spots of one capture, and causes of missing spots."""
 
     kind: Literal["spots_found"] = "spots_found"
     key: str
@@ -216,54 +217,55 @@ class SpotsFound(FileModel):
 
 
 class LimitChecked(FileModel):
-    """A measured quantity has been held against a limit of the procedure."""
+    """A measured quantity has been compared with a limit of the procedure."""
 
     kind: Literal["limit_checked"] = "limit_checked"
     step: str
     of: str
-    """What it was measured on: `fit`, or a laser at a placement."""
+    """Subject of the measurement: `fit`, or a laser at a placement."""
     quantity: str
     value: float | None
-    """None where it could not be measured."""
+    """None if it could not be measured."""
     limit: str
     verdict: Verdict
 
 
 class LatencyMeasured(FileModel):
-    """So many frames of the camera's stream are older than the last switching of a laser."""
+    """The latency of the camera has been measured."""
 
     kind: Literal["latency_measured"] = "latency_measured"
     frames: int
+    """Number of frames in the stream that precede the first one exposed after a laser was switched."""
 
 
 class StandoffAdvised(FileModel):
-    """How good ranges are by the captures so far, and where the target would help most next.
+    """Uncertainty of ranges after the captures so far, and the most informative next standoff.
 
-    Relative standard deviations of a single range (1 sigma), the largest from the nearest to the farthest
-    standoff of the procedure.
+    Relative standard deviations (1 sigma) are those of a single range, the largest between the nearest and
+    the farthest standoff of the procedure.
     """
 
     kind: Literal["standoff_advised"] = "standoff_advised"
     placements: int
     relative_range_sd: float
     limit: float
-    """What the fit step to come demands."""
+    """Limit of the next fit step on `relative_range_sd`."""
     next_standoff_mm: float
     then_relative_range_sd: float
-    """With a placement there."""
+    """Forecast of `relative_range_sd` after a placement at `next_standoff_mm`."""
     worst_residual_px: float | None = None
-    """Of a laser's mean position at a placement: the one that is the most deviations of noise off the fit."""
+    """Residual of a laser's mean position at a placement: the largest in standard deviations of its noise."""
     worst_residual_sd: float | None = None
     worst_laser_id: str = ""
     worst_standoff_mm: float | None = None
 
     @property
     def text(self) -> str:
-        """For people, one or two lines."""
-        met = "reached" if self.relative_range_sd <= self.limit else "not yet"
+        """Summary in one or two lines."""
+        met = "met" if self.relative_range_sd <= self.limit else "not yet met"
         return (
-            f"so far ranges to {100 * self.relative_range_sd:.2g} % ({100 * self.limit:g} % wanted: {met});"
-            f" best next {self.next_standoff_mm:g} mm: to {100 * self.then_relative_range_sd:.2g} %"
+            f"range uncertainty {100 * self.relative_range_sd:.2g} % (limit {100 * self.limit:g} %: {met});"
+            f" best next standoff {self.next_standoff_mm:g} mm: {100 * self.then_relative_range_sd:.2g} %"
             f"{self._worst}"
         )
 
@@ -286,7 +288,7 @@ class CalibrationExported(FileModel):
 
 
 class SessionFinished(FileModel):
-    """Last record of a session that ended, well or not."""
+    """Last record of a session that ended, with or without success."""
 
     kind: Literal["session_finished"] = "session_finished"
     exit_code: int
@@ -321,12 +323,12 @@ Event = Annotated[
 
 
 class Record(FileModel):
-    """An event with its place in the session."""
+    """An event with its number and time."""
 
     n: int
-    """Counts from 0 without a gap."""
+    """Number in the session, from 0 without gaps."""
     time_ns: int
-    """Wall clock, nanoseconds since 1970 (UTC)."""
+    """Wall clock time, nanoseconds since 1970 (UTC)."""
     event: Event
 
 

@@ -1,4 +1,4 @@
-"""How bright the brightest spot is to be, and what it is called: shares of full scale, in one place."""
+"""Target and verdicts for the brightness of the brightest spot, as shares of full scale."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from typing import Literal
 
 AIM = 0.65
 GOOD = (0.55, 0.7)
-"""A quarter of the range and more is left for what differs from frame to frame."""
+"""Lowest and highest share of a good exposure; the rest is headroom for variation between frames."""
 CLIPPED = 1.0
 WIDEST = 1e7
-"""Longest by shortest exposure that the search gets through."""
+"""Largest ratio of the longest to the shortest exposure that the search covers."""
 
 Verdict = Literal["unseen", "dim", "good", "bright", "clipped"]
 
 
 def verdict_of(peak: float, *, seen: bool) -> Verdict:
-    """What a share of full scale is called; where no laser is seen it is the room's, and never good."""
+    """Verdict on a peak, a share of full scale; `unseen` if no laser is seen and the peak is room light."""
     if not seen:
         return "unseen"
     if peak >= CLIPPED:

@@ -1,4 +1,4 @@
-"""Field types that several steps of a procedure file share."""
+"""Field types shared by steps of a procedure file."""
 
 from __future__ import annotations
 
@@ -14,14 +14,18 @@ Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 def require_different(standoffs_mm: tuple[float, ...], repeats: str) -> None:
-    """Refuse a standoff that is listed twice: standoffs name frames, by 12 digits.
+    """Check that all standoffs differ in their first 12 digits, which are part of the names of frames.
 
     Args:
-        standoffs_mm: as in the file.
+        standoffs_mm: standoffs as in the file.
         repeats: key of the number of captures at one standoff, for the message.
 
     Raises:
-        ValueError: two are the same.
+        ValueError: a standoff occurs more than once.
     """
-    if len({f"{standoff:.12g}" for standoff in standoffs_mm}) != len(standoffs_mm):
-        raise ValueError(f"standoffs_mm must differ: more at one standoff are more `{repeats}`")
+    keys = [f"{standoff:.12g}" for standoff in standoffs_mm]
+    if doubled := [key for key in dict.fromkeys(keys) if keys.count(key) > 1]:
+        raise ValueError(
+            f"standoffs_mm: expected each standoff once, got {', '.join(doubled)} mm more than once; for more"
+            f" captures at a standoff raise `{repeats}`"
+        )

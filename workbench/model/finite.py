@@ -1,4 +1,4 @@
-"""Numbers that JSON can hold: what is not finite counts as missing."""
+"""Conversion of numbers for JSON, which has none that are not finite."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from typing import Any
 
 
 def finite_or_none(value: Any) -> Any:
-    """The value itself; None in place of an infinite float or one that is not a number."""
+    """The value unchanged; None instead of an infinite float or NaN."""
     return None if isinstance(value, float) and not isfinite(value) else value

@@ -1,8 +1,8 @@
-"""Events of sessions recorded by version 0.1.0, read as today's.
+"""Conversion of events that version 0.1.0 recorded to the present schema.
 
-Version 0.1.0 had one event for each trial: `trial_finished` with the rows of the accuracy trial,
+Version 0.1.0 had one event for each trial: `trial_finished` with the rows of the accuracy trial, and
 `scene_simulated` and `simulation_finished` of the thesis's simulation. Their numbers become tables; the
-curves of single scenes are in the session's CSV files.
+curves of single scenes remain in the session's CSV files.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ UNITS = ("mm", "px", "deg")
 
 
 def upgraded(event: Any) -> Any:
-    """The event as a mapping of today's keys; anything but an old trial's event is returned as it is."""
+    """Event with the present keys; anything but a trial's event of version 0.1.0 is returned unchanged."""
     if not isinstance(event, dict):
         return event
     kind, trial = event.get("kind"), event.get("trial")
@@ -29,7 +29,7 @@ def upgraded(event: Any) -> Any:
 
 
 def _claim(row: dict[str, Any]) -> dict[str, Any]:
-    """A claim whose flags are alarms: true where something is not as it should be."""
+    """Row of a claim with its flags inverted to alarms: true where the claim does not hold."""
     kept = {key: value for key, value in row.items() if key not in {"reproduced", "better"}}
     return kept | {"not_reproduced": row["reproduced"] is False, "not_better": not row["better"]}
 

@@ -1,4 +1,4 @@
-"""A limit on one measured quantity, as a procedure file states it inline."""
+"""Limit on one measured quantity, inline in a procedure file."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from workbench.model.yamlfile import FileModel
 
 Verdict = Literal["pass", "marginal", "fail"]
 Bounds = tuple[float | None, float | None]
-"""Lowest and highest; `null` where there is none."""
+"""Lowest and highest value; `null`: no bound."""
 
 
 class Limit(FileModel):
-    """`in: [lo, hi]` with both ends good; `marginal` is the part of it that deserves no remark."""
+    """Limit `in: [lo, hi]`, ends included; values outside `marginal` but inside `in` get a remark."""
 
     within: Annotated[Bounds, Field(alias="in")]
     marginal: Bounds | None = None
-    """Within the limit but outside of this: told, and gone on."""
+    """Bounds of values without a remark; the procedure continues after a remark."""
     on_fail: Literal["retry", "ask", "stop"] = "stop"
 
     @model_validator(mode="after")
@@ -27,7 +27,7 @@ class Limit(FileModel):
             if low is not None and high is not None and low > high:
                 raise ValueError(f"`{name}`: expected [lowest, highest], got [{low:g}, {high:g}]")
         if self.within == (None, None):
-            raise ValueError("`in`: expected at least one number, or nothing can fail")
+            raise ValueError("`in`: expected at least one number; [null, null] cannot fail")
         if self.marginal is not None and not all(
             _holds(self.within, end) for end in self.marginal if end is not None
         ):
@@ -35,13 +35,13 @@ class Limit(FileModel):
         return self
 
     def judge(self, value: float | None) -> Verdict:
-        """The verdict on a value; one that could not be measured fails."""
+        """Verdict on a value; None (not measured) fails."""
         if value is None or not _holds(self.within, value):
             return "fail"
         return "pass" if self.marginal is None or _holds(self.marginal, value) else "marginal"
 
     def describe(self) -> str:
-        """The limit in words."""
+        """Limit in words, for messages."""
         low, high = self.within
         if low is None:
             return f"at most {high:g}"

@@ -1,4 +1,4 @@
-"""Simpler models of the same rig: parameters held at the rig file's value."""
+"""Nested models of a rig: parameters fixed at the rig file's value."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from workbench.model.rig import Prior, Rig
 from workbench.model.yamlfile import FileModel
 
 TILTS = "tilts"
-"""Of all placements of the target, together."""
+"""Name of the tilts of all placements of the target, as one term."""
 Part = TypeVar("Part", bound=FileModel)
 
 
 def fix_parameters(rig: Rig, names: Iterable[str]) -> Rig:
-    """The rig with parameters made constants, by their names in the calibration: `k2`, `L1.tx`; or `tilts`.
+    """Rig with parameters made constant, by their names in the calibration: `k2`, `L1.tx`; or `tilts`.
 
     Raises:
         BadInputError: the rig has no such parameter.
     """
     for name in names:
-        rig = _hold_one(rig, name)
+        rig = _fix_one(rig, name)
     return rig
 
 
-def _hold_one(rig: Rig, name: str) -> Rig:
+def _fix_one(rig: Rig, name: str) -> Rig:
     if name == TILTS:
         return rig.model_copy(update={"bench": rig.bench.model_copy(update={"tilt_sd_deg": 0.0})})
     laser_id, _, of_ray = name.rpartition(".")

@@ -1,4 +1,4 @@
-"""Numbers for people: as many digits as their standard deviation leaves meaningful."""
+"""Text of numbers with as many digits as their standard deviation justifies."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ MINUTES_BELOW_S = 7200
 
 
 def significant(value: float, sd: float) -> str:
-    """`value` to the second significant digit of its standard deviation; as it is where `sd` is 0."""
+    """Text of `value` to the second significant digit of its standard deviation; all digits if `sd` is 0."""
     if sd <= 0:
         return f"{value:g}"
     digits = max(0, 1 - floor(log10(sd)))
@@ -18,17 +18,17 @@ def significant(value: float, sd: float) -> str:
 
 
 def with_sd(value: float, sd: float) -> str:
-    """A value with its standard deviation: `500.3 +- 0.4`."""
+    """Text of a value with its standard deviation: `500.3 +- 0.4`."""
     return f"{significant(value, sd)} +- {two_digits(sd)}"
 
 
 def two_digits(sd: float) -> str:
-    """Two significant digits, without an exponent for what a person would write out."""
+    """Text with two significant digits, without an exponent for moderate numbers."""
     return f"{float(f'{sd:.2g}'):g}"
 
 
 def duration(seconds: float) -> str:
-    """Seconds below two minutes, minutes below two hours, else hours: `45 s`, `12 min`, `3.5 h`."""
+    """Text of a duration: seconds below two minutes, minutes below two hours, else hours (`3.5 h`)."""
     if seconds < SECONDS_BELOW_S:
         return f"{seconds:.0f} s"
     if seconds < MINUTES_BELOW_S:

@@ -1,4 +1,4 @@
-"""What is wrong with a file's values, in the words of its reader: each mistake once, and where it stands."""
+"""Schema violations of a file as plain messages: each mistake once, with its location in the file."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from pydantic_core import ErrorDetails
 
 Location = tuple[int | str, ...]
 LONGEST = 60
+"""Characters of a value in a message; longer ones are cut."""
 MOST_NAMES = 16
-"""So many of the names that are possible are told; the rest is counted."""
+"""Largest number of possible names in a message; the others are only counted."""
 WHOLE, NUMBER, MAPPING = "a whole number, such as {number}", "a number, such as {number}", "keys and values"
 TRUTH, LIST = "true or false", "a list, such as {items}"
 EXPECTED = {
@@ -50,12 +51,12 @@ EXPECTED = {
     "less_than_equal": "at most {le}",
     "literal_error": "{expected}",
     "union_tag_invalid": "one of {tags}",
-    "union_tag_not_found": "the key {discriminator}, which tells what it is",
+    "union_tag_not_found": "the key {discriminator}, which selects the kind",
 }
-"""What a kind of error expects; tests hold that there is no other kind."""
+"""Expectation of each of pydantic's error types that our models can raise."""
 SPELLED = {
-    r"^[A-Za-z0-9_-]+$": "letters (A to z), digits, _ and - alone, such as calibrate-flat",
-    r"^[a-z0-9-]+$": "small letters (a to z), digits and - alone, such as flat-near",
+    r"^[A-Za-z0-9_-]+$": "only letters (A to z), digits, _ and -, such as calibrate-flat",
+    r"^[a-z0-9-]+$": "only small letters (a to z), digits and -, such as flat-near",
     r"^[A-Za-z0-9][A-Za-z0-9_.-]*$": "letters (A to z), digits, _ . and -, not - or . first, such as L1",
     r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$": "letters (A to z), digits, _ . and -, not . first, such as flat.1",
     r"^(#[0-9a-fA-F]{6})?$": "# and six digits (0 to 9, a to f), or nothing, such as #56b4e9",
@@ -63,10 +64,11 @@ SPELLED = {
     r"^calibration[A-Za-z0-9_.-]*\.yaml$": "a name that begins with calibration and ends with .yaml, such as"
     " calibration-night.yaml, of letters (A to z), digits, _, . and -",
 }
-"""The patterns of the models in words."""
-AS_THEY_ARE = {"missing", "extra_forbidden", "invalid_key", "unexpected_keyword_argument"}
-SELF_EVIDENT = AS_THEY_ARE | {"too_short", "too_long"}
-"""What came is nothing, or is said already."""
+"""Descriptions of the models' patterns."""
+STATEMENTS = {"missing", "extra_forbidden", "invalid_key", "unexpected_keyword_argument"}
+"""Error types whose text is a statement, not an expectation."""
+WITHOUT_GOT = STATEMENTS | {"too_short", "too_long"}
+"""Error types without an actual value, or with the actual value in their text."""
 
 
 @runtime_checkable
@@ -75,60 +77,66 @@ class LaterModels(Protocol):
 
     @staticmethod
     def models() -> list[type[BaseModel]]:
-        """Those that are registered."""
+        """Registered models."""
 
 
 @dataclass(frozen=True)
 class SchemaProblem:
-    """One mistake."""
+    """One mistake in a file's values."""
 
     location: Location
-    """As in the file: without the names of kinds, which pydantic puts in."""
+    """Keys and indices in the file, without the names of kinds that pydantic inserts."""
     text: str
-    """What was expected, and what came."""
+    """Expected and actual value."""
 
     @property
     def key(self) -> str:
-        """As people write it: `lasers[0].x_mm`."""
+        """Location as text: `lasers[0].x_mm`."""
         key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in self.location)
         return key.lstrip(".") or "document"
 
     @property
-    def told(self) -> str:
-        """In one line."""
+    def message(self) -> str:
+        """Location, expected and actual value in one line."""
         return f"{self.key}: {self.text}"
 
 
 def problems(model: type[BaseModel], data: Any, errors: Sequence[ErrorDetails]) -> Iterator[SchemaProblem]:
-    """Each mistake in `data`, which was to be `model`, once, though pydantic may tell it several times."""
+    """Distinct mistakes in `data`, of which pydantic may report each several times.
+
+    Args:
+        model: expected model of `data`.
+        data: values as read from the file.
+        errors: pydantic's errors from validating `data` as `model`.
+    """
     places = [_in_file(data, error) for error in errors]
-    strangers = [
+    unknown_keys = [
         place for place, error in zip(places, errors, strict=True) if error["type"] == "extra_forbidden"
     ]
-    told: set[Location] = set()
+    reported: set[Location] = set()
     for error, place in zip(errors, places, strict=True):
-        if place in told or _follows(error, place, places, strangers):
+        if place in reported or _is_consequence(error, place, places, unknown_keys):
             continue
-        told.add(place)
+        reported.add(place)
         alike = [e for e, other in zip(errors, places, strict=True) if other == place]
-        yield SchemaProblem(place, _say(model, error, alike))
+        yield SchemaProblem(place, _text(model, error, alike))
 
 
 def closest_first(word: str, known: Sequence[str]) -> list[str]:
-    """Names that there are, those that look like `word` before the others."""
+    """Known names, those similar to `word` first."""
     near = get_close_matches(word, known, n=len(known) or 1)
     return [*near, *(name for name in known if name not in near)]
 
 
 def one_of(word: str, known: Sequence[str]) -> str:
-    """What there is in the place of `word`, for a message."""
+    """Expectation of one of the known names instead of `word`, for a message."""
     names = closest_first(word, known)
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"expected one of {', '.join(names[:MOST_NAMES])}{more}"
 
 
 def short(value: object) -> str:
-    """A value in a message, as it stands in the file."""
+    """Text of a value for a message, as in the file, cut to `LONGEST` characters."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -137,16 +145,16 @@ def short(value: object) -> str:
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
-def _follows(
-    error: ErrorDetails, place: Location, places: Sequence[Location], strangers: Sequence[Location]
+def _is_consequence(
+    error: ErrorDetails, place: Location, places: Sequence[Location], unknown_keys: Sequence[Location]
 ) -> bool:
-    """Whether a mistake is but what another one makes."""
-    if error["type"] == "too_short":  # a list whose items are wrong comes out too short
+    """Whether a mistake is only the consequence of another one."""
+    if error["type"] == "too_short":  # pydantic drops wrong items before it counts a list
         return any(len(other) > len(place) and other[: len(place)] == place for other in places)
-    # A key that is missing, beside one of nearly its name.
+    # A missing key beside an unknown key of a similar name.
     return error["type"] == "missing" and any(
         other[:-1] == place[:-1] and get_close_matches(str(other[-1]), [str(place[-1])])
-        for other in strangers
+        for other in unknown_keys
     )
 
 
@@ -170,28 +178,26 @@ def _has(node: Any, part: int | str) -> bool:
     return isinstance(node, dict) and part in node
 
 
-def _say(model: type[BaseModel], error: ErrorDetails, alike: Sequence[ErrorDetails]) -> str:
+def _text(model: type[BaseModel], error: ErrorDetails, alike: Sequence[ErrorDetails]) -> str:
     kind, context = error["type"], error.get("ctx", {})
-    came = error["input"]
-    if kind == "union_tag_invalid" and isinstance(came, dict):
-        came = came.get(context["discriminator"].strip("'"))
-    got = f", got {short(came)}"
+    value = error["input"]
+    if kind == "union_tag_invalid" and isinstance(value, dict):
+        value = value.get(context["discriminator"].strip("'"))
+    got = f", got {short(value)}"
     if context.get("class_name") == "Prior":
         value = error["input"] if isinstance(error["input"], int | float) else "..."
         return f"expected a value and its standard deviation, {{value: {value}, sd: ...}}{got}"
     if kind == "value_error":
-        said = error["msg"].removeprefix("Value error, ")
-        # A rule about a whole mapping says itself what came of it.
-        return f"{said[:1].lower()}{said[1:]}" + ("" if ", got " in said else got)
+        text = error["msg"].removeprefix("Value error, ")
+        # A rule about a whole mapping states the actual value itself.
+        return f"{text[:1].lower()}{text[1:]}" + ("" if ", got " in text else got)
     expected = " or ".join(dict.fromkeys(_expected(model, one) for one in alike))
-    return (expected if kind in AS_THEY_ARE else f"expected {expected}") + (
-        "" if kind in SELF_EVIDENT else got
-    )
+    return (expected if kind in STATEMENTS else f"expected {expected}") + ("" if kind in WITHOUT_GOT else got)
 
 
 def _expected(model: type[BaseModel], error: ErrorDetails) -> str:
-    """The expectation in words, with an example made of what came where that can be."""
-    kind, context, came = error["type"], dict(error.get("ctx", {})), error["input"]
+    """Expectation in words, with an example made of the actual value if possible."""
+    kind, context, value = error["type"], dict(error.get("ctx", {})), error["input"]
     if kind in {"extra_forbidden", "invalid_key"}:
         context["names"] = one_of(str(error["loc"][-1]), _keys_of(model, error["loc"][:-1]))
     if kind == "union_tag_invalid":
@@ -199,9 +205,9 @@ def _expected(model: type[BaseModel], error: ErrorDetails) -> str:
         context["tags"] = ", ".join(closest_first(context["tag"], known))
     if kind == "string_pattern_mismatch":
         context["spelled"] = SPELLED.get(context["pattern"], f"text that fits {context['pattern']}")
-    context |= {name: f"{value:.12g}" for name, value in context.items() if isinstance(value, float)}
-    context |= {"number": _number_in(came, kind), "items": f"[{came}]" if _plain(came) else "[1, 2]"}
-    context["text"] = f'"{came}"' if _plain(came) else '"some words"'
+    context |= {name: f"{number:.12g}" for name, number in context.items() if isinstance(number, float)}
+    context |= {"number": _number_in(value, kind), "items": f"[{value}]" if _plain(value) else "[1, 2]"}
+    context["text"] = f'"{value}"' if _plain(value) else '"some words"'
     return EXPECTED.get(kind, "something else here").format(**context)
 
 
@@ -209,16 +215,16 @@ def _plain(value: object) -> bool:
     return isinstance(value, int | float | str | date) and len(str(value)) < LONGEST
 
 
-def _number_in(came: object, kind: str) -> str:
-    """The number that a text with a unit or a comma seems to mean; any other where there is none."""
-    found = re.match(r"\s*([+-]?\d+)(?:[.,](\d+))?", str(came)) if _plain(came) else None
+def _number_in(value: object, kind: str) -> str:
+    """Number meant by a text with a unit or a decimal comma; an example number if there is none."""
+    found = re.match(r"\s*([+-]?\d+)(?:[.,](\d+))?", str(value)) if _plain(value) else None
     if kind.startswith("int"):
         return found[1] if found else "10"
     return "12.5" if found is None else found[1] + (f".{found[2]}" if found[2] else "")
 
 
 def _keys_of(model: type[BaseModel], location: Location) -> list[str]:
-    """Keys that there may be at a place, which pydantic tells with the names of kinds."""
+    """Permitted keys at a location, which contains the names of kinds that pydantic inserts."""
     here = _models_in(model)
     for part in location:
         fields = [each.model_fields for each in here]
@@ -229,7 +235,7 @@ def _keys_of(model: type[BaseModel], location: Location) -> list[str]:
 
 
 def _is_kind(model: type[BaseModel], name: object) -> bool:
-    """Whether one of several models in a place is the one that pydantic calls `name`."""
+    """Whether pydantic refers to the model, one of several at a location, by `name`."""
     return any(name in get_args(field.annotation) for field in model.model_fields.values())
 
 

@@ -1,4 +1,4 @@
-"""Questions that a procedure puts to whoever operates the bench, and their answers."""
+"""Prompts of a procedure to the operator of the bench, and their answers."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from pydantic import Field
 from workbench.model.yamlfile import FileModel
 
 Action = Literal["done", "redo", "skip", "abort"]
-"""`redo` has a placement captured again, `skip` leaves one out; a prompt says which (`Prompt.may`)."""
+"""`redo` captures a placement again, `skip` skips one; `Prompt.may` states which placement."""
 By = Literal["person", "answers file", "emulator"]
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number to be read off: within `low` and `high`; `usual` is what it should be."""
+    """Number to enter, between `low` and `high`; `usual` is the default."""
 
     unit: str
     low: float
@@ -27,30 +27,31 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Prompt:
-    """One question."""
+    """One instruction or question."""
 
     key: str
-    """Names it in answers files and in the journal."""
+    """Name in answers files and in the journal."""
     do: str
+    """Instruction or question."""
     expect: str = ""
-    """What is to be seen when it is done."""
+    """Expected sight afterwards."""
     otherwise: str = ""
-    """What to do if it is not so."""
+    """Instruction for another sight than the expected one."""
     quantity: Quantity | None = None
     choices: tuple[str, ...] = ()
     yes: str = ""
-    """What confirming does, where it is not plain."""
+    """Effect of a confirmation, where it is not obvious."""
     at_bench: bool = False
-    """Only somebody who sees the bench can answer: on a real rig no file does."""
+    """Whether the answer needs a person who sees the bench: on a real rig an answers file cannot give it."""
     may: Mapping[Action, str] = field(default_factory=dict)
-    """What is possible besides `done` and `abort`, and what each does here, in a few words."""
+    """Further actions besides `done` and `abort`, with a short description of their effect here."""
 
     def refuse(self, answer: Answer) -> str | None:
-        """What is wrong with an answer; None where it fits."""
+        """Reason why an answer is not valid; None for a valid one."""
         if answer.action != "done":
             if answer.action != "abort" and answer.action not in self.may:
                 return f"expected an answer, got {answer.action}, which is not possible here"
-            return None if answer.reason else f"{answer.action} loses data: expected a reason with it"
+            return None if answer.reason else f"expected a reason with {answer.action}: it discards data"
         if self.quantity is not None:
             return self._refuse_number(self.quantity, answer.value)
         if self.choices:
@@ -65,10 +66,10 @@ class Prompt:
 
 
 class Answer(FileModel):
-    """What the operator says."""
+    """Answer of an operator to a prompt."""
 
     action: Action = "done"
     value: Annotated[float, Field(strict=True)] | str | None = None
-    """A number or a choice, where one was asked for."""
+    """Number or choice, if the prompt asks for one."""
     reason: str | None = None
     by: By = "person"

@@ -1,4 +1,4 @@
-"""Chart of the errors of readings: live in the recording, and among the results of a trial."""
+"""Chart of reading errors, shown live in the recording and among the results of a trial."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from workbench.model.chart import Axis, Chart, Series
 from workbench.model.trial_event import ReadingTaken
 
 SENSOR = "sensor"
-"""Series of the readings themselves, beside those of the single lasers."""
+"""Name of the series of the whole sensor, beside those of single lasers."""
 PERCENT = 100.0
 
 
 def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
-    """Errors (measured - true) of readings and of their lasers, in percent of the true range.
+    """Chart of errors (measured - true) of readings and of their lasers, in percent of the true range.
 
-    An error is expected to be as large as the stated uncertainty of the range and the reference uncertainty
-    of the standoff together; where the latter is not known, no error can be an outlier.
+    The expected standard deviation of an error combines the stated uncertainty of the range and the reference
+    uncertainty of the standoff. No error is an outlier if the latter is unknown.
 
     Args:
-        name: of the chart.
-        readings: in the order in which they were taken.
+        name: name of the chart.
+        readings: readings in the order in which they were taken.
     """
     names = [*dict.fromkeys(one.laser_id for reading in readings for one in reading.lasers), SENSOR]
     points = [(reading, *one) for reading in readings for one in _ranges(reading)]
@@ -30,7 +30,9 @@ def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
         title="Error of every reading, bars stated u",
         x=Axis(label="standoff", unit="mm", scale="log"),
         y=Axis(label="error", unit="%"),
-        series=tuple(_series(who, [(r, mm, sd) for r, by, mm, sd in points if by == who]) for who in names),
+        series=tuple(
+            _series(name, [(r, mm, sd) for r, of, mm, sd in points if of == name]) for name in names
+        ),
     )
 
 

@@ -1,4 +1,4 @@
-"""The rig file: what is known of a sensor and its bench before any measurement, and how to reach them."""
+"""Schema of the rig file: prior knowledge about a sensor and its bench, and the drivers of its devices."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ Name = Annotated[
 ]
 
 LaserId = Annotated[Name, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
-"""Part of file names: letters, digits, `_`, `.` and `-`."""
+"""Laser id; part of file names, therefore of letters, digits, `_`, `.` and `-`."""
 LARGEST = 1e6
-"""Of any millimetres or pixels in a rig file."""
+"""Largest accepted number of millimetres or pixels."""
 MOST_PX = 100_000
-"""Of a picture's side."""
+"""Largest accepted width or height of an image."""
 SMALLEST_SD = 1e-9
+"""Smallest accepted standard deviation of a prior other than 0."""
 
 
 class Prior(FileModel):
-    """A value known before the measurement, with its standard deviation (1 sigma, Gaussian).
+    """Gaussian prior of a parameter: mean and standard deviation (1 sigma).
 
-    `sd: 0` means known exactly: the value is then a constant of the fit.
+    `sd: 0` makes the parameter a constant of the fit.
     """
 
     value: Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
@@ -40,14 +41,14 @@ class Prior(FileModel):
 
     @field_validator("sd")
     @classmethod
-    def _is_zero_or_countable(cls, sd: float) -> float:
+    def _is_zero_or_large_enough(cls, sd: float) -> float:
         if 0 < sd < SMALLEST_SD:
             raise ValueError(f"expected 0 (known exactly) or at least {SMALLEST_SD:g}")
         return sd
 
 
 def exactly(value: float) -> Prior:
-    """A constant."""
+    """Prior of a constant."""
     return Prior(value=value, sd=0.0)
 
 
@@ -62,13 +63,13 @@ def _slope(angle_deg: float, sd_deg: float) -> Prior:
 
 
 class CameraSpec(FileModel):
-    """Camera: image format, and the lens as its data sheet states it."""
+    """Camera: image format, and the lens according to its data sheet."""
 
     width_px: Annotated[int, Field(gt=0, le=MOST_PX)]
     height_px: Annotated[int, Field(gt=0, le=MOST_PX)]
     bits: Annotated[int, Field(ge=8, le=16)] = 8
     lens: LensName = "plumb_bob"
-    """Lens model. It chooses the distortion coefficients below: the others are refused, and stay 0."""
+    """Lens model; it selects the distortion coefficients below. Other coefficients must be 0 exactly."""
     f_px: Prior
     cx_px: Prior
     cy_px: Prior
@@ -82,8 +83,8 @@ class CameraSpec(FileModel):
     @field_validator("k1", "k2", "p1", "p2", "k3", "k4")
     @classmethod
     def _is_of_the_lens(cls, prior: Prior, info: ValidationInfo) -> Prior:
-        lens: LensName | None = info.data.get("lens")  # None: the lens itself is refused
-        if lens is not None and info.field_name not in COEFFICIENTS[lens]:
+        lens: LensName | None = info.data.get("lens")  # None: the lens itself is not valid
+        if lens is not None and info.field_name not in COEFFICIENTS[lens] and prior != exactly(0.0):
             raise ValueError(
                 f"expected coefficients of the lens {lens} ({', '.join(COEFFICIENTS[lens])}), got"
                 f" {info.field_name}; remove it, or name another lens in camera.lens"
@@ -99,7 +100,7 @@ class CameraSpec(FileModel):
 
     @property
     def lens_priors(self) -> dict[str, Prior]:
-        """Priors of the lens model's parameters by name, in the model's order."""
+        """Priors of the lens model's parameters by name, in the order of the model."""
         return {name: getattr(self, name) for name in lens_parameters(self.lens)}
 
 
@@ -118,7 +119,7 @@ class LaserSpec(FileModel):
     def _has_a_baseline(self) -> LaserSpec:
         if self.id in {"all", "board"}:
             raise ValueError(
-                f"a laser may not be called {self.id!r}: captures.csv means something else by it"
+                f"a laser must not have the id {self.id!r}, which is reserved in captures.csv; rename it"
             )
         along, name = (self.x_mm, "x_mm") if self.axis == "u" else (self.y_mm, "y_mm")
         if along.value == 0:
@@ -127,7 +128,7 @@ class LaserSpec(FileModel):
 
 
 class BenchSpec(FileModel):
-    """Ruler and target: how well a standoff is known. All standard deviations are 1 sigma."""
+    """Ruler and target: uncertainty of standoffs. All standard deviations are 1 sigma."""
 
     offset_mm: Prior = exactly(0.0)
     """Distance of the pinhole behind the rig's reference plane: z = standoff + offset."""
@@ -135,24 +136,24 @@ class BenchSpec(FileModel):
     """Relative error of the ruler: true standoff = ruler reading x (1 + ruler_scale)."""
     placement_sd_mm: NonNegativeFloat = 0.0
     tilt_sd_deg: NonNegativeFloat = 0.0
-    """Tilt of a flat target about each of its two axes, anew at every placement."""
+    """Tilt of a flat target about each of its two axes, independent at every placement."""
     target_yaw_deg: TiltAngle = 0.0
-    """Tilt common to all placements about the vertical, as measured: the rail or the target's mount is not
+    """Tilt about the vertical common to all placements, as measured: the rail or the target's mount is not
     square to the optical axis. Positive: the target's right side is farther away."""
     target_pitch_deg: TiltAngle = 0.0
-    """The same about the horizontal. Positive: the target's lower side is farther away."""
+    """Common tilt about the horizontal. Positive: the target's lower side is farther away."""
     target_tilt_sd_deg: TiltSd = 0.5
-    """How well the common tilt is known, about each of the two axes."""
+    """Standard uncertainty of the common tilt about each of the two axes."""
     drift_u_px: Prior = exactly(0.0)
-    """Shift of the image from the first capture to the last, linear in the order of the captures. Held at its
-    value where its sd is 0; the fit frees it where the data show a drift."""
+    """Shift of the image from the first capture to the last, linear in the order of the captures. With sd 0
+    it is fixed at its value; the fit frees it if the data show a drift."""
     drift_v_px: Prior = exactly(0.0)
     reach_mm: tuple[PositiveFloat, PositiveFloat] = (100.0, 5000.0)
-    """Nearest and farthest standoff at which the target can stand with its spots not saturated."""
+    """Nearest and farthest standoff at which the target can be placed without saturated spots."""
     print_scale: Prior = Prior(value=0.0, sd=0.002)
-    """Relative error of the printed board: true length = printed length by the file x (1 + print_scale)."""
+    """Relative error of the printed board: true length = nominal length x (1 + print_scale)."""
     board_flatness_sd_mm: Annotated[float, Field(ge=0, le=LARGEST)] = 0.1
-    """How far the board's paper may lie off its plane at 100 mm from its middle."""
+    """Deviation of the board's paper from its plane at 100 mm from its centre."""
 
     @property
     def target_slope_x(self) -> Prior:
@@ -173,22 +174,22 @@ class BenchSpec(FileModel):
 
 
 class NoiseSpec(FileModel):
-    """Noise of a spot's position, where the captures do not tell it. 1 sigma, pixels."""
+    """Noise of spot positions that the captures do not state, 1 sigma, pixels."""
 
     spot_sd_px: Annotated[float, Field(ge=1e-6)] = 0.1
-    """Of one spot, where its row states none."""
+    """Noise of one spot if its row states none."""
     speckle_sd_px: NonNegativeFloat = 0.0
-    """Shared by all repeats of one laser at one placement: the speckle pattern stands still."""
+    """Speckle noise, common to all repeats of one laser at one placement: the pattern does not change."""
 
 
 class AnyDeviceBlock(DeviceBlock):
-    """A device's block as it stands in the file: its settings are checked by its driver."""
+    """Block of a device as in the file; its driver validates the settings."""
 
     model_config = ConfigDict(extra="allow")
 
 
 class DeviceSpec(FileModel):
-    """Separate devices of the bench: each block is read by the driver that it names."""
+    """Separate devices of the bench; the driver named in a block reads it."""
 
     camera: AnyDeviceBlock = AnyDeviceBlock()
     lasers: AnyDeviceBlock = AnyDeviceBlock()
@@ -199,31 +200,31 @@ LaserClass = Annotated[
     Literal["1", "1M", "2", "2M", "3R", "3B", "4"],
     BeforeValidator(lambda v: str(v) if isinstance(v, int) and not isinstance(v, bool) else v),
 ]
-"""IEC 60825-1."""
+"""Laser class according to IEC 60825-1."""
 
 
 class Rig(FileModel):
     """A rig file, format 1."""
 
-    told_by = "rig"
+    kind_key = "rig"
 
     format: Literal[1]
     rig: str
     serial: Name = "unknown"
     driver: str | None = None
-    """How the bench is reached: `opencv+serial`, or nothing, for separate `devices`; else an entry point in
-    the group `workbench.benches`. A rig without a driver and without devices can be fitted but not run."""
+    """Driver of the bench: `opencv+serial` or None for separate `devices`; else an entry point in the group
+    `workbench.benches`. A rig without driver and devices can be fitted but not run."""
     laser_class: LaserClass | None = None
-    """Of the most dangerous of its lasers; the operator is asked to protect against it."""
+    """Class of the most dangerous laser; the safety prompt asks for protection against it."""
     devices: DeviceSpec | None = None
-    """Not read where the driver opens a whole bench."""
+    """Ignored if the driver opens a whole bench."""
     camera: CameraSpec
     lasers: Annotated[tuple[LaserSpec, ...], Field(min_length=1)]
     bench: BenchSpec = BenchSpec()
     board: Board = Board()
     noise: NoiseSpec = NoiseSpec()
     emulator: dict[str, Any] | None = None
-    """Read by the emulated bench alone, which validates it."""
+    """Settings of the emulated bench, which validates them."""
 
     @field_validator("lasers")
     @classmethod

@@ -1,4 +1,4 @@
-"""A laser spot in a frame: what the search finds, the journal keeps, and the recording shows."""
+"""Laser spot in a frame: result of the search, entry of the journal, item of the recording."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import PlainSerializer
 
 
 class Failure(StrEnum):
-    """What went wrong with a capture, or with one of its spots; `spots.explain` has cause and remedy."""
+    """Failure of a capture or of one of its spots; `spots.explain` states causes and remedies."""
 
     NO_SPOT = "no_spot"
     TOO_FEW = "too_few"
@@ -25,23 +25,23 @@ class Failure(StrEnum):
 
 NO_FLAGS: frozenset[Failure] = frozenset()
 Flags = Annotated[frozenset[Failure], PlainSerializer(sorted, return_type=list[str])]
-"""In JSON in alphabetical order, so that the same spot is the same text."""
+"""Flags of a spot; in JSON in alphabetical order, so that equal spots have equal text."""
 
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A laser spot in a frame: (0, 0) is the centre of the top-left pixel, u right, v down, sd 1 sigma."""
+    """Laser spot in a frame: (0, 0) is the centre of the top-left pixel, u right, v down, sd 1 sigma."""
 
     u_px: float
     v_px: float
     u_sd_px: float
     v_sd_px: float
     flux_dn: float
-    """Sum over the whole spot, above the background."""
+    """Sum of the fitted profile above the background."""
     width_px: float
-    """Standard deviation of the profile before the pixel integrates it, geometric mean of both axes."""
+    """Standard deviation of the profile before pixel integration, geometric mean of both axes."""
     peak_dn: float
-    """Highest pixel of the fitted profile above the background, also where the pixel itself was clipped."""
+    """Highest pixel of the fitted profile above the background, even if the measured pixel is clipped."""
     flags: Flags = NO_FLAGS
     laser_id: str | None = None
-    """None while no laser has been assigned."""
+    """Laser that the spot is assigned to; None: not assigned."""

@@ -1,7 +1,7 @@
 """Distribution functions under scipy.stats' names and order of arguments.
 
-They call scipy.special: importing scipy.stats takes longer than a whole fit. Arguments broadcast; a result is
-a scalar or an array as they are. NaN in, NaN out.
+They call scipy.special, because importing scipy.stats takes longer than a fit. Arguments broadcast; results
+are scalars or arrays accordingly. NaN propagates.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""Tables as data: what a column is called, its unit and its format, stated once for every renderer.
+"""Tables as data: name, unit and format of each column, stated once for every renderer.
 
-A trial, a fit or a forecast returns tables. The terminal, the recording, CSV and JSON render them and know no
-single one of them.
+Trials, fits and forecasts return tables. The terminal, the recording, CSV and JSON render any table.
 """
 
 from __future__ import annotations
@@ -18,12 +17,12 @@ from workbench.model.yamlfile import FileModel
 
 
 def _plain(value: Any) -> Any:
-    """A Python scalar in place of a numpy one, which would lose its type; None if it is not finite."""
+    """Python scalar of a numpy or Python scalar; None if it is not finite."""
     return finite_or_none(value.item() if hasattr(value, "item") else value)
 
 
 Cell = Annotated[float | int | bool | str | None, BeforeValidator(_plain)]
-"""None: there is no such number; so is one that is not finite. A bool is an alarm."""
+"""Value of a cell. None: no number, or one that is not finite. A bool is an alarm."""
 MISSING = "-"
 ALARM = "!"
 DIGITS_OF = "digits of "
@@ -33,22 +32,22 @@ class Column(FileModel):
     """One column of a table."""
 
     key: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
-    """Name in CSV and JSON, with the unit as its suffix: `mean_error_mm`."""
+    """Name in CSV and JSON with the unit as suffix: `mean_error_mm`."""
     name: str
-    """Heading for people, without the unit: `mean error`."""
+    """Heading without the unit: `mean error`."""
     unit: str = ""
     format: str = ""
-    """Python's format specification of a number: `+.2f`. Empty: the shortest text.
+    """Python format specification of a number, for example `+.2f`. Empty: the shortest text.
 
-    `sd`: two significant digits. `digits of KEY`: as many decimals as two significant digits of the column
-    KEY of the same row, its standard deviation, need. `duration`: seconds as `45 s`, `12 min` or `3.5 h`.
+    `sd`: two significant digits. `digits of KEY`: as many decimals as two significant digits of the standard
+    deviation in column KEY of the same row. `duration`: seconds as `45 s`, `12 min` or `3.5 h`.
     """
     scale: float = 1.0
-    """A number is multiplied by it for people: 100 with the unit `%`. CSV and JSON have it unscaled."""
+    """Factor of displayed numbers: 100 with the unit `%`. CSV and JSON contain unscaled numbers."""
 
     @property
     def sd_key(self) -> str:
-        """Key of the column with this one's standard deviation; empty where the format names none."""
+        """Key of the column with the standard deviation of this one; empty if the format names none."""
         return self.format.removeprefix(DIGITS_OF) if self.format.startswith(DIGITS_OF) else ""
 
     @property
@@ -58,10 +57,10 @@ class Column(FileModel):
 
 
 class Table(FileModel):
-    """Rows of cells under described columns."""
+    """Table of described columns and rows of cells."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$")]
-    """Names the table's file and its place in the recording."""
+    """Name of the table's file and of its entity in the recording."""
     title: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
@@ -73,36 +72,36 @@ class Table(FileModel):
             raise ValueError(f"table {self.name}: expected {len(self.columns)} cells a row, got {wrong[0]}")
         keys = {column.key for column in self.columns}
         if len(keys) != len(self.columns):
-            raise ValueError(f"table {self.name}: expected columns of different keys")
+            raise ValueError(f"table {self.name}: expected every column key once")
         if unknown := {c.sd_key for c in self.columns if c.sd_key} - keys:
-            raise ValueError(f"table {self.name}: expected a column of the key {min(unknown)}, there is none")
+            raise ValueError(f"table {self.name}: no such column: {min(unknown)}, named by a format")
         return self
 
     def text(self, row: int, column: int) -> str:
-        """A cell for people."""
+        """Displayed text of a cell."""
         return cell_text(self, self.rows[row], column)
 
     def records(self) -> list[dict[str, Cell]]:
-        """A mapping a row, from the columns' keys to unscaled cells: for JSON, CSV and data frames."""
+        """One mapping per row from column keys to unscaled cells, for JSON, CSV and data frames."""
         keys = [column.key for column in self.columns]
         return [dict(zip(keys, row, strict=True)) for row in self.rows]
 
     def is_number(self, column: int) -> bool:
-        """Whether a column holds numbers, and so is aligned to the right."""
+        """Whether a column contains numbers, which are aligned to the right."""
         cells = [row[column] for row in self.rows if row[column] is not None]
         return bool(cells) and not any(isinstance(cell, str | bool) for cell in cells)
 
     def to_csv(self) -> str:
-        """The records as CSV, the columns' keys as the header; lines end with a line feed."""
+        """Records as CSV with the column keys as header; lines end with a line feed."""
         file = StringIO()
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([column.key for column in self.columns])
-        writer.writerows(self.rows)  # None is empty, a float as short as it reads back
+        writer.writerows(self.rows)  # None becomes empty, a float the shortest text that reads back equal
         return file.getvalue()
 
 
 def cell_text(table: Table, row: tuple[Cell, ...], index: int) -> str:
-    """A cell as people read it: by its column's format and scale, without the unit."""
+    """Displayed text of a cell: by the format and scale of its column, without the unit."""
     cell = row[index]
     if cell is None:
         return MISSING

@@ -1,4 +1,4 @@
-"""Text of a table's columns, for the terminal and the recording: headings in lines, cells, alignment."""
+"""Text of a table's columns for the terminal and the recording: wrapped headings, cells, alignment."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ class TextColumn:
     """One column as text."""
 
     heading: tuple[str, ...]
-    """Lines: the heading is wrapped to the cells' width, and no word is broken."""
+    """Lines of the heading, wrapped to the width of the cells without breaking words."""
     cells: tuple[str, ...]
     is_number: bool
 
     @property
     def width(self) -> int:
-        """Characters of its longest line."""
+        """Length of the longest line, in characters."""
         return max(map(len, (*self.heading, *self.cells)))
 
 
 def text_columns(table: Table) -> tuple[TextColumn, ...]:
-    """The columns of a table as text, in their order."""
+    """Columns of a table as text, in order."""
     return tuple(_text_column(table, index) for index in range(len(table.columns)))
 
 

@@ -1,4 +1,4 @@
-"""Events of a trial: its readings, its progress, and its results as tables and charts."""
+"""Events of a trial: readings, progress, and results as tables and charts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from workbench.model.yamlfile import FileModel
 
 
 class LaserRange(FileModel):
-    """Range of one laser's spot, from the reference plane; 1 sigma."""
+    """Range of one laser's spot from the reference plane, 1 sigma."""
 
     laser_id: str
     range_mm: float
@@ -19,7 +19,7 @@ class LaserRange(FileModel):
     v_px: float | None
     low_mm: float | None = None
     high_mm: float | None = None
-    """The 95 % interval, longer beyond the range than before it; no upper end where it reaches infinity."""
+    """Upper end of the 95 % interval, which is not symmetric; None if it reaches infinity."""
 
 
 class ReadingTaken(FileModel):
@@ -32,25 +32,25 @@ class ReadingTaken(FileModel):
     reading: int
     status: Literal["done", "not_enough_points", "no_points"]
     range_mm: float | None
-    """Mean of the lasers, weighted by their spots: the range of a flat target."""
+    """Mean of the lasers weighted by their spots' uncertainty: the range of a flat target."""
     sigma_mm: float | None
     """Stated standard uncertainty of `range_mm`."""
     reference_sd_mm: float | None = None
-    """Reference uncertainty of `standoff_mm`, where it is known."""
+    """Reference uncertainty of `standoff_mm`; None if unknown."""
     lasers: tuple[LaserRange, ...]
 
 
 class TrialProgress(FileModel):
-    """A part of a trial is done."""
+    """A part of a trial is complete."""
 
     kind: Literal["trial_progress"] = "trial_progress"
     trial: str
     text: str
-    """One line for people."""
+    """Summary in one line."""
 
 
 class TrialFinished(FileModel):
-    """A trial's results, as data that any renderer shows."""
+    """Results of a trial as data for any renderer."""
 
     kind: Literal["trial_finished"] = "trial_finished"
     trial: str

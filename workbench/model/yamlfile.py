@@ -1,4 +1,4 @@
-"""YAML files that people edit, read into typed models with errors that name file and line."""
+"""Reader of YAML files into typed models, with errors that name file and line."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from workbench.model.errors import BadInputError
 from workbench.model.problems import Location, SchemaProblem, problems
 
 KINDS = {"procedure": "a procedure", "rig": "a rig", "laser_ranger": "a calibration"}
-"""The keys that tell what a file is."""
+"""Keys that identify the kind of a file, with the kind's name."""
 
 
 HINTS = {
-    "that cannot start any token": "; indent with spaces, and put text that begins so in quotes",
-    "but got ':'": "; put text with a colon in it in quotes",
-    "mapping values are not allowed here": "; put text with a colon in it in quotes",
-    "another document": "; a file holds one document: take out the later ---",
-    "expected <block end>": "; indent what belongs together by the same number of spaces",
+    "that cannot start any token": "; indent with spaces; quote text that begins with a special character",
+    "but got ':'": "; quote text that contains a colon",
+    "mapping values are not allowed here": "; quote text that contains a colon",
+    "another document": "; a file contains one document: remove the later ---",
+    "expected <block end>": "; indent items of one list or mapping by the same number of spaces",
     "while scanning a quoted scalar": "; close the quotes",
     "found unexpected end of stream": "; close the quotes or brackets",
-    "could not find expected ':'": "; after a key there is a colon and a space",
+    "could not find expected ':'": "; put a colon and a space after a key",
 }
-"""What to do about YAML's usual mistakes."""
+"""Remedies for frequent mistakes, by a part of YAML's error message."""
 
 
 class FileModel(BaseModel):
-    """Base of everything read from a file: unknown keys are mistakes, values do not change after reading."""
+    """Base class of models read from a file: unknown keys are mistakes, values are immutable."""
 
-    told_by: ClassVar[str | None] = None
-    """The key of a whole file's kind."""
+    kind_key: ClassVar[str | None] = None
+    """Key that identifies a file of this kind; None for a part of a file."""
 
-    # Built at first use: a command uses few of all the models that it imports.
+    # Validators are built at first use: a command uses few of the models that it imports.
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
@@ -48,41 +48,41 @@ Model = TypeVar("Model", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Mistake:
-    """Something wrong with a file."""
+    """Mistake in a file, with its line."""
 
     line: int
-    """From 1."""
+    """Line number, from 1."""
     text: str
 
 
 @dataclass(frozen=True)
 class Document:
-    """A YAML file as it was read; mappings and lists keep their line numbers."""
+    """Content of a YAML file; mappings and lists keep their line numbers."""
 
     path: Path
     data: Any
     doubled: tuple[Mistake, ...] = ()
-    """Keys that stand in one mapping twice; the first counts."""
+    """Keys that occur twice in one mapping; the first value is used."""
 
     def mistake(self, problem: SchemaProblem) -> Mistake:
-        """A problem with its line."""
-        return Mistake(line_of(self.data, problem.location), problem.told)
+        """Mistake for a schema violation, with its line."""
+        return Mistake(line_of(self.data, problem.location), problem.message)
 
     def mistakes(self, model: type[BaseModel]) -> list[Mistake]:
-        """All that keeps the document from being `model`."""
+        """Violations of the schema of `model`, with their lines."""
         return [self.mistake(problem) for problem in schema_problems(model, self.data)]
 
 
 def schema_problems(
     model: type[BaseModel], data: object, part: Location = (), context: object = None
 ) -> list[SchemaProblem]:
-    """All that keeps `data`, which stands at the keys `part` of a file, from being `model`.
+    """Violations of the schema of `model` by a part of a file.
 
     Args:
-        model: what it is to be.
-        data: what was read.
-        part: keys that lead to it; the problems' locations begin with them.
-        context: handed to the model's validators.
+        model: expected model.
+        data: values as read.
+        part: location of `data` in the file; prefix of the problems' locations.
+        context: context for the model's validators.
     """
     try:
         model.model_validate(data, context=context)
@@ -94,10 +94,10 @@ def schema_problems(
 
 
 def refuse(path: Path, mistakes: Iterable[Mistake]) -> None:
-    """Raise where there are mistakes, a line for each, in the order of the file.
+    """Raise an error if there are mistakes.
 
     Raises:
-        BadInputError: there are.
+        BadInputError: there are mistakes; one line for each, in the order of the file.
     """
     in_order = sorted(mistakes, key=lambda mistake: mistake.line)
     if in_order:
@@ -108,23 +108,23 @@ def load_yaml_model(path: Path, model: type[Model]) -> Model:
     """Read `path` and validate it as `model`.
 
     Raises:
-        BadInputError: the file is missing, is not YAML, or does not fit; one line for each problem, with
-            file, line, key, what was expected and what came.
+        BadInputError: the file is missing, is not YAML, or violates the schema; one line for each problem,
+            with file, line, key, expected value and actual value.
     """
     return parse_yaml_model(_read(path), path, model)
 
 
 def read_document(path: Path) -> Document:
-    """Read `path`.
+    """Read a YAML file.
 
     Raises:
-        BadInputError: it cannot be read, or is not one YAML document.
+        BadInputError: the file cannot be read or is not one YAML document.
     """
     return parse_document(_read(path), path)
 
 
 def parse_yaml_model(text: str, path: Path, model: type[Model]) -> Model:
-    """Validate YAML `text`, which comes from `path`, as `model`; the errors of `load_yaml_model`."""
+    """Validate YAML `text` from the file `path` as `model`; raises the errors of `load_yaml_model`."""
     document = parse_document(text, path)
     _check_kind(path, document.data, model)
     try:
@@ -137,10 +137,10 @@ def parse_yaml_model(text: str, path: Path, model: type[Model]) -> Model:
 
 
 def parse_document(text: str, path: Path) -> Document:
-    """Read YAML's safe subset.
+    """Parse the safe subset of YAML.
 
     Raises:
-        BadInputError: it is not one YAML document.
+        BadInputError: `text` is not one YAML document.
     """
     yaml = YAML(typ="rt")
     yaml.Constructor = _Constructor
@@ -154,14 +154,14 @@ def parse_document(text: str, path: Path) -> Document:
     except (YAMLError, ValueError) as error:
         raise BadInputError(f"{path}: not valid YAML: {error}") from None
     except RecursionError:
-        raise BadInputError(f"{path}: not valid YAML: nested too deep") from None
+        raise BadInputError(f"{path}: not valid YAML: nested too deeply") from None
     if data is None:
         raise BadInputError(f"{path}:1: expected a YAML mapping, the file is empty")
     return Document(path, data, tuple(yaml.constructor.doubled))
 
 
 class _Constructor(RoundTripConstructor):
-    """Goes on after a key that stands in a mapping twice, and notes it: there may be more to tell."""
+    """Constructor that collects duplicate keys instead of stopping at the first one."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -172,12 +172,12 @@ class _Constructor(RoundTripConstructor):
             return True
         first = mapping.lc.data[key][0] + 1 if key in mapping.lc.data else node.start_mark.line + 1
         line = key_node.start_mark.line + 1
-        self.doubled.append(Mistake(line, f"{key}: stands here again, after line {first}; leave one of them"))
+        self.doubled.append(Mistake(line, f"{key}: duplicate key, first on line {first}; remove one of them"))
         return False
 
 
 def kind_of(data: Any) -> str:
-    """What a document is, for people."""
+    """Kind of a document, for messages."""
     if not isinstance(data, dict):
         return "no mapping of keys to values"
     kinds = [name for key, name in KINDS.items() if key in data]
@@ -185,8 +185,8 @@ def kind_of(data: Any) -> str:
 
 
 def _check_kind(path: Path, data: Any, model: type[BaseModel]) -> None:
-    """A file of another kind is one mistake, not as many as it has keys."""
-    key = getattr(model, "told_by", None)
+    """Refuse a file of another kind with one mistake instead of one for each key."""
+    key = getattr(model, "kind_key", None)
     if key is not None and not (isinstance(data, dict) and key in data):
         raise BadInputError(f"{path}:1: expected {KINDS[key]}, with the key {key}; this is {kind_of(data)}")
 
@@ -197,16 +197,16 @@ def _read(path: Path) -> str:
     except FileNotFoundError:
         raise BadInputError(f"{path}: no such file; expected a YAML file") from None
     except IsADirectoryError:
-        raise BadInputError(f"{path}: expected a YAML file, got a folder; give the files in it") from None
+        raise BadInputError(f"{path}: expected a YAML file, got a folder; name a file in it") from None
     except (OSError, ValueError) as error:
         raise BadInputError(f"{path}: expected a readable YAML file: {error}") from None
-    if (came := not_text(content)) is not None:
-        raise BadInputError(f"{path}: expected a YAML file, got {came}")
+    if (got := not_text(content)) is not None:
+        raise BadInputError(f"{path}: expected a YAML file, got {got}")
     return content.decode("utf-8")
 
 
 def line_of(data: Any, location: Location) -> int:
-    """Line (from 1) of the deepest part of `location` that stands in the file."""
+    """Line number (from 1) of the deepest part of `location` that exists in the file."""
     line = 1
     node = data
     for part in location:

@@ -1,1 +1,1 @@
-"""Load, plan and run procedures."""
+"""Loading, planning and running of procedures."""

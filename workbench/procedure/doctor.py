@@ -1,4 +1,4 @@
-"""Is the rig ready? Each of its parts is tried, the lasers last."""
+"""Check of all parts of a rig: controller, interlock, camera, latency, exposure, lasers."""
 
 from __future__ import annotations
 
@@ -21,26 +21,28 @@ from workbench.procedure.engine.prompts import placement_prompt, safety_prompt
 from workbench.spots import Failure, find_spots
 
 STANDOFF_MM = 500.0
+"""Standoff of the target during the check."""
 MOST_FRAMES = 20
-BRIGHT = 0.25
-"""Of full scale: a spot's peak that leaves room for farther standoffs."""
+"""Largest latency that is measured, frames."""
+LEAST_PEAK = 0.25
+"""Least peak of a spot as a share of full scale, with reserve for farther standoffs."""
 
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What came of one check."""
+    """Result of one check."""
 
     part: str
     ok: bool
     found: str
-    """What was found; where it is not well, what to do."""
+    """Finding; after a failure also what to do."""
 
 
 def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[CheckResult]:
-    """Try every part of an opened bench.
+    """Check every part of an opened bench.
 
     Raises:
-        AnswerNeededError, StoppedError: nobody puts the target there, or confirms that it is safe.
+        AnswerNeededError, StoppedError: the operator does not confirm safety or the target's placement.
         LaserOffNotConfirmedError: a beam stays on.
     """
     yield CheckResult("controller", True, f"answers, all lasers off, {bench.lasers.identity}")
@@ -51,7 +53,7 @@ def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[CheckResult]
         if answer.action != "done":
             raise StoppedError(f"aborted by the operator at {prompt.key}: {answer.reason}")
     bench.target.place(_placement())
-    # Before all that is looked at with the lasers lit: those pictures would be stale.
+    # The latency comes first: without it the frames of the later checks could be stale.
     yield _tried("latency", partial(_latency, rig, bench))
     yield from _exposure(rig, bench)
     for laser in rig.lasers:
@@ -70,7 +72,9 @@ def _tried(part: str, check: Callable[[], str]) -> CheckResult:
 def _interlock(bench: Bench) -> CheckResult:
     closed = bench.lasers.state().interlock_closed
     if closed is None:
-        return CheckResult("interlock", True, "not told by this driver; an open one refuses the lasers below")
+        return CheckResult(
+            "interlock", True, "not reported by this driver; an open interlock makes the laser checks fail"
+        )
     return CheckResult("interlock", closed, "closed" if closed else "open: close the door or the key switch")
 
 
@@ -80,26 +84,26 @@ def _camera(rig: Rig, bench: Bench) -> str:
     expected = (rig.camera.height_px, rig.camera.width_px)
     if image.shape != expected:
         raise RigNotReadyError(
-            f"expected {expected[1]} x {expected[0]} pixels as in the rig file, got"
-            f" {image.shape[1]} x {image.shape[0]}; set the camera's mode or the rig file right"
+            f"expected {expected[1]} x {expected[0]} pixels (rig file), got"
+            f" {image.shape[1]} x {image.shape[0]}; correct the camera's mode or the rig file"
         )
     if image.max() == image.min():
         raise RigNotReadyError(
-            f"every pixel is {image.max()}: is the cap on, or does the driver deliver nothing?"
+            f"every pixel has the value {image.max()}; remove the lens cap, or check the camera's driver"
         )
     return f"{expected[1]} x {expected[0]}, {image.dtype.itemsize * 8} bits, median {np.median(image):.0f}"
 
 
 def _exposure(rig: Rig, bench: Bench) -> Iterator[CheckResult]:
-    """Set as for captures, where it can be set."""
+    """Set the exposure as for captures, if it can be set."""
     try:
         found = set_exposure(bench, rig, "doctor", bench.mark)
     except RigNotReadyError as error:
         yield CheckResult("exposure", False, str(error))
         return
     if found is not None:
-        well = found.verdict != "unseen" and BRIGHT <= found.peak < CLIPPED
-        yield CheckResult("exposure", well, found.text.removeprefix("exposure "))
+        ok = found.verdict != "unseen" and LEAST_PEAK <= found.peak < CLIPPED
+        yield CheckResult("exposure", ok, found.text.removeprefix("exposure "))
 
 
 def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:
@@ -109,31 +113,34 @@ def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:
     off = bench.camera.grab().image
     found = find_spots(on, off, scanlines=[prior_scanline(rig, laser)], expected=1)
     if len(found.spots) != 1:
-        said = ", ".join(found.failures) or f"{len(found.spots)} spots"
+        got = ", ".join(found.failures) or f"{len(found.spots)} spots"
         raise RigNotReadyError(
-            f"not seen ({said}): does it shine on the target at {STANDOFF_MM:g} mm, and is it on this line of"
-            " the controller?"
+            f"expected one spot, got {got}; check that the beam hits the target at {STANDOFF_MM:g} mm and"
+            " that the laser is connected to this line of the controller"
         )
     spot = found.spots[0]
     share = spot.peak_dn / (2**rig.camera.bits - 1)
     where = f"u {spot.u_px:.1f} v {spot.v_px:.1f} px, peak {100 * share:.0f} % of full scale"
     if Failure.SATURATED in spot.flags:
         raise RigNotReadyError(f"{where}: saturated; shorten the exposure or lower the gain")
-    if share < BRIGHT:
-        raise RigNotReadyError(f"{where}: too dim; lengthen the exposure, look for dirt on the optics")
+    if share < LEAST_PEAK:
+        raise RigNotReadyError(
+            f"{where}: too dim, expected at least {100 * LEAST_PEAK:.0f} %; lengthen the exposure, clean the"
+            " optics"
+        )
     return where
 
 
 def _latency(rig: Rig, bench: Bench) -> str:
     if not isinstance(bench.camera, StreamingCamera):
-        return "not told by this driver"
+        return "not measurable with this driver"
     bench.mark("doctor/latency")
     frames = count_latency(bench.lasers, bench.camera, rig, MOST_FRAMES)
-    if frames > (believed := bench.camera.discard_frames):
+    if frames > (discarded := bench.camera.discard_frames):
         bench.camera.discard_frames = frames  # for the checks that follow
         raise RigNotReadyError(
-            f"{frames} frames, the driver discards {believed}: captures would show what"
-            " was before; put a measure_latency step first in the procedure"
+            f"{frames} frames, but the driver discards only {discarded}: captures would use stale frames;"
+            " begin the procedure with a measure_latency step"
         )
     return f"{frames} frames"
 
@@ -143,4 +150,4 @@ def _placement() -> Placement:
 
 
 def _target_prompt() -> Prompt:
-    return replace(placement_prompt(_placement(), before=None), may={})  # it is all that there is
+    return replace(placement_prompt(_placement(), before=None), may={})  # nothing to redo or to skip

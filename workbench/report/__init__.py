@@ -1,1 +1,1 @@
-"""Tables, figures and exports for people."""
+"""Renderers of tables, figures and the printed board."""

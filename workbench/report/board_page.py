@@ -1,4 +1,4 @@
-"""The printed board as a PDF page of true size: rectangles, a ruler to check it with, two lines of text."""
+"""PDF page of the printed board at true size: rectangles, a ruler to check the scale, instructions."""
 
 from __future__ import annotations
 
@@ -20,38 +20,38 @@ POINTS_PER_MM = POINTS_PER_INCH / MM_PER_INCH
 TEXT_MM = 3.0
 LINE_MM = 4.0
 ASCENT_MM = 2.4
-"""Height of letters above their baseline."""
+"""Height of letters above the baseline."""
 RULER_STEP_MM = 10
 LONGEST_RULER_MM = 200
 HAIRLINE_MM = 0.15
 
 
 def ruler_mm(board: Board) -> int:
-    """Length of the printed ruler: whole centimetres, no longer than the blocks are wide."""
+    """Length of the printed ruler: whole centimetres, at most the width of the blocks."""
     width = int(board.columns * board.square_mm)
     return min(LONGEST_RULER_MM, width - width % RULER_STEP_MM)
 
 
 def board_page(board: Board) -> bytes:
-    """PDF file with one page of `board.page_mm`, the same bytes for the same board."""
+    """PDF file with one page of `board.page_mm`; equal boards give equal bytes."""
     width_in, height_in = (mm / MM_PER_INCH for mm in board.page_mm)
     figure = Figure(figsize=(width_in, height_in), dpi=POINTS_PER_INCH)
     file = BytesIO()
     with own_style():
         _draw(figure, board)
         pdf = PdfFile(file, metadata={"CreationDate": None, "Creator": None, "Producer": None})
-        _ask_for_true_size(pdf)
+        _disable_print_scaling(pdf)
         pdf.newPage(width_in, height_in)
         figure.draw(RendererPdf(pdf, POINTS_PER_INCH, height_in, width_in))
         pdf.finalize()
     return file.getvalue()
 
 
-def _ask_for_true_size(pdf: PdfFile) -> None:
-    """Ask viewers not to fit the page to the paper when they print it (ISO 32000-1, 12.2).
+def _disable_print_scaling(pdf: PdfFile) -> None:
+    """Set the viewer preference against fitting the page to the paper (ISO 32000-1, 12.2).
 
-    Matplotlib has no option for it, and has written the catalogue (7.7.2) already: it is written once more,
-    and the file's cross-reference table points to this one.
+    Matplotlib has no option for it and has already written the catalogue (7.7.2). The catalogue is written
+    again, and the cross-reference table of the file refers to the second one.
     """
     preferences = {"PrintScaling": Name("None")}
     catalogue = {"Type": Name("Catalog"), "Pages": pdf.pagesObject, "ViewerPreferences": preferences}
@@ -82,7 +82,7 @@ def _instructions(board: Board) -> tuple[str, str]:
     return (
         "Print at 100 % (not 'fit to page') and glue flat on a plate of glass or metal. Measure the ruler"
         " below with a steel rule;",
-        f"rig file: bench.print_scale.value = measured / {length} - 1. Laser spots go on the blank band."
+        f"rig file: bench.print_scale.value = measured / {length} - 1. Place the spots on the blank band."
         f" Squares {board.square_mm:g} mm, markers {board.marker_mm:g} mm, {board.dictionary}.",
     )
 

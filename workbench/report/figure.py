@@ -1,4 +1,4 @@
-"""A chart as an SVG picture, drawn by matplotlib: the same bytes for the same chart."""
+"""SVG picture of a chart, drawn by matplotlib; equal charts give equal bytes."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from workbench.report.plot_style import own_style
 
 SIZE_IN = (7.6, 4.4)
 TICK_DISTANCE = 0.07
-"""Least distance of two labels of x, as a share of the axis."""
+"""Least distance between two labels of x, as a share of the axis."""
 LEGEND_CHARACTERS, SYMBOL_CHARACTERS = 100, 8
-"""Width of a line of the legend, and of a symbol with the gaps beside it."""
+"""Width of a line of the legend and of a symbol with its gaps, in characters."""
+MARKER_POINTS = 4
 OUTLIER_COLOR = "#d00000"
 
 
 def svg(chart: Chart, colors: Mapping[str, str]) -> bytes:
-    """The chart as an SVG file: text as outlines, so that it looks alike whatever fonts there are.
+    """SVG file of a chart. Text is stored as outlines, independent of installed fonts.
 
     Args:
-        chart: what to draw.
-        colors: of series by name, such as lasers (`#rrggbb`).
+        chart: chart to draw.
+        colors: colours (`#rrggbb`) by series name, for example of lasers.
     """
     file = BytesIO()
     with own_style():
@@ -35,7 +36,7 @@ def svg(chart: Chart, colors: Mapping[str, str]) -> bytes:
 
 
 def draw(chart: Chart, colors: Mapping[str, str]) -> Figure:
-    """The chart as a figure, without pyplot: nothing is kept between two of them. Call it in `own_style`."""
+    """Figure of a chart, without pyplot and its global state. Call it within `own_style`."""
     figure = Figure(figsize=SIZE_IN, layout="constrained")
     axes = figure.add_subplot()
     _draw_axes(axes, chart)
@@ -75,9 +76,13 @@ def _draw_series(axes: Axes, series: Series, color: str) -> None:
     if series.style == "line":
         dash = "--" if series.dashed else "-"
         axes.plot(series.x, y, color=color, linestyle=dash, linewidth=1.3, label=series.name)
+        # A line through a single point has no length: draw the point itself.
+        if single := [run[0] for run in series.runs() if len(run) == 1]:
+            at = [series.x[i] for i in single], [y[i] for i in single]
+            axes.plot(*at, "o", color=color, markersize=MARKER_POINTS)
     else:
         sd = [float("nan") if value is None else value for value in series.sd] or None
-        axes.errorbar(series.x, y, sd, color=color, fmt="o", markersize=4, label=series.name)
+        axes.errorbar(series.x, y, sd, color=color, fmt="o", markersize=MARKER_POINTS, label=series.name)
     outliers = [i for i in range(len(series.x)) if series.is_outlier(i)]
     if outliers:
         at = [series.x[i] for i in outliers], [y[i] for i in outliers]

@@ -1,4 +1,4 @@
-"""Writes the charts of finished trials into the session folder, as SVG pictures."""
+"""Writer of the charts of finished trials into the session folder, as SVG pictures."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from workbench.session.files import write_record
 
 @dataclass
 class FigureWriter:
-    """A consumer of records that writes `<chart name>.svg` for each chart of a trial."""
+    """Consumer of records that writes `<chart name>.svg` for each chart of a trial."""
 
     session_dir: Path
     colors: Mapping[str, str]
-    """Of series by name, such as lasers (`#rrggbb`)."""
+    """Colours (`#rrggbb`) by series name, for example of lasers."""
 
     def __call__(self, record: Record) -> None:
-        """Take one record."""
+        """Write the charts of a finished trial; ignore other records."""
         if isinstance(record.event, TrialFinished) and record.event.charts:
             from workbench.report.figure import svg  # loads matplotlib, which most sessions do not need
 

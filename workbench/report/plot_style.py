@@ -1,4 +1,4 @@
-"""Style of everything that matplotlib draws for the workbench."""
+"""Style of all matplotlib figures of the workbench."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import matplotlib as mpl
 
 @contextmanager
 def own_style() -> Iterator[None]:
-    """Matplotlib's defaults whatever a user's matplotlibrc says, and files that do not vary.
+    """Context with matplotlib's defaults, independent of a user's matplotlibrc, and reproducible files.
 
-    SVG: text as outlines, and ids by a fixed salt. PDF: the fonts that every reader has.
+    SVG: text as outlines, ids from a fixed salt. PDF: only the fonts that every reader provides.
     """
     with mpl.rc_context():
         mpl.rcdefaults()

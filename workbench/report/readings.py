@@ -1,4 +1,4 @@
-"""The ranger's readings for people: a line each where that says it all, more where something is unusual."""
+"""Readings of the ranger on the terminal: one line each, with details only for unusual readings."""
 
 from __future__ import annotations
 
@@ -7,24 +7,25 @@ from collections.abc import Iterator, Sequence
 from math import degrees
 from typing import TYPE_CHECKING
 
-from rich.console import Group, RenderableType
+from rich.console import Group as Lines
+from rich.console import RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
 from workbench.model.number_text import with_sd
 
-if TYPE_CHECKING:  # what is printed of them is made without the rest
+if TYPE_CHECKING:  # rendering needs none of the ranging code
     from workbench.ranging.ranger import Reading
     from workbench.ranging.shape import Shape
 
 LONGEST_SCENE = 30
-"""Characters of a scene's name that leave room for the rest beside it."""
+"""Largest number of characters of a scene name that shares a line with its results."""
 CLOSEST = "closest"
 
 
-def reading_list(readings: Sequence[Reading]) -> Group:
-    """A line a scene; below it the lasers' ranges and the notes, where it is not done or has some."""
+def reading_list(readings: Sequence[Reading]) -> Lines:
+    """One line per scene; below it ranges of the lasers and notes, if it is not done or has notes."""
     names = [len(r.scene) for r in readings if len(r.scene) <= LONGEST_SCENE]
     widths = max([*names, len("scene")]), max([*(len(_closest(r)) for r in readings), len(CLOSEST)])
     lines: list[RenderableType] = [
@@ -32,20 +33,20 @@ def reading_list(readings: Sequence[Reading]) -> Group:
         _row(widths, "scene", CLOSEST, "shape", style="bold"),
     ]
     for reading in readings:
-        lines += _told(reading, widths)
+        lines += _lines(reading, widths)
     lines.append(Text(_counted(readings)))
-    return Group(*lines)
+    return Lines(*lines)
 
 
 def reading_line(r: Reading) -> str:
-    """One reading in one line."""
+    """Summary of a reading in one line."""
     if r.closest_mm is None or r.sigma_mm is None or r.interval_mm is None:
         return f"{r.scene}  {r.status}  {'; '.join(r.notes)}"
     return f"{r.scene}  {r.status}  {_closest(r)} mm  {_shapes(r)}  {_lasers(r)}"
 
 
 def shape_words(shape: Shape) -> str:
-    """A shape in a few words, 1 sigma."""
+    """Description of a shape in a few words, 1 sigma."""
     if shape.angle_rad is not None and shape.angle_sigma_rad is not None:
         return f"incline {with_sd(degrees(shape.angle_rad), degrees(shape.angle_sigma_rad))} deg"
     if shape.kind == "cylinder" and shape.cylinder is not None:
@@ -53,7 +54,7 @@ def shape_words(shape: Shape) -> str:
     return f"round, degree {shape.degree}" if shape.kind == "round" else shape.kind
 
 
-def _told(r: Reading, widths: tuple[int, int]) -> Iterator[RenderableType]:
+def _lines(r: Reading, widths: tuple[int, int]) -> Iterator[RenderableType]:
     done = r.status == "done"
     words = _shapes(r) if done else "; ".join(part for part in (_status(r.status), _shapes(r)) if part)
     if len(r.scene) > LONGEST_SCENE:
@@ -93,6 +94,4 @@ def _status(status: str) -> str:
 def _counted(readings: Sequence[Reading]) -> str:
     counts = Counter(_status(r.status) for r in readings)
     scenes = "1 scene" if len(readings) == 1 else f"{len(readings)} scenes"
-    return (
-        f"{scenes}: {', '.join(f'{n} {status}' for status, n in counts.items())}; each laser's range: --json"
-    )
+    return f"{scenes}: {', '.join(f'{n} {status}' for status, n in counts.items())}; ranges of lasers: --json"

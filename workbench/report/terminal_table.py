@@ -1,4 +1,4 @@
-"""A table on the terminal: no wider than the terminal, and no number cut or wrapped."""
+"""Table on the terminal: at most as wide as the terminal, no number cut or wrapped."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from workbench.model.table import Table
 from workbench.model.table_layout import TextColumn, text_columns
 
 GAP = 2
-"""Characters between columns."""
+"""Number of characters between columns."""
 NARROWEST_TEXT = 12
-"""Characters that a column of words keeps before columns are moved to a block of their own below."""
+"""Minimum width of a text column in characters; below it, columns move to a further block."""
 
 
 @dataclass(frozen=True)
 class TerminalTable:
-    """Title, columns and caption of a table; print it with a Rich console.
+    """Rich renderable of a table: title, columns and caption.
 
-    Numbers are aligned to the right. A table wider than the terminal is printed as blocks of columns, one
-    below the other, the first column in each.
+    Numbers are aligned to the right. A table wider than the terminal is split into blocks of columns, one
+    below the other; each block repeats the first column.
     """
 
     table: Table
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
-        """Title, blocks and caption, each in lines of the terminal's width."""
+        """Title, blocks and caption, each at most as wide as the terminal."""
         yield Text(f"\n{self.table.title}", style="bold")
         for block in blocks(text_columns(self.table), options.max_width):
             yield _rich_table(block)
@@ -40,15 +40,15 @@ class TerminalTable:
 
 
 def blocks(columns: Sequence[TextColumn], width: int) -> list[list[TextColumn]]:
-    """Columns in as few blocks of equally many as are at most `width` characters wide, if any are.
+    """Split columns into the fewest blocks that are at most `width` characters wide, if possible.
 
-    Each block begins with the first column.
+    Blocks have equal numbers of columns as far as possible. Each block begins with the first column.
     """
     first, *others = columns
     for size in range(len(others), 0, -1):
         parts = [[first, *others[i : i + size]] for i in range(0, len(others), size)]
         if all(_least_width(part) <= width for part in parts):
-            # As many blocks, with the columns spread evenly over them.
+            # Same number of blocks, with the columns distributed evenly.
             even = ceil(len(others) / len(parts))
             return [[first, *others[i : i + even]] for i in range(0, len(others), even)]
     return [[first, other] for other in others] or [[first]]
@@ -65,12 +65,12 @@ def _least_column_width(column: TextColumn) -> int:
 
 
 def _rich_table(columns: Sequence[TextColumn]) -> RichTable:
-    # The box draws blanks between columns, and a rule below the headings.
+    # The box draws blanks between columns and a rule below the headings.
     table = RichTable(box=box.SIMPLE_HEAD, padding=(0, GAP - 1, 0, 0), pad_edge=False, show_edge=False)
     height = max(len(column.heading) for column in columns)
     for column in columns:
         lines = [""] * (height - len(column.heading)) + list(column.heading)
-        # Text, not markup: names may have brackets in them.
+        # Text, not markup: names may contain brackets.
         table.add_column(
             Text("\n".join(lines)),
             justify="right" if column.is_number else "left",

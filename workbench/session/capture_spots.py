@@ -1,4 +1,4 @@
-"""The spots of one row of a captures file that names images."""
+"""Spots in the images of one row of a captures file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def find_row_spots(
         BadInputError: an image is missing, truncated or of another size, or the pair does not match.
     """
     if row.on is None:
-        raise ValueError(f"row {row.row} gives a position, not images")
+        raise ValueError(f"row {row.row} states a position, not images")
     try:
         on = read_image(row.on, size_px)
         off = None if row.off is None else read_image(row.off, size_px)

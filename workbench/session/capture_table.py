@@ -1,4 +1,4 @@
-"""A session's captures as the captures file that anyone can read."""
+"""Writer of a session's captures as a captures file (docs/captures-format.md)."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ CALIBRATION_TABLE = "captures.csv"
 TRIAL_TABLE = "trial-captures.csv"
 NEEDED = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene")
 COLUMNS = (*NEEDED, "standoff_sd_mm", "exposure", "exposure_unit")
-"""Those that are not needed are there only where a capture states them."""
+"""All columns. Those that are not needed are written only if a capture has a value for them."""
 
 
 def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
-    """Write captures.csv into the session folder; returns its sha256.
+    """Write a captures file into the session folder; returns its sha256.
 
-    The scene of a capture of one laser is its placement: what was taken at one placing of the target shares
-    that placing's error.
+    The scene of a calibration capture is its placement: captures at one placement share its error.
     """
     rows = [_row(capture) for capture in captures]
     stated = [n < len(NEEDED) or any(row[n] for row in rows) for n in range(len(COLUMNS))]

@@ -1,4 +1,4 @@
-"""Files that are either whole or not there."""
+"""Atomic writing of files: a reader sees the old content or all of the new."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from workbench.model.errors import BadInputError, StoppedError
 
 
 def write_output(path: Path, content: bytes) -> None:
-    """Write a file that the user named; an existing one is replaced whole or not at all.
+    """Write a file that the user named; an existing file is replaced atomically.
 
-    A link is followed: what it points to is replaced.
+    Links are followed: the file that a link points to is replaced.
 
     Raises:
         BadInputError: the folder is missing, cannot be written or is full, or `path` is no regular file.
@@ -25,16 +25,16 @@ def write_output(path: Path, content: bytes) -> None:
 
 
 def check_output(path: Path) -> None:
-    """See before the work whether its result can be written.
+    """Check before a computation that its result can be written.
 
     Raises:
         BadInputError: the folder is missing, or `path` is no regular file.
     """
     target = path.resolve()
     if not target.parent.is_dir():
-        raise BadInputError(f"{path}: cannot be written: there is no folder {target.parent}")
+        raise BadInputError(f"{path}: cannot be written: no such folder: {target.parent}")
     if target.exists() and not target.is_file():
-        raise BadInputError(f"{path}: expected the name of a file to write, this is something else")
+        raise BadInputError(f"{path}: expected the name of a file to write, got something else")
 
 
 def write_record(path: Path, content: bytes) -> None:
@@ -50,10 +50,10 @@ def write_record(path: Path, content: bytes) -> None:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write `content` so that `path` holds the old bytes or all of the new, whatever is pulled when.
+    """Write `content` so that `path` contains the old bytes or all new ones, even after a power failure.
 
     Raises:
-        OSError: it could not be written; `path` is as it was.
+        OSError: the file could not be written; `path` is unchanged.
     """
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     temporary = Path(name)
@@ -71,7 +71,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make renames in `folder` survive a power cut."""
+    """Make renames in `folder` survive a power failure."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

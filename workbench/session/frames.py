@@ -1,4 +1,4 @@
-"""The frame store: lossless PNG, on disk before anything refers to it; and reading anybody's images."""
+"""Frame store of a session (lossless PNG, on disk before anything refers to it), and reader of images."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from workbench.session.files import sync_folder, write_record
 
 @dataclass(frozen=True)
 class FrameStore:
-    """The `frames/` folder of one session."""
+    """Folder `frames/` of one session."""
 
     session_dir: Path
 
     def save(self, key: str, which: str, image: Image, time_ns: int) -> FrameRef:
-        """Store one frame and return how to find it; it is on disk when this returns.
+        """Store one frame and return a reference to it; the frame is on disk when this returns.
 
         Args:
-            key: the capture's key; its slashes become folders.
+            key: key of the capture; its slashes become folders.
             which: `on` or `off`.
             image: (height, width), uint8 or uint16.
-            time_ns: wall clock at exposure.
+            time_ns: wall clock time of the exposure.
 
         Raises:
             StoppedError: the disk is full or cannot be written.
@@ -44,12 +44,12 @@ class FrameStore:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise StoppedError(f"{path.parent}: cannot be made: {error.strerror}") from error
+            raise StoppedError(f"{path.parent}: cannot be created: {error.strerror}") from error
         write_record(path, content)
         return FrameRef(path=str(relative), sha256=hashlib.sha256(content).hexdigest(), time_ns=time_ns)
 
     def set_aside(self, placement_key: str) -> None:
-        """Move the frames of a placement that is about to be captured again into `set-aside/<number>/`.
+        """Move the frames of a placement that will be captured again to `set-aside/<number>/`.
 
         Raises:
             StoppedError: the disk is full or cannot be written.
@@ -68,31 +68,31 @@ class FrameStore:
 
 
 def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
-    """A grey image, (height, width), uint8 or uint16; colour is converted to grey.
+    """Read a grey image, (height, width), uint8 or uint16; colour is converted to grey.
 
     Args:
-        path: any format that OpenCV reads.
-        size_px: (width, height) that it must have.
+        path: file in any format that OpenCV reads.
+        size_px: required (width, height).
 
     Raises:
-        BadInputError: missing, not an image, truncated, or of another size.
+        BadInputError: the file is missing, no image, truncated, or of another size.
     """
     try:
         content = path.read_bytes()
     except OSError as error:
         raise BadInputError(f"{path}: expected an image: {error.strerror}") from None
     _check_whole(path, content)
-    # A camera's idea of which side is up would move every spot: pixels are taken as they are stored.
-    how = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
+    # An orientation tag would rotate the image and move every spot: pixels are used as stored.
+    flags = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
     try:
-        image = cv2.imdecode(np.frombuffer(content, np.uint8), how)
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
     except cv2.error as error:
-        raise BadInputError(f"{path}: expected an image, OpenCV refuses it: {error.err}") from None
+        raise BadInputError(f"{path}: expected an image, OpenCV cannot decode it: {error.err}") from None
     if image is None:
-        came = not_text(content) or "text"
-        raise BadInputError(f"{path}: expected an image, OpenCV cannot decode it; it is {came}, or truncated")
+        got = not_text(content) or "text"
+        raise BadInputError(f"{path}: expected an image, OpenCV cannot decode it; got {got}, or truncated")
     if image.dtype not in (np.uint8, np.uint16):
-        raise BadInputError(f"{path}: expected 8 or 16 bits a pixel, got {image.dtype}")
+        raise BadInputError(f"{path}: expected 8 or 16 bits per pixel, got {image.dtype}")
     if size_px is not None and (image.shape[1], image.shape[0]) != size_px:
         raise BadInputError(
             f"{path}: expected an image of {size_px[0]} x {size_px[1]} pixels,"
@@ -104,9 +104,9 @@ def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
 
 
 def _check_whole(path: Path, content: bytes) -> None:
-    """Decoders fill what is missing of a truncated file with grey: look for the end ourselves."""
+    """Refuse a truncated file: decoders silently fill its missing part with grey."""
     if not content:
         raise BadInputError(f"{path}: expected an image, the file is empty")
     png, jpeg = content.startswith(b"\x89PNG"), content.startswith(b"\xff\xd8")
     if (png and b"IEND" not in content[-16:]) or (jpeg and b"\xff\xd9" not in content[-1024:]):
-        raise BadInputError(f"{path}: the image is truncated: its end is missing after {len(content)} bytes")
+        raise BadInputError(f"{path}: the image is truncated after {len(content)} bytes")

@@ -1,4 +1,4 @@
-"""The journal: one JSON record a line, appended, never changed."""
+"""Journal of a session: one JSON record per line, only appended to."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ JOURNAL = "journal.jsonl"
 
 
 class Journal:
-    """Appends records to `journal.jsonl` of a session folder, one write a record.
+    """Writer of `journal.jsonl` in a session folder, one write per record.
 
-    The file is locked while it is open: two programs never write one session.
+    The file is locked while it is open, so that two programs never write one session.
     """
 
     def __init__(self, session_dir: Path, flags: int = os.O_CREAT | os.O_EXCL) -> None:
@@ -38,12 +38,12 @@ class Journal:
 
     @classmethod
     def reopen(cls, session_dir: Path) -> tuple[Journal, tuple[Record, ...]]:
-        """Go on with a journal, or begin it where a kill came first; returns it with its records so far.
+        """Open an existing journal, or create one that a kill prevented; returns it with its records.
 
-        What a torn write left after the last whole record is cut off.
+        An incomplete record at the end, left by an interrupted write, is removed.
 
         Raises:
-            BadInputError: another program writes it, or a record in it is damaged.
+            BadInputError: another program writes the journal, or a record in it is damaged.
         """
         journal = cls(session_dir, os.O_CREAT)
         try:
@@ -58,7 +58,7 @@ class Journal:
         return journal, records
 
     def append(self, event: Event) -> Record:
-        """Write one event. It is synced to disk unless thousands of its kind come in a row.
+        """Append one event. It is synced to disk, except for spots, which can be computed again.
 
         Raises:
             StoppedError: the disk is full or cannot be written.
@@ -66,11 +66,11 @@ class Journal:
         record = Record(n=self._next, time_ns=time.time_ns(), event=event)
         line = (record.model_dump_json() + "\n").encode()
         if self._torn:
-            raise StoppedError(f"{self._path}: the journal cannot be written any more")
+            raise StoppedError(f"{self._path}: the journal cannot be written after an earlier error")
         try:
             if os.write(self._file, line) != len(line):
                 raise OSError(errno.ENOSPC, "no space left on device")
-            # The spots are computed again from the frames; losing some costs nothing.
+            # Spots are computed again from the frames, and would cost thousands of syncs.
             if not isinstance(event, SpotsFound):
                 os.fsync(self._file)
         except OSError as error:
@@ -81,7 +81,7 @@ class Journal:
         return record
 
     def _cut_back(self) -> None:
-        """Take away what a failed write left: whatever came after it would be lost with it."""
+        """Remove the remains of a failed write, which would make later records unreadable."""
         try:
             os.ftruncate(self._file, self._size)
         except OSError:
@@ -102,12 +102,12 @@ class Journal:
 
 
 def read_journal(session_dir: Path) -> Iterator[Record]:
-    """The records of a session, in order.
+    """Records of a session, in order.
 
-    A last line without its newline is what a power cut leaves, and is dropped.
+    A last line without newline, left by a power failure, is dropped.
 
     Raises:
-        BadInputError: there is no journal, or a line in it is damaged (file and line are named).
+        BadInputError: there is no journal, or a line is damaged; names file and line.
     """
     path = session_dir / JOURNAL
     try:
@@ -119,15 +119,14 @@ def read_journal(session_dir: Path) -> Iterator[Record]:
         try:
             yield Record.model_validate_json(line)
         except ValidationError:
-            came = short(line.decode(errors="replace"))
+            got = short(line.decode(errors="replace"))
             raise BadInputError(
-                f"{path}:{number}: expected a journal record, got {came}; only the workbench may write in it:"
-                " put back a copy"
+                f"{path}:{number}: expected a journal record, got {got}; restore the journal from a copy"
             ) from None
 
 
 def is_running(session_dir: Path) -> bool:
-    """Whether a program has the session's journal open for writing."""
+    """Whether a program has the journal of the session open for writing."""
     try:
         handle = os.open(session_dir / JOURNAL, os.O_RDONLY)
     except OSError:

@@ -1,4 +1,4 @@
-"""`session.yaml`: everything that a session started from, word for word."""
+"""Manifest of a session, `session.yaml`: verbatim copies of its input files, versions and invocation."""
 
 from __future__ import annotations
 
@@ -32,26 +32,26 @@ RECORDED_VERSIONS = (
 
 
 def workbench_version() -> str:
-    """Version of the workbench that is running."""
+    """Version of the running workbench."""
     return version(DISTRIBUTION)
 
 
 class FileEntry(FileModel):
-    """A file that the session started from."""
+    """Input file of a session."""
 
     file: str
     text: str
-    """Word for word."""
+    """Content, verbatim."""
 
 
 class RigEntry(FileEntry):
-    """The rig file."""
+    """Rig file of a session."""
 
     serial: Name
 
 
 class Manifest(BaseModel):
-    """What is read back of a manifest; those before `command` was kept have none."""
+    """Manifest as read back. Sessions of version 0.1.0 may lack `command`."""
 
     created: str
     operator: str
@@ -74,13 +74,13 @@ def create_session(
     """Create the session folder with its manifest.
 
     Raises:
-        BadInputError: the folder exists or cannot be made.
+        BadInputError: the folder exists or cannot be created.
     """
     try:
         folder.mkdir(parents=True)
         (folder / "frames").mkdir()
     except OSError as error:
-        raise BadInputError(f"{folder}: the session folder cannot be made: {error.strerror}") from None
+        raise BadInputError(f"{folder}: the session folder cannot be created: {error.strerror}") from None
     caller = {"created": created, "operator": operator, "command": command}
     entry = RigEntry(file=str(rig_path.resolve()), text=_read(rig_path), serial=rig.serial)
     procedures = [FileEntry(file=str(path.resolve()), text=_read(path)) for path in procedure_paths]
@@ -88,7 +88,7 @@ def create_session(
 
 
 def replace_manifest(folder: Path, before: Manifest, rig: RigEntry, procedures: Sequence[FileEntry]) -> None:
-    """Have the session go on with other files; its manifest up to now stays beside the new one."""
+    """Replace the manifest by one with other files; the previous one is kept as `session-<number>.yaml`."""
     number = next(n for n in count(1) if not (folder / f"session-{n}.yaml").exists())
     write_record(folder / f"session-{number}.yaml", (folder / MANIFEST).read_bytes())
     caller = {"created": before.created, "operator": before.operator, "command": before.command}
@@ -99,16 +99,16 @@ def load_manifest(session_dir: Path) -> Manifest:
     """Read the manifest.
 
     Raises:
-        BadInputError: this is no session folder, or its manifest is damaged.
+        BadInputError: `session_dir` is no session folder, or its manifest is damaged.
     """
     if not (session_dir / MANIFEST).is_file():
-        came = "there is none" if session_dir.is_dir() else "there is no such folder"
-        raise BadInputError(f"{session_dir}: expected a session's folder, with {MANIFEST} in it; {came}")
+        got = f"a folder without {MANIFEST}" if session_dir.is_dir() else "no such folder"
+        raise BadInputError(f"{session_dir}: expected a session folder, got {got}")
     return load_yaml_model(session_dir / MANIFEST, Manifest)
 
 
 def recorded_versions() -> dict[str, str]:
-    """Python and the libraries that decide what a session computes."""
+    """Versions of Python and of the libraries that determine a session's results."""
     return {"python": platform.python_version()} | {n: version(n) for n in RECORDED_VERSIONS}
 
 
@@ -127,10 +127,10 @@ def _write(folder: Path, caller: dict[str, str], rig: RigEntry, procedures: Sequ
 
 
 def load_session_rig(session_dir: Path) -> Rig:
-    """The rig as it was when the session began.
+    """Rig of a session, from the copy in its manifest.
 
     Raises:
-        BadInputError: this is no session folder, or its manifest is damaged.
+        BadInputError: `session_dir` is no session folder, or its manifest is damaged.
     """
     text = load_manifest(session_dir).rig.text
     return parse_yaml_model(text, Path(f"{session_dir / MANIFEST} (rig)"), Rig)

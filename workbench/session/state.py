@@ -1,4 +1,4 @@
-"""From a session's records to where it stands: what still counts, and what is whole."""
+"""State of a session from its records: valid records, complete placements, status."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from workbench.session.manifest import MANIFEST
 
 
 def effective(records: Iterable[ev.Record]) -> list[ev.Record]:
-    """The records that count: without those that a resumption or a repeated placement has set aside."""
+    """Valid records: all but those that a resumption or a repeated placement has made void."""
     kept: list[ev.Record] = []
     for record in records:
         if isinstance(record.event, ev.SessionResumed | ev.SetAside):
@@ -25,32 +25,32 @@ def effective(records: Iterable[ev.Record]) -> list[ev.Record]:
 
 
 @dataclass
-class Group:
-    """Everything captured at one placement."""
+class PlacementCaptures:
+    """Captures at one placement."""
 
     placed: ev.TargetPlaced
     exposure: ev.ExposureSet | None = None
     captures: dict[str, ev.CaptureTaken] = field(default_factory=dict)
-    """By key."""
-    whole: bool = False
+    """Captures by key."""
+    complete: bool = False
 
 
-def groups(records: Iterable[ev.Record]) -> dict[str, Group]:
-    """The latest capture of each placement, by its key, whole or not.
+def placement_captures(records: Iterable[ev.Record]) -> dict[str, PlacementCaptures]:
+    """Latest captures of each placement by its key, complete or not.
 
-    Frames count whatever became of what was computed from them: only a repeated placement takes a group away.
+    Frames stay valid when computed records become void: only `SetAside` discards the captures of a placement.
     """
-    found: dict[str, Group] = {}
+    found: dict[str, PlacementCaptures] = {}
     for event in (record.event for record in records):
         match event:
             case ev.TargetPlaced(placement=placement):
-                found[placement.key] = Group(event)
+                found[placement.key] = PlacementCaptures(event)
             case ev.ExposureSet() if event.key in found:
                 found[event.key].exposure = event
             case ev.CaptureTaken() if event.placement_key in found:
                 found[event.placement_key].captures[event.key] = event
             case ev.PlacementFinished() if event.key in found:
-                found[event.key].whole = True
+                found[event.key].complete = True
             case ev.SetAside():
                 found.pop(event.key, None)
             case _:
@@ -59,7 +59,7 @@ def groups(records: Iterable[ev.Record]) -> dict[str, Group]:
 
 
 def safe_part(records: Sequence[ev.Record]) -> list[ev.Record]:
-    """The records that count, up to the placement that was under way when the session ended."""
+    """Valid records up to the placement that was under way when the session ended."""
     kept = [r for r in effective(records) if not isinstance(r.event, ev.SessionFinished)]
     for index in range(len(kept) - 1, -1, -1):
         event = kept[index].event
@@ -75,42 +75,42 @@ STATES: dict[int, Literal["finished", "stopped", "waiting"]] = {
     StoppedError.exit_code: "stopped",
     AnswerNeededError.exit_code: "waiting",
 }
-"""By the exit code that a session ended with; the others are `failed`."""
+"""State by the exit code of the session; other codes mean `failed`."""
 
 
 @dataclass(frozen=True)
 class SessionStatus:
-    """Where a session stands."""
+    """Status of a session."""
 
     session_dir: Path
     state: Literal["finished", "running", "stopped", "waiting", "failed", "interrupted", "damaged"]
-    """`stopped` by somebody, `waiting` for an answer that nobody gave, `failed` by an error or a limit,
-    `interrupted` without a word, by a kill."""
+    """`stopped` by a person, `waiting` for an answer to a prompt, `failed` by an error or a limit,
+    `interrupted` by a kill or a power failure."""
     procedures: tuple[str, ...]
     captures: int
     why: str
-    """How it ended, one line."""
+    """Cause of the end in one line."""
 
     @property
     def unfinished(self) -> bool:
-        """Whether `workbench resume` has something to do."""
+        """Whether `workbench resume` can continue the session."""
         return self.state in {"stopped", "waiting", "failed", "interrupted"}
 
 
 def session_statuses(sessions: Path) -> list[SessionStatus]:
-    """Every session of a folder, by name, which is by time.
+    """Status of every session in a folder, ordered by name and therefore by time.
 
     Raises:
         BadInputError: there is no such folder.
     """
     if not sessions.is_dir():
-        came = "this is a file" if sessions.exists() else "there is none"
-        raise BadInputError(f"{sessions}: expected a folder of sessions, {came}")
+        got = "a file" if sessions.exists() else "no such folder"
+        raise BadInputError(f"{sessions}: expected a folder of sessions, got {got}")
     return [session_status(path.parent) for path in sorted(sessions.glob(f"*/{MANIFEST}"))]
 
 
 def session_status(session_dir: Path) -> SessionStatus:
-    """Where one session stands."""
+    """Status of one session."""
     try:
         exists = (session_dir / JOURNAL).exists()
         events = [r.event for r in effective(read_journal(session_dir))] if exists else []
@@ -120,9 +120,9 @@ def session_status(session_dir: Path) -> SessionStatus:
     procedures = first.procedures if isinstance(first, ev.SessionStarted) else ()
     captures = sum(isinstance(event, ev.CaptureTaken) for event in events)
     if is_running(session_dir):
-        return SessionStatus(session_dir, "running", procedures, captures, "under way in another program")
+        return SessionStatus(session_dir, "running", procedures, captures, "running in another program")
     if not isinstance(last, ev.SessionFinished):
-        return SessionStatus(session_dir, "interrupted", procedures, captures, "killed, or the power went")
+        return SessionStatus(session_dir, "interrupted", procedures, captures, "kill or power failure")
     why = (last.message.splitlines() or [""])[0]
     if last.exit_code == AnswerNeededError.exit_code:
         why = f"for an answer to {why.removeprefix('prompt ').partition(' -- ')[0]}"

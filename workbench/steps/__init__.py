@@ -1,4 +1,4 @@
-"""Kinds of steps, one module each. Importing the package registers all: a new module needs no edit here."""
+"""Kinds of steps, one module each. Importing the package imports and thereby registers every module."""
 
 from importlib import import_module
 from pkgutil import iter_modules

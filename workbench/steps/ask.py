@@ -1,4 +1,4 @@
-"""Step `ask`: ask for a number or for one of some choices; the answer is kept in the journal."""
+"""Step `ask`: ask for a number or a choice and journal the answer."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
 
 ACTION_WORDS = {"redo", "skip", "abort"}
-"""Typed at a prompt these are actions, and choose nothing."""
+"""Words that are actions at a prompt and therefore cannot be choices."""
 
 
 class NumberAsked(FileModel):
-    """A number to be read off."""
+    """Number to enter."""
 
     unit: str
     within: Annotated[tuple[float, float], Field(alias="in")]
@@ -31,13 +31,13 @@ class NumberAsked(FileModel):
         if low > high:
             raise ValueError(f"`in`: expected [lowest, highest], got [{low:g}, {high:g}]")
         if self.usual is not None and not low <= self.usual <= high:
-            raise ValueError(f"`usual`: expected {low:g} to {high:g}, as `in` says, got {self.usual:g}")
+            raise ValueError(f"`usual`: expected {low:g} to {high:g} (`in`), got {self.usual:g}")
         return self
 
 
 @register
 class AskStep(StepModel):
-    """Ask for a number or for one of some choices; the answer is kept in the journal."""
+    """Ask for a number or a choice and journal the answer."""
 
     step: Literal["ask"]
     text: str
@@ -47,31 +47,32 @@ class AskStep(StepModel):
     @model_validator(mode="after")
     def _asks_for_one_thing(self) -> AskStep:
         if (self.number is None) == (not self.choices):
-            raise ValueError("expected either `number` or `choices`")
+            got = "both" if self.choices else "neither"
+            raise ValueError(f"expected either `number` or `choices`, got {got}")
         if len(set(self.choices)) != len(self.choices):
-            raise ValueError(f"`choices`: expected each once, got {', '.join(self.choices)}")
+            raise ValueError(f"`choices`: expected each choice once, got {', '.join(self.choices)}")
         if taken := ACTION_WORDS.intersection(choice.lower() for choice in self.choices):
             raise ValueError(
-                f"`choices`: expected other words than redo, skip, abort, got {', '.join(taken)}"
+                f"`choices`: redo, skip and abort are reserved for actions, got {', '.join(sorted(taken))}"
             )
         return self
 
     @property
     def default_duration_s(self) -> float:
-        """A person reads something off."""
+        """Time in which a person reads a value."""
         return 30.0
 
     @property
     def title(self) -> str:
-        """The question itself."""
+        """Text of the question."""
         return self.text
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """The one question."""
+        """Prompt with the question."""
         return [self._prompt(name)]
 
     def run(self, context: Context, name: str) -> str:
-        """Ask; the outcome is the answer with its unit."""
+        """Ask; returns the answer with its unit."""
         answer = context.ask(self._prompt(name))
         unit = "" if self.number is None else f" {self.number.unit}"
         return f"{answer.value}{unit}"

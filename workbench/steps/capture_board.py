@@ -1,4 +1,4 @@
-"""Step `capture_board`: the printed board in room light and under each laser, placed at several tilts."""
+"""Step `capture_board`: capture the printed board in room light and with each laser, at several tilts."""
 
 from __future__ import annotations
 
@@ -19,35 +19,35 @@ from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
 
 
-class BoardPlacing(FileModel):
-    """How the board is to stand: at a standoff, turned about the vertical and the horizontal."""
+class BoardPlacement(FileModel):
+    """Placement of the board: standoff, and rotation about the vertical and the horizontal axis."""
 
     standoff_mm: Standoff
     yaw_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
-    """Positive moves its right side away."""
+    """Rotation about the vertical; positive moves the right side away."""
     pitch_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
-    """Positive moves its lower side away."""
+    """Rotation about the horizontal; positive moves the lower side away."""
     standoff_sd_mm: NonNegativeFloat | None = None
-    """Standard uncertainty of the standoff of a board tilted by hand; the rig's if not stated."""
+    """Standard uncertainty of the standoff; None: that of the rig file."""
 
 
 @register
 class CaptureBoardStep(StepModel):
-    """At each placement of the printed board: `frames` in room light, then `repeats` pairs of each laser."""
+    """Capture `frames` in room light and `repeats` pairs of each laser at each placement of the board."""
 
     gives: ClassVar[str | None] = "captures"
     step: Literal["capture_board"]
-    placings: Annotated[tuple[BoardPlacing, ...], Field(min_length=1)]
+    placings: Annotated[tuple[BoardPlacement, ...], Field(min_length=1)]
     frames: Count
     repeats: Count
 
     @property
     def title(self) -> str:
-        """How much is captured."""
+        """Number of placements."""
         return f"Capture the board in {len(self.placings)} placements"
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
-        """Numbered from 1: the board may stand at one standoff with several tilts."""
+        """Placements, numbered from 1 because the board may have several tilts at one standoff."""
         upright = all(laser.axis == "v" for laser in rig.lasers)
         return [
             Placement(
@@ -62,11 +62,11 @@ class CaptureBoardStep(StepModel):
         ]
 
     def captures(self, rig: Rig) -> int:
-        """Frames in room light and pairs of each laser, at each placement."""
+        """Number of frames in room light and of pairs of all lasers, over all placements."""
         return len(self.placings) * (self.frames + self.repeats * len(rig.lasers))
 
     def run(self, context: Context, name: str) -> str:
-        """Capture at every placement; the errors of `visit_placements`."""
+        """Capture at every placement; raises the errors of `visit_placements`."""
         from workbench.calibration.data.boards import BoardView, see_board
         from workbench.calibration.data.observations import PlacementInfo
         from workbench.model.fit_event import Rejected

@@ -1,4 +1,4 @@
-"""Step `capture_grid`: fire each laser alone at each standoff."""
+"""Step `capture_grid`: capture each laser alone at each standoff."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from workbench.steps.fit import FitStep
 
 @register
 class CaptureGridStep(StepModel):
-    """Fire each laser alone at each standoff, `repeats` pairs of frames each."""
+    """Capture `repeats` pairs of each laser alone at each standoff."""
 
     gives: ClassVar[str | None] = "captures"
     step: Literal["capture_grid"]
@@ -40,24 +40,24 @@ class CaptureGridStep(StepModel):
 
     @property
     def title(self) -> str:
-        """How much is captured."""
-        return f"Capture at {len(self.standoffs_mm)} standoffs, {self.repeats} pairs a laser"
+        """Number of standoffs and of pairs."""
+        return f"Capture at {len(self.standoffs_mm)} standoffs, {self.repeats} pairs per laser"
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
-        """One a standoff."""
+        """One placement per standoff."""
         return [flat_placement(name, standoff_mm) for standoff_mm in self.standoffs_mm]
 
     def captures(self, rig: Rig) -> int:
-        """Each laser's repeats at each standoff."""
+        """Number of pairs of all lasers over all standoffs."""
         return len(self.standoffs_mm) * self.repeats * len(rig.lasers)
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Of the placements, then of limits that ask where they fail."""
+        """Prompts of the placements, then those of limits with `on_fail: ask`."""
         limits = capture_limit_prompts(self.placements(name, rig), rig, self.limits)
         return [*super().prompts(name, rig), *limits]
 
     def run(self, context: Context, name: str) -> str:
-        """Capture at every placement; the errors of `visit_placements` and `check_captures`."""
+        """Capture at every placement; raises the errors of `visit_placements` and `check_captures`."""
 
         def work(placement: Placement) -> int:
             pairs = capture_lasers(context, placement, self.repeats)
@@ -69,24 +69,24 @@ class CaptureGridStep(StepModel):
 
 
 def _advise(context: Context) -> None:
-    """Journal how good ranges are by the captures so far, and the standoff that would help most next.
+    """Journal the range uncertainty after the captures so far and the most informative next standoff.
 
-    Nothing where no fit follows, or where the board was seen: its corners would not count.
+    No advice if no fit follows, or if the board was captured, because the forecast does not use its corners.
     """
     from workbench.calibration.design.next_standoff import advise
     from workbench.procedure.engine.observed import observed_so_far
 
-    ahead = _next_fit(context.steps, context.step_index)
-    if ahead is None or context.boards:
+    upcoming = _next_fit(context.steps, context.step_index)
+    if upcoming is None or context.boards:
         return
-    planned_mm, fit = ahead
+    planned_mm, fit = upcoming
     if (advice := advise(context.rig, observed_so_far(context), planned_mm)) is not None:
         limit = fit.limits.max_relative_range_sd
         context.emit(StandoffAdvised(limit=limit, **asdict(advice)))
 
 
 def _next_fit(steps: Sequence[Step], index: int) -> tuple[tuple[float, ...], FitStep] | None:
-    """The next fit of the procedure from the step at `index` on, and the standoffs planned before it."""
+    """Standoffs planned before the next fit step at or after `index`, and that step; None without one."""
     for number, step in enumerate(steps[index:], start=index):
         if isinstance(step, FitStep):
             grids = [one for one in steps[:number] if isinstance(one, CaptureGridStep)]

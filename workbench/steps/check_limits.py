@@ -1,4 +1,4 @@
-"""Step `check_limits`: hold the last fit against limits."""
+"""Step `check_limits`: compare the last fit with limits."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FitLimits(FileModel):
 
 @register
 class CheckLimitsStep(StepModel):
-    """Hold the last fit against limits; `on_fail: ask` leaves it to the operator, with a reason."""
+    """Compare the last fit with limits; with `on_fail: ask` the operator decides."""
 
     needs: ClassVar[str | None] = "fit"
     step: Literal["check_limits"]
@@ -39,21 +39,21 @@ class CheckLimitsStep(StepModel):
 
     @property
     def default_duration_s(self) -> float:
-        """A few comparisons."""
+        """Time of a few comparisons."""
         return 1.0
 
     @property
     def title(self) -> str:
-        """What is checked."""
+        """Subject of the check."""
         return "Check the fit's limits"
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """One for each limit that asks where it fails."""
+        """One prompt per limit with `on_fail: ask`."""
         return fit_limit_prompts(name, self.limits)
 
     def run(self, context: Context, name: str) -> str:
-        """Check; the errors of `check_fit`."""
+        """Check the limits; raises the errors of `check_fit`."""
         if context.accepted is None:
-            raise BadInputError(f"step {name}: nothing to check; expected a fit step before it")
+            raise BadInputError(f"step {name}: no fit to check; expected a fit step before it")
         ranger = context.accepted.laser_ranger
         return check_fit(context, name, ranger.fit.model_dump() | ranger.validity.model_dump(), self.limits)

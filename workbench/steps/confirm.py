@@ -1,4 +1,4 @@
-"""Step `confirm`: have the technician do something, and wait until it is done."""
+"""Step `confirm`: instruct the technician and wait for a confirmation."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from workbench.procedure.engine.step import StepModel
 
 @register
 class ConfirmStep(StepModel):
-    """Have the technician do something, and wait until it is done."""
+    """Instruct the technician and wait for a confirmation."""
 
     step: Literal["confirm"]
     text: str
     expect: str = ""
-    """What is to be seen when it is done."""
+    """Expected sight afterwards."""
     otherwise: str = ""
-    """What to do if it is not so."""
+    """Instruction for another sight than the expected one."""
 
     @property
     def default_duration_s(self) -> float:
-        """A person does something."""
+        """Time in which a person does something."""
         return 30.0
 
     @property
     def title(self) -> str:
-        """The text itself."""
+        """Text of the instruction."""
         return self.text
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """The one question."""
+        """Prompt with the instruction."""
         return [self._prompt(name)]
 
     def run(self, context: Context, name: str) -> str:
-        """Ask, and wait."""
+        """Show the prompt and wait."""
         context.ask(self._prompt(name))
         return "confirmed"
 

@@ -17,7 +17,7 @@ from workbench.session.files import write_record
 
 @register
 class ExportStep(StepModel):
-    """Write the calibration to the session folder; trials range with it."""
+    """Write the accepted calibration to the session folder; later trials use it."""
 
     needs: ClassVar[str | None] = "fit"
     gives: ClassVar[str | None] = "calibration"
@@ -26,16 +26,16 @@ class ExportStep(StepModel):
 
     @property
     def default_duration_s(self) -> float:
-        """A small file."""
+        """Time of writing a small file."""
         return 1.0
 
     @property
     def title(self) -> str:
-        """The file."""
+        """Name of the file."""
         return f"Export {self.file}"
 
     def run(self, context: Context, name: str) -> str:
-        """Write the file, and journal its hash.
+        """Write the file and journal its hash.
 
         Raises:
             BadInputError: no fit was accepted.
@@ -44,7 +44,7 @@ class ExportStep(StepModel):
         from workbench.calibration.verdict.export import render
 
         if context.accepted is None:
-            raise BadInputError(f"step {name}: nothing to export; expected a fit step before it")
+            raise BadInputError(f"step {name}: no calibration to export; expected a fit step before it")
         content = render(context.accepted).encode()
         write_record(context.session_dir / self.file, content)
         context.calibration = context.accepted

@@ -15,7 +15,7 @@ from workbench.session.capture_table import CALIBRATION_TABLE, write_capture_tab
 
 @register
 class FitStep(StepModel):
-    """Fit the calibration to the captures so far; the session ends with exit code 3 where a limit fails."""
+    """Fit the calibration to the captures so far; a failed limit ends the session with exit code 3."""
 
     needs: ClassVar[str | None] = "captures"
     gives: ClassVar[str | None] = "fit"
@@ -24,14 +24,14 @@ class FitStep(StepModel):
 
     @property
     def title(self) -> str:
-        """What is done."""
+        """Description of the step."""
         return "Fit the calibration"
 
     def run(self, context: Context, name: str) -> str:
         """Write captures.csv, fit, journal the fit.
 
         Raises:
-            BadInputError: there are no captures to fit.
+            BadInputError: there are no captures.
             LimitFailedError: the calibration is refused.
         """
         from workbench.calibration.data.boards import BoardView, on_boards
@@ -44,7 +44,7 @@ class FitStep(StepModel):
 
         captures = [c for c in context.captures if c.purpose == "calibration"]
         if not captures:
-            raise BadInputError(f"step {name}: nothing to fit; expected a capture_grid step before it")
+            raise BadInputError(f"step {name}: no captures to fit; expected a capture_grid step before it")
         sha256 = write_capture_table(context.session_dir / CALIBRATION_TABLE, captures)
         spots = [observe_capture(context, capture) for capture in captures if capture.laser_id != BOARD]
         found = on_boards(context.rig.board, context.boards, spots)
@@ -57,9 +57,9 @@ class FitStep(StepModel):
         context.emit(fit_finished(fitted, assessment))
         if assessment.verdict == "refused":
             raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
-        context.accepted, context.left_out = calibration, assessment.cross_validation
+        context.accepted, context.cross_validation = calibration, assessment.cross_validation
         worst = calibration.laser_ranger.validity.max_relative_range_sd
         return (
-            f"accepted: rms {fitted.rms_px:.3f} px over {len(observations)} spots, {len(fitted.rejected)} not"
-            f" used; ranges to {100 * worst:.2g} % (1 sigma) or better"
+            f"accepted: rms {fitted.rms_px:.3f} px over {len(observations)} spots, {len(fitted.rejected)}"
+            f" rejected; range uncertainty at most {100 * worst:.2g} % (1 sigma)"
         )

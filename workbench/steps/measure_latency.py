@@ -1,4 +1,4 @@
-"""Step `measure_latency`: count the frames from switching a laser on to the first that shows it."""
+"""Step `measure_latency`: count the frames between switching a laser on and its first full exposure."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class MeasureLatencyStep(StepModel):
 
     @property
     def title(self) -> str:
-        """What is measured."""
+        """Description of the step."""
         return "Measure the camera's latency"
 
     def run(self, context: Context, name: str) -> str:
-        """Measure, and have the camera discard that many frames."""
+        """Measure the latency and set the camera to discard as many frames."""
         return f"{context.measure_latency(name, self.most_frames)} frames, discarded before each capture"

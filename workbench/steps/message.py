@@ -18,14 +18,14 @@ class MessageStep(StepModel):
 
     @property
     def default_duration_s(self) -> float:
-        """Shown at once."""
+        """Zero: the text is shown without waiting."""
         return 0.0
 
     @property
     def title(self) -> str:
-        """The text itself."""
+        """Text of the message."""
         return self.text
 
     def run(self, context: Context, name: str) -> str:
-        """Nothing more: the title was shown when the step began."""
+        """Return at once: the terminal shows the title when the step begins."""
         return "shown"

@@ -1,4 +1,4 @@
-"""Step `place_target`: have a flat target placed for later steps that need one."""
+"""Step `place_target`: place a flat target for later steps that need one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from workbench.procedure.engine.step import StepModel, flat_placement
 
 @register
 class PlaceTargetStep(StepModel):
-    """Have a flat target placed, for steps that need one without capturing a grid."""
+    """Place a flat target for later steps that need one, without captures."""
 
     gives: ClassVar[str | None] = "target"
     step: Literal["place_target"]
@@ -24,18 +24,17 @@ class PlaceTargetStep(StepModel):
 
     @property
     def title(self) -> str:
-        """The standoff."""
+        """Standoff of the target."""
         return f"Place the target at {self.standoff_mm:g} mm"
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
-        """The one placement."""
+        """One placement."""
         return [flat_placement(name, self.standoff_mm)]
 
     def run(self, context: Context, name: str) -> str:
-        """Have it placed."""
-        # No exposure is set: the steps that need lit frames set their own, as one found before the latency
-        # is measured may rest on old frames.
+        """Ask for the placement."""
+        # No exposure is set here: before the latency is measured, its trial exposures could be stale frames.
         placed = visit_placements(
             context, self.placements(name, context.rig), lambda placement: placement, lights=False
         )
-        return f"at {placed[0].standoff_mm:g} mm" if placed else "left out"
+        return f"at {placed[0].standoff_mm:g} mm" if placed else "skipped"

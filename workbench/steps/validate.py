@@ -19,19 +19,19 @@ from workbench.procedure.engine.step import StepModel
 
 
 class ValidationLimits(FileModel):
-    """Limits on what the fits without one placement each predict of it."""
+    """Limits on the errors of cross-validation."""
 
     worst_relative_error: Limit | None = None
-    """Largest |range - standoff| / standoff."""
+    """Limit on the largest |range - standoff| / standoff."""
     worst_z: Limit | None = None
-    """Largest |range - standoff| in its promised standard deviations."""
+    """Limit on the largest |range - standoff| / stated standard deviation."""
 
     _no_retry = model_validator(mode="after")(refuse_retry)
 
 
 @register
 class ValidateStep(StepModel):
-    """Leave each placement of the last fit out in turn: is it ranged as well as promised?"""
+    """Compare the errors of cross-validation (each placement ranged by the fit without it) with limits."""
 
     needs: ClassVar[str | None] = "fit"
     step: Literal["validate"]
@@ -39,28 +39,28 @@ class ValidateStep(StepModel):
 
     @property
     def default_duration_s(self) -> float:
-        """The fits were made by the fit step."""
+        """Time of a few comparisons: the fit step has made the fits."""
         return 1.0
 
     @property
     def title(self) -> str:
-        """What is done."""
-        return "Validate on standoffs left out"
+        """Description of the step."""
+        return "Cross-validate the calibration"
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """One for each limit that asks where it fails."""
+        """One prompt per limit with `on_fail: ask`."""
         return fit_limit_prompts(name, self.limits)
 
     def run(self, context: Context, name: str) -> str:
-        """Check; the errors of `check_fit`."""
-        left_out = context.left_out
-        if not left_out:
+        """Check the limits; raises the errors of `check_fit`."""
+        placements = context.cross_validation
+        if not placements:
             raise BadInputError(f"step {name}: nothing to validate; expected a fit of 3 placements or more")
-        worst_error = max(abs(one.error_mm) / one.standoff_mm for one in left_out)
-        worst_z = max(abs(one.z) for one in left_out)
+        worst_error = max(abs(one.error_mm) / one.standoff_mm for one in placements)
+        worst_z = max(abs(one.z) for one in placements)
         values = {"worst_relative_error": worst_error, "worst_z": worst_z}
         verdict = check_fit(context, name, values, self.limits)
         return (
-            f"{len(left_out)} placements, each ranged by a fit without it: to {100 * worst_error:.2g} % or"
-            f" better, {worst_z:.2g} sd of what was promised at worst; {verdict}"
+            f"{len(placements)} placements, each ranged by the fit without it: error at most"
+            f" {100 * worst_error:.2g} % and {worst_z:.2g} stated sd; {verdict}"
         )

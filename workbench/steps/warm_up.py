@@ -1,4 +1,4 @@
-"""Step `warm_up`: let the camera run with the lasers off until its focal length drifts less."""
+"""Step `warm_up`: run the camera with the lasers off until its focal length is stable."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
 
 SECONDS_PER_FRAME = 0.1
-"""Default: 30 frames a second, two of three discarded as too old."""
+"""Default duration per frame: 30 frames per second, two of three discarded as stale."""
 
 
 @register
 class WarmUpStep(StepModel):
-    """Let the camera run for some frames with the lasers off."""
+    """Run the camera for a number of frames with the lasers off."""
 
     step: Literal["warm_up"]
     frames: Count
 
     @property
     def title(self) -> str:
-        """The number of frames."""
+        """Number of frames."""
         return f"Warm up for {self.frames} frames"
 
     @property
     def default_duration_s(self) -> float:
-        """That of the frames."""
+        """Time of the frames."""
         return SECONDS_PER_FRAME * self.frames
 
     def run(self, context: Context, name: str) -> str:

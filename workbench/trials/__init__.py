@@ -1,4 +1,4 @@
-"""Trials, one package each. Importing the package registers their steps: a new package needs no edit."""
+"""Trials, one package each. Importing the package imports and thereby registers every trial."""
 
 from importlib import import_module
 from pkgutil import iter_modules

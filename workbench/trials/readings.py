@@ -1,4 +1,4 @@
-"""Readings of the sensor in a running session, as trials take them."""
+"""Readings of the sensor in a running session, for trials."""
 
 from __future__ import annotations
 
@@ -14,15 +14,14 @@ from workbench.spots import Finding
 
 
 def session_ranger(context: Context, name: str) -> Ranger:
-    """The ranger of the session's calibration, for the step `name`.
+    """Ranger with the session's calibration, for the step `name`.
 
     Raises:
         BadInputError: no calibration was exported.
     """
     if context.calibration is None:
         raise BadInputError(
-            f"step {name}: no calibration to range with; run a procedure with an export step before it,"
-            " in the same call"
+            f"step {name}: no calibration; run a procedure with an export step before it in the same command"
         )
     return Ranger(context.calibration)
 
@@ -33,10 +32,10 @@ def take_readings(
     """Take `count` readings at a placement, journal each, and return them.
 
     Args:
-        context: the session.
-        ranger: ranges the spots.
-        name: of the step, under which the readings are journalled.
-        placement: where the target stands; its key begins the names of the scenes.
+        context: session.
+        ranger: ranger with the session's calibration.
+        name: name of the step, under which the readings are journalled.
+        placement: present placement; its key is the prefix of the scenes' names.
         count: number of readings.
 
     Raises:
@@ -49,7 +48,7 @@ def _take_reading(
     context: Context, ranger: Ranger, name: str, placement: Placement, number: int
 ) -> ReadingTaken:
     scene = f"{placement.key}/{number:02d}"
-    reading = acquire(ranger, scene, _shoot(context, ranger, placement, scene, number))
+    reading = acquire(ranger, scene, _capture(context, ranger, placement, scene, number))
     stated = placement.standoff_sd_mm
     taken = ReadingTaken(
         trial=name,
@@ -66,15 +65,15 @@ def _take_reading(
     return taken
 
 
-def _shoot(
+def _capture(
     context: Context, ranger: Ranger, placement: Placement, scene: str, number: int
 ) -> Callable[[tuple[str, ...]], Finding]:
-    """Capture with the given lasers lit, under the scene's name."""
+    """Function that takes a capture of the scene with the given lasers."""
 
-    def shoot(ids: tuple[str, ...]) -> Finding:
+    def capture(ids: tuple[str, ...]) -> Finding:
         alone = len(ids) == 1
         key = f"{scene}/{ids[0] if alone else 'all'}"
-        shown = f"{scene}/alone" if alone else scene
-        return context.capture(key, ids, placement, number, ranger.searched(ids), scene=shown)
+        name = f"{scene}/alone" if alone else scene
+        return context.capture(key, ids, placement, number, ranger.searched(ids), scene=name)
 
-    return shoot
+    return capture

@@ -1,4 +1,4 @@
-"""Results of a trial: every table as a CSV file, and all of them in the journal."""
+"""Results of a trial: every table as a CSV file, tables and charts in the journal."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ def finish_trial(context: Context, name: str, tables: Sequence[Table], charts: S
     """Write the tables and the trial's captures into the session folder, and journal the results.
 
     Args:
-        context: the session.
-        name: of the step.
-        tables: each is written to `<its name>.csv`, with the columns' keys as its header.
-        charts: shown by the recording and the report.
+        context: session.
+        name: name of the step.
+        tables: tables, each written to `<table name>.csv` with the column keys as header.
+        charts: charts, shown by the recording and written as figures.
 
     Raises:
         StoppedError: the disk is full or cannot be written.

@@ -1,1 +1,1 @@
-"""The Rerun recording: a view made from the session's records."""
+"""Rerun recording of a session, made from its records."""

@@ -1,4 +1,4 @@
-"""How the viewer lays a recording out: one tab for the technician at the bench, three for the engineer."""
+"""Layout of a recording in the viewer: one tab for the technician at the bench, three for the engineer."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from workbench.viewer import entities as at
 from workbench.viewer.chart import BOUNDS_X, BOUNDS_Y
 
 PICTURE_VIEW = "Picture, lasers on"
-"""Name of the view with the frames, by which a test finds it."""
+"""Name of the view of the frames."""
 RESULTS_VIEW = "Results"
 TABLE_FORMAT = rrb.archetypes.TextDocumentFormat(monospace=True, word_wrap=False)
-"""Of the views whose documents are tables in plain text."""
+"""Format of views of tables in plain text."""
 
 
 def blueprint(rig: Rig, charts: Sequence[Chart] = ()) -> rrb.Blueprint:
-    """The layout for one rig; the technician's tab is in front, the cursor follows what comes in.
+    """Layout for one rig; the technician's tab is in front, and the time cursor follows new data.
 
     Args:
-        rig: whose picture and lasers are shown.
-        charts: results of the last trial, in the order of their places (`entities.trial_charts`); with more
-            than one each has a tab of its own.
+        rig: rig with the camera and the lasers.
+        charts: charts of the last trial in the order of `entities.trial_charts`; several charts get one tab
+            each.
     """
     return rrb.Blueprint(
         rrb.Tabs(_live(rig), _fit(), _trial(charts), _bench(), active_tab=0),
@@ -47,14 +47,14 @@ def _live(rig: Rig) -> rrb.Container:
         rrb.TimeSeriesView(origin=f"{at.SPOTS}/{axis}", name=f"Spot position {axis[0]} [px]"),
         rrb.TimeSeriesView(origin=f"{at.SPOTS}/peak_dn", name="Peak brightness [DN]"),
     )
-    doing = rrb.Horizontal(
+    activity = rrb.Horizontal(
         rrb.StateTimelineView(origin=at.LANES, name="Steps"),
         rrb.TextLogView(
             origin=at.STEP_LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
         ),
     )
     return rrb.Vertical(
-        rrb.Horizontal(picture, curves, column_shares=[3, 2]), doing, row_shares=[3, 1], name="Live"
+        rrb.Horizontal(picture, curves, column_shares=[3, 2]), activity, row_shares=[3, 1], name="Live"
     )
 
 
@@ -63,20 +63,20 @@ def _fit() -> rrb.Container:
         _chart(f"{at.FIT_CHART}/u", "Residuals u"),
         _chart(f"{at.FIT_CHART}/v", "Residuals v"),
     )
-    words = rrb.Vertical(
+    texts = rrb.Vertical(
         rrb.TextDocumentView(origin=at.FIT_SUMMARY, name="Verdict"),
         rrb.TextDocumentView(origin=at.FIT_CHECKS, name="Checks", format_options=TABLE_FORMAT),
         rrb.TextDocumentView(origin=at.FIT_TABLE, name="Parameters", format_options=TABLE_FORMAT),
         row_shares=[2, 3, 3],
     )
-    return rrb.Horizontal(charts, words, column_shares=[3, 2], name="Fit")
+    return rrb.Horizontal(charts, texts, column_shares=[3, 2], name="Fit")
 
 
 def _trial(charts: Sequence[Chart]) -> rrb.Container:
     curves = rrb.Vertical(
         _results(charts),
         rrb.TimeSeriesView(
-            origin=f"{at.TRIAL_ERRORS}/{SENSOR}", name="Error of the sensor [mm] as the trial went"
+            origin=f"{at.TRIAL_ERRORS}/{SENSOR}", name="Error of the sensor [mm] during the trial"
         ),
         row_shares=[3, 2],
     )
@@ -85,7 +85,7 @@ def _trial(charts: Sequence[Chart]) -> rrb.Container:
 
 
 def _results(charts: Sequence[Chart]) -> rrb.Container | rrb.View:
-    """The chart that grows as the trial goes and becomes the first of its results; the others beside it."""
+    """View of the live chart, which becomes the first chart of the results; tabs if there are several."""
     if len(charts) <= 1:
         return _chart(at.TRIAL_CHART, RESULTS_VIEW)
     places = at.trial_charts([chart.name for chart in charts])

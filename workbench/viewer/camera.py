@@ -1,7 +1,7 @@
-"""The picture and the spots found in it.
+"""Frames and the spots found in them.
 
-Only frames with the lasers on are logged. A frame with the lasers off is dark, serves the subtraction alone
-and would double the recording; it stays in the session folder.
+Only frames with the lasers on are logged. A frame with the lasers off serves only for the subtraction and
+would double the size of the recording; it stays in the session folder.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from workbench.viewer.stream import Stream
 
 QUANTITIES = ("u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "peak_dn")
 RERUN_PIXEL_CENTRE = 0.5
-"""Rerun's (0, 0) is the top-left pixel's corner, the workbench's its centre. Only drawings are shifted."""
+"""Shift of drawings: Rerun's (0, 0) is the corner of the top-left pixel, the workbench's its centre."""
 _DOT = rr.Radius.ui_points(1.0)
 _RING = rr.Radius.ui_points(1.0)
 _RING_PX = 9.0
@@ -30,7 +30,7 @@ _SAME_PX = 0.01
 
 
 def log_series_styles(stream: Stream, colors: Mapping[str, at.Rgb]) -> None:
-    """Name and colour of every laser's curve, once."""
+    """Log name and colour of every laser's curve."""
     for quantity in QUANTITIES:
         for laser, color in colors.items():
             style = rr.SeriesPoints(colors=color, names=laser, markers="circle", marker_sizes=3.0)
@@ -38,12 +38,12 @@ def log_series_styles(stream: Stream, colors: Mapping[str, at.Rgb]) -> None:
 
 
 def log_frame(stream: Stream, png: bytes) -> None:
-    """The picture with the lasers on, exactly as stored."""
+    """Log a frame with the lasers on, as stored."""
     stream.log(at.IMAGE, rr.EncodedImage(contents=png, media_type="image/png"))
 
 
 def log_spots(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
-    """The spots of one capture: drawn into the picture, and as numbers for curves and for a later fit."""
+    """Log the spots of one capture, as marks in the picture and as numbers for curves."""
     _draw(stream, spots, colors)
     by_laser: dict[str | None, list[Spot]] = defaultdict(list)
     for spot in spots:
@@ -57,13 +57,13 @@ def log_spots(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb
 def log_assigned(
     stream: Stream, spots: Sequence[Spot], lasers: Sequence[LaserRange], colors: Mapping[str, at.Rgb]
 ) -> None:
-    """The picture's spots again, now that a reading has told whose they are; a stray one stays nameless."""
-    named = [replace(spot, laser_id=_owner(spot, lasers)) for spot in spots]
-    _draw(stream, named, colors)
+    """Draw the spots of a frame again with the lasers that a reading has assigned to them."""
+    assigned = [replace(spot, laser_id=_assigned_laser(spot, lasers)) for spot in spots]
+    _draw(stream, assigned, colors)
 
 
-def _owner(spot: Spot, lasers: Sequence[LaserRange]) -> str | None:
-    """The laser that was ranged by this very spot."""
+def _assigned_laser(spot: Spot, lasers: Sequence[LaserRange]) -> str | None:
+    """Laser whose range comes from this spot."""
     for one in lasers:
         if one.u_px is None or one.v_px is None:
             continue
@@ -73,7 +73,7 @@ def _owner(spot: Spot, lasers: Sequence[LaserRange]) -> str | None:
 
 
 def _curve(quantity: str, laser: str | None) -> str:
-    """Spots of no laser stay out of the curves: from capture to capture they are in no order."""
+    """Entity of a spot's curve. Unassigned spots are separate: their order varies between captures."""
     if laser is None:
         return at.under(at.SPOTS, at.UNASSIGNED, quantity)
     return at.under(at.SPOTS, quantity, laser)
@@ -95,7 +95,7 @@ def _dots(spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> rr.Points2D:
 
 
 def _rings(spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> rr.LineStrips2D:
-    """A ring about each spot: a dot large enough to be seen would cover the very light that it marks."""
+    """Rings around spots; a visible dot would cover the spot itself."""
     turn = np.linspace(0.0, 2 * np.pi, _RING_CORNERS + 1)
     ring = _RING_PX * np.column_stack([np.cos(turn), np.sin(turn)]) + RERUN_PIXEL_CENTRE
     return rr.LineStrips2D(

@@ -1,4 +1,4 @@
-"""Documents about a fit and a trial, in Markdown."""
+"""Text documents about a fit and a trial."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from workbench.model.event import (
 
 
 def fit_summary(fit: FitFinished) -> str:
-    """Verdict first, then why, then how good."""
+    """Summary of a fit in Markdown: verdict, reasons, warnings, residual."""
     lines = [
         f"**Calibration {fit.verdict}**",
-        _bullets("Why", fit.reasons),
+        _bullets("Reasons", fit.reasons),
         _bullets("Warnings", fit.warnings),
         f"**Residual** {fit.rms_px:.3f} px rms over {fit.observations} observations, "
         f"{len(fit.rejected)} rejected.",
@@ -23,7 +23,7 @@ def fit_summary(fit: FitFinished) -> str:
 
 
 def without_range(readings: Iterable[ReadingTaken]) -> str:
-    """Readings that gave no range, a line each; empty where all have one."""
+    """List of readings without a range, one line each; empty if all have one."""
     missing = [
         f"{one.standoff_mm:g} mm, reading {one.reading}: {one.status}"
         for one in readings

@@ -1,4 +1,4 @@
-"""Names of entities and timelines, and each laser's colour: what is logged and what is shown share them."""
+"""Names of entities and timelines and colours of lasers, common to logging and layout."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from workbench.model import chart
 APPLICATION = "workbench"
 
 CAPTURE = "capture"
-"""Timeline: captures counted from 1; what prepares a capture bears the number of the capture it prepares."""
+"""Timeline: captures, counted from 1; preparations of a capture have the number of that capture."""
 STEP = "step"
-"""Timeline: steps counted from 1 through all procedures of the session."""
+"""Timeline: steps, counted from 1 through all procedures of the session."""
 WALL_CLOCK = "time"
-"""Timeline: wall clock; frames and their spots stand at the exposure."""
+"""Timeline: wall clock; frames and their spots have the time of exposure."""
 STANDOFF = "standoff_mm"
-"""Timeline: standoff by the ruler in whole millimetres, of what was measured at one."""
+"""Timeline: standoff by the ruler in whole millimetres, for measurements at one standoff."""
 
 BENCH = "bench"
 CAMERA = f"{BENCH}/camera"
@@ -48,7 +48,7 @@ TRIAL_SUMMARY = "trial/summary"
 TRIAL_ERRORS = "trial/errors"
 TRIAL_CHART = "trial/chart"
 TRIAL_CHARTS = "trial/charts"
-"""Below it the charts of a trial's results but for the first."""
+"""Parent of the charts of a trial's results except the first."""
 
 Rgb = tuple[int, int, int]
 
@@ -58,7 +58,7 @@ RED: Rgb = (255, 70, 70)
 
 
 def laser_colors(laser_ids: Sequence[str]) -> dict[str, Rgb]:
-    """Colours of lasers as Rerun takes them."""
+    """Colours of lasers for Rerun."""
     return {laser: from_hex(color) for laser, color in chart.laser_colors(laser_ids).items()}
 
 
@@ -74,12 +74,12 @@ def to_hex(color: Rgb) -> str:
 
 
 def trial_charts(names: Sequence[str]) -> list[str]:
-    """Entities of the charts of a trial's results, by the charts' names; the first has the live chart's."""
+    """Entities of the charts of a trial's results, by name; the first chart replaces the live chart."""
     return [TRIAL_CHART, *(under(TRIAL_CHARTS, name) for name in names[1:])][: len(names)]
 
 
 def under(parent: str, *parts: str) -> str:
-    """Entity path of `parts` below `parent`, whatever characters a name from a file has."""
+    """Entity path of `parts` below `parent`, with special characters escaped."""
     import rerun as rr
 
     return "/".join([parent, *(rr.escape_entity_path_part(part) for part in parts)])

@@ -1,4 +1,4 @@
-"""A fit: parameters, residuals against standoff, and its summary."""
+"""View of a fit: parameters, residuals against standoff, summary."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AXES: tuple[ImageAxis, ...] = get_args(ImageAxis)
 
 
 def log_no_fit_yet(stream: Stream) -> None:
-    """Say so where the fit will be shown: an empty view tells nobody whether it is broken."""
+    """Log a note in each view of the fit, because an empty view could be a defect."""
     for axis in AXES:
         log_note(stream, f"{at.FIT_CHART}/{axis}", "no fit yet")
     for entity in (at.FIT_SUMMARY, at.FIT_CHECKS, at.FIT_TABLE):
@@ -29,7 +29,7 @@ def log_no_fit_yet(stream: Stream) -> None:
 
 
 def log_fit(stream: Stream, fit: FitFinished, moment: Moment, colors: Mapping[str, at.Rgb]) -> None:
-    """Everything that a fit says."""
+    """Log parameters, residuals, tables and summary of a fit."""
     for parameter in fit.parameters:
         _log_parameter(stream, parameter)
     for axis in AXES:
@@ -47,18 +47,18 @@ def log_fit(stream: Stream, fit: FitFinished, moment: Moment, colors: Mapping[st
 
 def _log_parameter(stream: Stream, one: ParameterRecord) -> None:
     value = rr.Measurements(values=[one.value], variances=[one.sd**2], units=one.unit, names=one.name)
-    belief = rr.AnyValues(
+    uncertainty = rr.AnyValues(
         sd=one.sd,
         prior_value=one.prior_value,
         prior_sd=one.prior_sd,
         data_share=one.data_share,
         determined_by=one.determined_by,
     )
-    stream.log(at.under(at.FIT_PARAMETERS, one.name), value, belief)
+    stream.log(at.under(at.FIT_PARAMETERS, one.name), value, uncertainty)
 
 
 def _log_residual(stream: Stream, one: ResidualRecord) -> None:
-    """As numbers, on the standoff timeline too: choosing it in the viewer plots them against standoff."""
+    """Log a residual as numbers, also on the standoff timeline, which plots them against standoff."""
     values = {"u_px": one.u_px, "v_px": one.v_px, "u_sd_px": one.u_sd_px, "v_sd_px": one.v_sd_px}
     for name, value in values.items():
         if value is not None:
@@ -66,7 +66,7 @@ def _log_residual(stream: Stream, one: ResidualRecord) -> None:
 
 
 def _log_tables(stream: Stream, entity: str, *tables: Table) -> None:
-    """Tables that have rows, one below the other."""
+    """Log the tables that have rows, one below the other."""
     texts = [table_text(table) for table in tables if table.rows]
     _log_text(stream, entity, "\n\n\n".join(texts) or "Nothing was checked")
 

@@ -1,6 +1,6 @@
-"""Geometry of the sensor by its current parameters: the rig file's at first, the fit's once there is one.
+"""Geometry of the sensor for drawing: parameters of the rig file, or of the fit once there is one.
 
-For drawing only. Camera frame, millimetres: x right, y down, z forward, origin in the pinhole.
+Camera frame, millimetres: x right, y down, z forward, origin in the pinhole.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ class Geometry:
 
     lens_name: LensName
     lens: Mapping[str, float]
-    """The lens model's parameters by name, in its order."""
+    """Parameters of the lens model by name, in the order of the model."""
     offset_mm: float
     rays: Mapping[str, tuple[float, float, float, float]]
     """(x_mm, y_mm, tx, ty) of each laser."""
 
     @classmethod
     def of_rig(cls, rig: Rig) -> Geometry:
-        """By the rig file, before any measurement."""
+        """Geometry from the priors of the rig file."""
         return cls(
             lens_name=rig.camera.lens,
             lens={name: prior.value for name, prior in rig.camera.lens_priors.items()},
@@ -46,7 +46,7 @@ class Geometry:
         )
 
     def fitted(self, parameters: Iterable[ParameterRecord]) -> Geometry:
-        """The same with every value that a fit names (`f_px`, `offset_mm`, `<laser id>.x_mm`, ...)."""
+        """Geometry with fitted values of the parameters (`f_px`, `offset_mm`, `<laser id>.x_mm`, ...)."""
         fit = {parameter.name: parameter.value for parameter in parameters}
         rays = {}
         for laser, (x, y, tx, ty) in self.rays.items():
@@ -61,12 +61,12 @@ class Geometry:
 
     @property
     def camera_matrix(self) -> FloatArray:
-        """(3, 3), pixels; the centre of the top-left pixel is (0, 0)."""
+        """Camera matrix (3, 3), pixels; the centre of the top-left pixel is (0, 0)."""
         f, cx, cy = (self.lens[name] for name in ("f_px", "cx_px", "cy_px"))
         return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
 
     def ray_at(self, laser: str, z_mm: float) -> tuple[float, float, float]:
-        """Point of a laser's ray at depth `z_mm`."""
+        """Point of a laser's ray at depth `z_mm`, mm."""
         x, y, tx, ty = self.rays[laser]
         return (x + tx * z_mm, y + ty * z_mm, z_mm)
 

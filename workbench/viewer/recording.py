@@ -1,7 +1,6 @@
-"""The recording of a session: a view for the Rerun viewer, made from the session's records alone.
+"""Recording of a session for the Rerun viewer, made from the session's records and frames.
 
-The journal and the frames are the record. The recording can be made again from them with the same code, so a
-recording that is damaged, or that an interrupted session left incomplete, costs nothing.
+Journal and frames are the record. A damaged or incomplete recording can be made again from them.
 """
 
 from __future__ import annotations
@@ -28,14 +27,14 @@ RECORDING_FILE = "recording.rrd"
 
 
 class RecordingConsumer:
-    """Writes `recording.rrd` into the session folder as records come.
+    """Consumer that writes `recording.rrd` into the session folder.
 
-    An existing recording is replaced at the first record: whoever resumes a session gives the consumer the
-    records of the journal first. Use it as a context manager, or call `close`; without that everything logged
-    is in the file, only the footer is missing (`rerun rrd merge` adds it).
+    The first record replaces an existing recording; a resumed session therefore passes all earlier records
+    first. Use the consumer as a context manager, or call `close`. Without that only the footer of the file is
+    missing (`rerun rrd merge` adds it).
 
     Raises:
-        BadInputError: a frame that a record names is missing in the session folder, or has changed.
+        BadInputError: a frame of a record is missing in the session folder, or has changed.
     """
 
     def __init__(self, session_dir: Path, rig: Rig, out: Path | None = None) -> None:
@@ -46,7 +45,7 @@ class RecordingConsumer:
         self._open: _OpenRecording | None = None
 
     def __call__(self, record: ev.Record) -> None:
-        """Log one record. The first one must be `SessionStarted`: it names the recording."""
+        """Log one record. The first one must be `SessionStarted`, which names the recording."""
         if self._open is None:
             if not isinstance(record.event, ev.SessionStarted):
                 raise ValueError(f"expected session_started as the first record, got {record.event.kind}")
@@ -55,7 +54,7 @@ class RecordingConsumer:
         self._open.take(record)
 
     def close(self) -> None:
-        """Write everything out and close the file; a second call does nothing."""
+        """Flush and close the file; a second call has no effect."""
         if self._open is not None:
             self._open.stream.close()
             self._open = None
@@ -70,10 +69,10 @@ class RecordingConsumer:
 
 
 def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path) -> None:
-    """Make the recording again from the records of a session; `out` is replaced only by a complete one.
+    """Make the recording again from the records of a session; only a complete one replaces `out`.
 
     Raises:
-        BadInputError: a frame that a record names is missing in the session folder, or has changed.
+        BadInputError: a frame of a record is missing in the session folder, or has changed.
     """
     partial = out.with_name(out.name + ".partial")
     try:
@@ -86,7 +85,7 @@ def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path
 
 
 class _OpenRecording:
-    """What has to be remembered from one record to the next."""
+    """Open recording, with the state that later records need."""
 
     def __init__(self, stream: Stream, session_dir: Path, rig: Rig) -> None:
         self.stream = stream
@@ -103,7 +102,7 @@ class _OpenRecording:
         self._step = 0
 
     def take(self, record: ev.Record) -> None:
-        """Log one record where it belongs on the timelines."""
+        """Log one record at its position on the timelines."""
         self._advance(record.event)
         moment = Moment(self._capture, self._step, record.time_ns)
         self.stream.at(moment)
@@ -112,8 +111,8 @@ class _OpenRecording:
     def _advance(self, event: object) -> None:
         """Count captures and steps.
 
-        What prepares a capture (a step, a placement) bears the number of the capture to come. With the number
-        of the one before, the last picture of every standoff would show the target of the next.
+        Preparations of a capture (a step, a placement) have the number of the next capture. With the number
+        of the previous one, the last picture of a standoff would show the target of the next standoff.
         """
         taken = len(self._captures)
         if isinstance(event, ev.StepStarted):
@@ -134,47 +133,47 @@ class _OpenRecording:
         camera.log_series_styles(self.stream, self._colors)
         fit.log_no_fit_yet(self.stream)
         self._trial.log_none_yet()
-        steps.say(self.stream, f"Session {event.session} on {event.rig}: {', '.join(event.procedures)}")
+        steps.log_text(self.stream, f"Session {event.session} on {event.rig}: {', '.join(event.procedures)}")
 
     @_log.register
     def _(self, event: ev.ProcedureStarted, moment: Moment) -> None:
         steps.lane(self.stream, at.LANE_PROCEDURE, event.procedure)
-        steps.say(self.stream, f"{event.procedure}: {event.title} ({event.length})")
+        steps.log_text(self.stream, f"{event.procedure}: {event.title} ({event.length})")
 
     @_log.register
     def _(self, event: ev.StepStarted, moment: Moment) -> None:
         steps.lane(self.stream, at.LANE_STEP, event.title)
         if event.shots == 0:
             steps.lane(self.stream, at.LANE_LASER, steps.LASERS_OFF)
-        steps.say(self.stream, f"Step {event.index}: {event.title}")
+        steps.log_text(self.stream, f"Step {event.index}: {event.title}")
 
     @_log.register
     def _(self, event: ev.StepFinished, moment: Moment) -> None:
-        steps.say(self.stream, f"Step {event.index} done: {event.outcome}")
+        steps.log_text(self.stream, f"Step {event.index} done: {event.outcome}")
 
     @_log.register
     def _(self, event: ev.TargetPlaced, moment: Moment) -> None:
         self._placement = event.placement
         scene.log_target(self.stream, event.placement, self._geometry)
-        steps.say(self.stream, f"Target placed at {event.placement.standoff_mm:g} mm")
+        steps.log_text(self.stream, f"Target placed at {event.placement.standoff_mm:g} mm")
 
     @_log.register
     def _(self, event: ev.Answered, moment: Moment) -> None:
         answer = event.answer
-        said = answer.action if answer.value is None else answer.value
-        steps.say(self.stream, f"{event.question} {said} {answer.reason or ''}".rstrip())
+        text = answer.action if answer.value is None else answer.value
+        steps.log_text(self.stream, f"{event.question} {text} {answer.reason or ''}".rstrip())
 
     @_log.register
     def _(self, event: ev.PlacementFinished, moment: Moment) -> None:
-        """Of use to a resumed session alone."""
+        """Nothing to show: only a resumed session uses this event."""
 
     @_log.register
     def _(self, event: ev.SetAside, moment: Moment) -> None:
-        steps.say(self.stream, f"Placement {event.text}", steps.WARN)
+        steps.log_text(self.stream, f"Placement {event.text}", steps.WARN)
 
     @_log.register
     def _(self, event: ev.SessionResumed, moment: Moment) -> None:
-        steps.say(self.stream, f"Resumed by {event.operator} at {event.created}", steps.WARN)
+        steps.log_text(self.stream, f"Resumed by {event.operator} at {event.created}", steps.WARN)
 
     @_log.register
     def _(self, event: ev.CaptureTaken, moment: Moment) -> None:
@@ -193,25 +192,25 @@ class _OpenRecording:
         if placement is not None:
             scene.log_spots_on_target(self.stream, event.spots, placement, self._geometry, self._colors)
         for failure in event.failures:
-            steps.say(self.stream, f"Capture {event.key}: {failure}", steps.WARN)
+            steps.log_text(self.stream, f"Capture {event.key}: {failure}", steps.WARN)
 
     @_log.register
     def _(self, event: ev.LimitChecked, moment: Moment) -> None:
         value = "not measured" if event.value is None else f"{event.value:.4g}"
         text = f"{event.of}: {event.quantity} {value}, limit {event.limit}: {event.verdict}"
-        steps.say(self.stream, text, steps.INFO if event.verdict == "pass" else steps.WARN)
+        steps.log_text(self.stream, text, steps.INFO if event.verdict == "pass" else steps.WARN)
 
     @_log.register
     def _(self, event: ev.LatencyMeasured, moment: Moment) -> None:
-        steps.say(self.stream, f"Camera latency: {event.frames} frames")
+        steps.log_text(self.stream, f"Camera latency: {event.frames} frames")
 
     @_log.register
     def _(self, event: ev.ExposureSet, moment: Moment) -> None:
-        steps.say(self.stream, event.text, steps.INFO if event.verdict == "good" else steps.WARN)
+        steps.log_text(self.stream, event.text, steps.INFO if event.verdict == "good" else steps.WARN)
 
     @_log.register
     def _(self, event: ev.StandoffAdvised, moment: Moment) -> None:
-        steps.say(self.stream, f"After {event.placements} placements, {event.text}")
+        steps.log_text(self.stream, f"After {event.placements} placements, {event.text}")
 
     @_log.register
     def _(self, event: ev.FitFinished, moment: Moment) -> None:
@@ -219,17 +218,17 @@ class _OpenRecording:
         scene.log_sensor(self.stream, self._rig.camera, self._geometry, self._colors)
         fit.log_fit(self.stream, event, moment, self._colors)
         good = event.verdict == "accepted"
-        steps.say(
+        steps.log_text(
             self.stream,
             f"Calibration {event.verdict}, residual {event.rms_px:.3f} px rms. {' '.join(event.reasons)}",
             steps.INFO if good else steps.ERROR,
         )
         for warning in event.warnings:
-            steps.say(self.stream, warning, steps.WARN)
+            steps.log_text(self.stream, warning, steps.WARN)
 
     @_log.register
     def _(self, event: ev.CalibrationExported, moment: Moment) -> None:
-        steps.say(self.stream, f"Calibration written to {event.path}")
+        steps.log_text(self.stream, f"Calibration written to {event.path}")
 
     @_log.register
     def _(self, event: ev.ReadingTaken, moment: Moment) -> None:
@@ -240,23 +239,23 @@ class _OpenRecording:
         scene.log_ranged(self.stream, event.lasers, self._geometry, self._colors)
         if event.status != "done":
             text = f"{event.scene}, reading {event.reading} at {event.standoff_mm:g} mm: {event.status}"
-            steps.say(self.stream, text, steps.WARN)
+            steps.log_text(self.stream, text, steps.WARN)
 
     @_log.register
     def _(self, event: ev.TrialFinished, moment: Moment) -> None:
         self._trial.finish(event)
-        steps.say(self.stream, f"Trial {event.trial} finished, {len(event.tables)} tables")
+        steps.log_text(self.stream, f"Trial {event.trial} finished, {len(event.tables)} tables")
 
     @_log.register
     def _(self, event: ev.TrialProgress, moment: Moment) -> None:
-        steps.say(self.stream, event.text)
+        steps.log_text(self.stream, event.text)
 
     @_log.register
     def _(self, event: ev.SessionFinished, moment: Moment) -> None:
         self._trial.stop()
         steps.end_all(self.stream)
         level = steps.INFO if event.exit_code == 0 else steps.ERROR
-        steps.say(self.stream, f"Session ended ({event.exit_code}): {event.message}", level)
+        steps.log_text(self.stream, f"Session ended ({event.exit_code}): {event.message}", level)
 
     def _read(self, frame: ev.FrameRef) -> bytes:
         path = self._session_dir / frame.path
@@ -264,13 +263,13 @@ class _OpenRecording:
             png = path.read_bytes()
         except OSError as error:
             raise BadInputError(
-                f"{path}: expected the frame that the journal names, cannot read it ({error.strerror}); "
+                f"{path}: the frame of a journal record cannot be read ({error.strerror}); "
                 "restore it from a copy of the session folder"
             ) from None
-        # The viewer would show a damaged picture, or none, without a word.
+        # The viewer would show a damaged picture, or none, without an error.
         if sha256(png).hexdigest() != frame.sha256:
             raise BadInputError(
-                f"{path}: expected the frame that was captured (sha256 {frame.sha256[:12]}...), "
-                "the file has changed since; restore it from a copy of the session folder"
+                f"{path}: the frame has changed since it was captured (expected sha256"
+                f" {frame.sha256[:12]}...); restore it from a copy of the session folder"
             )
         return png

@@ -1,4 +1,4 @@
-"""The bench in 3D: camera, laser rays, target, and the spots on it. Millimetres in the camera frame."""
+"""3D view of the bench: camera, laser rays, target and spots, mm in the camera frame."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from workbench.viewer.stream import Stream
 
 RAY_LENGTH_MM = 5000.0
 TARGET_HALF_MM = 150.0
-"""Half side of the target as drawn; its real size is not known and does not matter."""
+"""Half side of the drawn target, whose real size is unknown."""
 _IMAGE_PLANE_MM = 150.0
 _LINE = rr.Radius.ui_points(1.5)
 _DOT = rr.Radius.ui_points(5.0)
@@ -36,14 +36,14 @@ Point = tuple[float, float, float]
 
 
 def log_styles(stream: Stream) -> None:
-    """Which way is up, and that a standoff stays until the next placement; once."""
+    """Log the orientation of the 3D view, and the step-like curve of the standoff."""
     stream.log(at.BENCH, rr.ViewCoordinates.RDF, static=True)
     stairs = rr.SeriesLines(colors=at.WHITE, names="standoff", interpolation_mode="StepAfter")
     stream.log(at.STANDOFF_SCALAR, stairs, static=True)
 
 
 def log_sensor(stream: Stream, camera: CameraSpec, geometry: Geometry, colors: Mapping[str, at.Rgb]) -> None:
-    """Camera and laser rays as they are believed to be from now on."""
+    """Log camera and laser rays with their present parameters."""
     matrix = geometry.camera_matrix
     matrix[:2, 2] += RERUN_PIXEL_CENTRE
     pinhole = rr.Pinhole(
@@ -59,11 +59,11 @@ def log_sensor(stream: Stream, camera: CameraSpec, geometry: Geometry, colors: M
 
 
 def log_target(stream: Stream, placement: Placement, geometry: Geometry) -> None:
-    """The target where the ruler says it is; measured points of the placement before it go away."""
+    """Log the target at its standoff by the ruler, and clear the points of the previous placement."""
     z_mm = placement.standoff_mm + geometry.offset_mm
     outline = _outline(placement, z_mm)
     stream.log(at.TARGET, rr.LineStrips3D(outline, colors=at.WHITE, radii=_LINE))
-    # Below the target: a label of the outline itself would stand in its middle, over the spots.
+    # Below the target: a label of the outline itself would cover the spots in its middle.
     below = [(0.0, TARGET_HALF_MM, z_mm)] if outline else []
     label = rr.Points3D(
         below, labels=[f"target at {placement.standoff_mm:g} mm"] * len(below), colors=at.WHITE
@@ -81,7 +81,7 @@ def log_spots_on_target(
     geometry: Geometry,
     colors: Mapping[str, at.Rgb],
 ) -> None:
-    """Spots where the camera sees them on a flat target; off its ray, one shows the calibration's error."""
+    """Log spots on a flat target along their lines of sight; distances from rays are calibration errors."""
     if not isinstance(placement.target, FlatTarget | BoardTarget) or not spots:
         return
     pixels = np.array([(spot.u_px, spot.v_px) for spot in spots])
@@ -97,7 +97,7 @@ def log_spots_on_target(
 def log_ranged(
     stream: Stream, lasers: Sequence[LaserRange], geometry: Geometry, colors: Mapping[str, at.Rgb]
 ) -> None:
-    """Points that the sensor has ranged, on their rays."""
+    """Log ranged points on their rays."""
     known = [one for one in lasers if one.laser_id in geometry.rays]
     points = [geometry.ray_at(one.laser_id, one.range_mm + geometry.offset_mm) for one in known]
     dots = rr.Points3D(points, colors=[colors[one.laser_id] for one in known], radii=_DOT if points else None)
@@ -105,7 +105,7 @@ def log_ranged(
 
 
 def _outline(placement: Placement, z_mm: float) -> list[list[Point]]:
-    """Lines that draw the target whose standoff point lies at depth `z_mm`."""
+    """Outline of the target with its standoff point at depth `z_mm`."""
     target = placement.target
     match target:
         case FlatTarget() | BoardTarget():
@@ -143,7 +143,7 @@ def _across() -> list[float]:
 
 
 def _upright(section: Sequence[tuple[float, float]]) -> list[list[Point]]:
-    """A vertical surface by its (x, z) section: three copies of it and the edges between them."""
+    """Outline of a vertical surface from its (x, z) section: three copies and the edges between them."""
     levels = (-TARGET_HALF_MM, 0.0, TARGET_HALF_MM)
     copies: list[list[Point]] = [[(x, y, z) for x, z in section] for y in levels]
     edges: list[list[Point]] = [

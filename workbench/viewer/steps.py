@@ -1,4 +1,4 @@
-"""What the session is doing: a text log, and lanes of states over time."""
+"""Activity of the session: text log, and lanes of states over time."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ ENDED = "ended"
 ERROR = rr.TextLogLevel.ERROR
 
 
-def say(stream: Stream, text: str, level: rr.TextLogLevel = INFO) -> None:
-    """One line of the log."""
+def log_text(stream: Stream, text: str, level: rr.TextLogLevel = INFO) -> None:
+    """Log one line of text."""
     stream.log(at.STEP_LOG, rr.TextLog(text, level=level))
 
 
 def lane(stream: Stream, entity: str, state: str) -> None:
-    """The state of one lane from now on."""
+    """Log a new state of one lane."""
     stream.log(entity, rr.StateChange(state=state))
 
 
 def end_all(stream: Stream) -> None:
-    """Nothing is going on any more."""
+    """Log the end in every lane."""
     for entity in (at.LANE_PROCEDURE, at.LANE_STEP, at.LANE_LASER):
         lane(stream, entity, ENDED)

@@ -1,4 +1,4 @@
-"""One open recording file, and the place on every timeline at which the next thing is logged."""
+"""Open recording file with its current position on every timeline."""
 
 from __future__ import annotations
 
@@ -17,38 +17,38 @@ FLUSH_SECONDS = 20.0
 
 @dataclass(frozen=True)
 class Moment:
-    """Where on the timelines something happened."""
+    """Position on all timelines."""
 
     capture: int
     step: int
     time_ns: int
     standoff_mm: float | None = None
-    """Only for what was measured at one standoff."""
+    """Standoff of a measurement at one standoff; None for other events."""
 
 
 class Stream:
-    """A Rerun recording written to a file as things are logged."""
+    """Rerun recording that is written to a file while it is logged."""
 
     def __init__(self, path: Path, session: str, layout: rrb.Blueprint) -> None:
         self._recording = rr.RecordingStream(
             APPLICATION,
             recording_id=session,
             send_properties=False,
-            # The default batcher holds scalars back while frames fill its buffer, and loses them in a crash.
+            # The default batcher delays scalars while frames fill its buffer, and loses them in a crash.
             batcher_config=rr.ChunkBatcherConfig.LOW_LATENCY(),
         )
-        # What is logged must be the same whenever it is logged, or a rebuilt recording would differ.
+        # No timelines of the logging itself: they would differ in a rebuilt recording.
         rr.set_log_time_enabled(False, self._recording)
         rr.set_log_tick_enabled(False, self._recording)
         self._recording.set_sinks(rr.FileSink(str(path)), default_blueprint=layout)
         self._recording.send_recording_name(session)
 
     def lay_out(self, layout: rrb.Blueprint) -> None:
-        """Replace the layout, also in a viewer that is showing the recording."""
+        """Replace the layout, also in a viewer that shows the recording."""
         self._recording.send_blueprint(layout)
 
     def at(self, moment: Moment) -> None:
-        """Everything logged from here on happened at `moment`."""
+        """Set the position on the timelines for everything logged afterwards."""
         self._recording.reset_time()
         self._recording.set_time(CAPTURE, sequence=moment.capture)
         self._recording.set_time(STEP, sequence=moment.step)
@@ -61,7 +61,7 @@ class Stream:
         self._recording.log(entity, *what, static=static)
 
     def curve(self, entity: str, values: Mapping[int, float]) -> None:
-        """Log a series over the timeline of standoffs alone, from whole millimetres to values."""
+        """Log values by standoff (whole mm) on the standoff timeline only."""
         if values:
             self._recording.send_columns(
                 entity,
@@ -70,10 +70,10 @@ class Stream:
             )
 
     def describe(self, name: str, **values: str | int) -> None:
-        """Properties of the recording as a whole."""
+        """Set properties of the recording."""
         self._recording.send_property(name, rr.AnyValues(drop_untyped_nones=True, **values))
 
     def close(self) -> None:
-        """Write what is still buffered and the file's footer."""
+        """Write buffered data and the footer of the file."""
         self._recording.flush(timeout_sec=FLUSH_SECONDS)
         self._recording.disconnect()

@@ -1,4 +1,4 @@
-"""A table as plain text in a font of one width, for a text document of the recording."""
+"""Table as plain text in a monospaced font, for text documents of the recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RULE = "─"
 
 
 def table_text(table: Table) -> str:
-    """Title, headings over a rule, rows, and the caption wrapped to the table's width."""
+    """Text of a table: title, headings over a rule, rows, and the caption wrapped to the table's width."""
     columns = text_columns(table)
     height = max(len(column.heading) for column in columns)
     headings = [

@@ -1,4 +1,4 @@
-"""A trial: the error of every reading as it is taken, then the tables and charts of its results."""
+"""View of a trial: the error of every reading live, then the tables and charts of its results."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ NO_TRIAL = "no trial yet"
 
 @dataclass
 class TrialView:
-    """Readings of one trial as they come."""
+    """View of the readings and results of one trial."""
 
     stream: Stream
     rig: Rig
     colors: Mapping[str, at.Rgb]
     readings: list[ReadingTaken] = field(default_factory=list)
     laid_out: list[tuple[str, str]] = field(default_factory=list)
-    """Names and titles of the charts that have views of their own; empty: there is the live chart alone."""
+    """Names and titles of the charts with their own views; empty if there is only the live chart."""
 
     def log_none_yet(self) -> None:
-        """Say so where the trial will be shown."""
+        """Log a note in each view of the trial."""
         self._log_errors()
         self._document(NO_TRIAL)
 
     def take(self, reading: ReadingTaken) -> None:
-        """Log one reading. The chart follows once a standoff: its bytes would otherwise grow squared."""
+        """Log one reading. The chart is drawn once per standoff, or its size would grow quadratically."""
         if self.readings and reading.trial != self.readings[-1].trial:
             self.readings.clear()
         elif self.readings and reading.standoff_mm != self.readings[-1].standoff_mm:
@@ -48,7 +48,7 @@ class TrialView:
         log_errors(self.stream, reading, self.colors)
 
     def finish(self, trial: TrialFinished) -> None:
-        """Log the tables, the readings without a range, and the charts; they replace an earlier trial's."""
+        """Log tables, readings without a range, and charts, replacing those of an earlier trial."""
         self.stream.log(at.TRIAL_CHARTS, rr.Clear(recursive=True))
         if not trial.charts:
             self.stop()
@@ -62,15 +62,15 @@ class TrialView:
             documents.without_range(self.readings),
         ]
         self._document("\n\n".join(part for part in parts if part))
-        self.readings.clear()  # or the end of the session would draw them over the first chart
+        self.readings.clear()  # otherwise `stop` would draw them over the first chart
 
     def stop(self) -> None:
-        """The session ends: show what there is."""
+        """Log the readings so far at the end of the session."""
         if self.readings:
             self._log_errors()
 
     def _lay_out(self, charts: Sequence[Chart]) -> None:
-        """Show a view for each chart. A layout that fits already stays: it may have been changed by hand."""
+        """Lay out one view per chart, unless the layout fits already: the user may have changed it."""
         titles = [(chart.name, chart.title) for chart in charts] if len(charts) > 1 else []
         if titles != self.laid_out:
             self.stream.lay_out(blueprint(self.rig, charts))
@@ -87,7 +87,7 @@ class TrialView:
 
 
 def log_errors(stream: Stream, reading: ReadingTaken, colors: Mapping[str, at.Rgb]) -> None:
-    """Errors (measured - true, mm) of a reading and of its lasers, with a band of the stated one sigma."""
+    """Log errors (measured - true, mm) of a reading and of its lasers, with their stated 1 sigma."""
     if reading.range_mm is not None:
         _log_error(stream, SENSOR, reading.range_mm - reading.standoff_mm, reading.sigma_mm, at.WHITE)
     for one in reading.lasers:
@@ -95,7 +95,7 @@ def log_errors(stream: Stream, reading: ReadingTaken, colors: Mapping[str, at.Rg
         _log_error(stream, one.laser_id, one.range_mm - reading.standoff_mm, one.sigma_mm, color)
 
 
-def _log_error(stream: Stream, who: str, error_mm: float, sigma_mm: float | None, color: at.Rgb) -> None:
+def _log_error(stream: Stream, name: str, error_mm: float, sigma_mm: float | None, color: at.Rgb) -> None:
     variances = None if sigma_mm is None else [sigma_mm**2]
-    error = rr.Measurements(values=[error_mm], variances=variances, units="mm", names=who, colors=color)
-    stream.log(at.under(at.TRIAL_ERRORS, who), error)
+    error = rr.Measurements(values=[error_mm], variances=variances, units="mm", names=name, colors=color)
+    stream.log(at.under(at.TRIAL_ERRORS, name), error)

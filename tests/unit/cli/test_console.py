@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from workbench.cli.console import columns, say, wrapped
+from workbench.cli.console import columns, print_message, wrapped
 
 PATH = "/a/very/long/path/without-any-space/" + "x" * 60
 
@@ -23,7 +23,7 @@ def test_a_path_is_never_broken() -> None:
 
 
 def test_where_no_terminal_is_a_message_stays_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    say("error: " + "word " * 60)
+    print_message("error: " + "word " * 60)
     captured = capsys.readouterr()
     assert captured.out == ""
     assert len(captured.err.splitlines()) == 1

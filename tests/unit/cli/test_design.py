@@ -41,21 +41,23 @@ class TestDesign:
         assert "proposed standoffs (mm)" in outcome.err
 
     @pytest.mark.parametrize(
-        ("options", "words"),
+        ("options", "parts"),
         [
-            (("--standoffs", "125,16o"), "millimetres separated by commas, such as 125,160,210, got '16o'"),
-            (("--standoffs", ""), "millimetres separated by commas"),
-            (("--standoffs", "nan"), "100 to 5000 mm (bench.reach_mm of the rig file), got nan"),
-            (("--standoffs", "50,200"), "100 to 5000 mm (bench.reach_mm of the rig file), got 50"),
-            (("--standoffs", "200,300,200"), "every standoff once, got 200 twice"),
-            (("--standoffs", "200", "--count", 3), "--standoffs or --count, not both"),
-            (("--repeats", 0), "'--repeats': expected a whole number of at least 1, such as 10, got 0"),
-            (("--count", 0), "'--count': expected a whole number of at least 1, such as 10, got 0"),
-            (("--count", 100), "got 100"),
+            (("--standoffs", "125,16o"), ("--standoffs", "'16o'")),
+            (("--standoffs", ""), ("--standoffs",)),
+            (("--standoffs", "nan"), ("--standoffs", "100 to 5000 mm", "got nan")),
+            (("--standoffs", "50,200"), ("--standoffs", "100 to 5000 mm", "got 50")),
+            (("--standoffs", "200,300,200"), ("--standoffs", "got 200")),
+            (("--standoffs", "200", "--count", 3), ("--count", "--standoffs")),
+            (("--repeats", 0), ("--repeats", "got 0")),
+            (("--count", 0), ("--count", "got 0")),
+            (("--count", 100), ("got 100",)),
         ],
     )
-    def test_bad_options(self, workbench: Run, options: tuple[object, ...], words: str) -> None:
-        refused(workbench("design", "--rig", self.RIG, *options), 2, words)
+    def test_bad_options_are_refused_with_name_and_value(
+        self, workbench: Run, options: tuple[object, ...], parts: tuple[str, ...]
+    ) -> None:
+        refused(workbench("design", "--rig", self.RIG, *options), 2, *parts)
 
     def test_a_standoff_with_nothing_in_the_picture(self, workbench: Run, tmp_path: Path) -> None:
         rig = tmp_path / "rig.yaml"
@@ -64,7 +66,7 @@ class TestDesign:
         )
         rig.write_text(text)
         outcome = workbench("design", "--rig", rig, "--standoffs", "10,500")
-        refused(outcome, 2, "standoff 10 mm: expected a laser's spot in the picture, there is none")
+        refused(outcome, 2, "standoff 10 mm")
 
     def test_a_reach_that_is_none(self, workbench: Run, tmp_path: Path) -> None:
         rig = tmp_path / "rig.yaml"
@@ -72,4 +74,4 @@ class TestDesign:
             "placement_sd_mm: 0.3", "placement_sd_mm: 0.3\n  reach_mm: [900, 100]"
         )
         rig.write_text(text)
-        refused(workbench("design", "--rig", rig), 2, "bench.reach_mm", "expected [nearest, farthest] in mm")
+        refused(workbench("design", "--rig", rig), 2, "bench.reach_mm")

@@ -61,18 +61,18 @@ def test_rejected_rows_are_listed_with_their_reasons(workbench: Run, tmp_path: P
     outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml", "--json")
     rejected = json.loads(outcome.out)["rejected"]
     assert [r["row"] for r in rejected] == [11, 12]
-    assert "standoff_mm is empty" in rejected[0]["reason"]
-    assert "expected one of 1 (rig webcam-laser), got 2" in rejected[1]["reason"]
+    assert "standoff_mm" in rejected[0]["reason"]
+    assert "got 2" in rejected[1]["reason"]
 
 
-def test_a_fit_that_fails_a_limit_is_said_and_not_written(workbench: Run, tmp_path: Path) -> None:
+def test_a_refused_calibration_is_reported_and_not_written(workbench: Run, tmp_path: Path) -> None:
     captures = tmp_path / "c.csv"
     captures.write_text("".join(WEBCAM.read_text().splitlines(keepends=True)[:3]))
     output = tmp_path / "c.yaml"
     output.write_text("as it was\n")
     outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", output, "--json")
-    refused(outcome, 3, "seen at 2 standoffs, expected at least 3", "is not written")
-    assert outcome.err.splitlines()[-1].startswith("do: ")  # what is seen last
+    refused(outcome, 3, "2 standoffs", output)
+    assert outcome.err.splitlines()[-1].startswith("do: ")  # the remedy comes last
     assert json.loads(outcome.out)["verdict"] == "refused"
     assert output.read_text() == "as it was\n"
 
@@ -86,24 +86,24 @@ def test_without_json_nothing_is_on_stdout(workbench: Run, tmp_path: Path) -> No
 
 
 class TestAnotherModel:
-    """Refitting with something left out, and keeping what a limit refuses."""
+    """Fits without a standoff or a parameter, and acceptance of a refused calibration."""
 
-    def test_a_standoff_left_out_is_listed(self, workbench: Run, tmp_path: Path) -> None:
+    def test_an_excluded_standoff_is_listed(self, workbench: Run, tmp_path: Path) -> None:
         output = tmp_path / "c.yaml"
         outcome = workbench(
             "fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", output, "--json", "--without-standoff", 300
         )
         result = json.loads(outcome.out)
-        assert result["rejected"] == [{"row": 3, "reason": "left out: standoff 300 mm"}]
+        assert [rejected["row"] for rejected in result["rejected"]] == [3]
         # Row 3 has the largest residual of the nine: the rest agree better.
         assert result["rms_px"] < 0.4
         assert load_calibration(output).laser_ranger.fit.observations == 8
 
-    def test_a_standoff_that_is_not_there(self, workbench: Run, tmp_path: Path) -> None:
+    def test_an_unknown_standoff_is_refused(self, workbench: Run, tmp_path: Path) -> None:
         arguments = ("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c", "--without-standoff", 1234)
-        refused(workbench(*arguments), 2, "no row has the standoff 1234 mm")
+        refused(workbench(*arguments), 2, "--without-standoff", "1234 mm")
 
-    def test_a_parameter_held(self, workbench: Run, tmp_path: Path) -> None:
+    def test_a_fixed_parameter_keeps_its_value(self, workbench: Run, tmp_path: Path) -> None:
         arguments = ("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c", "--json", "--fix", "f_px")
         result = json.loads(workbench(*arguments).out)
         f_px = result["parameters"][0]
@@ -121,12 +121,10 @@ class TestAnotherModel:
         assert workbench(*arguments, "--accept", "only to try the ranger").code == 0
         summary = load_calibration(output).laser_ranger.fit
         assert (summary.verdict, summary.accepted_because) == ("refused", "only to try the ranger")
-        assert "seen at 2 standoffs" in summary.reasons[0]
+        assert "2 standoffs" in summary.reasons[0]
         assert workbench("range", WEBCAM, "--calibration", output).code == 0
         output.write_text(output.read_text().replace("only to try the ranger", ""))
-        refused(
-            workbench("range", WEBCAM, "--calibration", output), 2, "refused because laser 1 was seen at 2"
-        )
+        refused(workbench("range", WEBCAM, "--calibration", output), 2, "laser_ranger.fit.verdict")
 
     def test_opencv_reads_a_calibration_kept_with_a_long_reason(self, workbench: Run, tmp_path: Path) -> None:
         """Its limit is 4095 bytes for any string, and the command holds the reason too."""
@@ -144,33 +142,33 @@ class TestAnotherModel:
 
     def test_a_blank_reason_is_none(self, workbench: Run, tmp_path: Path) -> None:
         fit = ("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c")
-        refused(workbench(*fit, "--accept", " "), 2, "expected a reason")
-        refused(workbench("resume", tmp_path, "--accept-changes", ""), 2, "expected a reason")
+        refused(workbench(*fit, "--accept", " "), 2, "--accept")
+        refused(workbench("resume", tmp_path, "--accept-changes", ""), 2, "--accept-changes")
 
     def test_a_captures_file_needs_a_rig(self, workbench: Run, tmp_path: Path) -> None:
-        refused(workbench("fit", WEBCAM, "-o", tmp_path / "c"), 2, "needs --rig")
+        refused(workbench("fit", WEBCAM, "-o", tmp_path / "c"), 2, "--rig")
 
 
 def test_a_file_of_a_session_is_not_written_over(workbench: Run, tmp_path: Path) -> None:
     (tmp_path / "session.yaml").write_text("format: 1\n")
     kept = tmp_path / "calibration.yaml"
     kept.write_text("as it was")
-    refused(workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", kept), 2, "belongs to the session", tmp_path)
+    refused(workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", kept), 2, "--output", kept, tmp_path)
     frame = tmp_path / "frames" / "a.png"
     frame.parent.mkdir()
     frame.write_text("a frame")
-    refused(workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", frame), 2, "belongs to the session", tmp_path)
+    refused(workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", frame), 2, "--output", frame, tmp_path)
     assert (kept.read_text(), frame.read_text()) == ("as it was", "a frame")
     assert workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "refit.yaml").code == 0
 
 
 def test_a_source_that_is_not_there_is_named(workbench: Run, tmp_path: Path) -> None:
     outcome = workbench("fit", tmp_path / "nope", "-o", tmp_path / "c.yaml")
-    refused(outcome, 2, "nope: expected a session's folder or a captures file, there is none")
+    refused(outcome, 2, tmp_path / "nope")
 
 
 def test_names_are_printed_as_they_are(workbench: Run, tmp_path: Path) -> None:
-    """Brackets are how rich is told of colours."""
+    """Brackets are markup for rich."""
     for folder in ("[red]", "["):  # the second ends as a closing tag does, [/a]
         output = tmp_path / folder / "a].yaml"
         output.parent.mkdir()
@@ -183,7 +181,7 @@ def test_a_csv_error_names_row_and_column(workbench: Run, tmp_path: Path) -> Non
     captures = tmp_path / "c.csv"
     captures.write_text(WEBCAM.read_text().replace("1,400,0", "1,4oo,0"))
     outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
-    refused(outcome, 2, f"{captures}: row 4, column standoff_mm: expected a number")
+    refused(outcome, 2, f"{captures}: row 4, column standoff_mm: ")
 
 
 @pytest.mark.parametrize("which", [0, 1])
@@ -194,7 +192,7 @@ def test_an_output_that_is_an_input(workbench: Run, tmp_path: Path, which: int) 
     before = made_from[which].read_bytes()
     outcome = workbench("fit", made_from[0], "--rig", made_from[1], "-o", made_from[which])
     assert outcome.code == 2
-    assert "expected another file than the calibration is made from" in outcome.err.replace("\n", " ")
+    assert f"--output {made_from[which]}" in outcome.err
     assert made_from[which].read_bytes() == before
 
 
@@ -226,28 +224,28 @@ def test_captures_without_any_spot(workbench: Run, tmp_path: Path) -> None:
     captures = tmp_path / "c.csv"
     captures.write_text("laser_id,standoff_mm,repeat,on\n1,500,0,on.png\n")
     outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
-    refused(outcome, 2, "no spot is left to fit", "not used: row 2: laser 1 at 500 mm: expected one spot")
+    refused(outcome, 2, captures, "row 2: laser 1 at 500 mm: ")
 
 
-def test_a_rig_of_another_picture_says_what_became_of_the_rows(workbench: Run, tmp_path: Path) -> None:
+def test_a_rig_with_another_picture_size_gives_the_cause_for_each_row(workbench: Run, tmp_path: Path) -> None:
     rig = tmp_path / "rig.yaml"
     rig.write_text(WEBCAM_RIG.read_text().replace("height_px: 480", "height_px: 20"))
     outcome = workbench("fit", WEBCAM, "--rig", rig, "-o", tmp_path / "c.yaml")
-    refused(outcome, 2, "no spot is left", "row 3: laser 1 at 300 mm: v_px: expected -0.5 to 19.5, got 94")
+    refused(outcome, 2, WEBCAM, "row 3: laser 1 at 300 mm: v_px: ", "got 94")
 
 
-def test_every_image_that_is_not_there_is_told(workbench: Run, tmp_path: Path) -> None:
+def test_every_missing_image_is_reported(workbench: Run, tmp_path: Path) -> None:
     captures = tmp_path / "c.csv"
     captures.write_text("laser_id,standoff_mm,repeat,on,off\n1,200,0,a.png,\n1,300,0,.,b.png\n")
     outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
-    refused(outcome, 2, f"{captures}: row 2, column on: expected an image, there is no file")
-    assert [line.split(": ")[-2] for line in outcome.err.splitlines()] == [
-        "row 2, column on", "row 3, column on", "row 3, column off",
-    ]  # fmt: skip
+    assert outcome.code == 2
+    assert [line.removeprefix("error: ").split(": ")[:2] for line in outcome.err.splitlines()] == [
+        [str(captures), f"row {row}, column {column}"] for row, column in ((2, "on"), (3, "on"), (3, "off"))
+    ]
 
 
-def test_what_is_no_image_is_called_what_it_is(workbench: Run, tmp_path: Path) -> None:
+def test_a_file_that_is_no_image_is_named_with_its_kind(workbench: Run, tmp_path: Path) -> None:
     captures = tmp_path / "c.csv"
     captures.write_text("laser_id,standoff_mm,repeat,on\n1,200,0,c.csv\n")
     outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
-    refused(outcome, 2, f"{captures}: row 2: {captures}: expected an image", "it is text, or truncated")
+    refused(outcome, 2, f"{captures}: row 2: {captures}: ", "text")

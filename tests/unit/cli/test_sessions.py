@@ -13,7 +13,7 @@ from workbench.cli.sessions import find_session, list_sessions
 from workbench.session.journal import Journal
 from workbench.session.state import SessionStatus
 
-LONG_WHY = "laser controller at /dev/ttyACM0: asked '!', expected 'OK OFF', got a dead line; check the cable"
+LONG_WHY = "laser controller at /dev/ttyACM0: request '!': expected 'OK OFF', got a line failure; check it"
 
 
 def test_sessions_are_listed_with_whole_names(
@@ -32,7 +32,7 @@ def test_sessions_are_listed_with_whole_names(
     assert told[0].split() == [names[0], "finished", "440", "captures"]
     assert told[1].split() == [names[1], "failed", "12", "captures"]
     assert " ".join(line.strip() for line in told[2:-1]) == LONG_WHY
-    assert told[-1] == f"go on: workbench resume sessions/{names[1]}"
+    assert told[-1] == f"resume: workbench resume sessions/{names[1]}"
 
 
 def test_a_session_with_a_name_as_long_as_the_line_has_two(

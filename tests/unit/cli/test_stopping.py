@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from workbench.cli.stopping import SIGNALS, StopAfterShot, ignore_signals, stop_at_once
+from workbench.cli.stopping import SIGNALS, StopAfterCapture, ignore_signals, stop_at_once
 from workbench.model.errors import StoppedError
 
 
@@ -32,7 +32,7 @@ def test_a_signal_stops_at_once_and_the_next_is_ignored(number: signal.Signals) 
 
 @pytest.mark.parametrize("number", SIGNALS)
 def test_the_first_signal_asks_the_second_raises_the_third_is_ignored(number: signal.Signals) -> None:
-    asked = StopAfterShot()
+    asked = StopAfterCapture()
     assert asked.reason is None
     os.kill(os.getpid(), number)
     assert asked.reason is not None

@@ -39,9 +39,9 @@ BUSY_S = 0.3
 """Well over `END_MS`, and less than a guardian waits for a beat."""
 LIGHT_AND_WAIT = f"""
 import time
-from workbench.cli.stopping import StopAfterShot
+from workbench.cli.stopping import StopAfterCapture
 from tests.support.lasers import board_bank
-StopAfterShot()  # as `workbench run` does
+StopAfterCapture()  # as `workbench run` does
 bank = board_bank({LINES!r}, {IDS!r})
 with bank.lit(["L2"], for_s=30):
     print("lit", flush=True)

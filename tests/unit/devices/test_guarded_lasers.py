@@ -164,12 +164,12 @@ def test_one_lost_reply_is_forgiven_when_off_is_confirmed(wired: Wired, bank: Gu
 @pytest.mark.parametrize("reply", [b"", b"OK\n", b"\xff\xfe\x00\n", b"OK OF", b"OK OFFER\n", b"x" * 500])
 def test_somebody_else_answers(answering: Callable[[Callable[[bytes], bytes]], str], reply: bytes) -> None:
     port = answering(lambda data: reply)
-    with pytest.raises(RigNotReadyError, match="asked '!', expected 'OK OFF', got"):
+    with pytest.raises(RigNotReadyError, match="'!': expected 'OK OFF', got"):
         serial_bank(port, IDS, boot_s=0.0)
 
 
 def test_somebody_who_says_ok_to_anything(answering: Callable[[Callable[[bytes], bytes]], str]) -> None:
-    with pytest.raises(RigNotReadyError, match=r"asked '\*IDN\?', expected 'OK \*IDN', got 'OK OFF"):
+    with pytest.raises(RigNotReadyError, match=r"'\*IDN\?': expected 'OK \*IDN', got 'OK OFF"):
         serial_bank(answering(lambda data: b"OK OFF\n"), IDS, boot_s=0.0)
 
 
@@ -223,7 +223,7 @@ def test_an_answer_that_was_not_waited_for_confirms_nothing(
 
 def test_disconnect_in_mid_lease(wired: Wired) -> None:
     bank = serial_bank(wired.server.port, IDS)
-    with pytest.raises(LaserOffNotConfirmedError, match="dead line"), bank.lit(["L1"], for_s=5.0):
+    with pytest.raises(LaserOffNotConfirmedError, match="may be on"), bank.lit(["L1"], for_s=5.0):
         wired.server.close()
     with pytest.raises(LaserOffNotConfirmedError):
         bank.close()

@@ -28,8 +28,8 @@ def test_commands_are_answered_by_their_number(tmp_path: Path, monkeypatch: pyte
     assert guardian.ask("STATE") == [0, True]
     guardian.close()
     guardian.close()
-    with pytest.raises(ValueError, match="let go"):
-        guardian.tell("BEAT")
+    with pytest.raises(ValueError, match="closed"):
+        guardian.send("BEAT")
 
 
 def test_a_guardian_that_cannot_import_its_driver_has_lit_nothing(

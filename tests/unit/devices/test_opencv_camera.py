@@ -154,22 +154,18 @@ def test_a_camera_that_is_unplugged(streams: Callable[..., Stream], how: str) ->
 
 @pytest.mark.parametrize("source", ["/dev/video97", "97", "http://127.0.0.1:9/none.mjpg", "none.avi"])
 def test_no_such_camera(source: str) -> None:
-    with pytest.raises(
-        RigNotReadyError, match=f"camera {source}: expected a device, a stream or a video file"
-    ):
+    with pytest.raises(RigNotReadyError, match=f"camera {source}: "):
         camera_of(source)
 
 
 def test_frames_of_another_size(streams: Callable[..., Stream]) -> None:
     stream = streams(lambda: np.zeros((48, 64), np.uint8))
-    with pytest.raises(
-        RigNotReadyError, match=r"expected frames of 160 x 120 px in 8 bits.*got 64 x 48 in 8"
-    ):
+    with pytest.raises(RigNotReadyError, match=r"160 x 120 .*8.*64 x 48 .*8"):
         camera_of(stream.url)
 
 
 def test_a_stream_has_no_exposure_to_set(streams: Callable[..., Stream]) -> None:
-    with pytest.raises(RigNotReadyError, match=r"manual exposure: asked for 1, the camera says -1"):
+    with pytest.raises(RigNotReadyError, match=r"manual exposure: .*1\b.* -1\b"):
         camera_of(streams(Scene().picture).url, exposure=20)
 
 
@@ -229,7 +225,7 @@ def test_settings_are_made_and_read_back(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_a_setting_that_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cv2, "VideoCapture", Device)
-    with pytest.raises(RigNotReadyError, match="exposure: asked for 20, the camera says 16"):
+    with pytest.raises(RigNotReadyError, match=r"exposure: .*20\b.* 16\b"):
         camera_of("/dev/video0", exposure=20)
 
 
@@ -243,7 +239,7 @@ def test_room_light_has_an_exposure_of_its_own(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_an_ambient_exposure_needs_one_to_go_back_to() -> None:
-    with pytest.raises(ValidationError, match="needs an exposure to go back to"):
+    with pytest.raises(ValidationError, match="ambient_exposure"):
         OpenCvBlock(source="0", ambient_exposure=5.0)
 
 
@@ -255,7 +251,7 @@ def test_an_exposure_is_set_as_near_as_the_camera_can(monkeypatch: pytest.Monkey
     assert level(camera.grab().image) == 72
     assert level(camera.grab_ambient().image) == 160
     assert level(camera.grab().image) == 72, "not what it began with"
-    with pytest.raises(RigNotReadyError, match=r"exposure: asked for 3, the camera says 0.*limits"):
+    with pytest.raises(RigNotReadyError, match=r"exposure: .*3\b.* 0\b.*exposure_limits"):
         camera.set_exposure(3.0)
     camera.close()
 
@@ -373,7 +369,7 @@ def test_an_exposure_that_is_another_the_next_time() -> None:
     assert camera.asked[-1] in camera.asked[:-1], "half of it confirmed it, then it was set again"
     camera.asked.clear()
     camera.keeps = False
-    with pytest.raises(RigNotReadyError, match=r"expected 100 as it was taken in a trial, .* says 90 now"):
+    with pytest.raises(RigNotReadyError, match=r"exposure: expected 100\b.* got 90\b"):
         set_exposure(bench, RIG, "k", lambda key: None)
 
 

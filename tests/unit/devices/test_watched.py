@@ -51,6 +51,6 @@ def test_a_camera_that_hangs_is_given_up_for_good() -> None:
     with pytest.raises(RigNotReadyError, match=r"0\.05 s"):
         watched.grab()
     goes_on.set()
-    with pytest.raises(RigNotReadyError, match="before"):
+    with pytest.raises(RigNotReadyError, match="earlier"):
         watched.grab()
     watched.close()

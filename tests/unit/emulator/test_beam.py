@@ -7,9 +7,9 @@ import pytest
 
 from workbench.emulator.beam import Beam
 from workbench.emulator.spec import BeamSpec
-from workbench.emulator.truth import Ray
+from workbench.emulator.truth import TrueRay
 
-RAY = Ray(60.0, -5.0, 0.02, -0.01)
+RAY = TrueRay(60.0, -5.0, 0.02, -0.01)
 SPEC = BeamSpec(power_mw=2.0, exit_diameter_mm=1.5, divergence_mrad=1.6)
 ALONG = np.array([0.02, -0.01, 1.0])
 AXIS = ALONG / np.linalg.norm(ALONG)

@@ -13,7 +13,7 @@ from tests.support.virtual_bench import THESIS, emulated_thesis, put, read_truth
 from workbench.devices.registry import open_bench as open_named_bench
 from workbench.emulator import EmulatedBench, open_bench
 from workbench.emulator.spec import emulator_spec
-from workbench.emulator.spot import Spot
+from workbench.emulator.spot import SpotImage
 from workbench.emulator.truth import draw_placement_error, draw_truth
 from workbench.model.target import Placement
 
@@ -52,7 +52,7 @@ def test_a_whole_bench_shows_its_truth(tmp_path: Path, seed: int) -> None:
                 u, v = _predicted(truth, name, standoff, f"P{standoff}")
                 left, top = round(u) - 8, round(v) - 8
                 window = np.maximum((on - off)[top : top + 17, left : left + 17] - 6.0, 0)
-                centre, _ = moments(Spot(left, top, window.astype(np.float32)))
+                centre, _ = moments(SpotImage(left, top, window.astype(np.float32)))
                 misses.append(centre - [u, v])
     # Speckle's 0.04 px, and what a thresholded centroid adds.
     assert np.sqrt(np.mean(np.square(misses))) < 0.08

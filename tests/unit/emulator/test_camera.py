@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tests.support.ideal import exact, ideal_rig, laser, moments
 from tests.support.virtual_bench import emulated_thesis, put, shot
 from workbench.emulator import open_bench
-from workbench.emulator.spot import Spot
+from workbench.emulator.spot import SpotImage
 from workbench.model.arrays import Image
 
 
@@ -177,7 +177,7 @@ def test_warm_up_moves_spots_outward_and_dies_away(tmp_path: Path) -> None:
 
 def _centre(image: NDArray[Any]) -> float:
     signal = np.maximum(image.astype(np.float64) - 0.03 * 255 - 2, 0).astype(np.float32)
-    return float(moments(Spot(0, 0, signal))[0][0])
+    return float(moments(SpotImage(0, 0, signal))[0][0])
 
 
 def test_a_stuck_beam_shows_in_a_dark_frame(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from tests.support.ideal import ideal_rig
 from workbench.emulator.keyed import generator
 from workbench.emulator.sensor import ImageSensor
 from workbench.emulator.spec import emulator_spec
-from workbench.emulator.spot import ImageFormat, Spot
+from workbench.emulator.spot import ImageFormat, SpotImage
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
@@ -50,7 +50,7 @@ def test_shot_noise_inside_a_spot_is_poissons() -> None:
     rate = np.full((40, 40), 2e5, dtype=np.float32)
     rig = ideal_rig(camera={"bits": 16}, sensor={"read_noise_e": 30.0})
     sensor = sensor_of(rig)
-    spots = (Spot(10, 20, rate), Spot(30, 20, rate))  # the second overlaps the first
+    spots = (SpotImage(10, 20, rate), SpotImage(30, 20, rate))  # the second overlaps the first
     frames = np.stack([sensor.expose(spots, 0.01, 1.0, 1.0, generator(3, "f", i)) for i in range(150)])
     electrons = (frames.astype(float) - 0.03 * 65535) * 40_000 / 65535
     for u, level in ((15, 2000.0), (40, 4000.0), (60, 2000.0)):
@@ -60,7 +60,7 @@ def test_shot_noise_inside_a_spot_is_poissons() -> None:
 
 
 def test_numbers_stay_in_their_range() -> None:
-    spot = (Spot(0, 0, np.full((150, 200), 1e9, dtype=np.float32)),)
+    spot = (SpotImage(0, 0, np.full((150, 200), 1e9, dtype=np.float32)),)
     for bits, kind in ((8, np.uint8), (10, np.uint16), (12, np.uint16), (16, np.uint16)):
         sensor = sensor_of(ideal_rig(camera={"bits": bits}, sensor={"read_noise_e": 5000.0}))
         bright = sensor.expose(spot, 1.0, 1.0, 1.0, generator(1, "a"))

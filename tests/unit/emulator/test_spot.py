@@ -13,7 +13,7 @@ from workbench.emulator.beam import Beam
 from workbench.emulator.lens import Lens
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.spot import ImageFormat, SpotPainter
-from workbench.emulator.surfaces import Plane
+from workbench.emulator.surfaces import PlaneSurface
 from workbench.emulator.truth import draw_truth
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 
@@ -134,10 +134,10 @@ def test_what_misses_the_surface_or_the_picture_is_no_spot(tmp_path: Path) -> No
     truth = draw_truth(rig, spec)
     painter = SpotPainter(spec, Lens(truth), ImageFormat(640, 480), truth.f_px)
     beam = Beam(truth.lasers["L"], spec.beam)
-    wall = Plane(500.0, 0.0, 0.0, 0.8)
+    wall = PlaneSurface(500.0, 0.0, 0.0, 0.8)
     assert painter.paint(beam, wall, 1.0, ("P", "L")) is not None
-    assert painter.paint(beam, Plane(60.0, 0.0, 0.0, 0.8), 1.0, ("P", "L")) is None
-    narrow = Plane(500.0, 0.0, 0.0, 0.8, half_width_mm=20.0)
+    assert painter.paint(beam, PlaneSurface(60.0, 0.0, 0.0, 0.8), 1.0, ("P", "L")) is None
+    narrow = PlaneSurface(500.0, 0.0, 0.0, 0.8, half_width_mm=20.0)
     assert painter.paint(beam, narrow, 1.0, ("P", "L")) is None
     half, whole = (painter.paint(beam, wall, gain, ("P", "L")) for gain in (0.5, 1.0))
     assert half is not None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.ideal import CX, F, ideal_rig, laser, moments, painted, scene_of
-from workbench.emulator.surfaces import Cylinder, Plane, Polynomial, Surface
+from workbench.emulator.surfaces import CylinderSurface, PlaneSurface, PolynomialSurface, Surface
 from workbench.model.target import CylinderTarget, Placement, PolynomialTarget
 
 
@@ -47,7 +47,7 @@ def test_polynomials_of_the_thesis(tmp_path: Path, coefficients: tuple[float, ..
 
 @pytest.mark.parametrize(("coefficients", "shift"), THESIS_PROFILES)
 def test_first_crossing_is_the_first(coefficients: tuple[float, ...], shift: float) -> None:
-    surface = Polynomial(500.0, coefficients, shift, 0.8)
+    surface = PolynomialSurface(500.0, coefficients, shift, 0.8)
     slopes = np.linspace(-0.5, 0.5, 11)
     direction = np.column_stack([slopes, np.zeros(11), np.ones(11)])
     depth = surface.depth(np.zeros(3), direction)
@@ -64,7 +64,7 @@ def test_first_crossing_is_the_first(coefficients: tuple[float, ...], shift: flo
 
 
 def test_many_rays_of_one_origin_meet_where_each_does() -> None:
-    surface = Polynomial(300.0, (-16.4, 0.403, -0.003186, 0.0000073), 60.0, 0.8)
+    surface = PolynomialSurface(300.0, (-16.4, 0.403, -0.003186, 0.0000073), 60.0, 0.8)
     slopes = np.linspace(0.17, 0.23, 5000)  # a window of 32 px
     direction = np.column_stack([slopes, np.full(5000, 0.1), np.ones(5000)])
     many = surface.depth(np.zeros(3), direction)
@@ -76,9 +76,9 @@ def test_many_rays_of_one_origin_meet_where_each_does() -> None:
 @pytest.mark.parametrize(
     "surface",
     [
-        Plane(400.0, 0.6, -0.3, 0.8),
-        Cylinder(20.0, 450.0, 89.0, 0.8),
-        Polynomial(400.0, (0.3, 0.004), -10.0, 0.8),
+        PlaneSurface(400.0, 0.6, -0.3, 0.8),
+        CylinderSurface(20.0, 450.0, 89.0, 0.8),
+        PolynomialSurface(400.0, (0.3, 0.004), -10.0, 0.8),
     ],
 )
 def test_normals_stand_on_their_surface(surface: Surface) -> None:

@@ -50,6 +50,20 @@ def test_everything_drawn_counts_for_the_axes() -> None:
     assert one.y_values() == [-4.0, -1.0, 0.5, 1.0, 1.5, 2.0, 4.0, 8.0]
 
 
+@pytest.mark.parametrize(
+    ("y", "runs"),
+    [
+        ((), []),
+        ((None, None), []),
+        ((1.0, 2.0), [[0, 1]]),
+        ((1.0, None, None, 2.0, 3.0, None, 4.0), [[0], [3, 4], [6]]),
+        ((None, 1.0, None), [[1]]),
+    ],
+)
+def test_runs_are_the_points_between_gaps(y: tuple[float | None, ...], runs: list[list[int]]) -> None:
+    assert Series(name="s", x=tuple(map(float, range(len(y)))), y=y).runs() == runs
+
+
 def test_a_chart_of_gaps_is_empty() -> None:
     assert chart().is_empty
     assert chart(Series(name="a", x=(1.0,), y=(None,))).is_empty

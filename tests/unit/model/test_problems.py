@@ -1,4 +1,4 @@
-"""Whatever a model can object to is told in the words of whoever wrote the file, never in the library's."""
+"""Violations of every model are reported in plain words, never in those of pydantic."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_every_model_answers_odd_values_in_plain_words() -> None:
             else:
                 continue
             kinds |= {one["type"] for one in errors}
-            said = [one.told for one in problems(model, value, errors)]
+            said = [one.message for one in problems(model, value, errors)]
             assert said, (model, value)
             for text in said:
                 without_input = re.sub(r", got .*", "", text, flags=re.DOTALL)
@@ -133,7 +133,7 @@ def told(text: str, tmp_path: Path, model: type[BaseModel] = Beam) -> list[str]:
         ("powr_mw: 1", "f.yaml:1: powr_mw: no such key; expected one of power_mw, colours"),
         (
             "power_mw: 1\npower_mw: 2",
-            "f.yaml:2: power_mw: stands here again, after line 1; leave one of them",
+            "f.yaml:2: power_mw: duplicate key, first on line 1; remove one of them",
         ),
     ],
 )

@@ -154,3 +154,12 @@ def test_a_laser_class_is_one_of_the_standard(laser_class: object, good: bool) -
     else:
         with pytest.raises(ValidationError):
             Rig.model_validate(data)
+
+
+@pytest.mark.parametrize("lens", ["plumb_bob", "equidistant"])
+@pytest.mark.parametrize("unset", [True, False])
+def test_a_rig_is_read_back_from_its_own_values(tmp_path: Path, lens: str, unset: bool) -> None:
+    rig = rig_with(tmp_path, f"lens: {lens}", f"k2: {PRIOR}")
+    assert rig.camera.lens == lens
+    assert Rig.model_validate(rig.model_dump(exclude_unset=unset)) == rig
+    assert Rig.model_validate_json(rig.model_dump_json(exclude_unset=unset)) == rig

@@ -62,7 +62,7 @@ def test_a_rig_is_read(tmp_path: Path) -> None:
         ("value: 500.0", "value: .nan", 6, ["camera.f_px.value", "finite"]),
     ],
 )
-def test_errors_name_file_line_key_expected_and_came(
+def test_errors_name_file_line_key_and_both_values(
     tmp_path: Path, old: str, new: str, line: int, words: list[str]
 ) -> None:
     message = rig_error(tmp_path, old, new)
@@ -77,9 +77,9 @@ def test_every_problem_is_listed(tmp_path: Path) -> None:
     assert [line.split(": ")[0] for line in message.splitlines()] == ["rig.yaml:7", "rig.yaml:8"]
 
 
-def test_two_lasers_with_one_id(tmp_path: Path) -> None:
+def test_two_lasers_with_one_id_are_refused(tmp_path: Path) -> None:
     laser = RIG[RIG.index("  - id: 1") :]
-    assert "must differ" in rig_error(tmp_path, laser, laser + laser)
+    assert rig_error(tmp_path, laser, laser + laser).startswith("rig.yaml:9: lasers: ")
 
 
 @pytest.mark.parametrize("content", [None, b"", b"\xff\xfe\x00", b"- 1\n- 2\n", b"a: 1\na: 2\n"])
@@ -99,7 +99,7 @@ def test_tags_that_build_objects_stay_text(tmp_path: Path) -> None:
     assert not (tmp_path / "owned").exists()
 
 
-def test_procedure_errors(tmp_path: Path) -> None:
+def test_every_wrong_step_is_reported_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "p.yaml"
     path.write_text(
         "format: 1\nprocedure: p\ntitle: t\nsteps:\n  - step: capture_grid\n    standoffs_mm: [500, 500]\n"
@@ -108,10 +108,8 @@ def test_procedure_errors(tmp_path: Path) -> None:
     with pytest.raises(BadInputError) as caught:
         load_procedure(path)
     lines = str(caught.value).splitlines()
-    assert "p.yaml:5: steps[0]" in lines[0]
-    assert "must differ" in lines[0]
-    assert "p.yaml:8: steps[1]" in lines[1]
-    assert "steps[1].step: expected one of" in lines[1]
+    assert lines[0].startswith(f"{path}:5: steps[0]: ")
+    assert lines[1].startswith(f"{path}:8: steps[1].step: ")
     assert "measure_latency" in lines[1]
     assert "dance" in lines[1]
 
@@ -120,7 +118,7 @@ def test_procedure_errors(tmp_path: Path) -> None:
     ("content", "what"),
     [
         (b"\x89PNG\r\n\x1a\n\0\0", "a PNG image"),
-        (b"PK\x03\x04\x14\0\x9d", "an archive, as spreadsheets are"),
+        (b"PK\x03\x04\x14\0\x9d", "a zip archive or a spreadsheet"),
         (b"\xff\xfea\0", "text in UTF-16; save it as UTF-8"),
         (b"a: 1\nb: caf\xe9\n", r"text in another encoding \(line 2\); save it as UTF-8"),
         (b"a: 1\0", "binary data"),
@@ -129,11 +127,11 @@ def test_procedure_errors(tmp_path: Path) -> None:
 def test_what_is_no_text_is_called_what_it_is(content: bytes, what: str, tmp_path: Path) -> None:
     path = tmp_path / "f.yaml"
     path.write_bytes(content)
-    with pytest.raises(BadInputError, match=rf"f.yaml: expected a YAML file, got {what}"):
+    with pytest.raises(BadInputError, match=rf"f\.yaml: .*got {what}"):
         load_yaml_model(path, Manifest)
 
 
-def test_lines_of_keys_that_stand_twice() -> None:
+def test_duplicate_keys_are_found_with_their_lines() -> None:
     document = parse_document("a:\n  b: 1\n  c: 2\n  b: 3\na: 4\n", Path("f.yaml"))
     assert [(one.line, one.text.split(":")[0]) for one in document.doubled] == [(4, "b"), (5, "a")]
     assert document.data["a"]["b"] == 1

@@ -42,6 +42,20 @@ def test_a_line_is_drawn_to_scale_with_its_gap() -> None:
     assert (y[2] - y[0]) / (y[1] - y[0]) == pytest.approx(0.5, abs=1e-4)
 
 
+def test_a_point_between_gaps_of_a_line_is_drawn_as_a_marker() -> None:
+    (axes,) = draw(CHART.model_copy(update={"series": (LINE,)}), {}).axes
+    markers = [line for line in axes.lines if line.get_marker() == "o"]
+    assert [np.asarray(one.get_xydata()).tolist() for one in markers] == [[[0.0, 1.0]]]
+    assert [one.get_color() for one in markers] == [LINE.color]
+
+
+def test_a_line_of_one_point_is_drawn_as_a_marker() -> None:
+    single = LINE.model_copy(update={"x": (4.0,), "y": (0.5,)})
+    (axes,) = draw(CHART.model_copy(update={"series": (single,)}), {}).axes
+    markers = [line for line in axes.lines if line.get_marker() == "o"]
+    assert [np.asarray(one.get_xydata()).tolist() for one in markers] == [[[4.0, 0.5]]]
+
+
 def test_the_same_chart_gives_the_same_bytes_whatever_the_user_s_style() -> None:
     first = svg(CHART, {})
     with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 30.0, "svg.fonttype": "none"}):

@@ -11,7 +11,7 @@ from workbench.model.errors import BadInputError
 from workbench.model.prompt import Answer
 from workbench.model.target import Placement
 from workbench.session.journal import JOURNAL, Journal
-from workbench.session.state import effective, groups, safe_part, session_status, session_statuses
+from workbench.session.state import effective, placement_captures, safe_part, session_status, session_statuses
 
 STARTED = ev.SessionStarted(session="s", rig="r", procedures=("p",))
 STEP = ev.StepStarted(procedure="p", index=1, step="s", title="t", shots=0)
@@ -59,9 +59,9 @@ def test_a_group_is_the_latest_capture_of_its_placement() -> None:
         placed("a"), exposed, taken("a", "a1"), whole("a"), placed("b"), taken("b", "b1"), aside("b", 4),
         placed("b"), taken("b", "b2"), placed("c"), taken("c", "c1"), aside("c", 9),
     )  # fmt: skip
-    found = groups(records)
+    found = placement_captures(records)
     assert {key: list(group.captures) for key, group in found.items()} == {"a": ["a1"], "b": ["b2"]}
-    assert {key: group.whole for key, group in found.items()} == {"a": True, "b": False}
+    assert {key: group.complete for key, group in found.items()} == {"a": True, "b": False}
     assert (found["a"].exposure, found["b"].exposure) == (exposed, None)
 
 

@@ -38,7 +38,7 @@ def test_the_worst_placement_of_either_sign_is_held_against_the_limits(tmp_path:
     operator = Scripted()
     with running(tmp_path, operator=operator) as session:
         # The worst relative error is the second's, the worst z the third's.
-        session.context.left_out = (
+        session.context.cross_validation = (
             left_out(300.0, 0.1, 1.0),
             left_out(500.0, -4.0, 4.0),
             left_out(1000.0, -3.5, 1.0),
@@ -55,7 +55,7 @@ def test_the_worst_placement_of_either_sign_is_held_against_the_limits(tmp_path:
 
 def test_a_limit_that_stops_ends_with_exit_code_3(tmp_path: Path) -> None:
     with running(tmp_path) as session:
-        session.context.left_out = (left_out(300.0, 6.0, 4.0),)
+        session.context.cross_validation = (left_out(300.0, 6.0, 4.0),)
         with pytest.raises(LimitFailedError, match="worst_relative_error") as caught:
             parse_step(f"step: validate, limits: {{{BOTH}}}").run(session.context, "p.3")
     assert caught.value.exit_code == 3

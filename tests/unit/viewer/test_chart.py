@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from math import dist
 from typing import Literal
 
 import pytest
@@ -9,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workbench.model.chart import Axis, Chart, Series
-from workbench.viewer.chart import HEIGHT, WIDTH, Plot
+from workbench.viewer.chart import BOUNDS_Y, HEIGHT, WIDTH, Plot, dashes, legend_points
 
 NAMES = ("L1", "L2", "L3")
 
@@ -72,3 +74,36 @@ def test_series_of_points_stand_side_by_side_and_lines_do_not_move() -> None:
 def test_what_lies_beyond_the_limits_is_drawn_on_the_edge() -> None:
     plot = Plot.of(chart(series("L1", [(200.0, 50.0, None), (500.0, 0.0, None)]), limits=(-1.0, 1.0)))
     assert plot.point(0, 0)[1] == 0.0
+
+
+CHARACTER_WIDTH, ROW_HEIGHT = 13.0, 40.0
+"""Size of a label's character in a view of usual size, plot units."""
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [("L1", 1), ("L1", 9), ("sensor", 9), ("workbench, noise, 30 deg", 4)]
+)
+def test_names_of_a_legend_do_not_overlap(name: str, count: int) -> None:
+    names = [f"{name} {i}" for i in range(count)]
+    points = legend_points(names)
+    width = CHARACTER_WIDTH * max(map(len, names))
+    for i, (x, y) in enumerate(points):
+        assert x - width / 2 >= 0
+        assert BOUNDS_Y[0] < y < 0
+        for other_x, other_y in points[:i]:
+            assert abs(x - other_x) >= width or abs(y - other_y) >= ROW_HEIGHT
+
+
+def test_dashes_have_equal_lengths_and_gaps_along_a_line() -> None:
+    line = [(0.0, 0.0), (30.0, 40.0), (30.0, 40.0), (30.0, 240.0)]
+    cut = list(dashes(line))
+    lengths = [dist(a, b) for a, b in cut]
+    assert sum(lengths) == pytest.approx(250.0 * 14.0 / 23.0, abs=14.0)
+    assert max(lengths) <= 14.0 + 1e-9
+    assert cut[0][0] == (0.0, 0.0)
+    gaps = [dist(a[1], b[0]) for a, b in pairwise(cut)]
+    assert all(gap == pytest.approx(9.0) or gap == pytest.approx(0.0) for gap in gaps[3:])
+    on_line = [
+        x == pytest.approx(0.75 * y) if y < 40 else x == pytest.approx(30.0) for p in cut for x, y in p
+    ]
+    assert all(on_line)

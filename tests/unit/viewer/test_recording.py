@@ -193,7 +193,7 @@ def test_rebuilt_recording_has_the_same_data(recorded: Recorded, tmp_path: Path)
 def test_missing_frame_is_named_and_the_old_recording_stays(recorded: Recorded, tmp_path: Path) -> None:
     out = tmp_path / "again.rrd"
     out.write_bytes(b"an older recording")
-    with pytest.raises(BadInputError, match=r"frames/c0001-on\.png: expected the frame"):
+    with pytest.raises(BadInputError, match=r"frames/c0001-on\.png: "):
         rebuild(tmp_path, recorded.rig, recorded.records, out)
     assert out.read_bytes() == b"an older recording"
     assert list(tmp_path.iterdir()) == [out]
@@ -204,7 +204,7 @@ def test_changed_frame_is_named(recorded: Recorded, tmp_path: Path) -> None:
     damaged = tmp_path / first.path
     damaged.parent.mkdir()
     damaged.write_bytes((recorded.folder / first.path).read_bytes()[:-100])
-    with pytest.raises(BadInputError, match=r"frames/c0001-on\.png: expected the frame that was captured"):
+    with pytest.raises(BadInputError, match=r"frames/c0001-on\.png: .*sha256"):
         rebuild(tmp_path, recorded.rig, recorded.records, tmp_path / "again.rrd")
 
 

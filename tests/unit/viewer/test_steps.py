@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from tests.support.viewer_stream import HERE, logged
-from workbench.viewer.steps import ENDED, ERROR, INFO, WARN, end_all, lane, say
+from workbench.viewer.steps import ENDED, ERROR, INFO, WARN, end_all, lane, log_text
 from workbench.viewer.stream import Moment, Stream
 
 
 def test_a_line_has_its_level(tmp_path: Path) -> None:
     def log(stream: Stream) -> None:
         for level in (INFO, WARN, ERROR):
-            say(stream, f"a line of {level}", level)
-        say(stream, "plain")
+            log_text(stream, f"a line of {level}", level)
+        log_text(stream, "plain")
 
     contents = logged(tmp_path, log)
     levels = [level for _, (level,) in contents.values("/steps/log", "TextLog:level")]

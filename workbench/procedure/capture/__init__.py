@@ -1,1 +1,1 @@
-"""One capture: exposure, frame pair, stuck-beam check, brightness, quality."""
+"""Capture: exposure, latency, frame pair, brightness, quality."""

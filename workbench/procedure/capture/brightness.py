@@ -1,4 +1,4 @@
-"""How bright the brightest spot of a trial is: nothing but what the lasers light counts."""
+"""Brightness of the brightest spot in a trial exposure; only light of the lasers counts."""
 
 from __future__ import annotations
 
@@ -13,32 +13,30 @@ from workbench.model.arrays import BoolArray, Image
 from workbench.model.rig import Rig
 from workbench.spots.strip import distance_px
 
-SURE_SD = 6.0
-"""A band has some 10^5 pixels: the largest of so many Gaussian numbers lies at 4.4 sd."""
+DETECTION_SD = 6.0
+"""Threshold of laser light in noise sd. The maximum of 10^5 Gaussian numbers, one per pixel, is 4.4 sd."""
 LEAST_NOISE_DN = 0.5
-"""Of a difference of two frames, each rounded to whole numbers: sqrt(2 / 12)."""
+"""Lower bound of the noise of a difference of two frames; rounding alone gives sqrt(2 / 12)."""
 SD_PER_MAD = 1.4826
-"""Of Gaussian noise."""
-OUTLYING_SD = 4.0
+"""Ratio of the standard deviation to the median absolute deviation of Gaussian noise."""
+OUTLIER_SD = 4.0
+"""Distance from the median, in sd, beyond which a difference is an outlier."""
 
 
 @dataclass(frozen=True)
 class Brightness:
-    """Shares of full scale."""
+    """Brightness in a trial exposure, as shares of full scale."""
 
     peak: float
-    """Brightest pixel that the lasers light; where they light none, the median of the darks."""
+    """Brightest pixel with laser light; without any, the median of the dark frames."""
     lit: float = 0.0
-    """How much of it is the lasers'; 0 where they are not seen."""
+    """Part of `peak` due to the lasers; 0 if they are not seen."""
     noise: float = 0.0
     """Standard deviation of `lit`."""
 
 
 def searched_pixels(rig: Rig) -> BoolArray:
-    """Where the rig file lets its lasers' spots lie, or everywhere if that is beside the picture.
-
-    Shape (height, width).
-    """
+    """Mask (height, width) of pixels near the scanlines of the rig's lasers; all pixels if there are none."""
     v, u = np.mgrid[0 : rig.camera.height_px, 0 : rig.camera.width_px].astype(float)
     lines = [prior_scanline(rig, laser) for laser in rig.lasers]
     on_a_line = np.logical_or.reduce([distance_px(line, u, v) <= line.half_width_px for line in lines])
@@ -48,32 +46,33 @@ def searched_pixels(rig: Rig) -> BoolArray:
 def measure_brightness(
     on: Sequence[Image], off: Sequence[Image], searched: BoolArray, full_scale: int
 ) -> Brightness:
-    """What the lasers light most.
+    """Measure the brightest pixel with laser light.
 
-    A lamp that flickers is as bright in a dark frame as in a lit one, or differs between frames alike. So a
-    pixel counts by its least number in the lit frames, less its largest in the dark ones, less its largest
-    difference between frames that should be the same.
+    A flickering lamp is as bright in dark frames as in lit ones, or it differs between frames of one kind.
+    The criterion for laser light at a pixel is therefore min(lit frames) - max(dark frames) - its largest
+    difference between frames of one kind.
 
     Args:
-        on: two frames with the lasers lit, (height, width).
-        off: two with them off, one before and one after these.
-        searched: where to look, (height, width).
-        full_scale: the largest number of a pixel.
+        on: two frames with the lasers on, (height, width).
+        off: two frames with the lasers off, one before and one after these.
+        searched: mask of the pixels to search, (height, width).
+        full_scale: largest value of a pixel.
     """
     lit = np.stack([image[searched] for image in on]).astype(np.int32)
     dark = np.stack([image[searched] for image in off]).astype(np.int32)
     noise = max(_typical_sd(dark[0] - dark[1]), LEAST_NOISE_DN)
     unsteady = np.maximum(np.ptp(lit, axis=0), np.ptp(dark, axis=0))
-    sure = lit.min(axis=0) - dark.max(axis=0) - unsteady
-    where = int(sure.argmax())
-    if sure[where] <= SURE_SD * noise:
+    certain = lit.min(axis=0) - dark.max(axis=0) - unsteady
+    where = int(certain.argmax())
+    if certain[where] <= DETECTION_SD * noise:
         return Brightness(float(np.median(dark)) / full_scale)
     gained = float(lit[:, where].mean() - dark[:, where].mean())
     return Brightness(int(lit[:, where].max()) / full_scale, gained / full_scale, noise / full_scale)
 
 
 def _typical_sd(differences: NDArray[np.int32]) -> float:
-    """Standard deviation without the few that a lamp makes; about their median, as all light may differ."""
-    off = np.abs(differences - np.median(differences))
-    usual = off <= OUTLYING_SD * SD_PER_MAD * (np.median(off) + 0.5)  # whole numbers: the median is as coarse
-    return float(np.std(differences[usual]))
+    """Standard deviation about the median without outliers, which a lamp may cause."""
+    distance = np.abs(differences - np.median(differences))
+    # Half a unit is added because the median of whole numbers is rounded.
+    inliers = distance <= OUTLIER_SD * SD_PER_MAD * (np.median(distance) + 0.5)
+    return float(np.std(differences[inliers]))

@@ -1,14 +1,15 @@
-"""The exposure at which the brightest spot is bright and not clipped, found with a few trials.
+"""Search for the exposure at which the brightest spot is bright and not clipped.
 
-A pixel's number is its pedestal plus what it is lit with times the exposure, until it is clipped. Scaling
-the exposure by (aim / number) therefore closes in on the aim: the pedestal alone, some hundredths of full
-scale, is scaled wrongly, and the next trial sees how much that was. Of a clipped pixel nothing else is known.
+The value of a pixel is its pedestal plus irradiance times exposure, until it is clipped. Scaling the exposure
+by (aim / value) therefore converges to the aim: only the pedestal, some hundredths of full scale, is scaled
+wrongly, and the next trial exposure corrects that. A clipped pixel gives only a bound.
 
-Not every pixel is clipped at full scale: where a camera of colours makes grey by itself, a red spot is
-clipped when it is at 30 % of that. A longer exposure gives no more then; that number is taken for full scale.
-Or the number jumps to full scale, where the driver tells of such a pixel: the search ends below the jump.
+Not every pixel is clipped at full scale. In a colour camera that converts to grey itself, a red spot is
+clipped at 30 % of full scale. A longer exposure then gives no higher value, which is taken as full scale. If
+the driver reports such a pixel as clipped, the value jumps to full scale; the search then ends below the
+jump.
 
-Where no laser is seen, the light is the room's alone: it is too little, or so much that it hides the lasers.
+If no laser is seen, only room light is visible: it is too dark, or so bright that it hides the lasers.
 """
 
 from __future__ import annotations
@@ -26,34 +27,36 @@ from workbench.model.rig import Rig
 from workbench.procedure.capture.brightness import Brightness, measure_brightness, searched_pixels
 from workbench.procedure.capture.latency import LEASE_S
 
-BOLDEST = 8.0
-"""Largest factor from one trial to the next."""
+LARGEST_FACTOR = 8.0
+"""Largest ratio of consecutive trial exposures."""
 MOST_TRIALS = 9
-"""Four go from the middle of a range of 1 : 10^7 to its ends; four are left to close in, one to step down."""
+"""Largest number of trial exposures: four from the middle of a range of 1 : 10^7 to an end, four to converge,
+one to step down below a jump."""
 LIT_FRAMES = 2
-"""Of a trial."""
-TELLING = 1.4
-"""Ratio of two exposures from which on their peaks tell whether they grow."""
+"""Number of frames with lasers on in a trial exposure."""
+DECISIVE_RATIO = 1.4
+"""Least ratio of two exposures whose peaks show whether the peak grows with the exposure."""
 LEAST_GROWTH = 0.3
-"""As which power of the exposure a peak grows at least: 1 where it is linear, 0.45 with a gamma of 2.2."""
+"""Least exponent of the growth of a peak with the exposure: linear 1, gamma of 2.2 0.45."""
 GROWTH_SD = 4.0
+"""Tolerance of that comparison in standard deviations of the noise."""
 SAME_STEP = 1.05
-"""Ratio up to which two exposures are not worth two trials."""
+"""Ratio below which two exposures count as equal."""
 NEAR = 1.35
-"""Ratio of the shortest exposure that was clipped to the longest that was not, which is near enough."""
+"""Ratio of the shortest clipped to the longest unclipped exposure at which the search stops."""
 STEP_DOWN = 0.7
-"""From the longest exposure below a jump, where a colour may be all but clipped, to one with room left."""
-LEFT = 0.75
-"""Of that longest exposure, at most: a quarter is left, however coarse the camera's steps."""
+"""Ratio of the final exposure to the longest below a jump, where one colour may be almost clipped."""
+LARGEST_STEP_DOWN = 0.75
+"""Upper bound of that ratio for cameras with coarse exposure steps."""
 SAME = 0.005
-"""Relative difference below which an exposure was taken as in its trial."""
-FLAT = 0.03
-"""How much clipped numbers differ where it is not at full scale: they were averaged, or compressed."""
+"""Largest relative difference of an exposure from that of its trial exposure."""
+CLIPPED_SPREAD = 0.03
+"""Relative spread of clipped values below full scale, due to averaging or compression."""
 
 
 @dataclass(frozen=True)
 class ExposureTrial:
-    """An exposure as the camera took it, and what the lasers lit with it."""
+    """Trial exposure: exposure as accepted by the camera, and brightness at this exposure."""
 
     exposure: float
     seen: Brightness
@@ -62,23 +65,23 @@ class ExposureTrial:
 def set_exposure(
     bench: Bench, rig: Rig, placement_key: str, begin: Callable[[str], None]
 ) -> ExposureSet | None:
-    """Set the camera's exposure for all lasers of the rig on the target as it stands.
+    """Set the camera's exposure for all lasers of the rig and the present placement of the target.
 
-    They are lit together: no laser by itself is brighter, and one trial tells. The first trial is
-    always the same, so that what is found at a placement does not depend on where the target was before.
+    All lasers are on together: no single laser is brighter, and one trial exposure covers all. The first one
+    is always the same, so that the result does not depend on the previous placement.
 
     Args:
-        bench: its camera and lasers.
-        rig: tells which lasers, where their spots may lie, and the camera's full scale.
-        placement_key: of the placement.
-        begin: called with the key of each trial before it.
+        bench: bench with camera and lasers.
+        rig: rig with the lasers, their scanlines and the camera's full scale.
+        placement_key: key of the placement.
+        begin: called before each trial exposure with its key.
 
     Returns:
-        What was set; None where the camera's exposure is not to be set.
+        The exposure that was set; None if the camera's exposure cannot or must not be set.
 
     Raises:
         LaserOffNotConfirmedError: a beam stays on.
-        RigNotReadyError: a device does not answer, or takes another exposure than in its trial.
+        RigNotReadyError: a device does not answer, or takes another exposure than in its trial exposure.
     """
     if (found := settable(bench.camera)) is None:
         return None
@@ -110,35 +113,35 @@ def set_exposure(
 
 
 def _next_frame(camera: Camera) -> Image:
-    """After a grab; nothing was switched since then."""
+    """Next frame after a grab, without waiting for the latency: no laser was switched in between."""
     return (camera.read() if isinstance(camera, StreamingCamera) else camera.grab()).image
 
 
 def _set_again(camera: ExposableCamera, exposure: float) -> None:
-    """What was found holds for the exposure of its trial, and for no other.
+    """Set the exposure of an earlier trial exposure again.
 
     Raises:
-        RigNotReadyError: the camera does not take it this time.
+        RigNotReadyError: the camera accepts another exposure this time.
     """
-    came = camera.set_exposure(exposure)
-    if abs(came - exposure) > SAME * exposure:
+    accepted = camera.set_exposure(exposure)
+    if abs(accepted - exposure) > SAME * exposure:
         raise RigNotReadyError(
-            f"camera: exposure: expected {exposure:g} as it was taken in a trial, the camera says {came:g}"
-            " now; does another program set it? Leave exposure_limits out if the camera keeps none"
+            f"camera: exposure: expected {exposure:g} as in a trial exposure, got {accepted:g}; check that no"
+            " other program sets it; remove exposure_limits from the rig file if the camera does not keep it"
         )
 
 
 def search_exposure(
     limits: tuple[float, float], look: Callable[[float, int], ExposureTrial]
 ) -> list[ExposureTrial]:
-    """Try exposures until one is good, or the next would be one that was tried.
+    """Try exposures until one is good or none is left to try.
 
     Args:
         limits: shortest and longest exposure.
-        look: makes the trial of that number at an exposure.
+        look: takes a trial exposure at an exposure; the second argument is its number, from 0.
 
     Returns:
-        Every trial.
+        All trial exposures, in order.
     """
     asked: list[float] = []
     tried: list[ExposureTrial] = []
@@ -154,41 +157,42 @@ def search_exposure(
 
 
 def _after(tried: Sequence[ExposureTrial]) -> float | None:
-    """The exposure to try next; None: a good one is among them."""
+    """Exposure to try next; None: the search has converged."""
     best = _longest(tried)
     if GOOD[0] <= _level(best, tried) <= GOOD[1]:
-        # Half of it tells whether the number is that of a pixel clipped below full scale.
-        return None if any(_tells(other, best) for other in tried) else best.exposure / 2
+        # Half the exposure decides whether the pixel is clipped below full scale.
+        return None if any(_is_decisive(other, best) for other in tried) else best.exposure / 2
     last, level = tried[-1], _level(tried[-1], tried)
-    following = last.exposure * (1 / BOLDEST if level >= CLIPPED else AIM / max(level, AIM / BOLDEST))
+    factor = 1 / LARGEST_FACTOR if level >= CLIPPED else AIM / max(level, AIM / LARGEST_FACTOR)
+    following = last.exposure * factor
     clipped = _shortest_clipped(tried)
     dimmest = max((t.exposure for t in tried if _level(t, tried) < GOOD[0]), default=0.0)
     if clipped == math.inf or SAME_STEP * dimmest < following < clipped / SAME_STEP:
         return following
-    # It jumps from below the aim to clipped, as grey does where one of its colours is clipped: in between.
+    # The level jumps from below the aim to clipped, as grey does if one colour is clipped: bisect.
     return math.sqrt(dimmest * clipped) if clipped > NEAR * dimmest else None
 
 
 def _within(limits: tuple[float, float], exposure: float) -> float:
-    """Three digits are finer than any aim, and can be read."""
+    """Exposure within the limits, rounded to three significant digits."""
     return min(max(float(f"{exposure:.3g}"), limits[0]), limits[1])
 
 
 def best_of(tried: Sequence[ExposureTrial]) -> ExposureTrial:
-    """The longest exposure that was not too bright; where all were, the shortest; well below a jump."""
+    """Longest trial exposure that is not too bright, else the shortest; well below a jump."""
     longest = _longest(tried)
     if not _below_jump(longest, tried):
         return longest
     lower = [t for t in tried if t.seen.lit > 0 and t.exposure < longest.exposure]
     return max(
-        (t for t in lower if t.exposure <= LEFT * longest.exposure),
+        (t for t in lower if t.exposure <= LARGEST_STEP_DOWN * longest.exposure),
         key=_exposure,
         default=min(lower, key=_exposure, default=longest),
     )
 
 
 def _longest(tried: Sequence[ExposureTrial]) -> ExposureTrial:
-    """Not too bright, with the lasers seen if any trial sees them."""
+    """Longest trial exposure that is not too bright, among those that show the lasers if there are any."""
     seen = [trial for trial in tried if trial.seen.lit > 0 and share_of(trial, tried) < CLIPPED]
     among = seen or tried
     sound = [trial for trial in among if _level(trial, tried) <= GOOD[1]]
@@ -196,7 +200,7 @@ def _longest(tried: Sequence[ExposureTrial]) -> ExposureTrial:
 
 
 def _below_jump(trial: ExposureTrial, tried: Sequence[ExposureTrial]) -> bool:
-    """Whether a dim spot was clipped at an exposure at which light in proportion would not have been."""
+    """Whether the spot is dim, and clipped at an exposure at which proportional growth would not clip it."""
     share = share_of(trial, tried)
     growth = _shortest_clipped(tried) / trial.exposure
     return trial.seen.lit > 0 and share < GOOD[0] and share * growth < CLIPPED
@@ -207,28 +211,28 @@ def _shortest_clipped(tried: Sequence[ExposureTrial]) -> float:
 
 
 def _level(trial: ExposureTrial, tried: Sequence[ExposureTrial]) -> float:
-    """How bright it is for the search: where no laser is seen dark, or clipped if it is as bright as that."""
+    """Level for the search: share of full scale; without a laser 0, or clipped if the room is bright."""
     if trial.seen.lit > 0:
         return share_of(trial, tried)
     return 0.0 if trial.seen.peak <= GOOD[1] else CLIPPED
 
 
 def share_of(trial: ExposureTrial, tried: Sequence[ExposureTrial]) -> float:
-    """The brightest pixel as a share of the number at which it is clipped, which all trials tell."""
+    """Brightest pixel as a share of the value at which it is clipped, estimated from all trial exposures."""
     ceiling = _ceiling(tried)
     share = trial.seen.peak / ceiling
-    return CLIPPED if ceiling < CLIPPED and share >= 1 - FLAT else share
+    return CLIPPED if ceiling < CLIPPED and share >= 1 - CLIPPED_SPREAD else share
 
 
 def _ceiling(tried: Sequence[ExposureTrial]) -> float:
-    """Where peaks do not grow any more; full scale where they do."""
-    flat = any(_tells(a, b) and not _grows(a, b) for a in tried for b in tried)
+    """Value above which peaks do not grow with the exposure; full scale if they all grow."""
+    flat = any(_is_decisive(a, b) and not _grows(a, b) for a in tried for b in tried)
     return max(trial.seen.peak for trial in tried) if flat else CLIPPED
 
 
-def _tells(shorter: ExposureTrial, longer: ExposureTrial) -> bool:
-    """Whether two trials can tell if the peak grows: both see the lasers, at exposures that differ."""
-    return longer.exposure >= TELLING * shorter.exposure and min(shorter.seen.lit, longer.seen.lit) > 0
+def _is_decisive(shorter: ExposureTrial, longer: ExposureTrial) -> bool:
+    """Whether two trial exposures show if the peak grows: they differ, and both show the lasers."""
+    return longer.exposure >= DECISIVE_RATIO * shorter.exposure and min(shorter.seen.lit, longer.seen.lit) > 0
 
 
 def _grows(shorter: ExposureTrial, longer: ExposureTrial) -> bool:

@@ -1,4 +1,4 @@
-"""How many frames of a camera's stream are older than what was just switched."""
+"""Latency of a camera: number of frames in its stream that are older than the last laser switching."""
 
 from __future__ import annotations
 
@@ -16,45 +16,45 @@ from workbench.model.rig import Rig
 from workbench.spots import Spot, find_spots
 
 LEASE_S = 2.0
-"""Longest time that a laser may stay lit for one capture: many frames, and short for an eye."""
+"""Longest emission for one capture: enough for many frames, short for eye safety."""
 PHASES = (0.0, 0.5, 0.95)
-"""When a trial switches, in frames after one has come. A camera that runs freely has begun the next by then:
-the later, the less of it is lit. Captures are switched whenever it is their turn."""
+"""Delays of switching after the last frame, in frame periods. A free-running camera is already exposing the
+next frame: the later the switching, the smaller its lit part. Captures switch at any phase."""
 WHOLE = 0.9
-"""Least share of the next frame's light in one that was not begun before the switch."""
+"""Least light, relative to the next frame, of a frame whose exposure began after the switching."""
 NOISE_SD = 3.0
-"""By so much noise may a whole frame seem to have less."""
+"""Tolerance of that comparison in standard deviations of the noise."""
 STEP = 16.0
-"""Between two exposures: from too dim to be found to clipped is more than that."""
+"""Ratio of consecutive exposures; the range from too dim to clipped is wider."""
 
 
 def count_latency(lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_frames: int) -> int:
-    """Frames from switching the first laser on to the first that was lit throughout; the most of some trials.
+    """Number of frames from switching the first laser on to the first frame lit throughout.
 
-    Nothing that hangs on the latency is used: it is counted at the exposure that the camera has, and where
-    that shows no spot at others, far apart, if they may be set. Before each trial more frames pass in the
-    dark than can be late.
+    The result is the largest of several trials at different phases. The method does not depend on a known
+    latency: it uses the present exposure and, if that shows no spot, others that are far apart. Before each
+    trial more frames pass in the dark than can be late.
 
     Raises:
-        RigNotReadyError: none of `most_frames` frames shows it, at no exposure.
+        RigNotReadyError: none of `most_frames` frames shows the laser at any exposure.
     """
     lasers.all_off()
     first = rig.lasers[0]
-    # The first search in a process takes a second: a laser lit meanwhile would be put off as forgotten.
-    some = camera.grab().image
-    find_spots(some, some, scanlines=[prior_scanline(rig, first)], expected=1)
+    # The first search in a process compiles for a second, longer than a lease allows with a laser on.
+    image = camera.grab().image
+    find_spots(image, image, scanlines=[prior_scanline(rig, first)], expected=1)
     for _ in _exposures(camera):
         if (frames := _count(lasers, camera, rig, most_frames, PHASES[0])) is not None:
             later = [_count(lasers, camera, rig, most_frames, phase) for phase in PHASES[1:]]
             return max([frames, *(more for more in later if more is not None)])
     raise RigNotReadyError(
-        f"camera: expected to see laser {first.id} at most {most_frames} frames after it was switched on, saw"
-        " no spot; look whether it shines on the target, and into the picture"
+        f"camera: expected laser {first.id} within {most_frames} frames after switching it on, got no spot;"
+        " check that its beam hits the target and that the spot lies in the picture"
     )
 
 
 def _exposures(camera: StreamingCamera) -> Iterator[None]:
-    """Set one after the other: as it is, then from the middle of the limits out to them."""
+    """Set exposures one after the other: the present one, then from the middle of the limits outwards."""
     yield
     if (found := settable(camera)) is None:
         return
@@ -71,11 +71,11 @@ def _count(
 ) -> int | None:
     first = rig.lasers[0]
     scanlines = [prior_scanline(rig, first)]
-    # Drops what has piled up; then whatever a laser lit before this call passes.
+    # Drop buffered frames, then frames that were exposed before this call.
     camera.grab()
     for _ in range(most_frames + 1):
         camera.read()
-    # A lamp that flickers is no brighter later than in the brightest of them.
+    # The maximum over several dark frames covers a flickering lamp.
     began = time.monotonic()
     dark: Image = np.maximum.reduce([camera.read().image for _ in range(most_frames + 1)])
     time.sleep(phase * (time.monotonic() - began) / (most_frames + 1))
@@ -91,12 +91,12 @@ def _count(
 
 
 def _is_whole(spot: Spot, later: Spot) -> bool:
-    """Whether the frame of `spot` has no less of its light than the next one, as far as noise lets one tell.
+    """Whether the frame of `spot` has as much of its light as the next one, within the noise.
 
-    Where both are clipped, neither's light is known.
+    True if both spots are clipped: then neither's light is known.
     """
     if "saturated" in spot.flags & later.flags:
         return True
-    # With shot noise alone the relative deviation of the light is that of the place, in widths.
+    # With shot noise alone, the relative sd of the flux equals the sd of the centre in units of the width.
     noise = math.hypot(*(it.flux_dn * it.u_sd_px / it.width_px for it in (spot, later)))
     return spot.flux_dn >= WHOLE * later.flux_dn - NOISE_SD * noise

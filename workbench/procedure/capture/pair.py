@@ -1,4 +1,4 @@
-"""One capture: taken and stored, or served from disk; and a look for beams that burn when they should not."""
+"""Captures: taken and stored, or replayed from disk; with a check for stuck beams."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from workbench.model.target import Placement
 from workbench.procedure.capture.exposure import set_exposure
 from workbench.procedure.capture.latency import LEASE_S
 from workbench.session.frames import FrameStore, read_image
-from workbench.session.state import Group
+from workbench.session.state import PlacementCaptures
 from workbench.spots import Finding, Scanline, Spot, find_spots, refuse_stuck_beam
 
 LATENCY_ADVICE = "begin the procedure with a measure_latency step"
@@ -27,87 +27,87 @@ LATENCY_ADVICE = "begin the procedure with a measure_latency step"
 
 @dataclass
 class PairSource:
-    """The captures at one placement after the other."""
+    """Source of captures at the present placement: the bench, or the frames on disk in a replay."""
 
     session_dir: Path
     rig: Rig
     bench: Bench
-    served: Group | None = None
-    """What is on disk already of the present placement."""
-    may_fire: bool = False
-    """Whether somebody has confirmed that the beams may be switched on."""
+    replayed: PlacementCaptures | None = None
+    """Captures on disk, if the present placement is replayed."""
+    may_emit: bool = False
+    """Whether the operator has confirmed that the lasers may be switched on."""
     _exposure: ev.ExposureSet | None = None
-    """Of the present placement, where the camera's is set."""
+    """Exposure of the present placement, if it was set."""
     _dark: Image | None = None
-    """The last frame at the present placement with all lasers off."""
+    """Last frame at the present placement with all lasers off."""
 
     def set_exposure(self, key: str, begin: Callable[[str], None]) -> ev.ExposureSet | None:
-        """Set it for a placement by trial shots; of what is on disk already it is known.
+        """Set the exposure for a placement by trial exposures; a replay takes it from the journal.
 
         Args:
-            key: the placement's.
-            begin: called with the key of each trial before it.
+            key: key of the placement.
+            begin: called before each trial exposure with its key.
 
         Returns:
-            What was set; None where the camera's exposure is not to be set.
+            The exposure that was set; None if the camera's exposure cannot or must not be set.
 
         Raises:
             LaserOffNotConfirmedError: a beam stays on.
             RigNotReadyError: a device does not answer.
         """
-        if self.served is None:
+        if self.replayed is None:
             self._refuse_unsafe()
             found = set_exposure(self.bench, self.rig, key, begin)
-        else:  # nothing is captured there any more: the camera is left as it is
-            found = self.served.exposure
+        else:  # no further captures at this placement: the camera is left unchanged
+            found = self.replayed.exposure
         self._exposure = found
         return found
 
     def pair(
         self, key: str, laser_ids: Sequence[str], placement: Placement, repeat: int, scene: str | None
     ) -> tuple[Image, Image, ev.CaptureTaken]:
-        """Frames with `laser_ids` lit and all off.
+        """Pair of frames: `laser_ids` on, and all lasers off.
 
         Raises:
-            BadInputError: the placement is whole, but not with this capture, or a frame has changed.
+            BadInputError: a replayed placement lacks this capture, or a frame on disk has changed.
             LaserOffNotConfirmedError: a beam stays on.
             RigNotReadyError: a device does not answer.
         """
         kept = self._kept(key)
         if kept is None or kept.off is None:
-            return self._shoot(key, laser_ids, placement, repeat, scene)
+            return self._capture(key, laser_ids, placement, repeat, scene)
         return self._read(kept.on), self._read(kept.off), kept
 
     def room_light(self, key: str, placement: Placement, repeat: int) -> tuple[Image, ev.CaptureTaken]:
-        """A frame with no laser lit; the errors of `pair`."""
+        """Frame with all lasers off; raises the errors of `pair`."""
         kept = self._kept(key)
-        return (self._read(kept.on), kept) if kept else self._expose(key, placement, repeat)
+        return (self._read(kept.on), kept) if kept else self._capture_room_light(key, placement, repeat)
 
-    def look_at_dark(self, key: str, off: Image, finding: Finding, scanlines: Sequence[Scanline]) -> None:
-        """Keep the dark frame of a capture; where its pair shows no spot, look for one in it.
+    def check_dark(self, key: str, off: Image, finding: Finding, scanlines: Sequence[Scanline]) -> None:
+        """Keep the dark frame of a capture; if the pair shows no spot, search the dark frame for one.
 
-        What is on disk already was looked at when it was taken.
+        Replayed frames were checked when they were taken.
 
         Raises:
-            LaserOffNotConfirmedError: there is a spot in it.
+            LaserOffNotConfirmedError: the dark frame shows a spot.
         """
-        if self.served is not None:
+        if self.replayed is not None:
             return
         if not finding.spots:
             self._search(key, off, scanlines)
         self._dark = off
 
-    def look_for_stuck_beam(self, key: str) -> None:
-        """Look for any beam in the last dark frame of a group: another laser's pairs do not show it.
+    def check_stuck_beam(self, key: str) -> None:
+        """Search the last dark frame of a placement for any beam; pairs show only beams of their own laser.
 
         Raises:
-            LaserOffNotConfirmedError: see `look_at_dark`.
+            LaserOffNotConfirmedError: the dark frame shows a spot.
         """
         dark, self._dark = self._dark, None
         if dark is not None:
             self._search(key, dark, [prior_scanline(self.rig, laser) for laser in self.rig.lasers])
 
-    def _shoot(
+    def _capture(
         self, key: str, laser_ids: Sequence[str], placement: Placement, repeat: int, scene: str | None
     ) -> tuple[Image, Image, ev.CaptureTaken]:
         self._refuse_unsafe()
@@ -135,10 +135,12 @@ class PairSource:
         return on.image, off.image, taken
 
     def _refuse_unsafe(self) -> None:
-        if not self.may_fire:
-            raise RuntimeError("a laser was to be lit before anybody confirmed eyewear and beam path")
+        if not self.may_emit:
+            raise RuntimeError("a laser must not be switched on before eyewear and beam path are confirmed")
 
-    def _expose(self, key: str, placement: Placement, repeat: int) -> tuple[Image, ev.CaptureTaken]:
+    def _capture_room_light(
+        self, key: str, placement: Placement, repeat: int
+    ) -> tuple[Image, ev.CaptureTaken]:
         frame = self.bench.camera.grab_ambient()
         taken = ev.CaptureTaken(
             key=key,
@@ -153,19 +155,19 @@ class PairSource:
         return frame.image, taken
 
     def _kept(self, key: str) -> ev.CaptureTaken | None:
-        """The capture as taken before the session ended early.
+        """Capture on disk, if the placement is replayed.
 
         Raises:
-            BadInputError: the placement is whole, but not with this capture.
+            BadInputError: the replayed placement lacks this capture.
         """
-        if self.served is None:
+        if self.replayed is None:
             return None
-        if key not in self.served.captures:
+        if key not in self.replayed.captures:
             raise BadInputError(
-                f"capture {key}: expected it among those of its placement, which was finished without it; a"
-                " change of rig or procedure asks for captures that were never taken: run the procedure anew"
+                f"capture {key}: not among the captures of its complete placement; the rig or the procedure"
+                " has changed and requires further captures: run the procedure again in a new session"
             )
-        return self.served.captures[key]
+        return self.replayed.captures[key]
 
     def _read(self, frame: ev.FrameRef) -> Image:
         path = self.session_dir / frame.path
@@ -177,7 +179,7 @@ class PairSource:
         return image
 
     def _search(self, key: str, off: Image, scanlines: Sequence[Scanline]) -> None:
-        """Check a dark frame; the errors of `refuse_stuck_beam`."""
+        """Check a dark frame; raises the errors of `refuse_stuck_beam`."""
 
         def look_again() -> Sequence[Spot]:
             return find_spots(self.bench.camera.grab().image, scanlines=scanlines).spots
@@ -187,7 +189,7 @@ class PairSource:
 
 
 def spots_found(key: str, finding: Finding, laser_ids: Sequence[str]) -> ev.SpotsFound:
-    """The record of what was found in a capture; of a laser alone, its one spot is the laser's."""
+    """Event of the spots in a capture; a single spot in a capture of one laser is assigned to it."""
     spots = finding.spots
     if len(laser_ids) == 1 and len(spots) == 1:
         spots = (replace(spots[0], laser_id=laser_ids[0]),)

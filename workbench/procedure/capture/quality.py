@@ -1,4 +1,4 @@
-"""How good the captures of one laser at one placement are."""
+"""Quality of the captures of one laser at one placement."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from workbench.model.yamlfile import FileModel
 
 
 class CaptureLimits(FileModel):
-    """Limits on the captures of one laser at one placement; of the quantities of `Quality`."""
+    """Limits on `Quality`, of the captures of one laser at one placement."""
 
     missing: Limit | None = None
     saturated: Limit | None = None
@@ -23,25 +23,26 @@ class CaptureLimits(FileModel):
 
 @dataclass(frozen=True)
 class Quality:
-    """Of the repeats of one laser at one placement; numbers of spots are None where there is none."""
+    """Quality of the repeats of one laser at one placement; quantities of spots are None without a spot."""
 
     repeats: int
     missing: float
-    """Share of the repeats without just one spot."""
+    """Share of the repeats with no spot or more than one."""
     saturated: float
     """Share of the spots with clipped pixels."""
     snr: float | None = None
-    """Median of the spot's width over its centre's stated deviation: with shot noise alone that is the square
-    root of its electrons, its signal to noise."""
+    """Signal-to-noise ratio: median of spot width / stated sd of the centre. With shot noise alone this is
+    the square root of the number of electrons."""
     scatter_px: float | None = None
-    """Standard deviation of the centre over the repeats, of the worse axis; None with fewer than two."""
+    """Standard deviation of the centre over the repeats, larger of both axes; None below two spots."""
     u_px: float | None = None
-    """Mean."""
+    """Mean u of the centres."""
     v_px: float | None = None
+    """Mean v of the centres."""
 
 
 def quality_of(found: Sequence[Sequence[Spot]]) -> Quality:
-    """Quality from the spots of each repeat."""
+    """Quality of repeats from the spots found in each of them."""
     spots = [one[0] for one in found if len(one) == 1]
     missing = 1 - len(spots) / len(found)
     if not spots:

@@ -1,1 +1,1 @@
-"""Runs any step of a procedure file: placements, prompts, replay, limits."""
+"""Engine that runs any step of a procedure file: placements, prompts, replay, limits."""

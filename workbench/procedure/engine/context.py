@@ -1,4 +1,4 @@
-"""What a running procedure carries from step to step."""
+"""Context of a running procedure: bench, session and results so far."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from workbench.procedure.engine.replay import ReplayingJournal
 from workbench.procedure.engine.step import Step
 from workbench.spots import Finding, Scanline, find_spots
 
-if TYPE_CHECKING:  # results of steps: a file is checked without the solver
+if TYPE_CHECKING:  # types of results: checking a file must not import the solver
     from workbench.calibration.data.boards import BoardView
     from workbench.model.fit_event import CrossValidatedPlacement, Rejected
 
 
 @dataclass
 class Context:
-    """The bench, the session and the results so far."""
+    """Bench, session and results so far; passed from step to step."""
 
     session_dir: Path
     rig: Rig
@@ -38,36 +38,36 @@ class Context:
     recorder: ReplayingJournal
     provenance: Provenance
     stopping: Callable[[], str | None]
-    """Asked between shots; a text ends the session with it."""
+    """Called between captures; a text is the reason to end the session."""
     captures: list[ev.CaptureTaken] = field(default_factory=list)
     findings: dict[str, Finding] = field(default_factory=dict)
-    """By the capture's key."""
+    """Spots by capture key."""
     boards: dict[str, BoardView | Rejected] = field(default_factory=dict)
-    """By the placement's key."""
+    """Views of the printed board by placement key."""
     steps: Sequence[Step] = ()
-    """All of the procedure under way."""
+    """Steps of the present procedure."""
     step_index: int = 0
-    """Of the step under way among `steps`, from 0."""
+    """Index of the present step in `steps`, from 0."""
     accepted: Calibration | None = None
-    """What the last fit amounts to."""
-    left_out: tuple[CrossValidatedPlacement, ...] = ()
-    """Its cross-validation."""
+    """Calibration of the last accepted fit."""
+    cross_validation: tuple[CrossValidatedPlacement, ...] = ()
+    """Cross-validation of the last accepted fit, by placement."""
     calibration: Calibration | None = None
-    """The exported one: trials range with it."""
+    """Exported calibration, used by trials."""
     pairs: PairSource = field(init=False)
 
     def __post_init__(self) -> None:
         self.pairs = PairSource(self.session_dir, self.rig, self.bench)
 
     def emit(self, event: ev.Event) -> ev.Record:
-        """Journal an event, then show it to every consumer."""
+        """Journal an event, then pass it to every consumer."""
         return self.recorder.emit(event)
 
     def ask(self, prompt: Prompt) -> Answer:
-        """The operator's answer, with every laser off; a resumed session asks only what is open still.
+        """Answer of the operator, with every laser off; a replay uses the journalled answer.
 
         Raises:
-            AnswerNeededError: nobody is there to answer.
+            AnswerNeededError: there is no operator.
             StoppedError: the operator aborts.
             LaserOffNotConfirmedError: a beam stays on.
         """
@@ -76,12 +76,12 @@ class Context:
         return answer
 
     def confirm_safety(self) -> None:
-        """Before the first emission: eyewear and beam path, whoever resumes a session asks again."""
-        if not self.pairs.may_fire:
+        """Have eyewear and beam path confirmed before the first emission, again after each resumption."""
+        if not self.pairs.may_emit:
             prompt = safety_prompt(self.rig)
             answer = self.ask_now(prompt)
             self.emit(ev.Answered(key=SAFETY, question=prompt.do, answer=answer))
-            self.pairs.may_fire = True
+            self.pairs.may_emit = True
 
     def capture(
         self,
@@ -92,12 +92,12 @@ class Context:
         scanlines: Sequence[Scanline],
         scene: str | None = None,
     ) -> Finding:
-        """Take a pair of frames with `laser_ids` lit and all off, store it, and find the spots in it.
+        """Take a pair of frames with `laser_ids` on and all lasers off, store it, and find its spots.
 
-        A capture with a scene belongs to a trial, one without to the calibration.
+        A capture with a scene belongs to a trial, one without a scene to the calibration.
 
         Raises:
-            StoppedError: a stop was asked for.
+            StoppedError: a stop was requested.
             LaserOffNotConfirmedError: a beam stays on.
         """
         self.begin(key)
@@ -105,16 +105,16 @@ class Context:
         self.emit(taken)
         finding = find_spots(on, off, scanlines=scanlines, expected=len(laser_ids))
         self.emit(spots_found(key, finding, laser_ids))
-        self.pairs.look_at_dark(key, off, finding, scanlines)
+        self.pairs.check_dark(key, off, finding, scanlines)
         self.captures.append(taken)
         self.findings[key] = finding
         return finding
 
     def capture_room_light(self, key: str, placement: Placement, repeat: int) -> Image:
-        """Take a frame of the board with no laser lit, and store it.
+        """Take a frame of the board with all lasers off, and store it.
 
         Raises:
-            StoppedError: a stop was asked for.
+            StoppedError: a stop was requested.
         """
         self.begin(key)
         image, taken = self.pairs.room_light(key, placement, repeat)
@@ -123,10 +123,10 @@ class Context:
         return image
 
     def warm_up(self, key: str, frames: int) -> None:
-        """Have the camera take so many frames, with the lasers off.
+        """Take a number of frames with the lasers off, without storing them.
 
         Raises:
-            StoppedError: a stop was asked for.
+            StoppedError: a stop was requested.
         """
         self.bench.lasers.all_off()
         for _ in range(frames):
@@ -134,14 +134,16 @@ class Context:
             self.bench.camera.grab()
 
     def measure_latency(self, key: str, most_frames: int) -> int:
-        """Count the frames from a laser's switching on to the first that shows it, and have them discarded.
+        """Measure the camera's latency in frames, and set the camera to discard as many.
 
         Raises:
-            RigNotReadyError: the camera cannot tell, or none of `most_frames` shows the laser.
+            RigNotReadyError: the camera has no readable stream, or no frame of `most_frames` shows the laser.
         """
         camera = self.bench.camera
         if not isinstance(camera, StreamingCamera):
-            raise RigNotReadyError("camera: expected one whose stream can be read frame by frame")
+            raise RigNotReadyError(
+                "camera: expected a driver with a readable stream; remove the measure_latency step"
+            )
         frames = self.recorder.latency
         if frames is None:
             self.confirm_safety()
@@ -152,21 +154,21 @@ class Context:
         return frames
 
     def check_stop(self) -> None:
-        """End here if a stop was asked for.
+        """Raise an error if a stop was requested.
 
         Raises:
-            StoppedError: it was.
+            StoppedError: a stop was requested.
         """
         if (reason := self.stopping()) is not None:
             raise StoppedError(reason)
 
     def begin(self, key: str) -> None:
-        """Name the capture about to be taken, unless a stop was asked for; the error of `check_stop`."""
+        """Mark the beginning of a capture on the bench; raises the error of `check_stop`."""
         self.check_stop()
         self.bench.mark(key)
 
     def ask_now(self, prompt: Prompt) -> Answer:
-        """The operator's answer, whatever was answered before; the errors of `ask`."""
+        """Answer of the operator, asked even in a replay; raises the errors of `ask`."""
         self.bench.lasers.all_off()
         answer = self.operator.ask(prompt)
         self.check_stop()
@@ -175,7 +177,7 @@ class Context:
         return answer
 
     def forget(self, key: str) -> None:
-        """Drop what was captured at a placement: it is captured again, or left out."""
+        """Drop all captures at a placement that is captured again or skipped."""
         self.recorder.forget(key)
         self.boards.pop(key, None)
         for capture in [c for c in self.captures if c.placement_key == key]:

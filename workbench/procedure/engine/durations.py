@@ -29,34 +29,34 @@ LOADED = frozenset({"exposing_s", "capture_s", "finishing_s"})
 
 @dataclass(frozen=True)
 class StepDurations:
-    """Mean durations; those of a person without pauses of `LONG_PAUSE_FACTOR` times the median."""
+    """Mean durations; durations of a person exclude pauses longer than `LONG_PAUSE_FACTOR` medians."""
 
     placing_s: float = 60.0
     """From the end of one placement to the target being placed at the next."""
     exposing_s: float = 3.0
-    """Setting the exposure for a placement."""
+    """Setting the exposure at a placement."""
     capture_s: float = 1.0
-    """One capture, with storing it, finding its spots and working out a range."""
+    """One capture, including storage, search for spots and ranging."""
     finishing_s: float = 1.0
     """From a placement's last capture to its end: limits, advice."""
     lit_s: float | None = None
-    """Emission of one capture."""
+    """Emission of one capture; None if not measured."""
     without_captures_s: Mapping[str, float] = field(default_factory=dict)
-    """Steps without captures, by their titles."""
+    """Durations of steps without captures, by title."""
     sessions: int = 0
-    """Number that they were learned from; 0: defaults."""
+    """Number of sessions that the durations were learned from; 0: defaults."""
 
     def seconds(self, step: PlannedStep) -> float:
-        """How long the step will take."""
+        """Expected duration of a step."""
         if step.captures:
             each = self.placing_s + self.exposing_s + self.finishing_s
             return step.placements * each + step.captures * self.capture_s
-        guess_s = step.placements * self.placing_s if step.placements else step.default_duration_s
-        return self.without_captures_s.get(step.title, guess_s)
+        default_s = step.placements * self.placing_s if step.placements else step.default_duration_s
+        return self.without_captures_s.get(step.title, default_s)
 
 
 def learn_durations(sessions: Path, rig: str) -> StepDurations:
-    """Durations of the latest sessions of `rig`; defaults where there are none."""
+    """Durations of the latest sessions of `rig`; defaults if there are none."""
     meter = DurationMeter()
     used = 0
     for manifest in sorted(sessions.glob(f"*/{MANIFEST}"), reverse=True):
@@ -74,36 +74,36 @@ def learn_durations(sessions: Path, rig: str) -> StepDurations:
 
 
 class DurationMeter:
-    """Measures durations between records that follow one another."""
+    """Measures durations between consecutive records."""
 
     def __init__(self) -> None:
         self._measured: dict[str, list[float]] = defaultdict(list)
         self._loading: dict[str, float] = {}
-        """The first of each of `LOADED`, which tells of the others only where it is all that there is."""
+        """First occurrence of each of `LOADED`, used only until there is another one."""
         self._fresh = set(LOADED)
-        """Of which the first is still to come."""
+        """Names whose first occurrence is still to come."""
         self._steps: dict[str, list[float]] = defaultdict(list)
-        """Steps without captures, by their titles."""
+        """Durations of steps without captures, by title."""
         self._title: str | None = None
-        """Of such a step, while nothing but time has gone by in it."""
+        """Title of the present step, as long as it has no captures."""
         self._since: ev.Record | None = None
 
     def durations(self, otherwise: StepDurations) -> StepDurations:
-        """Measured durations, weighted with `otherwise` where those were learned; the rest is `otherwise`."""
-        worth = PRIOR_WEIGHT if otherwise.sessions else 0
+        """Measured durations, averaged with `otherwise` if those were learned; `otherwise` for the rest."""
+        prior_weight = PRIOR_WEIGHT if otherwise.sessions else 0
         measured: dict[str, Any] = dict(self._loading)
         for name, values in self._measured.items():
-            usual = _usual(values) if name == "placing_s" else fmean(values)
-            before = getattr(otherwise, name)
-            weight = 0 if before is None else worth
-            measured[name] = (len(values) * usual + weight * (before or 0.0)) / (len(values) + weight)
+            mean = _mean_without_pauses(values) if name == "placing_s" else fmean(values)
+            prior = getattr(otherwise, name)
+            weight = 0 if prior is None else prior_weight
+            measured[name] = (len(values) * mean + weight * (prior or 0.0)) / (len(values) + weight)
         steps = {title: fmean(values) for title, values in self._steps.items()}
-        # A session that captures without setting an exposure has a camera whose exposure is fixed.
+        # Captures without an exposure event mean that the camera's exposure is fixed.
         measured |= {"exposing_s": 0.0} if "capture_s" in measured and "exposing_s" not in measured else {}
         return replace(otherwise, **measured, without_captures_s={**otherwise.without_captures_s, **steps})
 
     def take(self, record: ev.Record) -> None:
-        """Take the time of a record; what an interruption cut short is not counted."""
+        """Measure the time of a record; durations cut short by an interruption are not counted."""
         match record.event:
             case ev.SessionStarted() | ev.SessionResumed():
                 self._fresh = set(LOADED)
@@ -113,7 +113,7 @@ class DurationMeter:
             case ev.StepStarted() as e:
                 self._since, self._title = record, e.title
             case ev.Answered() as e if self._title is None or e.key == SAFETY or e.answer.action == "skip":
-                self._since = record  # not a step's own question: what comes begins only now
+                self._since = record  # not the step's own question: the next duration starts here
             case ev.TargetPlaced():
                 self._note("placing_s", record)
                 self._title = None
@@ -123,7 +123,7 @@ class DurationMeter:
                 self._title = None
                 if e.lit_s is not None:
                     self._measured["lit_s"].append(e.lit_s)
-                if e.laser_id == BOARD:  # no spots are looked for
+                if e.laser_id == BOARD:  # no search for spots follows
                     self._note("capture_s", record)
             case ev.SpotsFound():
                 self._note("capture_s", record)
@@ -139,7 +139,7 @@ class DurationMeter:
                 pass
 
     def _note(self, name: str, end: ev.Record) -> None:
-        """Count the time since the last record as one duration of `name`."""
+        """Record the time since the last record as one duration of `name`."""
         if self._since is not None:
             took = _seconds(self._since, end)
             if name in self._fresh:
@@ -150,8 +150,8 @@ class DurationMeter:
         self._since = end
 
 
-def _usual(values: Sequence[float]) -> float:
-    """Mean without long pauses: sums of it are to be right, and a person may take a break."""
+def _mean_without_pauses(values: Sequence[float]) -> float:
+    """Mean of the values up to `LONG_PAUSE_FACTOR` medians. A median would bias the sum over placements."""
     most = LONG_PAUSE_FACTOR * median(values)
     return fmean(value for value in values if value <= most)
 

@@ -1,4 +1,4 @@
-"""Captures of single lasers at one placement."""
+"""Captures of each laser alone at one placement."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from workbench.procedure.engine.context import Context
 
 
 def capture_lasers(context: Context, placement: Placement, repeats: int) -> int:
-    """Fire each laser alone, `repeats` pairs of frames each; returns the number of pairs.
+    """Take `repeats` pairs of frames of each laser alone; returns the number of pairs.
 
     Raises:
         StoppedError, LaserOffNotConfirmedError: see `Context.capture`.

@@ -1,4 +1,4 @@
-"""Holding measured quantities against a procedure's limits, and what follows where one fails."""
+"""Comparison of measured quantities with a procedure's limits, and the reaction to a failure."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from workbench.procedure.engine.placements import RetakeError, settle
 from workbench.procedure.engine.prompts import captures_prompt
 
 Limits = TypeVar("Limits", bound=FileModel)
+CONTINUE = "Continue nevertheless?"
 RETRIES = 2
-"""`on_fail: retry` captures a placement again so often in a session before it stops."""
+"""Number of times that `on_fail: retry` captures a placement again in a session."""
 
 
 def capture_limit_prompts(placements: Sequence[Placement], rig: Rig, limits: CaptureLimits) -> list[Prompt]:
-    """Prompts that limits with `on_fail: ask` may put, of each laser at each placement."""
+    """Possible prompts of limits with `on_fail: ask`, for each laser at each placement."""
     return [
         captures_prompt(f"{placement.key}/{laser_id}/{name}", name, placement)
         for placement in placements
@@ -33,63 +34,63 @@ def capture_limit_prompts(placements: Sequence[Placement], rig: Rig, limits: Cap
 
 
 def fit_limit_prompts(step: str, limits: FileModel) -> list[Prompt]:
-    """Prompts that limits with `on_fail: ask` may put about a fit."""
-    return [Prompt(f"{step}/{name}", "Go on all the same?") for name in _asking(limits)]
+    """Possible prompts of limits on a fit with `on_fail: ask`."""
+    return [Prompt(f"{step}/{name}", CONTINUE) for name in _asking(limits)]
 
 
 def refuse_retry(limits: Limits) -> Limits:
-    """Validate limits on a fit: the same captures give the same fit again.
+    """Validate limits on a fit, which would be the same after a retry.
 
     Raises:
-        ValueError: one has `on_fail: retry`.
+        ValueError: a limit has `on_fail: retry`.
     """
     for name, limit in _stated(limits):
         if limit.on_fail == "retry":
-            raise ValueError(f"{name}: on_fail: retry would give the same fit again; expected ask or stop")
+            raise ValueError(f"{name}: on_fail: expected ask or stop, got retry; a retry gives the same fit")
     return limits
 
 
 def check_captures(context: Context, step: str, placement: Placement, limits: CaptureLimits) -> None:
-    """Hold what each laser gave at a placement against the limits.
+    """Compare the captures of each laser at a placement with limits.
 
     Args:
-        context: the session; its operator is asked where a limit says so.
+        context: session; its operator is asked if a limit has `on_fail: ask`.
         step: name of the step.
-        placement: where the captures were taken.
-        limits: of the step.
+        placement: placement of the captures.
+        limits: limits of the step.
 
     Raises:
-        RetakeError: the placement is to be captured again.
-        LimitFailedError: a limit failed, and the session ends.
+        RetakeError: the placement must be captured again.
+        LimitFailedError: a limit failed and ends the session.
     """
     for laser_id in context.rig.laser_ids:
         keys = [c.key for c in context.captures if (c.placement_key, c.laser_id) == (placement.key, laser_id)]
         found = [context.findings[key].spots for key in keys]
         quality = quality_of(found)
-        unseen, answered = quality.u_px is None, False
+        missing, answered = quality.u_px is None, False
         for name, limit in _stated(limits):
             of = f"{placement.key}/{laser_id}"
             why = why_not_measured(name, laser_id, [len(spots) for spots in found])
             failed = _check(context, step, of, name, getattr(quality, name), limit, f"none: {why}")
-            if failed is None or (unseen and answered and limit.on_fail == "ask"):
-                continue  # a spot that is not there is asked about once
+            if failed is None or (missing and answered and limit.on_fail == "ask"):
+                continue  # a missing spot fails several limits: ask once
             if limit.on_fail == "retry" and context.recorder.retries(placement.key) < RETRIES:
                 raise RetakeError(failed, by_limit=True)
-            where = _expected_position(context, laser_id, placement) if unseen else ""
+            where = _expected_position(context, laser_id, placement) if missing else ""
             if limit.on_fail != "ask":
-                raise LimitFailedError(f"{failed}. {where}" if unseen else failed)
+                raise LimitFailedError(f"{failed}. {where}" if missing else failed)
             shown = f"{why} at {placement.standoff_mm:g} mm ({name}: expected {limit.describe()})"
-            question = captures_prompt(f"{of}/{name}", shown if unseen else failed, placement, where)
+            question = captures_prompt(f"{of}/{name}", shown if missing else failed, placement, where)
             settle(context, question, failed)
             answered = True
 
 
 def check_fit(context: Context, step: str, values: Mapping[str, float], limits: FileModel) -> str:
-    """Hold what is known of a fit against limits of the same names; returns how it went.
+    """Compare quantities of a fit with the limits of the same names; returns a summary.
 
     Raises:
-        LimitFailedError: a limit failed, and the session ends.
-        StoppedError: the operator, asked about it, stops.
+        LimitFailedError: a limit failed and ends the session.
+        StoppedError: the operator aborts at a failed limit.
     """
     remarks = []
     for name, limit in _stated(limits):
@@ -98,9 +99,7 @@ def check_fit(context: Context, step: str, values: Mapping[str, float], limits: 
             continue
         if limit.on_fail == "stop":
             raise LimitFailedError(failed)
-        context.ask(
-            Prompt(f"{step}/{name}", f"{failed}. Go on all the same?", otherwise="Abort, and say why.")
-        )
+        context.ask(Prompt(f"{step}/{name}", f"{failed}. {CONTINUE}", otherwise="Abort with a reason."))
         remarks.append(failed)
     return "; ".join(remarks) or "within the limits"
 
@@ -114,15 +113,15 @@ def _check(
     limit: Limit,
     otherwise: str = "",
 ) -> str | None:
-    """Journal the verdict; what failed, in words, `otherwise` where nothing was measured."""
+    """Journal the verdict; returns a description of a failure, with `otherwise` for a missing value."""
     verdict = limit.judge(value)
     context.emit(
         ev.LimitChecked(
             step=step, of=of, quantity=quantity, value=value, limit=limit.describe(), verdict=verdict
         )
     )
-    came = otherwise if value is None else f"{value:.4g}"
-    return f"{of}: {quantity}: expected {limit.describe()}, got {came}" if verdict == "fail" else None
+    got = otherwise if value is None else f"{value:.4g}"
+    return f"{of}: {quantity}: expected {limit.describe()}, got {got}" if verdict == "fail" else None
 
 
 def _asking(limits: FileModel) -> Iterator[str]:
@@ -134,17 +133,23 @@ def _stated(limits: FileModel) -> Iterator[tuple[str, Limit]]:
 
 
 def why_not_measured(quantity: str, laser_id: str, spots: Sequence[int]) -> str:
-    """Why a quantity could not be measured, where each capture of a laser shows so many `spots`."""
+    """Reason why a quantity could not be measured.
+
+    Args:
+        quantity: name of the quantity.
+        laser_id: laser of the captures.
+        spots: number of spots in each capture.
+    """
     captures = "1 capture" if len(spots) == 1 else f"{len(spots)} captures"
     if 1 in spots:
-        return f"{quantity} takes a spot of {laser_id} in two captures or more"
+        return f"{quantity} requires a spot of {laser_id} in at least two captures"
     if any(spots):
-        return f"{laser_id} cannot be told among up to {max(spots)} spots in {captures}"
+        return f"{laser_id} is ambiguous among up to {max(spots)} spots in {captures}"
     return f"no spot of {laser_id} was found in {captures}"
 
 
 def _expected_position(context: Context, laser_id: str, placement: Placement) -> str:
-    # Imports the solver, which a file that is only checked does not need.
+    # Imported here: checking a file must not import the solver.
     from workbench.procedure.engine.observed import expected_position_text
 
     return expected_position_text(context, laser_id, placement)

@@ -1,4 +1,4 @@
-"""Observations of a running session for a fit, and where a spot that was not found is expected."""
+"""Observations of a running session, and the expected position of a missing spot."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from workbench.procedure.engine.context import Context
 
 
 def observe_capture(context: Context, capture: ev.CaptureTaken) -> Observation | Rejected:
-    """The one spot of a capture of a laser alone, or why there is none."""
+    """Observation from a capture of one laser, or the reason why there is none."""
     laser = context.rig.lasers[context.rig.laser_ids.index(capture.laser_id)]
     observation = Observation(
         source=capture.on.path,
@@ -32,7 +32,7 @@ def observe_capture(context: Context, capture: ev.CaptureTaken) -> Observation |
 
 
 def observed_so_far(context: Context) -> list[Observation]:
-    """Every spot of the calibration seen so far on a flat target, not on the board."""
+    """Observations of the calibration so far on a flat target (not on the board)."""
     found = [
         observe_capture(context, capture)
         for capture in context.captures
@@ -44,20 +44,20 @@ def observed_so_far(context: Context) -> list[Observation]:
 
 
 def expected_position_text(context: Context, laser_id: str, placement: Placement) -> str:
-    """By the rig file and by what was seen so far, of a square flat target; what that means."""
+    """Expected position of a spot on a square flat target, from the rig file and the observations so far."""
     where = expected_spot(context.rig, observed_so_far(context), laser_id, placement.standoff_mm)
-    return in_words(context.rig, laser_id, where)
+    return expected_spot_text(context.rig, laser_id, where)
 
 
-def in_words(rig: Rig, laser_id: str, where: ExpectedSpot) -> str:
-    """For the person at the bench."""
-    picture = f"the picture of {rig.camera.width_px} x {rig.camera.height_px}"
-    told = {
-        "outside": f"outside {picture}: {laser_id} cannot be seen here, and nothing is wrong.",
-        "at the edge": f"at the edge of {picture}: if it is outside, nothing is wrong.",
-        "inside": f"inside {picture}: is {laser_id} lit, and does its beam reach the target?",
+def expected_spot_text(rig: Rig, laser_id: str, where: ExpectedSpot) -> str:
+    """Text of an expected position, with advice for the person at the bench."""
+    picture = f"the picture of {rig.camera.width_px} x {rig.camera.height_px} pixels"
+    advice = {
+        "outside": f"outside {picture}: {laser_id} cannot be seen at this standoff.",
+        "at the edge": f"at the edge of {picture}: {laser_id} may not be visible at this standoff.",
+        "inside": f"inside {picture}: check that {laser_id} is on and that its beam hits the target.",
     }
     return (
-        f"By what is known so far, its spot is at u = {where.u_px:.0f} +- {where.u_sd_px:.0f},"
-        f" v = {where.v_px:.0f} +- {where.v_sd_px:.0f} px (1 sigma), {told[where.place]}"
+        f"Its spot is expected at u = {where.u_px:.0f} +- {where.u_sd_px:.0f},"
+        f" v = {where.v_px:.0f} +- {where.v_sd_px:.0f} px (1 sigma), {advice[where.place]}"
     )

@@ -1,4 +1,4 @@
-"""Who answers a procedure's questions: see also the person in `cli` and the emulated bench."""
+"""Operators that answer prompts from a file or not at all; `cli` and `emulator` have further ones."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from workbench.model.prompt import Answer, Prompt, Quantity
 from workbench.model.yamlfile import Mistake, kind_of, line_of, read_document, refuse
 
 GIVEN = "true, a number, a choice, or {action: skip, reason: ...}"
+"""Accepted forms of an answer in an answers file."""
 
 
 def _in_full(given: object) -> object:
-    """An answer as a mapping, where it was given as a number, a choice or `true`."""
+    """Mapping of an answer that is given as a number, a choice or `true`."""
     if isinstance(given, dict | Answer):
         return given
     if given is True:
@@ -31,71 +32,71 @@ def _in_full(given: object) -> object:
 
 
 class _Answers(RootModel[dict[str, Annotated[Answer, BeforeValidator(_in_full)]]]):
-    """An answers file: prompt keys, each with a number, a choice, `true`, or an answer in full."""
+    """Answers file: prompt keys, each with a number, a choice, `true`, or a mapping."""
 
 
 @dataclass(frozen=True)
 class NoOperator:
-    """No terminal, or nobody at it: every question stays open."""
+    """Absent operator: every prompt stays open."""
 
     why: str
 
     def ask(self, prompt: Prompt) -> Answer:
-        """Raise.
+        """Refuse a prompt.
 
         Raises:
             AnswerNeededError: always.
         """
         raise AnswerNeededError(
-            f"prompt {prompt.key}: {prompt.do} -- nobody answers: {self.why}; run it at a terminal"
-            + ("" if prompt.at_bench else f", or give --answers a file with `{prompt.key}: ...`")
+            f"prompt {prompt.key}: {prompt.do} -- no operator: {self.why}; run the command at a terminal"
+            + ("" if prompt.at_bench else f", or use --answers with a file that contains `{prompt.key}: ...`")
         )
 
 
 @dataclass(frozen=True)
 class ScriptedOperator:
-    """Answers out of a file; what the file does not answer goes to `other`."""
+    """Operator that answers from a file and passes other prompts on to `other`."""
 
     path: Path
     answers: dict[str, Answer]
     other: Operator
     at_bench: bool = False
-    """Whether nobody can be hurt: on a virtual bench the file may say where the target stands."""
+    """Whether the file may answer prompts that need a person at the bench, as on a virtual bench."""
 
     @classmethod
-    def load(cls, path: Path, foreseen: Mapping[str, Prompt], other: Operator) -> ScriptedOperator:
-        """Read the file, and hold it against the prompts that may come.
+    def load(cls, path: Path, prompts: Mapping[str, Prompt], other: Operator) -> ScriptedOperator:
+        """Read an answers file and check it against the possible prompts.
 
         Raises:
-            BadInputError: it cannot be read, answers what nobody asks, or with what does not fit; one line
-                for each mistake, with file and line.
+            BadInputError: the file cannot be read, or contains answers to unknown prompts or answers that are
+                not valid; one line for each mistake, with file and line.
         """
         document = read_document(path)
         if not isinstance(document.data, dict) or "steps" in document.data or "rig" in document.data:
-            came = kind_of(document.data)
-            raise BadInputError(f"{path}:1: expected answers to prompts by their keys, got {came}")
-        strangers = {line_of(document.data, (key,)) for key in document.data if key not in foreseen}
-        malformed = [one for one in document.mistakes(_Answers) if one.line not in strangers]
+            got = kind_of(document.data)
+            raise BadInputError(f"{path}:1: expected answers to prompts by their keys, got {got}")
+        unknown = {line_of(document.data, (key,)) for key in document.data if key not in prompts}
+        malformed = [one for one in document.mistakes(_Answers) if one.line not in unknown]
         mistakes = [*document.doubled, *malformed]
         answers: dict[str, Answer] = {}
         for key, given in document.data.items():
-            if key not in foreseen:
-                wrong: str | None = f"nothing of this name is asked; {one_of(str(key), list(foreseen))}"
+            if key not in prompts:
+                wrong: str | None = f"no such prompt; {one_of(str(key), list(prompts))}"
             elif (answer := _read(key, given)) is None:
                 continue
             else:
-                answers[key] = _fitted(foreseen[key], answer)
-                wrong = _refuse(foreseen[key], answers[key])
+                answers[key] = _fitted(prompts[key], answer)
+                wrong = _refuse(prompts[key], answers[key])
             if wrong is not None:
                 mistakes.append(Mistake(line_of(document.data, (key,)), f"{key}: {wrong}"))
         refuse(path, mistakes)
         return cls(path, answers, other)
 
     def ask(self, prompt: Prompt) -> Answer:
-        """The file's answer.
+        """Answer from the file, else from `other`.
 
         Raises:
-            AnswerNeededError: as `other` does.
+            AnswerNeededError: neither has an answer.
         """
         if prompt.key in self.answers and (self.at_bench or not prompt.at_bench):
             return self.answers[prompt.key]
@@ -103,15 +104,15 @@ class ScriptedOperator:
             return self.other.ask(prompt)
         except AnswerNeededError as error:
             why = (
-                f"{self.path} answers it, but on a real rig only somebody at the bench can"
+                f"the answer in {self.path} is not used: on a real rig a person at the bench must answer"
                 if prompt.key in self.answers
-                else f"{self.path} has no answer to it"
+                else f"{self.path} has no answer to this prompt"
             )
             raise AnswerNeededError(f"{error}; {why}") from None
 
 
 def _read(key: str, given: object) -> Answer | None:
-    """One answer; None where it is none, which the file's schema has told."""
+    """One answer; None for a malformed one, which the check against the schema reports."""
     try:
         answer = _Answers.model_validate({key: given}).root[key]
     except ValidationError:
@@ -120,7 +121,7 @@ def _read(key: str, given: object) -> Answer | None:
 
 
 def _fitted(prompt: Prompt, answer: Answer) -> Answer:
-    """The answer as a person's would be taken: `yes` confirms, `true` says as asked, 21.5 C is a number."""
+    """Answer converted like typed input: `yes` confirms, `true` is the default value, `21.5 C` a number."""
     value: float | str | None = answer.value
     if answer.action != "done":
         return answer
@@ -144,12 +145,12 @@ def _number(value: float | str | None, quantity: Quantity) -> float | str | None
 
 def _refuse(prompt: Prompt, answer: Answer) -> str | None:
     if answer.action == "redo":
-        return "expected an answer, got redo: asked again, the file would say it again, without end"
+        return "expected an answer, got redo: repeated from a file it would never end"
     return prompt.refuse(answer)
 
 
 def operator_of_bench(bench: Bench, given: Operator) -> Operator:
-    """The bench's own operator where it has one, but an answers file comes first."""
+    """Operator for a bench: an answers file first, then the bench's own operator, else the given one."""
     if bench.operator is None:
         return given
     return (

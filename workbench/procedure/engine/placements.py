@@ -1,4 +1,4 @@
-"""Placements of the target, one after the other: asked for, worked at, repeated, left out, or served."""
+"""Placements of the target, one after the other: captured, captured again, skipped, or replayed."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ T = TypeVar("T")
 
 
 class RetakeError(Exception):
-    """What was captured at the present placement is to be captured again; says why."""
+    """Request to capture the present placement again; the text is the reason."""
 
     def __init__(self, why: str, by_limit: bool = False) -> None:
         super().__init__(why)
         self.by_limit = by_limit
-        """Nobody was asked."""
+        """Whether a limit with `on_fail: retry` is the cause, not the operator."""
 
 
-class _ServedAgainError(Exception):
-    """What a resumed session had on disk of the present placement is to be captured again."""
+class _RetakeReplayedError(Exception):
+    """Request to capture a replayed placement again, for which the target must be placed first."""
 
 
-class _LeftOutError(Exception):
-    """The present placement is to be left out."""
+class _SkipError(Exception):
+    """Request to skip the present placement."""
 
     def __init__(self, answer: Answer) -> None:
         super().__init__()
@@ -39,20 +39,20 @@ class _LeftOutError(Exception):
 def visit_placements(
     context: Context, placements: Sequence[Placement], work: Callable[[Placement], T], *, lights: bool = True
 ) -> list[T]:
-    """Have the target placed at one placement after the other, and do the `work` at each.
+    """Ask for the target at one placement after the other and do the `work` at each.
 
-    The operator may skip one, or have the one before captured again. What is done at a placement is a
-    group: a resumed session serves whole ones from disk, and repeats the one that was under way.
+    The operator may skip a placement or request the previous one again. A resumed session replays complete
+    placements from disk and repeats the one that was under way.
 
     Args:
-        context: the session.
-        placements: where the target is to stand; their keys differ.
-        work: gets the placement as measured; takes every capture under its key.
-        lights: whether it captures spots, and so needs the exposure set for them.
+        context: session.
+        placements: placements of the target, with distinct keys.
+        work: called with the placement as measured; must take its captures under the placement's key.
+        lights: whether the work captures spots, so that the exposure must be set before.
 
     Returns:
-        What `work` returned, for the placements that were not skipped. Where results are grouped, `work`
-        returns the placement's key with them: its standoff is as measured.
+        Results of `work` for the placements that were not skipped. A placement's standoff is as measured, so
+        results that are grouped by placement should contain its key.
 
     Raises:
         AnswerNeededError, StoppedError, LaserOffNotConfirmedError: see `Context.ask`.
@@ -64,7 +64,7 @@ def visit_placements(
     while index < len(placements):
         asked = placements[index]
         before = placements[index - 1] if index and placements[index - 1].key in began else None
-        context.pairs.served = context.recorder.group(asked.key)
+        context.pairs.replayed = context.recorder.complete_placement(asked.key)
         answer = _place_answer(context, asked, before)
         if answer.action == "redo" and before is not None:
             _set_aside(context, before.key, began.pop(before.key), answer.reason or "")
@@ -73,45 +73,45 @@ def visit_placements(
             continue
         index += 1
         if answer.action == "skip":
-            _tell_skipped(context, asked, answer)
+            _journal_skip(context, asked, answer)
             continue
         record, placed = _place(context, asked, answer)
         began[asked.key] = record.n
         try:
             results[asked.key] = _work(context, work, placed, record.n, answer)
-        except _ServedAgainError:  # the target is not known to stand there, nor the beams to be free
+        except _RetakeReplayedError:  # neither the target's position nor a free beam path is known
             del began[asked.key]
             index -= 1
-        except _LeftOutError as left_out:
+        except _SkipError as skip:
             del began[asked.key]
-            _tell_skipped(context, asked, left_out.answer)
+            _journal_skip(context, asked, skip.answer)
         else:
-            context.pairs.look_for_stuck_beam(asked.key)
+            context.pairs.check_stuck_beam(asked.key)
             context.emit(ev.PlacementFinished(key=asked.key))
-        context.pairs.served = None
+        context.pairs.replayed = None
     return list(results.values())
 
 
 def _work(
     context: Context, work: Callable[[Placement], T], placed: Placement, from_n: int, answer: Answer
 ) -> T:
-    """Do the work at a placement, again where it asks for that."""
+    """Call the work at a placement, again if it requests that."""
     while True:
         try:
             return work(placed)
         except RetakeError as again:
             _set_aside(context, placed.key, from_n, str(again), retry=again.by_limit)
-            if context.pairs.served is not None:
-                raise _ServedAgainError from again
+            if context.pairs.replayed is not None:
+                raise _RetakeReplayedError from again
             FrameStore(context.session_dir).set_aside(placed.key)
             from_n = context.emit(ev.TargetPlaced(placement=placed, by=answer.by)).n
-        except _LeftOutError as left_out:
-            _set_aside(context, placed.key, from_n, left_out.answer.reason or "", left_out=True)
+        except _SkipError as skip:
+            _set_aside(context, placed.key, from_n, skip.answer.reason or "", left_out=True)
             raise
 
 
 def _exposed(context: Context, work: Callable[[Placement], T]) -> Callable[[Placement], T]:
-    """The work with the camera's exposure set before it."""
+    """Work preceded by setting the camera's exposure."""
 
     def do(placed: Placement) -> T:
         if (found := context.pairs.set_exposure(placed.key, context.begin)) is not None:
@@ -121,12 +121,12 @@ def _exposed(context: Context, work: Callable[[Placement], T]) -> Callable[[Plac
     return do
 
 
-def _tell_skipped(context: Context, asked: Placement, answer: Answer) -> None:
+def _journal_skip(context: Context, asked: Placement, answer: Answer) -> None:
     context.emit(ev.Answered(key=asked.key, question=f"{asked.standoff_mm:g} mm", answer=answer))
 
 
 def _place_answer(context: Context, asked: Placement, before: Placement | None) -> Answer:
-    if context.pairs.served is not None:
+    if context.pairs.replayed is not None:
         return Answer()
     known = context.recorder.answer(asked.key)
     if known is not None and known.action == "skip":
@@ -136,9 +136,9 @@ def _place_answer(context: Context, asked: Placement, before: Placement | None) 
 
 
 def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Record, Placement]:
-    """The target stands; what stood in frames of an earlier try is moved aside."""
-    if context.pairs.served is not None:
-        return context.emit(context.pairs.served.placed), context.pairs.served.placed.placement
+    """Place the target and journal it; frames of an earlier attempt are moved aside."""
+    if context.pairs.replayed is not None:
+        return context.emit(context.pairs.replayed.placed), context.pairs.replayed.placed.placement
     FrameStore(context.session_dir).set_aside(asked.key)
     measured = answer.value if isinstance(answer.value, float) else asked.standoff_mm
     placed = context.bench.target.place(asked.model_copy(update={"standoff_mm": measured}))
@@ -148,21 +148,21 @@ def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Recor
 def _set_aside(
     context: Context, key: str, from_n: int, reason: str, *, retry: bool = False, left_out: bool = False
 ) -> None:
-    """Forget what was captured at a placement; its frames are kept, moved aside when it is repeated."""
+    """Make the records of a placement void; its frames are kept, and moved aside by the next attempt."""
     context.emit(ev.SetAside(key=key, from_n=from_n, reason=reason, retry=retry, left_out=left_out))
     context.forget(key)
 
 
 def settle(context: Context, prompt: Prompt, failed: str) -> None:
-    """Ask what to do about a limit that failed at the present placement; returns where it is kept.
+    """Ask what to do about a failed limit at the present placement; returns if its captures are kept.
 
     Raises:
-        RetakeError: it is to be captured again.
+        RetakeError: the placement must be captured again.
         AnswerNeededError, StoppedError, LaserOffNotConfirmedError: see `Context.ask`.
     """
     answer = context.recorder.answer(prompt.key) or context.ask_now(prompt)
     if answer.action == "redo":
         raise RetakeError(f"{failed}: {answer.reason}")
     if answer.action == "skip":
-        raise _LeftOutError(answer)
+        raise _SkipError(answer)
     context.emit(ev.Answered(key=prompt.key, question=prompt.do, answer=answer))

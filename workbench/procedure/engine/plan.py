@@ -1,4 +1,4 @@
-"""What is about to run, read and checked before anything is switched on: files, steps, prompts."""
+"""Plan of a session: files, steps and prompts, read and checked before the bench is opened."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from workbench.procedure.engine.prompts import safety_prompt
 
 @dataclass(frozen=True)
 class PlannedStep:
-    """One step of a procedure."""
+    """Step of a procedure with its numbers of placements and captures."""
 
     procedure: str
     index: int
@@ -25,12 +25,12 @@ class PlannedStep:
     placements: int
     captures: int
     default_duration_s: float = 10.0
-    """Where it takes no captures, and no session has measured it."""
+    """Duration without captures, if no session has measured it."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A rig and the procedures that run on it in one session."""
+    """Rig, and the procedures that run on it in one session."""
 
     rig: Rig
     rig_path: Path
@@ -39,10 +39,10 @@ class Plan:
 
     @classmethod
     def load(cls, rig_path: Path, procedure_paths: Sequence[Path]) -> Plan:
-        """Read the files.
+        """Read and check the files.
 
         Raises:
-            BadInputError: one of them is wrong.
+            BadInputError: a file is wrong.
         """
         procedures = tuple(load_procedure(path) for path in procedure_paths)
         return cls.of(load_bench_rig(rig_path), rig_path, procedures, procedure_paths)
@@ -51,16 +51,18 @@ class Plan:
     def of(
         cls, rig: Rig, rig_path: Path, procedures: Sequence[Procedure], procedure_paths: Sequence[Path]
     ) -> Plan:
-        """Check what was read.
+        """Check a rig and procedures.
 
         Raises:
-            BadInputError: steps do not find what they need, two procedures have one name, no such driver.
+            BadInputError: a step lacks what it needs, two procedures have the same name, or the driver is
+                unknown.
         """
         names = [p.procedure for p in procedures]
         for path, name in zip(procedure_paths, names, strict=True):
             if names.count(name) > 1:
                 raise BadInputError(
-                    f"{path}: procedure: expected a name that no other procedure of this call has, got {name}"
+                    f"{path}: procedure: expected distinct names of procedures in one command, got {name}"
+                    " more than once"
                 )
         _check_order(procedures, procedure_paths)
         _check_placements(rig, procedures, procedure_paths)
@@ -68,7 +70,7 @@ class Plan:
         return cls(rig, rig_path, tuple(procedures), tuple(procedure_paths))
 
     def new_session(self, sessions: Path) -> Path:
-        """A folder name that sorts by time and says what was run; with a number where it is taken."""
+        """Folder of a new session, named by time and first procedure, with a number if it exists."""
         stamp = time.strftime("%Y%m%d-%H%M%S", time.localtime())
         base = sessions / f"{stamp}-{self.procedures[0].procedure}"
         taken = (base.with_name(f"{base.name}-{n}") for n in range(2, 1000))
@@ -90,9 +92,9 @@ class Plan:
         ]
 
     def prompts(self) -> dict[str, Prompt]:
-        """Every prompt that may come, by its key, in order: what an answers file can answer.
+        """Every possible prompt by its key, in order; an answers file may answer these.
 
-        The text of a prompt about a limit is known only when the limit fails; here it names the limit.
+        The final text of a prompt about a limit is known only when the limit fails; here it names the limit.
         """
         found = [safety_prompt(self.rig)]
         for procedure in self.procedures:
@@ -102,25 +104,25 @@ class Plan:
 
 
 def _check_placements(rig: Rig, procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:
-    """Placements of a step have keys that differ: captures are stored and resumed by them."""
+    """Refuse a step with equal placement keys, by which captures are stored and replayed."""
     for path, procedure in zip(paths, procedures, strict=True):
         for index, step in enumerate(procedure.steps, start=1):
             keys = [placement.key for placement in step.placements(procedure.step_name(index), rig)]
             if doubled := [key for key in keys if keys.count(key) > 1]:
                 raise BadInputError(
-                    f"{path}: steps[{index - 1}]: {step.step}: expected placements that differ, got"
+                    f"{path}: steps[{index - 1}]: {step.step}: expected distinct placements, got"
                     f" {doubled[0].rpartition('/')[2]} more than once; take more readings there instead"
                 )
 
 
 def _check_order(procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:
-    """Every step finds what it needs made by an earlier one, of its own or an earlier procedure."""
+    """Refuse a step whose requirement no earlier step of this or an earlier procedure meets."""
     made: set[str | None] = set()
     for path, procedure in zip(paths, procedures, strict=True):
         for index, step in enumerate(procedure.steps):
             if step.needs is not None and step.needs not in made:
                 raise BadInputError(
                     f"{path}: steps[{index}]: {step.step} needs a step before it that gives {step.needs};"
-                    " add one, or give a procedure that has one before this in the same call"
+                    " add one, or name a procedure with such a step before this one in the command"
                 )
             made.add(step.gives)

@@ -1,4 +1,4 @@
-"""The procedure file: a name, a title, and steps of registered kinds."""
+"""Schema of the procedure file: name, title, and steps of registered kinds."""
 
 from __future__ import annotations
 
@@ -8,24 +8,25 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from workbench.model.yamlfile import FileModel, load_yaml_model
-from workbench.procedure.engine.registry import AnyStep, holds_steps
+from workbench.procedure.engine.registry import AnyStep, rebuild_with_new_kinds
 
 
 class Procedure(FileModel):
     """A procedure file, format 1."""
 
-    told_by = "procedure"
+    kind_key = "procedure"
+
     format: Literal[1]
     procedure: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
     title: str
     steps: Annotated[tuple[AnyStep, ...], Field(min_length=1)]
 
     def step_name(self, index: int) -> str:
-        """Name of the step at `index`, from 1: unique in a session."""
+        """Name of the step at `index` (from 1), unique in a session."""
         return f"{self.procedure}.{index}"
 
 
-holds_steps(Procedure)
+rebuild_with_new_kinds(Procedure)
 
 
 def load_procedure(path: Path) -> Procedure:

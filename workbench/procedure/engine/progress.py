@@ -1,4 +1,4 @@
-"""How far a session is, and how long it will still take."""
+"""Progress of a session: placements done, and estimate of the time left."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from workbench.procedure.engine.plan import PlannedStep
 
 
 class TimeLeft:
-    """By the pace of this session as far as it goes, by that of others for the rest."""
+    """Estimate of the time left, from durations of this session and, for the rest, of earlier ones."""
 
     def __init__(self, steps: Sequence[PlannedStep], otherwise: StepDurations) -> None:
         self._steps, self._otherwise = list(steps), otherwise
         self._meter = DurationMeter()
         self._step = -1
         self._visited: dict[str, int] = {}
-        """Placements of this step, those left out too, with the shots that each took so far."""
+        """Placements of this step by key, including skipped ones, with their captures so far."""
         self._here: str | None = None
-        """The one under way."""
+        """Key of the placement under way."""
         self._exposed = False
 
     def take(self, record: ev.Record) -> None:
-        """Note what a record tells."""
+        """Update the progress with a record."""
         self._meter.take(record)
         match record.event:
             case ev.StepStarted():
@@ -49,24 +49,25 @@ class TimeLeft:
 
     @property
     def done(self) -> int:
-        """Placements that are dealt with, the one under way included."""
+        """Number of placements done, including the one under way and skipped ones."""
         return sum(step.placements for step in self._steps[: self._step]) + len(self._visited)
 
     @property
     def total(self) -> int:
-        """Of how many."""
+        """Number of placements of the session."""
         return sum(step.placements for step in self._steps)
 
     @property
     def seconds_left(self) -> float:
-        """From the last record to the end of the session."""
-        pace = self._meter.durations(self._otherwise)
+        """Estimated time from the last record to the end of the session."""
+        durations = self._meter.durations(self._otherwise)
         step = self._steps[self._step]
-        ahead = step.placements - len(self._visited)
+        remaining = step.placements - len(self._visited)
         each = step.captures // max(step.placements, 1)
-        to_come = replace(step, placements=ahead, captures=ahead * each)
-        here = pace.seconds(to_come) if ahead or not step.placements else 0.0
+        rest = replace(step, placements=remaining, captures=remaining * each)
+        seconds = durations.seconds(rest) if remaining or not step.placements else 0.0
         if self._here is not None and step.captures:
-            here += (each - min(self._visited[self._here], each)) * pace.capture_s + pace.finishing_s
-            here += 0.0 if self._exposed else pace.exposing_s
-        return here + sum(pace.seconds(later) for later in self._steps[self._step + 1 :])
+            captures = each - min(self._visited[self._here], each)
+            seconds += captures * durations.capture_s + durations.finishing_s
+            seconds += 0.0 if self._exposed else durations.exposing_s
+        return seconds + sum(durations.seconds(later) for later in self._steps[self._step + 1 :])

@@ -1,8 +1,8 @@
-"""Registered kinds of steps, from which the schema of a procedure file is built.
+"""Registry of the kinds of steps, from which the schema of a procedure file is built.
 
-A kind registers itself with the decorator `register` when its module is imported. Modules are found by the
-entry-point group `workbench.steps`: the project's own packages `workbench.steps` and `workbench.trials`, and
-those of any other installed package.
+A kind is registered by the decorator `register` when its module is imported. Modules are found through the
+entry-point group `workbench.steps`: the project's packages `workbench.steps` and `workbench.trials`, and
+those of other installed packages.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.step import Step, StepModel
 
 GROUP = "workbench.steps"
-Kind = TypeVar("Kind", bound=StepModel)
+StepKind = TypeVar("StepKind", bound=StepModel)
 _kinds: dict[str, type[StepModel]] = {}
 _models: list[type[FileModel]] = []
-"""Models whose schema holds the union of all kinds."""
+"""Models whose schema contains the union of all kinds."""
 
 
-def register(kind: type[Kind]) -> type[Kind]:
+def register(kind: type[StepKind]) -> type[StepKind]:
     """Class decorator: add a kind of step under the literal of its field `step`.
 
     Raises:
-        TypeError: the class does not keep the protocol `Step`, or another class has its name.
+        TypeError: the class does not implement the protocol `Step`, or another class has the same literal.
     """
     if not issubclass(kind, StepModel):
         raise TypeError(f"{kind.__qualname__}: expected a subclass of StepModel")
@@ -44,8 +44,8 @@ def register(kind: type[Kind]) -> type[Kind]:
     known = _kinds.get(tags[0])
     if known is not None and (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
         raise TypeError(
-            f"{kind.__qualname__}: expected a name that no other step has, {tags[0]} is one of"
-            f" {known.__module__}"
+            f"{kind.__qualname__}: expected a name that no other step has, got {tags[0]}, which is registered"
+            f" by {known.__module__}"
         )
     _kinds[tags[0]] = kind
     for model in _models:
@@ -55,7 +55,7 @@ def register(kind: type[Kind]) -> type[Kind]:
 
 
 def step_kinds() -> dict[str, type[StepModel]]:
-    """Every kind of step by its tag, those of installed packages included.
+    """Kinds of steps by tag, including those of installed packages.
 
     Raises:
         BadInputError: an installed package's entry point cannot be loaded.
@@ -69,7 +69,7 @@ def _load_installed() -> None:
     for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
         try:
             point.load()
-        except Exception as error:  # another package's code: whatever it raises, the user can only remove it
+        except (Exception, SystemExit) as error:  # code of other packages may raise anything
             raise BadInputError(
                 f"step package {point.value}: cannot be imported ({type(error).__name__}: {error}); repair or"
                 " uninstall the package that has this entry point"
@@ -77,22 +77,22 @@ def _load_installed() -> None:
 
 
 class AnyKind:
-    """Annotation of a field that holds one of the registered kinds, by their tag `step`."""
+    """Annotation of a field whose value is one of the registered kinds, selected by the tag `step`."""
 
     @staticmethod
     def models() -> list[type[BaseModel]]:
-        """The kinds, for messages that name the keys of one; see `model.problems`."""
+        """Registered kinds, for messages that name their keys; see `model.problems`."""
         return list(step_kinds().values())
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Schema of the union of all kinds, as registered when the model is built."""
+        """Schema of the union of all kinds that are registered when the model is built."""
         kinds = tuple(step_kinds().values())
         return handler.generate_schema(Annotated[Union[kinds], Field(discriminator="step")])  # noqa: UP007
 
 
-def holds_steps(model: type[FileModel]) -> None:
-    """Have `model`, which has fields of `AnyStep`, built anew when a kind is registered later."""
+def rebuild_with_new_kinds(model: type[FileModel]) -> None:
+    """Rebuild `model`, which has fields of type `AnyStep`, when further kinds are registered."""
     _models.append(model)
 
 

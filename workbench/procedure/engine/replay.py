@@ -1,7 +1,7 @@
 """Deterministic replay: a resumed session runs its procedures again over its own journal.
 
-Events already in the journal are matched, from the first new one on they are appended. Captures of whole
-placements are read from the frames on disk; everything computed from them is computed again.
+Events already in the journal are matched; from the first new one on, events are appended. Captures of
+complete placements are read from disk, and all results are computed again from the frames.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from workbench.model.errors import BadInputError
 from workbench.model.prompt import Answer
 from workbench.procedure.engine.prompts import SAFETY
 from workbench.session.journal import Journal
-from workbench.session.state import Group, groups, safe_part
+from workbench.session.state import PlacementCaptures, placement_captures, safe_part
 
 
 class ReplayingJournal:
-    """Appends new events to the journal, and shows the records of all events to the consumers."""
+    """Appends new events to the journal and passes the records of all events to the consumers."""
 
     def __init__(
         self,
@@ -28,13 +28,22 @@ class ReplayingJournal:
         before: Sequence[ev.Record] = (),
         resumed: ev.SessionResumed | None = None,
     ) -> None:
-        """Start, or go on after the records `before`; `resumed` is then written before anything new."""
+        """Create a recorder.
+
+        Args:
+            journal: open journal.
+            consumers: receivers of every record, replayed ones first.
+            before: records of the session so far; empty for a new session.
+            resumed: event that is journalled before the first new one of a resumed session.
+        """
         self._journal, self._consumers = journal, consumers
         self._kept = deque(safe_part(before))
         self._from_n = 0
         self._resumed = resumed if before else None
-        self.whole = {key: group for key, group in groups(before).items() if group.whole}
-        """Whole placements by key: they are not captured again."""
+        self._complete = {
+            key: captures for key, captures in placement_captures(before).items() if captures.complete
+        }
+        """Complete placements by key, which are not captured again."""
         self._answers = {
             e.key: e for e in (record.event for record in self._kept) if isinstance(e, ev.Answered)
         }
@@ -42,14 +51,14 @@ class ReplayingJournal:
         self._retries = Counter(r.event.key for r in before if _is_retry(r.event))
         measured = [e for e in (r.event for r in self._kept) if isinstance(e, ev.LatencyMeasured)]
         self.latency = measured[-1].frames if measured else None
-        """As measured before the session ended early."""
+        """Latency in frames as measured before the session ended early; None if it was not measured."""
 
     def emit(self, event: ev.Event) -> ev.Record:
-        """Write an event unless the journal has it, then show it to every consumer.
+        """Journal an event unless it is replayed, then pass its record to every consumer.
 
         Raises:
             StoppedError: the journal cannot be written.
-            BadInputError: the session is another one.
+            BadInputError: the journal began with other procedures, another rig or another session name.
         """
         if _is_retry(event):
             self._retries[event.key] += 1
@@ -58,11 +67,11 @@ class ReplayingJournal:
             return self._show(self._kept.popleft())
         if self._kept and isinstance(event, ev.SessionStarted):
             raise BadInputError(
-                f"session {event.session}: expected what it began with, {_what(self._kept[0].event)}, got"
-                f" {_what(event)}; run these anew"
+                f"session {event.session}: expected {_what(self._kept[0].event)}, as at its start, got"
+                f" {_what(event)}; run these in a new session"
             )
         if self._kept and isinstance(event, ev.SessionFinished) and event.exit_code != 0:
-            # It ended again before anything was new: what was there already still counts, all of it.
+            # The resumed session ended before any new event: all earlier records stay valid.
             self._from_n = self._kept[-1].n + 1
         self._kept.clear()
         if self._resumed is not None:
@@ -71,26 +80,26 @@ class ReplayingJournal:
             self._show(self._journal.append(resumed))
         return self._show(self._journal.append(event))
 
-    def group(self, key: str) -> Group | None:
-        """What is captured at a placement already, all of it."""
-        return self.whole.get(key)
+    def complete_placement(self, key: str) -> PlacementCaptures | None:
+        """Captures at a placement that was complete before the resumption; None for others."""
+        return self._complete.get(key)
 
     def retries(self, key: str) -> int:
-        """How often a limit has had a placement captured again in this session, resumptions included."""
+        """Number of retries of a placement by limits in this session, including before resumptions."""
         return self._retries[key]
 
     def answer(self, key: str) -> Answer | None:
-        """What was answered before the session ended early."""
+        """Answer that was given before the session ended early; None if there is none."""
         given = self._answers.get(key)
         return None if given is None or key == SAFETY else given.answer
 
     def forget(self, key: str) -> None:
-        """What is known of a placement counts no more: it is captured again."""
-        self.whole.pop(key, None)
+        """Drop captures and answers of a placement that is captured again."""
+        self._complete.pop(key, None)
         self._answers = {k: e for k, e in self._answers.items() if k != key and not k.startswith(f"{key}/")}
 
     def _show_notes(self) -> None:
-        """Pass over what no procedure tells: resumptions, repetitions, confirmations of safety."""
+        """Pass on records that no step emits again: resumptions, repetitions, confirmations of safety."""
         while self._kept and _is_note(self._kept[0].event):
             self._show(self._kept.popleft())
 

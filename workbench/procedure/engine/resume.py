@@ -1,4 +1,4 @@
-"""Going on with a session that ended early."""
+"""Resumption of a session that ended early."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_mode
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.procedure_file import Procedure
 from workbench.procedure.engine.replay import ReplayingJournal
-from workbench.procedure.engine.run import NOBODY, Invocation, go_through, open_context
+from workbench.procedure.engine.run import NO_OPERATOR, Invocation, open_context, run_steps
 from workbench.session.journal import JOURNAL, Journal, read_journal
 from workbench.session.manifest import (
     MANIFEST,
@@ -33,25 +33,26 @@ def resume(
     consumers: Sequence[ev.Consumer],
     caller: Invocation,
     stopping: Callable[[], str | None],
-    operator: Operator = NOBODY,
+    operator: Operator = NO_OPERATOR,
     accepted_because: str | None = None,
 ) -> None:
-    """Run the session's procedures again from their start, on the frames that are on disk already.
+    """Replay the session's procedures from the start with the frames on disk, then continue them.
 
-    Placements that are whole are not captured again; the one that was under way is, from its placing on.
-    What is computed is computed again from the frames.
+    Complete placements are not captured again; the one that was under way is placed and captured again. All
+    results are computed again from the frames.
 
     Args:
-        session_dir: the session.
-        consumers: who is shown every record, those of before first.
-        caller: who resumes it, for the record.
-        stopping: asked between shots; a text ends the session with it.
-        operator: who answers, unless the bench has somebody of its own.
-        accepted_because: why to go on although rig, procedure or versions have changed.
+        session_dir: session folder.
+        consumers: receivers of every record, earlier ones first.
+        caller: invocation, for the record.
+        stopping: called between captures; a text is the reason to end the session.
+        operator: operator, unless the bench has its own.
+        accepted_because: reason to resume although rig, procedures or versions have changed.
 
     Raises:
-        BadInputError: this is no session, it is finished or running, or something has changed.
-        WorkbenchError: as `run`.
+        BadInputError: `session_dir` is no session, the session is finished or running, or files or versions
+            have changed.
+        WorkbenchError: see `run`.
     """
     began_with = load_manifest(session_dir)
     _check_unfinished(session_dir)
@@ -59,7 +60,7 @@ def resume(
     if changes and accepted_because is None:
         raise BadInputError(
             "\n".join(f"{session_dir}: {change}" for change in changes)
-            + '\nput it back as it was, or go on with --accept-changes "why it does no harm"'
+            + '\nundo the changes, or resume with --accept-changes "reason why they are harmless"'
         )
     plan = plan_of(session_dir, now)
     with ExitStack() as stack:
@@ -78,28 +79,28 @@ def resume(
         )
         recorder = ReplayingJournal(journal, consumers, before, resumed)
         began = Invocation(began_with.operator, began_with.command, began_with.created)
-        go_through(plan, open_context(plan, session_dir, bench, operator, recorder, began, stopping))
+        run_steps(plan, open_context(plan, session_dir, bench, operator, recorder, began, stopping))
 
 
 def files_now(session_dir: Path, began_with: Manifest) -> tuple[Manifest, tuple[str, ...]]:
-    """The session's files as they are now, and what has changed since it began.
+    """Present input files of a session, and descriptions of their changes since its start.
 
-    A file that is gone is taken from the session; a comment that changed is no change.
+    A missing file is taken from the manifest. A changed comment is no change.
     """
     rig, rig_change = _now(session_dir, began_with.rig, Rig)
     procedures = [_now(session_dir, entry, Procedure) for entry in began_with.procedures]
     versions = recorded_versions()
-    moved = [
-        f"{name} was {was} when the session began and is {versions.get(name)}"
+    version_changes = [
+        f"{name}: expected version {was} (at the session's start), got {versions.get(name)}"
         for name, was in began_with.versions.items()
         if versions.get(name) != was
     ]
     now = began_with.model_copy(update={"rig": rig, "procedures": tuple(entry for entry, _ in procedures)})
-    return now, (*rig_change, *(change for _, changes in procedures for change in changes), *moved)
+    return now, (*rig_change, *(change for _, changes in procedures for change in changes), *version_changes)
 
 
 def plan_of(session_dir: Path, manifest: Manifest) -> Plan:
-    """The plan that a manifest's texts make."""
+    """Plan from the texts in a manifest."""
     where = session_dir / MANIFEST
     procedures = [
         parse_yaml_model(entry.text, Path(f"{where} ({entry.file})"), Procedure)
@@ -129,8 +130,8 @@ def _check_unfinished(session_dir: Path) -> None:
     first, last = (records[0].event, records[-1].event) if records else (None, None)
     if isinstance(first, ev.SessionStarted) and first.session != session_dir.name:
         raise BadInputError(
-            f"{session_dir}: expected the session's folder to be called {first.session}, as when it began;"
-            " give it its name back"
+            f"{session_dir}: expected the folder name {first.session}, as at the session's start; rename the"
+            " folder"
         )
     if isinstance(last, ev.SessionFinished) and last.exit_code == 0:
-        raise BadInputError(f"{session_dir}: the session is finished, there is nothing to resume")
+        raise BadInputError(f"{session_dir}: the session is finished and cannot be resumed")

@@ -1,4 +1,4 @@
-"""Running procedures: one session, one bench, one recording."""
+"""Execution of procedures in one session on one bench."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from workbench.procedure.engine.replay import ReplayingJournal
 from workbench.session.journal import Journal
 from workbench.session.manifest import create_session, workbench_version
 
-NOBODY = NoOperator("the caller has given nobody to ask")
+NO_OPERATOR = NoOperator("the caller has provided no operator")
 
 
 @dataclass(frozen=True)
 class Invocation:
-    """Who runs a session, with what command, and when (ISO 8601 with zone)."""
+    """Invocation of a session: operator, command, and time (ISO 8601 with zone)."""
 
     operator: str
     command: str
@@ -37,32 +37,32 @@ def run(
     consumers: Sequence[ev.Consumer],
     caller: Invocation,
     stopping: Callable[[], str | None],
-    operator: Operator = NOBODY,
+    operator: Operator = NO_OPERATOR,
 ) -> None:
     """Run every procedure of the plan, in order, in one new session.
 
-    Whatever ends the session early is journalled as its end before it goes on to the caller; frames and
-    records up to there are on disk, and `resume` goes on from them.
+    An error is journalled as the end of the session before it is raised. Frames and records up to then are on
+    disk, and `resume` continues from them.
 
     Args:
-        plan: what to run.
-        session_dir: where to keep it; must not exist.
-        consumers: who is shown every record.
-        caller: for the record.
-        stopping: asked between shots; a text ends the session with it.
-        operator: who answers, unless the bench has somebody of its own.
+        plan: rig and procedures.
+        session_dir: folder of the new session; must not exist.
+        consumers: receivers of every record.
+        caller: invocation, for the record.
+        stopping: called between captures; a text is the reason to end the session.
+        operator: operator, unless the bench has its own.
 
     Raises:
-        WorkbenchError: its exit code says what went wrong.
+        WorkbenchError: the session ended early; the exit code identifies the cause.
     """
     try:
         session_dir.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInputError(
-            f"{session_dir.parent}: expected a folder for sessions, which cannot be made: {error.strerror}"
+            f"{session_dir.parent}: the folder of sessions cannot be created: {error.strerror}"
         ) from None
     with ExitStack() as stack:
-        # The bench first: one that does not open leaves no empty session behind.
+        # The bench first: a failure to open it must not leave an empty session.
         bench = stack.enter_context(open_bench(plan.rig, session_dir))
         create_session(
             session_dir,
@@ -75,15 +75,15 @@ def run(
         )
         journal = stack.enter_context(Journal(session_dir))
         recorder = ReplayingJournal(journal, consumers)
-        go_through(plan, open_context(plan, session_dir, bench, operator, recorder, caller, stopping))
+        run_steps(plan, open_context(plan, session_dir, bench, operator, recorder, caller, stopping))
 
 
-def go_through(plan: Plan, context: Context) -> None:
-    """Run every step, and journal how it ended."""
+def run_steps(plan: Plan, context: Context) -> None:
+    """Run every step and journal the end of the session, also after an error."""
     try:
         _run_all(plan, context)
     except BaseException as error:
-        # A journal that cannot be written any more must not hide why the session ended.
+        # An unwritable journal must not hide the cause of the end.
         with suppress(StoppedError):
             context.emit(_ending(error))
         raise
@@ -99,7 +99,7 @@ def open_context(
     caller: Invocation,
     stopping: Callable[[], str | None],
 ) -> Context:
-    """The context that a session's steps run in; what they write names `caller`."""
+    """Context for the steps of a session, with `caller` as provenance."""
     provenance = Provenance(
         session=session_dir.name,
         captures_sha256="",

@@ -1,4 +1,4 @@
-"""The protocol of a step, all that the engine knows of one, and the base class that most steps use."""
+"""Protocol of a step, which is all that the engine uses, and base class of steps."""
 
 from __future__ import annotations
 
@@ -11,56 +11,56 @@ from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.prompts import placement_prompts
 
-if TYPE_CHECKING:  # the context imports what a running step needs; files are checked without it
+if TYPE_CHECKING:  # checking a file must not import what a running step needs
     from workbench.procedure.engine.context import Context
 
 COMPUTING_S = 10.0
-"""Duration of a step without captures where no session has measured it: computing, as a rule."""
+"""Default duration of a step without captures: usually a computation."""
 
 
 class Step(Protocol):
-    """One step of a procedure file: its keys, what it will do, and doing it.
+    """Step of a procedure file: its keys, its planned actions, and their execution.
 
-    `name` is unique in a session (`calibrate-flat.3`) and begins the keys of the step's placements, captures
-    and prompts.
+    `name` is unique in a session (`calibrate-flat.3`); it is the prefix of the keys of the step's placements,
+    captures and prompts.
     """
 
     needs: ClassVar[str | None]
-    """What an earlier step must have given: `target`, `captures`, `fit`, `calibration`."""
+    """Requirement that an earlier step must give: `target`, `captures`, `fit` or `calibration`."""
     gives: ClassVar[str | None]
-    """What later steps find."""
+    """Result for later steps."""
 
     @property
     def step(self) -> str:
-        """Kind of the step, the tag in the file."""
+        """Kind of the step: the tag in the file."""
 
     @property
     def title(self) -> str:
-        """One line for people."""
+        """Title in one line."""
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
-        """Placements of the target, in the order in which they are asked for."""
+        """Placements of the target, in order."""
 
     def captures(self, rig: Rig) -> int:
-        """Number of captures at all placements together, but for those that only some readings need."""
+        """Number of captures at all placements, without those that only ambiguous readings need."""
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Prompts that may come, so that an answers file can be checked before anything begins."""
+        """Possible prompts, against which an answers file is checked before the session."""
 
     @property
     def default_duration_s(self) -> float:
-        """Duration without placements and captures, where no session has measured it."""
+        """Duration without placements and captures, if no session has measured it."""
 
     def run(self, context: Context, name: str) -> str:
-        """Do it; returns the outcome in one line.
+        """Run the step; returns the outcome in one line.
 
         Raises:
-            WorkbenchError: the procedure cannot go on.
+            WorkbenchError: the procedure cannot continue.
         """
 
 
 class StepModel(FileModel):
-    """Base of a step: no placements, no captures, prompts for the placements alone."""
+    """Base class of steps: no placements, no captures, prompts only for placements."""
 
     needs: ClassVar[str | None] = None
     gives: ClassVar[str | None] = None
@@ -74,20 +74,20 @@ class StepModel(FileModel):
         return 0
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Those of the placements; see `Step`."""
+        """Prompts of the placements; see `Step`."""
         return placement_prompts(self.placements(name, rig))
 
     @property
     def default_duration_s(self) -> float:
-        """That of a computation; see `Step`."""
+        """Duration of a computation; see `Step`."""
         return COMPUTING_S
 
 
 def flat_placement(name: str, standoff_mm: float, number: int | None = None) -> Placement:
     """Placement of a flat target at a standoff, in the step `name`.
 
-    A target that returns to a standoff needs the `number` of the placement: keys must differ.
+    A step that returns to a standoff must state the `number` of the placement, so that keys differ.
     """
-    # 12 digits: keys name files, so standoffs that differ must have keys that differ.
-    turn = "" if number is None else f"{number:02d}-"
-    return Placement(key=f"{name}/{turn}{standoff_mm:.12g}mm", standoff_mm=standoff_mm)
+    # 12 digits keep the keys of different standoffs distinct; keys are parts of file names.
+    prefix = "" if number is None else f"{number:02d}-"
+    return Placement(key=f"{name}/{prefix}{standoff_mm:.12g}mm", standoff_mm=standoff_mm)

@@ -1,4 +1,4 @@
-"""The accuracy trial: readings of a flat at standoffs that the fit did not see, and their errors."""
+"""Accuracy trial: readings of a flat target at standoffs that the fit has not used, and their errors."""
 
 from workbench.trials.accuracy.step import AccuracyTrialStep
 

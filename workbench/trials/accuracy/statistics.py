@@ -1,4 +1,4 @@
-"""Statistics of the accuracy trial: errors of readings of a flat at a known standoff."""
+"""Statistics of the accuracy trial: errors of readings of a flat target at a known standoff."""
 
 from __future__ import annotations
 
@@ -16,33 +16,34 @@ class AccuracyRow:
 
     standoff_mm: float
     readings: int
-    """With a range; the numbers below are of these, and None where there are too few of them."""
+    """Number of readings with a range; statistics are of these, and None if there are too few."""
     missing: int = 0
-    """Readings without a range."""
+    """Number of readings without a range."""
     mean_error_mm: float | None = None
     max_error_mm: float | None = None
     min_error_mm: float | None = None
     sd_mm: float | None = None
     range_sd_mm: float | None = None
-    """Stated standard uncertainty of one reading: calibration and spots."""
+    """Stated standard uncertainty of one reading, from calibration and spots."""
     reference_sd_mm: float | None = None
-    """Reference uncertainty of the standoff: the placement's own or the rig's; None where not known."""
+    """Reference uncertainty of the standoff, of the placement or the rig; None if unknown."""
 
     @property
     def mean_relative_error(self) -> float | None:
-        """Mean error over the true range, without unit; None without readings."""
+        """Mean error / true range, without unit; None without readings."""
         return None if self.mean_error_mm is None else self.mean_error_mm / self.standoff_mm
 
 
 def accuracy_row(readings: Sequence[ReadingTaken]) -> AccuracyRow:
     """Statistics of the readings at one standoff; errors are measured - true, mm, 1 sigma.
 
-    The standard deviation over the readings shows what differs between them. What they share (calibration,
-    speckle, placement) it cannot show: hold the mean error against the stated deviations instead. The range's
-    contains the ruler's scale, which cancels where the calibration was made with the same ruler.
+    The standard deviation over the readings contains only what differs between them. Common errors
+    (calibration, speckle, placement) appear in the mean error, to be compared with the stated uncertainties.
+    The stated uncertainty of a range contains the ruler's scale, which cancels if the calibration used the
+    same ruler.
 
     Args:
-        readings: every reading taken there, at least one; those without a range count as missing.
+        readings: all readings at the standoff, at least one; those without a range count as missing.
     """
     standoff_mm = readings[0].standoff_mm
     ranges = np.array([r.range_mm for r in readings if r.range_mm is not None])

@@ -1,4 +1,4 @@
-"""Step `accuracy_trial`: range a flat at standoffs that the fit did not see."""
+"""Step `accuracy_trial`: range a flat target at standoffs that the fit has not used."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from workbench.procedure.engine.step import StepModel, flat_placement
 
 @register
 class AccuracyTrialStep(StepModel):
-    """Range a flat at standoffs that the fit did not see; a table and a chart of the errors."""
+    """Range a flat target at standoffs that the fit has not used; give a table and a chart of the errors."""
 
     needs: ClassVar[str | None] = "calibration"
     step: Literal["accuracy_trial"]
@@ -31,25 +31,25 @@ class AccuracyTrialStep(StepModel):
 
     @property
     def title(self) -> str:
-        """How much is measured."""
+        """Numbers of standoffs and readings."""
         return f"Accuracy at {len(self.standoffs_mm)} standoffs, {self.readings} readings each"
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
-        """One a standoff."""
+        """One placement per standoff."""
         return [flat_placement(name, standoff_mm) for standoff_mm in self.standoffs_mm]
 
     def captures(self, rig: Rig) -> int:
-        """One a reading; a reading takes more where the lasers have to be fired one by one."""
+        """One capture per reading; ambiguous readings take further captures of single lasers."""
         return len(self.standoffs_mm) * self.readings
 
     def run(self, context: Context, name: str) -> str:
-        """Take the readings at every placement, and write their statistics.
+        """Take the readings at every placement and write their statistics.
 
         Raises:
             BadInputError: there is no calibration.
             WorkbenchError: see `visit_placements`.
         """
-        # Imported here: a file is checked without the ranger.
+        # Imported here: checking a file must not import the ranger.
         from workbench.trials.accuracy.trial import run_trial
 
         return run_trial(context, name, self.placements(name, context.rig), self.readings)

@@ -1,4 +1,4 @@
-"""The run of the accuracy trial, and its table and chart."""
+"""Execution of the accuracy trial, with its table and chart."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def run_trial(context: Context, name: str, placements: Sequence[Placement], coun
 
 
 def accuracy_table(name: str, rows: Sequence[AccuracyRow]) -> Table:
-    """Statistics of the errors, a row a standoff."""
+    """Table of the error statistics, one row per standoff."""
     return Table(
         name=name,
         title="Accuracy: error = measured - true",

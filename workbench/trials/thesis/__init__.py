@@ -1,4 +1,4 @@
-"""The thesis's simulation: its scenes, its own chain, the workbench's chain, and what the thesis claims."""
+"""Simulation of the thesis: scenes, the thesis's chain, the workbench's chain, and the thesis's claims."""
 
 from workbench.trials.thesis.step import ThesisSimulationStep
 

@@ -1,9 +1,9 @@
-"""Frames of the thesis's scene as a camera takes them: light is integrated over pixels, after a lens.
+"""Frames of the thesis's scenes with a realistic camera: a lens that blurs, and pixels that integrate light.
 
-The thesis takes a spot's intensity at the middle of each pixel. From half a metre on its spots are then
-narrower than any lens makes them, and a spot's place between two pixels is hardly told. Here the same beams
-fall through a lens that blurs, on pixels with an area; the flux of a spot falls with the square of its
-distance. The lens and the noise are those of the virtual bench's camera.
+The thesis evaluates a spot's intensity at the centre of each pixel. Beyond half a metre its spots are then
+narrower than any lens produces, and their position between two pixels is almost lost. Here the same beams
+pass a lens with a Gaussian point spread and fall on pixels with an area. The flux of a spot decreases with
+the square of the distance. Lens and noise are those of the virtual bench's camera.
 """
 
 from __future__ import annotations
@@ -14,34 +14,34 @@ from numpy.typing import NDArray
 
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.stats import norm_cdf
-from workbench.trials.thesis.scene import Line
+from workbench.trials.thesis.scene import LaserLine
 
 Frame = NDArray[np.uint8]
 BAND_PX = 64
-"""Rows (columns) about the line that a frame has: nothing else is lit."""
+"""Rows (columns) of a frame around the line; no other pixels receive light."""
 BLUR_PX = 0.7
 """Standard deviation of the lens's Gaussian point spread."""
 FULL_WELL_E = 40_000.0
 READ_NOISE_E = 225.0
 BLACK_LEVEL = 0.03
 METERED_PEAK = 0.7
-"""Of full scale, both: where no light is, and where the brightest pixel is when every laser is lit."""
+"""Shares of full scale: a dark pixel (`BLACK_LEVEL`), and the brightest one with every laser on."""
 FULL_SCALE_DN = 255
 
 
 def expose(
-    line: Line, depths_mm: FloatArray, spots_px: FloatArray, lit: BoolArray, noise: Generator | None
+    line: LaserLine, depths_mm: FloatArray, spots_px: FloatArray, lit: BoolArray, noise: Generator | None
 ) -> tuple[Frame, Frame]:
-    """A frame with the lasers `lit` and one with none; (BAND_PX, length), or turned for a vertical line.
+    """Frames with the lasers `lit` and with none, (BAND_PX, length), transposed for a vertical line.
 
-    Exposure is metered with every laser lit, so that a spot alone is as bright as among the others.
+    The exposure is metered with every laser on, so that a spot is as bright alone as among the others.
 
     Args:
-        line: the lasers.
-        depths_mm: (n,) where their beams end.
-        spots_px: (n,) where the spots appear along the line.
-        lit: (n,) whose spots are to be seen.
-        noise: draws shot and read noise; None for frames without, rounded to whole numbers alone.
+        line: line of lasers.
+        depths_mm: (n,) depths at which the beams end.
+        spots_px: (n,) positions of the spots along the line.
+        lit: (n,) lasers whose spots are visible.
+        noise: generator of shot and read noise; None for noise-free frames, which are only rounded.
     """
     widths = np.hypot(line.radii_px(depths_mm) / 2, BLUR_PX)
     flux = 1 / depths_mm**2
@@ -55,12 +55,12 @@ def expose(
 
 
 def _peak_share(width_px: FloatArray) -> FloatArray:
-    """Share of a spot's light in a pixel at its centre."""
+    """Share of a spot's light in the pixel at its centre."""
     return np.asarray((2 * norm_cdf(0.5 / width_px) - 1) ** 2)
 
 
 def _profile(centre_px: float, width_px: float, pixels: int) -> FloatArray:
-    """(pixels,) share of a Gaussian's light in each pixel of a row."""
+    """Shares (pixels,) of a Gaussian's light in each pixel of a row."""
     return np.diff(norm_cdf((np.arange(pixels + 1) - 0.5 - centre_px) / width_px))
 
 

@@ -1,4 +1,4 @@
-"""The thesis's figures 21 to 30 as charts of a simulation, with the workbench's own curves on them."""
+"""Figures 21 to 30 of the thesis as charts of a simulation, with the curves of the workbench's chain."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from workbench.model.chart import Axis, Chart, Series
 from workbench.trials.thesis.schema import ChainReadings, SceneSimulated, SimulatedScene
 
 CHAINS = (("thesis", "#d08010"), ("noisy", "#70a0d8"), ("ours", "#0a2f80"))
-"""Name and colour, in the order they are drawn."""
+"""Name and colour of each chain, in the order of drawing."""
 NAMES = {"thesis": "thesis", "noisy": "workbench, noise", "ours": "workbench"}
 PERCENT = 100.0
 FRONT_MM = range(121)
@@ -17,12 +17,12 @@ FRONT_MM = range(121)
 
 @dataclass(frozen=True)
 class ErrorFigure:
-    """A figure of the thesis with errors over the distance."""
+    """Figure of the thesis with errors against distance."""
 
     number: int
     title: str
     scenes: tuple[str, ...]
-    """One, or two of which the second is dashed."""
+    """Names of one or two scenes; the curves of the second are dashed."""
     farthest_mm: float
     limits_percent: tuple[float, float]
     is_angle: bool = False
@@ -42,7 +42,7 @@ SURFACES = ((25, "round-2-shifted"), (27, "round-3-shifted"), (29, "round-4"))
 
 
 def figures(simulated: Mapping[str, SceneSimulated]) -> tuple[Chart, ...]:
-    """Charts named `figure-21` to `figure-30`, in this order, of the figures all of whose scenes are there.
+    """Charts named `figure-21` to `figure-30`, in this order, of all figures whose scenes were simulated.
 
     Args:
         simulated: simulated scenes by name.
@@ -81,7 +81,7 @@ def _error_chart(figure: ErrorFigure, scenes: list[SceneSimulated]) -> Chart:
 
 
 def _difference(scene: SimulatedScene) -> str:
-    """What distinguishes a scene from the other one of its figure."""
+    """Property that distinguishes a scene from the other one of its figure."""
     return f"{scene.incline_deg:g} deg" if scene.incline_deg else f"shift {scene.shift_mm:g} mm"
 
 
@@ -104,7 +104,7 @@ def _surface_chart(number: int, scene: SimulatedScene) -> Chart:
         name=f"figure-{number}",
         title=f"Figure {number}: surface of {scene.name}",
         x=x,
-        y=Axis(label="distance beyond the one set", unit="mm"),
+        y=Axis(label="distance beyond the set distance", unit="mm"),
         series=(
             Series(name="surface", x=tuple(map(float, FRONT_MM)), y=heights, style="line", color="#0a2f80"),
         ),

@@ -1,7 +1,7 @@
-"""The scene of the thesis's stand-alone simulation: lines of parallel lasers before a surface by a formula.
+"""Scenes of the thesis's stand-alone simulation: lines of parallel lasers in front of an analytic surface.
 
 Deborah L. Tran, "Obstacle Detection for Robot Navigation Using Structured Light", MIT 2001, section
-5.2.3.2.1. A beam meets the surface at its own place on the front: beams are parallel and have no width here.
+5.2.3.2.1. Beams are parallel and have no width where they meet the surface.
 """
 
 from __future__ import annotations
@@ -27,56 +27,56 @@ FEWEST_LASERS = 2
 
 
 @dataclass(frozen=True)
-class Line:
-    """One line of lasers, and the row or column of pixels along which their spots move."""
+class LaserLine:
+    """Line of lasers, with the row or column of pixels along which their spots move."""
 
     axis: Literal["u", "v"]
     ids: tuple[str, ...]
     baselines_mm: FloatArray
-    """(n,) ascending; negative for lasers left of the camera, or above it."""
+    """(n,) ascending; negative for lasers left of the camera or above it."""
     f_px: float
     centre_px: float
-    """Where the optical axis meets the row (column); whole pixels are at whole numbers."""
+    """Position of the optical axis along the row (column); pixel centres are whole numbers."""
     length_px: int
     speckle_sd_px: float
 
     @property
     def baselines_by_id(self) -> dict[str, float]:
-        """Baselines, mm."""
+        """Baselines by laser id, mm."""
         return dict(zip(self.ids, self.baselines_mm.tolist(), strict=True))
 
     @property
     def front_mm(self) -> FloatArray:
-        """(n,) places along the front, from the first laser."""
+        """Positions (n,) along the front, from the first laser."""
         return np.asarray(self.baselines_mm - self.baselines_mm[0])
 
     def spots_px(self, depths_mm: FloatArray) -> FloatArray:
-        """(n,) where beams that end at these depths are seen: (4.1) and (4.2) of the thesis."""
+        """Positions (n,) of the spots of beams that end at these depths: (4.1) and (4.2) of the thesis."""
         return np.asarray(self.centre_px + self.f_px * self.baselines_mm / depths_mm)
 
     def radii_px(self, depths_mm: FloatArray) -> FloatArray:
-        """(n,) 1/e^2 radii of the spots: (4.5), scaled as the camera sees them."""
+        """Radii (n,) of the spots at 1/e^2: (4.5) of the thesis, projected into the image."""
         return np.asarray((BEAM_EXIT_MM + DIVERGENCE * depths_mm) / 2 * self.f_px / depths_mm)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a chain makes of one reading, or what is true of it."""
+    """Result of a chain for one reading, or the truth."""
 
     closest_mm: float | None
-    """Smallest range over the front; None where no spot was seen."""
+    """Smallest range along the front; None if no spot was seen."""
     shape: str
     """`flat`, `incline`, `round 2` and so on, `cylinder`, `unknown`, `none`."""
     angle_deg: float | None = None
     sigma_mm: float | None = None
-    """1 sigma of the closest range, where the chain states one."""
+    """1 sigma of the closest range; None if the chain states none."""
 
 
-def line_of(rig: Rig, name: LineName) -> Line:
-    """The lasers of one line of an ideal rig: pinhole, parallel beams, every value as the rig file has it.
+def line_of(rig: Rig, name: LineName) -> LaserLine:
+    """Line of lasers of an ideal rig: pinhole, parallel beams, values of the rig file.
 
     Raises:
-        BadInputError: the rig has not two lasers on that line, or its lens or beams are not ideal.
+        BadInputError: the rig has fewer than two lasers on the line, or its lens or beams are not ideal.
     """
     along: Literal["u", "v"] = "u" if name == "horizontal" else "v"
     camera = rig.camera
@@ -99,7 +99,7 @@ def line_of(rig: Rig, name: LineName) -> Line:
             f" simulation; set to 0: {', '.join(bent) or 'bench.offset_mm'}"
         )
     baselines = np.array([(x.x_mm if along == "u" else x.y_mm).value for x in lasers])
-    return Line(
+    return LaserLine(
         axis=along,
         ids=tuple(laser.id for laser in lasers),
         baselines_mm=baselines,
@@ -111,7 +111,7 @@ def line_of(rig: Rig, name: LineName) -> Line:
 
 
 def surface_mm(scene: SimulatedScene, x_mm: FloatArray, set_mm: float) -> FloatArray:
-    """(n,) distance of the surface from the front at places x."""
+    """Distances (n,) of the surface from the front at positions x."""
     if scene.incline_deg is not None:
         return set_mm + tan(radians(scene.incline_deg)) * x_mm
     powers = np.arange(1, len(scene.coefficients) + 1)
@@ -119,17 +119,17 @@ def surface_mm(scene: SimulatedScene, x_mm: FloatArray, set_mm: float) -> FloatA
     return np.asarray(set_mm + (from_vertex[:, None] ** powers) @ np.array(scene.coefficients, float))
 
 
-def truth(scene: SimulatedScene, lines: Sequence[Line], set_mm: float) -> Outcome:
-    """What is there: the smallest distance before the front, whether a beam falls on it or not."""
+def truth(scene: SimulatedScene, lines: Sequence[LaserLine], set_mm: float) -> Outcome:
+    """Truth of a scene: the smallest distance along the front, whether or not a beam falls there."""
     closest = min(float(surface_mm(scene, _front(line), set_mm).min()) for line in lines)
     return Outcome(closest, scene.shape, scene.incline_deg)
 
 
-def seen(scene: SimulatedScene, line: Line) -> BoolArray:
-    """(n,) lasers whose spots can be seen.
+def seen(scene: SimulatedScene, line: LaserLine) -> BoolArray:
+    """Mask (n,) of the lasers whose spots are visible.
 
     Raises:
-        BadInputError: the scene loses a laser that the line does not have.
+        BadInputError: `lost` names a laser that the line does not have.
     """
     if (missing := [n for n in scene.lost if n > len(line.ids)]) != []:
         raise BadInputError(
@@ -139,9 +139,9 @@ def seen(scene: SimulatedScene, line: Line) -> BoolArray:
 
 
 def angle_deg(slope: float) -> float:
-    """Incline of a slope."""
+    """Incline of a slope, degrees."""
     return degrees(atan(slope))
 
 
-def _front(line: Line) -> FloatArray:
+def _front(line: LaserLine) -> FloatArray:
     return np.arange(0.0, line.front_mm[-1] + FRONT_STEP_MM / 2, FRONT_STEP_MM)

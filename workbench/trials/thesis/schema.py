@@ -1,4 +1,4 @@
-"""A simulated scene before one or two lines of lasers, and what is claimed of ranging it."""
+"""Schema of simulated scenes in front of one or two lines of lasers, and of claims about their ranges."""
 
 from __future__ import annotations
 
@@ -17,34 +17,35 @@ Span = Annotated[tuple[PositiveFloat, ...], Field(min_length=2, max_length=2)]
 
 
 class Claim(FileModel):
-    """What somebody states of a scene, to be held against what is measured."""
+    """Stated value of a quantity of a scene, to be compared with the measured value."""
 
     quantity: Quantity
     stated: Annotated[float, Field(ge=0)] | None = None
-    """Relative, mm or a number, by `quantity`; nothing where it is only to be measured."""
+    """Relative error, mm or number, depending on `quantity`; None: only measured."""
     set_mm: Span | None = None
-    """Distances it holds for; the scene's if not given."""
+    """Distances of the claim; None: those of the scene."""
 
 
 class SimulatedScene(FileModel):
-    """A surface that is put at distances from `set_mm[0]` to `set_mm[1]`.
+    """Surface at distances from `set_mm[0]` to `set_mm[1]`.
 
-    Before each line the surface is y(x) = set distance + the incline's slope x, or + the sum of
-    coefficients[k] (x - shift)^(k + 1); x runs along the front from the line's first laser, mm.
+    In front of each line the surface is y(x) = set distance + slope x for an incline. For coefficients, the
+    second term is the sum of coefficients[k] (x - shift)^(k + 1). The position x along the front counts from
+    the line's first laser, mm.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9-]+$")]
     source: str
-    """The thesis's figure or section."""
+    """Figure or section of the thesis."""
     lines: Annotated[tuple[LineName, ...], Field(min_length=1)] = ("horizontal",)
     incline_deg: Annotated[float, Field(gt=-90, lt=90)] | None = None
     coefficients: tuple[float, ...] = ()
     shift_mm: float = 0.0
     lost: tuple[Annotated[int, Field(ge=1)], ...] = ()
-    """Lasers of each line, counted from 1, whose spot nobody sees."""
+    """Lasers of each line, counted from 1, whose spot is not visible."""
     set_mm: Span
     points: Annotated[int, Field(ge=2, le=1_000_000)] | None = None
-    """Distances to put it at; as many as the step says if not given."""
+    """Number of distances; None: that of the step."""
     claims: Annotated[tuple[Claim, ...], Field(min_length=1)]
 
     @model_validator(mode="after")
@@ -54,43 +55,43 @@ class SimulatedScene(FileModel):
         if not 0 < self.set_mm[0] < self.set_mm[1]:
             raise ValueError(f"set_mm: expected nearest < farthest, got {list(self.set_mm)}")
         if len(set(self.lines)) != len(self.lines):
-            raise ValueError(f"lines: expected each once, got {list(self.lines)}")
+            raise ValueError(f"lines: expected each line once, got {list(self.lines)}")
         return self
 
     @property
     def shape(self) -> str:
-        """Right name of the shape."""
+        """True shape."""
         if self.coefficients:
             return f"round {len(self.coefficients)}"
         return "incline" if self.incline_deg else "flat"
 
 
 class ChainReadings(FileModel):
-    """What one chain made of a scene, a value for each distance."""
+    """Results of one chain for a scene, one value per distance."""
 
     closest_mm: tuple[float | None, ...]
-    """None where no spot was seen."""
+    """Closest ranges; None where no spot was seen."""
     shape: tuple[str, ...]
     angle_deg: tuple[float | None, ...]
 
 
 class SceneSimulated(FileModel):
-    """A scene was put at many distances and ranged by three chains."""
+    """Scene at many distances, ranged by three chains."""
 
     scene: SimulatedScene
     set_mm: tuple[float, ...]
     true_mm: tuple[float, ...]
-    """Smallest distance of the surface before the front."""
+    """Smallest distance of the surface along the front."""
     thesis: ChainReadings
-    """As in the thesis."""
+    """Chain of the thesis."""
     ours: ChainReadings
-    """The workbench's, on frames without noise."""
+    """Chain of the workbench on noise-free frames."""
     noisy: ChainReadings
-    """The workbench's, on frames with noise."""
+    """Chain of the workbench on frames with noise."""
 
 
 class ClaimRow(FileModel):
-    """A claim, and what each chain reached; units by `quantity` as in `Claim`."""
+    """Claim with the value that each chain reaches; units depend on `quantity`, see `Claim`."""
 
     scene: str
     source: str
@@ -102,7 +103,6 @@ class ClaimRow(FileModel):
     ours: float | None
     noisy: float | None
     reproduced: bool | None
-    """Whether the thesis's chain keeps what the thesis states, to the digits it states."""
+    """Whether the thesis's chain reaches the stated value, to the stated digits."""
     better: bool
-    """Whether ours, without noise as the thesis's, is better than the thesis's, or as good where both are
-    perfect."""
+    """Whether the workbench's chain without noise is better than the thesis's; true if both are perfect."""

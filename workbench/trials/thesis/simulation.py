@@ -1,4 +1,4 @@
-"""The thesis's stand-alone simulation, run with its own chain and with ours, and what it claims of it."""
+"""Stand-alone simulation of the thesis with its chain and the workbench's, compared with its claims."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from numpy.random import Generator
 
 from workbench.model.rig import Rig
 from workbench.trials.thesis import thesis_chain
-from workbench.trials.thesis.scene import Line, Outcome, line_of, seen, surface_mm, truth
+from workbench.trials.thesis.scene import LaserLine, Outcome, line_of, seen, surface_mm, truth
 from workbench.trials.thesis.schema import ChainReadings, Claim, ClaimRow, SceneSimulated, SimulatedScene
 from workbench.trials.thesis.workbench_chain import Chain
 
 CHAINS = ("thesis", "ours", "noisy")
 RIGHT_ANGLE = 0.2
-"""An incline is recognised when its angle is right to this part; the thesis gives no bound."""
+"""Largest relative error of the angle of a recognised incline; the thesis states no bound."""
 ROUND_MM = 100.0
-"""The thesis states distances in hundreds of millimetres."""
+"""Resolution of the distances that the thesis states."""
 
 
 @dataclass(frozen=True)
 class Lines:
-    """The lines of lasers of a scene with the workbench's chains for them."""
+    """Lines of lasers of a scene, with the workbench's chains for them."""
 
-    lines: tuple[Line, ...]
+    lines: tuple[LaserLine, ...]
     ours: tuple[Chain, ...]
     noisy: tuple[Chain, ...]
 
     @classmethod
     def of(cls, rig: Rig, scene: SimulatedScene) -> Lines:
-        """The lines that a scene asks for.
+        """Lines of a scene.
 
         Raises:
-            BadInputError: the rig does not have them.
+            BadInputError: the rig lacks a line.
         """
         lines = tuple(line_of(rig, name) for name in scene.lines)
         span = (scene.set_mm[0], scene.set_mm[1])
@@ -48,13 +48,13 @@ class Lines:
 
 
 def simulate(scene: SimulatedScene, rig: Rig, points: int, rng: Generator) -> SceneSimulated:
-    """Put the scene at `points` distances and range it with every chain.
+    """Simulate a scene at `points` distances with every chain.
 
-    They are evenly spaced in their square root: a tooth of the thesis's error is as long as the square of the
-    distance, and the near teeth are many.
+    Distances are equally spaced in their square root, because the period of the thesis's sawtooth error is
+    proportional to the square of the distance.
 
     Raises:
-        BadInputError: scene and rig do not go together.
+        BadInputError: the scene does not match the rig.
     """
     lines = Lines.of(rig, scene)
     nearest, farthest = scene.set_mm
@@ -70,7 +70,7 @@ def simulate(scene: SimulatedScene, rig: Rig, points: int, rng: Generator) -> Sc
 
 def _true_mm(lines: Lines, scene: SimulatedScene, set_mm: float) -> float:
     closest = truth(scene, lines.lines, set_mm).closest_mm
-    assert closest is not None  # noqa: S101 - a surface is everywhere somewhere
+    assert closest is not None  # noqa: S101 - a surface has a distance everywhere
     return closest
 
 
@@ -82,9 +82,9 @@ def _read(lines: Lines, scene: SimulatedScene, set_mm: float, rng: Generator) ->
     by_ours = [chain.read(*at, rng) for chain, at in zip(lines.ours, placed, strict=True)]
     by_noisy = [chain.read(*at, rng) for chain, at in zip(lines.noisy, placed, strict=True)]
     return {
-        "thesis": together(by_thesis, [line.length_px for line in lines.lines]),
-        "ours": together(by_ours, [_information(o) for o in by_ours]),
-        "noisy": together(by_noisy, [_information(o) for o in by_noisy]),
+        "thesis": combined(by_thesis, [line.length_px for line in lines.lines]),
+        "ours": combined(by_ours, [_information(o) for o in by_ours]),
+        "noisy": combined(by_noisy, [_information(o) for o in by_noisy]),
     }
 
 
@@ -92,8 +92,8 @@ def _information(outcome: Outcome) -> float:
     return 0.0 if outcome.sigma_mm is None else outcome.sigma_mm**-2
 
 
-def together(outcomes: Sequence[Outcome], weights: Sequence[float]) -> Outcome:
-    """One answer of one or two lines: closest ranges averaged by weight, shapes side by side."""
+def combined(outcomes: Sequence[Outcome], weights: Sequence[float]) -> Outcome:
+    """Combined result of one or two lines: weighted mean of the closest ranges, shapes joined."""
     found = [(o, w) for o, w in zip(outcomes, weights, strict=True) if o.closest_mm is not None]
     if len(found) == 1:
         return found[0][0]
@@ -112,7 +112,7 @@ def _readings(outcomes: Sequence[Outcome]) -> ChainReadings:
 
 
 def claim_rows(simulated: SceneSimulated) -> list[ClaimRow]:
-    """Every claim of the scene with what each chain reached."""
+    """Every claim of the scene with the values that the chains reach."""
     return [_row(simulated, claim) for claim in simulated.scene.claims]
 
 
@@ -130,7 +130,7 @@ def _row(simulated: SceneSimulated, claim: Claim) -> ClaimRow:
         **reached,
         reproduced=_reproduced(claim, reached["thesis"]),
         better=_better(claim, farthest, reached["ours"], reached["thesis"])
-        and not _tells_less(simulated, claim, simulated.ours, simulated.thesis),
+        and not _has_fewer(simulated, claim, simulated.ours, simulated.thesis),
     )
 
 
@@ -140,12 +140,12 @@ def _reached(simulated: SceneSimulated, claim: Claim, chain: ChainReadings) -> f
         return _farthest_right(simulated, chain, inside)
     if claim.quantity == "readings":
         return float(sum(chain.closest_mm[i] is not None for i in inside))
-    told = [e for i in inside if (e := _error(simulated, claim, chain, i)) is not None]
-    return max(told, default=None)
+    errors = [e for i in inside if (e := _error(simulated, claim, chain, i)) is not None]
+    return max(errors, default=None)
 
 
 def _inside(simulated: SceneSimulated, claim: Claim) -> list[int]:
-    """Which of the distances a claim is about."""
+    """Indices of the distances of a claim."""
     nearest, farthest = claim.set_mm or simulated.scene.set_mm
     set_mm = np.array(simulated.set_mm)
     inside = np.flatnonzero((set_mm >= nearest * (1 - 1e-9)) & (set_mm <= farthest * (1 + 1e-9)))
@@ -157,35 +157,35 @@ def _error(simulated: SceneSimulated, claim: Claim, chain: ChainReadings, i: int
     return error(simulated, chain, i)
 
 
-def _tells_less(simulated: SceneSimulated, claim: Claim, one: ChainReadings, other: ChainReadings) -> bool:
-    """Whether a largest error of `one` is that of fewer readings."""
+def _has_fewer(simulated: SceneSimulated, claim: Claim, one: ChainReadings, other: ChainReadings) -> bool:
+    """Whether the largest error of `one` is over fewer readings than that of `other`."""
     if claim.quantity not in ("range", "angle"):
         return False
-    return _untold(simulated, claim, one) > _untold(simulated, claim, other)
+    return _missing(simulated, claim, one) > _missing(simulated, claim, other)
 
 
-def _untold(simulated: SceneSimulated, claim: Claim, chain: ChainReadings) -> int:
-    """How many readings tell no range, or no angle."""
+def _missing(simulated: SceneSimulated, claim: Claim, chain: ChainReadings) -> int:
+    """Number of readings without a range or an angle."""
     return sum(_error(simulated, claim, chain, i) is None for i in _inside(simulated, claim))
 
 
 def _range_error(simulated: SceneSimulated, chain: ChainReadings, i: int) -> float | None:
-    """Relative; None where no spot was seen."""
+    """Relative error of the range; None if no spot was seen."""
     closest, true = chain.closest_mm[i], simulated.true_mm[i]
     return None if closest is None else abs(closest - true) / true
 
 
 def _angle_error(simulated: SceneSimulated, chain: ChainReadings, i: int) -> float | None:
-    """Relative; a flat is an incline of 0 degrees, and what is neither tells no angle."""
-    told = 0.0 if chain.shape[i] == "flat" else chain.angle_deg[i]
+    """Relative error of the angle, 0 degrees for a flat; None for other shapes."""
+    measured = 0.0 if chain.shape[i] == "flat" else chain.angle_deg[i]
     true = simulated.scene.incline_deg
-    return None if told is None or not true else abs(told - true) / abs(true)
+    return None if measured is None or not true else abs(measured - true) / abs(true)
 
 
 def _farthest_right(simulated: SceneSimulated, chain: ChainReadings, inside: Sequence[int]) -> float:
-    """Last distance with the right shape before two in a row are wrong; 0 if there is none.
+    """Last distance with the true shape before two consecutive wrong ones; 0 if there is none.
 
-    A test of significance rejects one right shape in a hundred: a single one does not end the span.
+    The significance test rejects one true shape in a hundred, so a single rejection does not end the span.
     """
     right = [_is_right(simulated, chain, i) for i in inside]
     end = next((k for k in range(1, len(right)) if not (right[k - 1] or right[k])), len(right))
@@ -201,7 +201,7 @@ def _is_right(simulated: SceneSimulated, chain: ChainReadings, i: int) -> bool:
 
 
 def _reproduced(claim: Claim, reached: float | None) -> bool | None:
-    """Whether what was reached, rounded to the digits that the thesis states, keeps what it states."""
+    """Whether the reached value, rounded to the digits of the stated one, satisfies the claim."""
     if claim.stated is None or reached is None:
         return None
     if claim.quantity == "shape":
@@ -219,7 +219,7 @@ def _better(claim: Claim, farthest: float, ours: float | None, thesis: float | N
 
 
 def readings_csv(simulated: Sequence[SceneSimulated]) -> str:
-    """Every reading, a line for each scene and distance; ranges in mm, angles in degrees."""
+    """CSV of all readings, one line per scene and distance; ranges in mm, angles in degrees."""
     tables = [
         pd.DataFrame(
             {"scene": one.scene.name, "set_mm": one.set_mm, "true_mm": one.true_mm}
@@ -235,5 +235,5 @@ def readings_csv(simulated: Sequence[SceneSimulated]) -> str:
 
 
 def claims_csv(rows: Sequence[ClaimRow]) -> str:
-    """The table of claims as CSV, columns as in `ClaimRow`."""
+    """CSV of the claims, columns as in `ClaimRow`."""
     return pd.DataFrame([row.model_dump() for row in rows]).to_csv(index=False, lineterminator="\n")

@@ -1,4 +1,4 @@
-"""Step `thesis_simulation`: range simulated scenes as the thesis did and as the workbench does."""
+"""Step `thesis_simulation`: range simulated scenes with the thesis's chain and the workbench's."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from workbench.trials.thesis.schema import SimulatedScene
 
 @register
 class ThesisSimulationStep(StepModel):
-    """Range simulated scenes as the thesis did and as the workbench does; no camera takes part."""
+    """Range simulated scenes with the thesis's chain and the workbench's; the bench is not used."""
 
     step: Literal["thesis_simulation"]
     points: Annotated[int, Field(ge=2, le=1_000_000)]
-    """Distances of each scene that does not state its own number."""
+    """Number of distances of each scene without its own number."""
     scenes: Annotated[tuple[SimulatedScene, ...], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _names_differ(self) -> ThesisSimulationStep:
         names = [scene.name for scene in self.scenes]
         if len(set(names)) != len(names):
-            raise ValueError(f"names of scenes must differ, got {names}")
+            raise ValueError(f"scenes: expected distinct names, got {', '.join(names)}")
         return self
 
     @property
     def title(self) -> str:
-        """How much is simulated."""
+        """Number of scenes."""
         return f"Simulate {len(self.scenes)} scenes"
 
     def run(self, context: Context, name: str) -> str:
-        """Simulate every scene, and write claims, readings and figures.
+        """Simulate every scene and write claims, readings and figures.
 
         Raises:
-            BadInputError: a scene and the rig do not go together.
-            StoppedError: a stop was asked for.
+            BadInputError: a scene does not match the rig.
+            StoppedError: a stop was requested.
         """
-        # Imported here: a file is checked without the ranger.
+        # Imported here: checking a file must not import the ranger.
         from workbench.trials.thesis.trial import run_trial
 
         return run_trial(context, name, self.scenes, self.points)

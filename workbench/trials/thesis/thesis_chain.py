@@ -1,9 +1,9 @@
-"""The chain of the thesis's simulation as it was, idealisations and quirks included, to measure it by.
+"""Chain of the thesis's simulation, including its idealisations and peculiarities, for comparison.
 
 Deborah L. Tran, "Obstacle Detection for Robot Navigation Using Structured Light", MIT 2001: equations (4.3),
 (4.4), (4.6) to (4.9), sections 5.2.1, 5.2.2.3, 5.2.3 and Appendix A. Its frames have no noise, so one row of
-pixels tells all. The text leaves pixels out that are farther from a spot's centre than its radius, the
-program does not; the farthest distance of 12.6 m follows from the program (docs/thesis-simulation.md).
+pixels suffices. The text excludes pixels farther from a spot's centre than its radius, the program does not;
+the farthest distance of 12.6 m follows from the program (docs/thesis-simulation.md).
 """
 
 from __future__ import annotations
@@ -12,24 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.model.arrays import BoolArray, FloatArray
-from workbench.trials.thesis.scene import Line, Outcome, angle_deg
+from workbench.trials.thesis.scene import LaserLine, Outcome, angle_deg
 
 IntArray = NDArray[np.int64]
 BRIGHTEST_DN = 255
 AMBIGUOUS_PX = 2
-"""Pixels no farther than this from the centre are nobody's: there the two lines of lasers cross."""
+"""Half width of the zone around the centre whose pixels are ignored: there the two lines of lasers cross."""
 FLAT_SLOPE = 1e-4
 HALF_PX = 0.5
 FRONT_STEP_MM = 0.1
 
 
-def read(line: Line, depths_mm: FloatArray, lit: BoolArray) -> Outcome:
-    """One reading: every laser at once, and each alone where there are not as many spots as lasers.
+def read(line: LaserLine, depths_mm: FloatArray, lit: BoolArray) -> Outcome:
+    """One reading: all lasers at once, then each alone if the number of spots differs from that of lasers.
 
     Args:
-        line: the lasers.
-        depths_mm: (n,) where their beams end.
-        lit: (n,) whose spots can be seen.
+        line: line of lasers.
+        depths_mm: (n,) depths at which the beams end.
+        lit: (n,) lasers whose spots are visible.
     """
     centres = spot_centres(line, depths_mm, lit)
     lasers = np.arange(len(lit))
@@ -42,8 +42,8 @@ def read(line: Line, depths_mm: FloatArray, lit: BoolArray) -> Outcome:
     return shape_of(line, lasers, ranges_mm(line, lasers, centres), sigmas_mm(line, lasers, centres))
 
 
-def spot_centres(line: Line, depths_mm: FloatArray, lit: BoolArray) -> FloatArray:
-    """(m,) centres of mass (4.8) of neighbouring bright pixels outside the ambiguous zone, ascending."""
+def spot_centres(line: LaserLine, depths_mm: FloatArray, lit: BoolArray) -> FloatArray:
+    """Centres of mass (m,), (4.8), of adjacent bright pixels outside the ambiguous zone, ascending."""
     row = draw(line, depths_mm, lit)
     bright = np.flatnonzero(row)
     bright = bright[np.abs(bright - line.centre_px) > AMBIGUOUS_PX]
@@ -51,10 +51,10 @@ def spot_centres(line: Line, depths_mm: FloatArray, lit: BoolArray) -> FloatArra
     return np.array([(group * row[group]).sum() / row[group].sum() for group in groups])
 
 
-def draw(line: Line, depths_mm: FloatArray, lit: BoolArray) -> IntArray:
-    """(length,) the row that holds the spots: (4.7), rounded, one spot over the other.
+def draw(line: LaserLine, depths_mm: FloatArray, lit: BoolArray) -> IntArray:
+    """Row of pixels (length,) with the spots: (4.7), rounded; later spots overwrite earlier ones.
 
-    The square that is drawn has its sides at whole pixels, cut off downwards on both sides.
+    A spot is drawn in a square with its sides at whole pixels, both rounded as in the thesis's program.
     """
     row = np.zeros(line.length_px, np.int64)
     spots, radii = line.spots_px(depths_mm), line.radii_px(depths_mm)
@@ -67,15 +67,15 @@ def draw(line: Line, depths_mm: FloatArray, lit: BoolArray) -> IntArray:
     return row
 
 
-def ranges_mm(line: Line, lasers: IntArray, centres: FloatArray, moved_px: float = 0.0) -> FloatArray:
-    """(m,) ranges (4.3) of spots whose lasers are known, `moved_px` farther from the centre than seen."""
+def ranges_mm(line: LaserLine, lasers: IntArray, centres: FloatArray, moved_px: float = 0.0) -> FloatArray:
+    """Ranges (m,), (4.3), of assigned spots, moved by `moved_px` away from the centre."""
     baselines = line.baselines_mm[lasers]
     away = np.sign(baselines) * (centres - line.centre_px) + moved_px
     return np.asarray(line.f_px * np.abs(baselines) / away)
 
 
-def sigmas_mm(line: Line, lasers: IntArray, centres: FloatArray) -> FloatArray:
-    """(m,) the error of half a pixel (4.4), which the thesis takes for the deviation of a range."""
+def sigmas_mm(line: LaserLine, lasers: IntArray, centres: FloatArray) -> FloatArray:
+    """Range errors (m,) of half a pixel (4.4), which the thesis uses as standard deviations."""
     farther = ranges_mm(line, lasers, centres, -HALF_PX)
     nearer = ranges_mm(line, lasers, centres, HALF_PX)
     return (farther - nearer) / 2
@@ -90,11 +90,10 @@ def fit(x_mm: FloatArray, y_mm: FloatArray, sigma_mm: FloatArray, degree: int) -
     return np.asarray(scaled / scale ** np.arange(degree + 1)), float(misfit @ misfit)
 
 
-def shape_of(line: Line, lasers: IntArray, y_mm: FloatArray, sigma_mm: FloatArray) -> Outcome:
-    """Shape and closest range: a straight line if chi^2 < m - 1, else the first degree for which it is.
+def shape_of(line: LaserLine, lasers: IntArray, y_mm: FloatArray, sigma_mm: FloatArray) -> Outcome:
+    """Shape and closest range: the lowest degree of polynomial with chi^2 < m - 1.
 
-    One spot is a flat by itself: no line can be laid through it, and the thesis does not say what its program
-    then found.
+    A single spot is taken as a flat, because the thesis does not state the result of its program.
     """
     x_mm = line.front_mm[lasers]
     if len(x_mm) == 1:
@@ -111,22 +110,22 @@ def shape_of(line: Line, lasers: IntArray, y_mm: FloatArray, sigma_mm: FloatArra
     return _unknown(y_mm)
 
 
-def _straight(line: Line, coefficients: FloatArray) -> Outcome:
+def _straight(line: LaserLine, coefficients: FloatArray) -> Outcome:
     at_first, slope = coefficients.tolist()
     if abs(slope) < FLAT_SLOPE:
         return Outcome(at_first, "flat")
-    # One more spacing than there are lasers: the front of the thesis's program ends beyond its last laser.
+    # One spacing more than lasers: the front of the thesis's program ends beyond its last laser.
     beyond = _spacing(line) * (len(line.ids) + 1)
     return Outcome(min(at_first, at_first + slope * beyond), "incline", angle_deg(slope))
 
 
-def _lowest(line: Line, coefficients: FloatArray, spots: int) -> float:
-    """Smallest value before the front, which is as many spacings long as there are spots."""
+def _lowest(line: LaserLine, coefficients: FloatArray, spots: int) -> float:
+    """Smallest value along the front, whose length is the number of spots times the spacing."""
     x = np.arange(0.0, spots * _spacing(line), FRONT_STEP_MM)
     return float(np.polynomial.Polynomial(coefficients)(x).min())
 
 
-def _spacing(line: Line) -> float:
+def _spacing(line: LaserLine) -> float:
     return float(np.diff(line.baselines_mm).min())
 
 

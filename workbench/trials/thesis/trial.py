@@ -1,4 +1,4 @@
-"""The run of the thesis's simulation, and its tables."""
+"""Execution of the thesis's simulation, with its tables."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from workbench.trials.thesis.schema import ClaimRow, Quantity, SimulatedScene
 from workbench.trials.thesis.simulation import claim_rows, claims_csv, readings_csv, simulate
 
 SEED = 2001
-"""With a scene's name it draws the scene's noise: adding a scene leaves the others as they were."""
+"""Seed of a scene's noise together with its name, so that adding a scene does not change the others."""
 PERCENT = 100.0
 TITLES: dict[Quantity, str] = {
     "range": "Largest relative error of the closest range",
@@ -32,8 +32,8 @@ def run_trial(context: Context, name: str, scenes: Sequence[SimulatedScene], poi
     """Simulate the scenes at `points` distances each; returns the outcome in one line.
 
     Raises:
-        BadInputError: a scene and the rig do not go together.
-        StoppedError: a stop was asked for.
+        BadInputError: a scene does not match the rig.
+        StoppedError: a stop was requested.
     """
     simulated, rows = [], []
     for scene in scenes:
@@ -50,13 +50,13 @@ def run_trial(context: Context, name: str, scenes: Sequence[SimulatedScene], poi
     finish_trial(context, name, claim_tables(name, rows), charts)
     stated = [row for row in rows if row.reproduced is not None]
     return (
-        f"as in the thesis: {sum(row.reproduced is True for row in stated)} of {len(stated)} claims kept;"
-        f" ours better in {sum(row.better for row in rows)} of {len(rows)} rows; tables in {name}.csv"
+        f"{sum(row.reproduced is True for row in stated)} of {len(stated)} claims of the thesis reproduced;"
+        f" workbench better in {sum(row.better for row in rows)} of {len(rows)} rows; tables in {name}.csv"
     )
 
 
 def claim_tables(name: str, rows: Sequence[ClaimRow]) -> list[Table]:
-    """Stated and reached values, a table for each quantity that is claimed."""
+    """Tables of stated and reached values, one for each claimed quantity."""
     return [
         _claim_table(name, quantity, [row for row in rows if row.quantity == quantity])
         for quantity in TITLES
@@ -102,5 +102,5 @@ def _claim_table(name: str, quantity: Quantity, rows: Sequence[ClaimRow]) -> Tab
             )
             for row in rows
         ),
-        caption="! after thesis: not what it states; ! after ours: not better than the thesis's",
+        caption="! after thesis: claim not reproduced; ! after ours: not better than the thesis's chain",
     )

@@ -1,4 +1,4 @@
-"""The workbench's own chain before the thesis's scene: frames, spots, ranges, shape."""
+"""Chain of the workbench for the thesis's scenes: frames, spots, ranges, shape."""
 
 from __future__ import annotations
 
@@ -29,37 +29,37 @@ from workbench.ranging.ranger import Ranger, Reading
 from workbench.ranging.shape import Shape
 from workbench.spots import Finding, SpotFinder
 from workbench.trials.thesis.camera import BAND_PX, expose
-from workbench.trials.thesis.scene import Line, Outcome
+from workbench.trials.thesis.scene import LaserLine, Outcome
 
 TYPICAL_SPOT_SD_PX = 0.01
 
 
 @dataclass(frozen=True)
 class Chain:
-    """Ranges one line of lasers with an exact calibration."""
+    """Chain for one line of lasers with an exact calibration."""
 
-    line: Line
+    line: LaserLine
     noisy: bool
-    """Frames with shot, read and speckle noise; without, frames are rounded and nothing else."""
+    """Whether frames have shot noise, read noise and speckle; otherwise they are only rounded."""
     span_mm: tuple[float, float]
-    """Nearest and farthest distance that the calibration is said to hold for."""
+    """Nearest and farthest standoff of the calibration's validity."""
 
     def read(self, depths_mm: FloatArray, lit: BoolArray, rng: Generator) -> Outcome:
-        """One reading, as `thesis_chain.read`; `rng` draws the noise."""
+        """One reading, see `thesis_chain.read`; `rng` generates the noise."""
         spots = self.line.spots_px(depths_mm)
         if self.noisy:
             spots = spots + self.line.speckle_sd_px * rng.standard_normal(len(spots))
 
-        def shoot(ids: tuple[str, ...]) -> Finding:
-            fired = lit & np.isin(self.line.ids, ids)
-            on, off = expose(self.line, depths_mm, spots, fired, rng if self.noisy else None)
+        def capture(ids: tuple[str, ...]) -> Finding:
+            on_lasers = lit & np.isin(self.line.ids, ids)
+            on, off = expose(self.line, depths_mm, spots, on_lasers, rng if self.noisy else None)
             return self._finders[ids].find(on, off)
 
-        return _outcome(acquire(self.ranger, "simulated", shoot))
+        return _outcome(acquire(self.ranger, "simulated", capture))
 
     @cached_property
     def ranger(self) -> Ranger:
-        """A ranger that knows the line exactly."""
+        """Ranger with the exact calibration of the line."""
         return Ranger(exact_calibration(self.line, self.noisy, self.span_mm))
 
     @cached_property
@@ -81,8 +81,8 @@ def _name(shape: Shape) -> str:
     return f"round {shape.degree}" if shape.kind == "round" else shape.kind
 
 
-def exact_calibration(line: Line, noisy: bool, span_mm: tuple[float, float]) -> Calibration:
-    """The calibration of an ideal line, every value certain."""
+def exact_calibration(line: LaserLine, noisy: bool, span_mm: tuple[float, float]) -> Calibration:
+    """Calibration of an ideal line without uncertainty."""
     width, height = (line.length_px, BAND_PX) if line.axis == "u" else (BAND_PX, line.length_px)
     cx, cy = (line.centre_px, BAND_PX / 2) if line.axis == "u" else (BAND_PX / 2, line.centre_px)
     f = line.f_px

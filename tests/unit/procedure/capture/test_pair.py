@@ -17,7 +17,7 @@ from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.event import CaptureTaken, ExposureSet, TargetPlaced
 from workbench.model.target import Placement
 from workbench.procedure.capture.pair import PairSource, spots_found
-from workbench.session.state import Group
+from workbench.session.state import PlacementCaptures
 from workbench.spots import Failure, Finding, find_spots
 
 PLACEMENT = Placement(key="p.1/500mm", standoff_mm=500.0, standoff_sd_mm=1.5)
@@ -31,7 +31,7 @@ def source(tmp_path: Path) -> Iterator[PairSource]:
     rig = two_laser_rig()
     with plain_bench(rig, tmp_path) as bench:
         bench.target.place(PLACEMENT)
-        yield PairSource(tmp_path, rig, bench, may_fire=True)
+        yield PairSource(tmp_path, rig, bench, may_emit=True)
 
 
 def take(source: PairSource, *ids: str, scene: str | None = None) -> CaptureTaken:
@@ -59,14 +59,14 @@ def test_every_trial_exposure_is_named_before_it_is_taken(source: PairSource) ->
 
 
 def test_a_frame_in_room_light_has_no_dark_frame_and_needs_no_confirmation(source: PairSource) -> None:
-    source.may_fire = False
+    source.may_emit = False
     image, taken = source.room_light("p.1/500mm/board/00", PLACEMENT, 0)
     assert image.shape == (120, 640)
     assert (taken.laser_id, taken.off, taken.lit_s) == ("board", None, None)
 
 
 def test_nothing_fires_before_the_beams_are_confirmed_to_be_safe(source: PairSource) -> None:
-    source.may_fire = False
+    source.may_emit = False
     for fire in (lambda: take(source), lambda: source.set_exposure(PLACEMENT.key, lambda key: None)):
         with pytest.raises(RuntimeError):
             fire()
@@ -74,8 +74,8 @@ def test_nothing_fires_before_the_beams_are_confirmed_to_be_safe(source: PairSou
 
 def test_a_whole_placement_is_served_from_disk(source: PairSource) -> None:
     on, off, taken = source.pair(KEY, ("L1",), PLACEMENT, 0, None)
-    source.served = Group(TargetPlaced(placement=PLACEMENT), SET, {KEY: taken}, whole=True)
-    source.may_fire = False
+    source.replayed = PlacementCaptures(TargetPlaced(placement=PLACEMENT), SET, {KEY: taken}, complete=True)
+    source.may_emit = False
     assert source.set_exposure(PLACEMENT.key, lambda key: None) == SET
     again_on, again_off, again = source.pair(KEY, ("L1",), PLACEMENT, 0, None)
     assert again == taken
@@ -88,7 +88,7 @@ def test_a_whole_placement_is_served_from_disk(source: PairSource) -> None:
 def test_a_frame_that_changed_on_disk_is_refused(source: PairSource) -> None:
     taken = take(source)
     assert taken.off is not None
-    source.served = Group(TargetPlaced(placement=PLACEMENT), None, {KEY: taken}, whole=True)
+    source.replayed = PlacementCaptures(TargetPlaced(placement=PLACEMENT), None, {KEY: taken}, complete=True)
     path = source.session_dir / taken.on.path
     path.write_bytes((source.session_dir / taken.off.path).read_bytes())
     with pytest.raises(BadInputError, match="00-on") as caught:
@@ -102,7 +102,7 @@ def test_a_beam_in_the_dark_frame_is_refused(source: PairSource) -> None:
     with source.bench.lasers.lit(["L2"], for_s=2.0):
         stuck = source.bench.camera.grab().image
     line = prior_scanline(rig, rig.lasers[0])
-    source.look_at_dark(KEY, stuck, find_spots(stuck, scanlines=[line], expected=1), [line])
+    source.check_dark(KEY, stuck, find_spots(stuck, scanlines=[line], expected=1), [line])
     camera = source.bench.camera
 
     class Stuck:
@@ -119,10 +119,10 @@ def test_a_beam_in_the_dark_frame_is_refused(source: PairSource) -> None:
 
     source.bench = replace(source.bench, camera=Stuck())
     with pytest.raises(LaserOffNotConfirmedError, match=KEY) as caught:
-        source.look_for_stuck_beam(KEY)
+        source.check_stuck_beam(KEY)
     assert caught.value.exit_code == 7
     assert "measure_latency" in str(caught.value)
-    source.look_for_stuck_beam(KEY)  # the frame was looked at: nothing is left
+    source.check_stuck_beam(KEY)  # the frame was looked at: nothing is left
 
 
 def test_one_spot_of_a_laser_alone_is_the_lasers(source: PairSource) -> None:

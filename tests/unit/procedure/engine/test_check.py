@@ -1,4 +1,4 @@
-"""What `workbench check` says of files that are wrong: each mistake once, where it stands, in plain words."""
+"""`check_file`: each mistake once, with line and key, in the order of the file; notes apart from mistakes."""
 
 from __future__ import annotations
 
@@ -22,14 +22,24 @@ steps:
     standoffs_mm: [300, 600]
     repeats: 2
 """
+HEAD = "format: 1\nprocedure: p\ntitle: P\nsteps:\n"
+CALIBRATION = "%YAML 1.2\n---\nimage_width: 640\ncamera_name: c\nlaser_ranger:\n  format: 1\n"
+CSV = "laser_id,standoff_mm,repeat,u_px,v_px\nL1,200,0,1,2\n"
+Place = tuple[int, str]
 
 
-def wrong(tmp_path: Path, text: str, name: str = "f.yaml") -> list[str]:
-    path = tmp_path / name
+def place(path: Path, text: str) -> Place:
+    """Line and key of a mistake or note, after checking that it names the file."""
+    file, _, rest = text.partition(f"{path.name}:")
+    assert file == f"{path.parent}/"
+    line, key, _ = rest.split(": ", 2)
+    return int(line), key
+
+
+def mistakes(tmp_path: Path, text: str) -> list[Place]:
+    path = tmp_path / "f.yaml"
     path.write_text(text)
-    with pytest.raises(BadInputError) as caught:
-        check_file(path)
-    return str(caught.value).replace(f"{tmp_path}/", "").splitlines()
+    return [place(path, one) for one in check_file(path).mistakes]
 
 
 def changed(text: str, old: str, new: str) -> str:
@@ -38,109 +48,93 @@ def changed(text: str, old: str, new: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("old", "new", "found"),
     [
-        (
-            "repeats: 2",
-            "repeats: two",
-            "f.yaml:7: steps[0].repeats: expected a whole number, such as 10, got 'two'",
-        ),
-        ("    repeats: 2\n", "", "f.yaml:5: steps[0].repeats: is missing"),
-        (
-            "repeats: 2",
-            "repeats: 2\n    colour: red",
-            "f.yaml:8: steps[0].colour: no such key; expected one of step, standoffs_mm, repeats, limits",
-        ),
-        ("[300, 600]", "[]", "f.yaml:6: steps[0].standoffs_mm: expected a list of at least 1, got 0"),
-        (
-            "[300, 600]",
-            "[300, far]",
-            "f.yaml:6: steps[0].standoffs_mm[1]: expected a number, such as 12.5, got 'far'",
-        ),
-        ("[300, 600]", "300", "f.yaml:6: steps[0].standoffs_mm: expected a list, such as [300], got 300"),
+        ("repeats: 2", "repeats: two", (7, "steps[0].repeats")),
+        ("repeats: 2", "repeats: 0", (7, "steps[0].repeats")),
+        ("    repeats: 2\n", "", (5, "steps[0].repeats")),
+        ("repeats: 2", "repeats: 2\n    colour: red", (8, "steps[0].colour")),
+        ("[300, 600]", "[]", (6, "steps[0].standoffs_mm")),
+        ("[300, 600]", "[300, far]", (6, "steps[0].standoffs_mm[1]")),
+        ("[300, 600]", "300", (6, "steps[0].standoffs_mm")),
+        ("[300, 600]", "[300, 600, 300]", (5, "steps[0]")),
+        ("capture_grid", "capture_grd", (5, "steps[0].step")),
+        ("title: P", "title: P\ntitle: Q", (4, "title")),
     ],
 )
-def test_one_mistake_is_one_line(tmp_path: Path, old: str, new: str, says: str) -> None:
-    assert wrong(tmp_path, changed(PROCEDURE, old, new)) == [says]
+def test_one_mistake_is_reported_once(tmp_path: Path, old: str, new: str, found: Place) -> None:
+    assert mistakes(tmp_path, changed(PROCEDURE, old, new)) == [found]
 
 
-def test_a_step_that_is_none_is_told_with_those_there_are(tmp_path: Path) -> None:
-    (line,) = wrong(tmp_path, changed(PROCEDURE, "capture_grid", "capture_grd"))
-    assert line.startswith("f.yaml:5: steps[0].step: expected one of capture_grid, capture_board, ")
-    assert line.endswith(", got 'capture_grd'")
+def test_an_unknown_kind_of_step_is_answered_with_the_nearest_names_first(tmp_path: Path) -> None:
+    path = tmp_path / "f.yaml"
+    path.write_text(changed(PROCEDURE, "capture_grid", "capture_grd"))
+    (text,) = check_file(path).mistakes
+    assert "capture_grid, capture_board, " in text
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("old", "new", "found"),
     [
-        (
-            "f_px: {value: 533.3, sd: 26.7} ",
-            "f_px: 533.3 ",
-            [
-                "f.yaml:12: camera.f_px: expected a value and its standard deviation,"
-                " {value: 533.3, sd: ...}, got 533.3"
-            ],
-        ),
-        ("axis: u", "axis: w", ["f.yaml:20: lasers[0].axis: expected 'u' or 'v', got 'w'"]),
-        ("id: L2", "id: L1", ["f.yaml:18: lasers: ids must differ, got L1, L1, L3, L4"]),
+        ("f_px: {value: 533.3, sd: 26.7} ", "f_px: 533.3 ", [(12, "camera.f_px")]),
+        ("axis: u", "axis: w", [(20, "lasers[0].axis")]),
+        ("id: L2", "id: L1", [(18, "lasers")]),
         (
             "seed: 2001",
             "seed: 2001\n  beam: {power_mw: 1 W, colour: red}\n  camera: {gain: 0.2}",
-            [
-                "f.yaml:58: emulator.beam.power_mw: expected a number, such as 1, got '1 W'",
-                "f.yaml:58: emulator.beam.colour: no such key; expected one of power_mw, exit_diameter_mm,"
-                " divergence_mrad, wavelength_nm, speckle_contrast",
-                "f.yaml:59: emulator.camera.gain: expected at least 1, got 0.2",
-            ],
+            [(58, "emulator.beam.power_mw"), (58, "emulator.beam.colour"), (59, "emulator.camera.gain")],
         ),
+        ("seed: 2001", "seed: 2001\n  truth: {lasers: {L9: {x_mm: 3}}}", [(58, "emulator.truth")]),
+        ("seed: 2001", "answers: true", [(56, "emulator.seed")]),
+        ("emulator:\n  seed: 2001", "", [(1, "emulator.seed")]),
+        ("driver: emulated", "driver: robot", [(6, "driver")]),
         (
-            "seed: 2001",
-            "seed: 2001\n  truth: {lasers: {L9: {x_mm: 3}}}",
-            [
-                "f.yaml:58: emulator.truth: lasers.L9: expected a laser of the rig (L1, L2, L3, L4),"
-                " got {'lasers': {'L9': {'x_mm': 3}}}"
-            ],
+            "driver: emulated",
+            "driver: opencv+serial",
+            [(1, "devices.camera.source"), (1, "devices.lasers.port")],
         ),
-        ("seed: 2001", "answers: true", ["f.yaml:56: emulator.seed: is missing"]),
-        ("emulator:\n  seed: 2001", "", ["f.yaml:1: emulator.seed: is missing"]),
     ],
 )
-def test_a_rig_with_its_virtual_bench(tmp_path: Path, old: str, new: str, says: list[str]) -> None:
-    assert wrong(tmp_path, changed(RIG, old, new)) == says
+def test_mistakes_of_a_rig_and_of_its_drivers(tmp_path: Path, old: str, new: str, found: list[Place]) -> None:
+    assert mistakes(tmp_path, changed(RIG, old, new)) == found
 
 
-CALIBRATION = "%YAML 1.2\n---\nimage_width: 640\ncamera_name: c\nlaser_ranger:\n  format: 1\n"
-CSV = "laser_id,standoff_mm,repeat,u_px,v_px\nL1,200,0,1,2\n"
+def test_mistakes_of_a_rig_do_not_hide_those_of_its_driver(tmp_path: Path) -> None:
+    text = changed(changed(RIG, "axis: u", "axis: w"), "seed: 2001", "seed: none")
+    assert [key for _, key in mistakes(tmp_path, text)] == ["lasers[0].axis", "emulator.seed"]
+    text = changed(changed(RIG, "axis: u", "axis: w"), "driver: emulated", "driver: robot")
+    assert [key for _, key in mistakes(tmp_path, text)] == ["driver", "lasers[0].axis"]
 
 
-def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match=r"expected a YAML file, got a folder; give the files in it"):
+def test_a_device_block_is_checked_by_its_driver(tmp_path: Path) -> None:
+    block = "devices:\n  camera: {source: 0, gain: loud}\n  lasers: {port: /dev/ttyACM0}\n"
+    text = changed(RIG, "driver: emulated", "driver: opencv+serial") + block
+    line = text[: text.index("gain: loud")].count("\n") + 1
+    assert mistakes(tmp_path, text) == [(line, "devices.camera.gain")]
+
+
+def test_a_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError):
         check_file(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("text", "what"),
-    [
-        (CALIBRATION, "this is a calibration"),
-        (CSV, "this is no mapping of keys to values"),
-        ("a: 1\nb: 2\n", "this is a mapping of other keys"),
-    ],
-)
-def test_a_file_of_another_kind_is_one_line_everywhere(tmp_path: Path, text: str, what: str) -> None:
-    (line,) = wrong(tmp_path, text)
-    assert line == f"f.yaml:1: expected a procedure or a rig, with one key of these names; {what}"
-    for load, kind in ((load_procedure, "procedure"), (load_rig, "rig")):
+@pytest.mark.parametrize("text", [CALIBRATION, CSV, "a: 1\nb: 2\n", "lasers: []\n"])
+def test_a_file_of_another_kind_is_one_mistake(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "f.yaml"
+    path.write_text(text)
+    for load in (check_file, load_procedure, load_rig):
         with pytest.raises(BadInputError) as caught:
-            load(tmp_path / "f.yaml")
-        assert str(caught.value).endswith(f"f.yaml:1: expected a {kind}, with the key {kind}; {what}")
+            load(path)
+        (line,) = str(caught.value).splitlines()
+        assert line.startswith(f"{path}:1: ")
 
 
-def test_a_rig_given_as_a_procedure(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match=r"expected a procedure, with the key procedure; this is a rig$"):
+def test_a_rig_is_refused_as_a_procedure() -> None:
+    with pytest.raises(BadInputError, match="key procedure"):
         load_procedure(ROOT / "rigs/thesis-emulated.yaml")
 
 
-def test_steps_are_held_against_each_other_whatever_else_is_wrong(tmp_path: Path) -> None:
+def test_the_order_of_steps_is_checked_beside_other_mistakes(tmp_path: Path) -> None:
     """A fit before any capture, an export before its fit, a limit without one, beside other mistakes."""
     text = """\
 format: 1
@@ -156,111 +150,48 @@ steps:
 title: P
 title: Q
 """
-    told = wrong(tmp_path, text)
-    assert [line.split(": ")[0].split(":")[1] for line in told] == ["2", "4", "5", "6", "8", "12"]
-    assert told[1] == "f.yaml:4: steps[0]: fit needs what gives captures before it, which comes after it"
-    assert "procedure: expected letters (A to z), digits, _ and - alone" in told[0]
-    assert "begins with calibration" in told[2]
-    assert "no such key; expected one of rms_px" in told[3]
-    assert told[5].startswith("f.yaml:12: title: stands here again, after line 11")
+    assert mistakes(tmp_path, text) == [
+        (2, "procedure"),
+        (4, "steps[0]"),
+        (5, "steps[1].file"),
+        (6, "steps[2].limits.rms"),
+        (8, "steps[3].standoffs_mm[1]"),
+        (12, "title"),
+    ]
 
 
 @pytest.mark.parametrize("kind", ["capture_grd", "3", "[capture_grid]"])
-def test_nothing_follows_from_a_step_that_cannot_be_read(tmp_path: Path, kind: str) -> None:
-    """It may be the one that gives what the others need."""
+def test_nothing_is_required_after_a_step_of_unknown_kind(tmp_path: Path, kind: str) -> None:
+    """The unknown step may give what later steps need."""
     text = changed(PROCEDURE, "step: capture_grid", f"step: {kind}") + "  - {step: fit}\n  - {step: export}\n"
-    told = wrong(tmp_path, text)
-    assert len(told) == 1
-    assert told[0].startswith("f.yaml:5: steps[0]")
+    ((line, key),) = mistakes(tmp_path, text)
+    assert (line, key.removesuffix(".step")) == (5, "steps[0]")
 
 
-def test_what_a_malformed_step_would_give_is_given(tmp_path: Path) -> None:
-    told = wrong(tmp_path, changed(PROCEDURE, "repeats: 2", "repeats: 0") + "  - {step: fit}\n")
-    assert told == ["f.yaml:7: steps[0].repeats: expected at least 1, got 0"]
+def test_a_malformed_step_gives_what_its_kind_gives(tmp_path: Path) -> None:
+    text = changed(PROCEDURE, "repeats: 2", "repeats: 0") + "  - {step: fit}\n"
+    assert mistakes(tmp_path, text) == [(7, "steps[0].repeats")]
 
 
-def test_notes_stand_beside_the_mistakes(tmp_path: Path) -> None:
-    """A fit without any capture may be meant for another procedure's, or may be the mistake."""
-    told = wrong(
-        tmp_path, changed(PROCEDURE, "repeats: 2", "repeats: 0").replace("capture_grid", "accuracy_trial")
+def test_a_retry_of_a_fit_is_refused(tmp_path: Path) -> None:
+    text = (
+        PROCEDURE
+        + "  - step: fit\n  - step: check_limits\n    limits: {rms_px: {in: [0, 1], on_fail: retry}}\n"
     )
-    assert [line.split(": ")[1] for line in told] == [
-        "steps[0].readings",
-        "note",
-        "steps[0].repeats",
-    ]
-    assert told[1] == (
-        "f.yaml:5: note: steps[0]: accuracy_trial needs a procedure before this one, in the same call, that"
-        " gives calibration"
-    )
+    assert mistakes(tmp_path, text) == [(10, "steps[2].limits")]
 
 
-def test_a_rig_is_looked_through_with_its_driver_and_bench(tmp_path: Path) -> None:
-    """Mistakes of the rig hide neither a driver that is not there nor those of the virtual bench."""
-    text = changed(changed(RIG, "axis: u", "axis: w"), "seed: 2001", "seed: none")
-    assert [line.split(": ")[1] for line in wrong(tmp_path, text)] == ["lasers[0].axis", "emulator.seed"]
-    text = changed(changed(RIG, "axis: u", "axis: w"), "driver: emulated", "driver: robot")
-    assert [line.split(": ")[1] for line in wrong(tmp_path, text)] == ["driver", "lasers[0].axis"]
+def test_notes_are_apart_from_mistakes(tmp_path: Path) -> None:
+    """A trial without a calibration may be meant to follow another procedure."""
+    path = tmp_path / "f.yaml"
+    path.write_text(HEAD + "  - {step: accuracy_trial, standoffs_mm: [300], readings: 0}\n")
+    found = check_file(path)
+    assert [place(path, one) for one in found.mistakes] == [(5, "steps[0].readings")]
+    assert [place(path, one) for one in found.notes] == [(5, "steps[0]")]
 
 
-def test_a_driver_without_what_it_needs(tmp_path: Path) -> None:
-    told = wrong(tmp_path, changed(RIG, "driver: emulated", "driver: opencv+serial"))
-    assert told == [
-        "f.yaml:1: devices.camera.source: is missing",
-        "f.yaml:1: devices.lasers.port: is missing",
-    ]
-    block = "devices:\n  camera: {source: 0, gain: loud}\n  lasers: {port: /dev/ttyACM0}\n"
-    (line,) = wrong(tmp_path, changed(RIG, "driver: emulated", "driver: opencv+serial") + block)
-    assert "devices.camera.gain: expected a number, such as 12.5, got 'loud'" in line
-
-
-HEAD = "format: 1\nprocedure: p\ntitle: P\nsteps:\n"
-
-
-@pytest.mark.parametrize(
-    ("steps", "words"),
-    [
-        (
-            "  - step: capture_grid\n    standoffs_mm: [5]\n    repeats: 0\n",
-            ":7: steps[0].repeats: expected at least 1, got 0",
-        ),
-        ("  - step: dance\n", ":5: steps[0]"),
-        (
-            "  - step: fit\n  - step: capture_grid\n    standoffs_mm: [5]\n    repeats: 1\n",
-            ":5: steps[0]: fit needs",
-        ),
-        (
-            "  - step: capture_grid\n    standoffs_mm: [5]\n    repeats: 1\n"
-            "  - step: fit\n  - step: check_limits\n"
-            "    limits:\n      rms_px: {in: [0, 1], on_fail: retry}\n",
-            "would give the same fit again",
-        ),
-    ],
-)
-def test_a_wrong_procedure_is_named_with_its_line(tmp_path: Path, steps: str, words: str) -> None:
-    path = tmp_path / "p.yaml"
-    path.write_text(HEAD + steps)
-    with pytest.raises(BadInputError) as caught:
-        check_file(path)
-    assert words in str(caught.value)
-
-
-def test_what_every_file_of_ours_is_worth() -> None:
+def test_the_files_of_the_project_are_good() -> None:
     for path in [*ROOT.glob("procedures/*.yaml"), *ROOT.glob("rigs/*.yaml")]:
-        check_file(path)
-    (note,) = check_file(ROOT / "procedures/accuracy-flat.yaml")
-    assert "accuracy-flat.yaml:7: steps[0]: accuracy_trial needs a procedure before" in note
-
-
-def test_a_rig_of_an_unknown_driver(tmp_path: Path) -> None:
-    rig = tmp_path / "rig.yaml"
-    rig.write_text(
-        (ROOT / "rigs/thesis-emulated.yaml").read_text().replace("driver: emulated", "driver: robot")
-    )
-    with pytest.raises(
-        BadInputError, match=r"rig.yaml:6: driver: expected an installed bench driver .*got robot"
-    ):
-        check_file(rig)
-    rig.write_text("lasers: []\n")
-    with pytest.raises(BadInputError, match="expected a procedure or a rig"):
-        check_file(rig)
+        assert check_file(path).mistakes == ()
+    trial = ROOT / "procedures/accuracy-flat.yaml"
+    assert [place(trial, one) for one in check_file(trial).notes] == [(7, "steps[0]")]

@@ -1,4 +1,4 @@
-"""Observations of a running session, and where a spot that was not found is expected."""
+"""Observations of a running session, and the expected position of a missing spot."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from pathlib import Path
 
 from workbench.calibration.design.expected_spot import ExpectedSpot
 from workbench.model.rig import load_rig
-from workbench.procedure.engine.observed import in_words
+from workbench.procedure.engine.observed import expected_spot_text
 
 RIG = load_rig(Path(__file__).parents[4] / "rigs/thesis-emulated.yaml")
 
 
-def test_what_is_said_of_it() -> None:
-    outside = in_words(RIG, "L4", ExpectedSpot(662.3, 248.4, 6.6, 3.6, "outside"))
-    assert "u = 662 +- 7, v = 248 +- 4 px (1 sigma), outside the picture of 640 x 480" in outside
-    assert "nothing is wrong" in outside
-    inside = in_words(RIG, "L4", ExpectedSpot(600.0, 248.4, 6.6, 3.5, "inside"))
-    assert "is L4 lit" in inside
-    assert "nothing is wrong" not in inside
-    edge = in_words(RIG, "L4", ExpectedSpot(640.0, 248.4, 6.6, 3.5, "at the edge"))
-    assert "if it is outside" in edge
+def test_the_text_of_an_expected_spot_has_its_position_and_place() -> None:
+    outside = expected_spot_text(RIG, "L4", ExpectedSpot(662.3, 248.4, 6.6, 3.6, "outside"))
+    assert "u = 662 +- 7, v = 248 +- 4 px (1 sigma)" in outside
+    assert "outside the picture of 640 x 480" in outside
+    inside = expected_spot_text(RIG, "L4", ExpectedSpot(600.0, 248.4, 6.6, 3.5, "inside"))
+    assert "inside" in inside
+    edge = expected_spot_text(RIG, "L4", ExpectedSpot(640.0, 248.4, 6.6, 3.5, "at the edge"))
+    assert "at the edge" in edge
+    assert len({text.rpartition(":")[2] for text in (outside, inside, edge)}) == 3, "advice differs"

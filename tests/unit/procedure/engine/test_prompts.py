@@ -1,4 +1,4 @@
-"""Prompts that every procedure puts."""
+"""Prompts common to all procedures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.running import two_laser_rig
 from workbench.model.prompt import Answer
-from workbench.model.target import BoardTarget, Placement
+from workbench.model.target import BoardTarget, FlatTarget, Placement
 from workbench.procedure.engine.prompts import (
     captures_prompt,
     placement_prompt,
@@ -18,18 +18,34 @@ from workbench.procedure.engine.prompts import (
 
 
 @pytest.mark.parametrize(
-    ("standoff_mm", "before_mm", "may"),
+    ("before_mm", "standoffs"),
     [
-        (900.0, None, {"skip": "leave 900 mm out"}),
-        (900.0, 600.0, {"redo": "600 mm again", "skip": "leave 900 mm out"}),
-        (900.0, 900.0, {"redo": "the one before", "skip": "leave this one out"}),
+        (None, {"skip": ["900"]}),
+        (600.0, {"redo": ["600"], "skip": ["900"]}),
+        (900.0, {"redo": [], "skip": []}),  # the standoff does not distinguish them
     ],
 )
-def test_a_placement_prompt_says_which_is_captured_again_and_which_left_out(
-    standoff_mm: float, before_mm: float | None, may: dict[str, str]
+def test_a_placement_prompt_names_the_standoffs_of_redo_and_skip(
+    before_mm: float | None, standoffs: dict[str, list[str]]
 ) -> None:
     before = None if before_mm is None else Placement(key="b", standoff_mm=before_mm)
-    assert placement_prompt(Placement(key="a", standoff_mm=standoff_mm), before).may == may
+    may = placement_prompt(Placement(key="a", standoff_mm=900.0), before).may
+    assert {action: re.findall(r"\d+", text) for action, text in may.items()} == standoffs
+
+
+def test_a_target_that_stands_as_requested_is_taken_away_first() -> None:
+    board = BoardTarget(yaw_deg=20.0)
+    flat, turned = (Placement(key="a", standoff_mm=500.0, target=one) for one in (FlatTarget(), board))
+    for placement in (flat, turned):
+        before = placement.model_copy(update={"key": "b"})
+        again = placement_prompt(placement, before).do
+        assert again != placement_prompt(placement, None).do
+        assert "away and place it again" in again
+        for other in (
+            before.model_copy(update={"standoff_mm": 501.0}),
+            turned if placement is flat else flat,
+        ):
+            assert placement_prompt(placement, other).do == placement_prompt(placement, None).do
 
 
 def test_a_standoff_within_a_tenth_is_no_slip() -> None:
@@ -40,7 +56,7 @@ def test_a_standoff_within_a_tenth_is_no_slip() -> None:
     assert prompt.quantity.usual == 500.0
 
 
-def test_only_somebody_at_the_bench_answers_for_safety_and_placements() -> None:
+def test_safety_and_placements_need_a_person_at_the_bench() -> None:
     assert safety_prompt(two_laser_rig()).at_bench
     assert placement_prompt(Placement(key="a", standoff_mm=500.0), None).at_bench
     captures = captures_prompt("a/L1/snr", "snr", Placement(key="a", standoff_mm=500.0))
@@ -48,7 +64,7 @@ def test_only_somebody_at_the_bench_answers_for_safety_and_placements() -> None:
     assert set(captures.may) == {"redo", "skip"}
 
 
-def test_each_placement_may_have_the_one_before_it_captured_again() -> None:
+def test_redo_is_possible_after_the_first_placement() -> None:
     prompts = placement_prompts([Placement(key=f"{mm}", standoff_mm=mm) for mm in (300.0, 500.0, 700.0)])
     assert [set(prompt.may) for prompt in prompts] == [{"skip"}, {"redo", "skip"}, {"redo", "skip"}]
 
@@ -64,7 +80,9 @@ def test_the_safety_prompt_names_the_rigs_laser_class() -> None:
 @pytest.mark.parametrize(
     ("yaw_deg", "pitch_deg", "numbers"), [(0, 0, []), (20, 0, ["20"]), (-20, 15, ["20", "15"])]
 )
-def test_a_board_is_asked_for_with_its_angles(yaw_deg: float, pitch_deg: float, numbers: list[str]) -> None:
+def test_the_prompt_of_a_board_states_its_angles(
+    yaw_deg: float, pitch_deg: float, numbers: list[str]
+) -> None:
     board = BoardTarget(yaw_deg=yaw_deg, pitch_deg=pitch_deg)
     text = placement_prompt(Placement(key="a", standoff_mm=700.0, target=board), None).do
     assert re.findall(r"\d+", text) == ["700", *numbers]

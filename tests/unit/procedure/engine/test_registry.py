@@ -19,7 +19,7 @@ from workbench.procedure.engine.step import StepModel
 PROCEDURE = "format: 1\nprocedure: p\ntitle: P\nsteps:\n  - {step: late_kind, number: 3}\n"
 
 
-class Kind(StepModel):
+class OwnStep(StepModel):
     """A step that does nothing."""
 
     needs: ClassVar[str | None] = None
@@ -50,19 +50,19 @@ def test_a_class_without_a_tag_is_refused(kinds: dict[str, type[StepModel]]) -> 
     with pytest.raises(TypeError):
 
         @register
-        class Untagged(Kind):
+        class Untagged(OwnStep):
             pass
 
     with pytest.raises(TypeError):
 
         @register
-        class AnyTag(Kind):
+        class AnyTag(OwnStep):
             step: str
 
     with pytest.raises(TypeError):
 
         @register
-        class TwoTags(Kind):
+        class TwoTags(OwnStep):
             step: Literal["one", "two"]
 
     assert kinds == before
@@ -84,7 +84,7 @@ def test_a_doubled_tag_is_refused_and_the_first_class_stays(kinds: dict[str, typ
     with pytest.raises(TypeError, match=r"workbench\.steps\.fit"):
 
         @register
-        class Fit(Kind):
+        class Fit(OwnStep):
             step: Literal["fit"]
 
     assert kinds["fit"] is fit
@@ -93,7 +93,7 @@ def test_a_doubled_tag_is_refused_and_the_first_class_stays(kinds: dict[str, typ
 def test_a_class_that_is_imported_again_takes_the_place_of_itself(kinds: dict[str, type[StepModel]]) -> None:
     def define() -> type[StepModel]:
         @register
-        class Again(Kind):
+        class Again(OwnStep):
             step: Literal["again_kind"]
 
         return Again
@@ -110,7 +110,7 @@ def test_a_kind_registered_late_is_in_the_schema(kinds: dict[str, type[StepModel
         load_procedure(path)
 
     @register
-    class Late(Kind):
+    class Late(OwnStep):
         step: Literal["late_kind"]
         number: int
 
@@ -123,12 +123,18 @@ def test_a_kind_registered_late_is_in_the_schema(kinds: dict[str, type[StepModel
         load_procedure(path)
 
 
-def test_an_entry_point_that_cannot_be_imported_is_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:
-    broken = EntryPoint("broken", "no_such_package_of_steps", registry.GROUP)
+@pytest.mark.parametrize("fault", ["missing", "raise SystemExit(0)", "raise SystemExit", "1 / 0"])
+def test_an_entry_point_that_cannot_be_imported_is_bad_input(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, fault: str
+) -> None:
+    if fault != "missing":
+        (tmp_path / "broken_package_of_steps.py").write_text(f"{fault}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    broken = EntryPoint("broken", "broken_package_of_steps", registry.GROUP)
     monkeypatch.setattr(registry, "entry_points", lambda group: [broken])
     registry._load_installed.cache_clear()
     try:
-        with pytest.raises(BadInputError, match="no_such_package_of_steps") as caught:
+        with pytest.raises(BadInputError, match="broken_package_of_steps") as caught:
             step_kinds()
     finally:
         monkeypatch.undo()

@@ -81,14 +81,14 @@ def test_answers_and_latency_of_before_are_known(tmp_path: Path) -> None:
 
 def test_only_whole_placements_are_served(tmp_path: Path) -> None:
     with replay(tmp_path, [STARTED, PLACED, WHOLE]) as (recorder, _):
-        group = recorder.group("a")
+        group = recorder.complete_placement("a")
         assert group is not None
         assert group.placed == PLACED
         recorder.forget("a")
-        assert recorder.group("a") is None
+        assert recorder.complete_placement("a") is None
     (tmp_path / JOURNAL).unlink()
     with replay(tmp_path, [STARTED, PLACED]) as (recorder, _):
-        assert recorder.group("a") is None
+        assert recorder.complete_placement("a") is None
 
 
 def test_retries_of_before_count(tmp_path: Path) -> None:

@@ -115,4 +115,4 @@ def test_another_version_is_a_change_that_names_it(stopped: Path) -> None:
     older = manifest.model_copy(update={"versions": manifest.versions | {"numpy": "0.9"}})
     _, changes = files_now(stopped, older)
     assert len(changes) == 1
-    assert {"numpy", "0.9"} <= set(changes[0].split())
+    assert {"numpy:", "0.9"} <= set(changes[0].split())

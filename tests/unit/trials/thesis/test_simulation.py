@@ -12,7 +12,7 @@ from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig, load_rig
 from workbench.trials.thesis import scene as scenes
 from workbench.trials.thesis.schema import ChainReadings, Claim, SceneSimulated, SimulatedScene
-from workbench.trials.thesis.simulation import claim_rows, readings_csv, simulate, together
+from workbench.trials.thesis.simulation import claim_rows, combined, readings_csv, simulate
 
 ROOT = Path(__file__).parents[4]
 
@@ -37,10 +37,10 @@ def readings(
 
 def test_two_lines_are_averaged() -> None:
     near, far = scenes.Outcome(100.0, "flat"), scenes.Outcome(110.0, "incline", 3.0)
-    both = together([near, far], [640, 480])
+    both = combined([near, far], [640, 480])
     assert both.closest_mm == pytest.approx((100 * 640 + 110 * 480) / 1120)
-    assert together([scenes.Outcome(None, "none"), far], [640, 480]) == far
-    assert together([scenes.Outcome(None, "none")] * 2, [640, 480]).closest_mm is None
+    assert combined([scenes.Outcome(None, "none"), far], [640, 480]) == far
+    assert combined([scenes.Outcome(None, "none")] * 2, [640, 480]).closest_mm is None
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_a_simulation_is_the_same_again(rig: Rig) -> None:
         ({"lost": (5,)}, "expected numbers from 1 to 4, got 5"),
         ({"incline_deg": 30.0, "coefficients": (1.0,)}, "incline_deg or coefficients, got both"),
         ({"set_mm": (500.0, 100.0)}, "nearest < farthest"),
-        ({"lines": ("vertical", "vertical")}, "each once"),
+        ({"lines": ("vertical", "vertical")}, "lines: "),
     ],
 )
 def test_scenes_that_make_no_sense(rig: Rig, changes: dict[str, object], message: str) -> None:

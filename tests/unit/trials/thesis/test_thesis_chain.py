@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workbench.trials.thesis import thesis_chain as chain
-from workbench.trials.thesis.scene import Line, Outcome
+from workbench.trials.thesis.scene import LaserLine, Outcome
 
 F_MM, SENSOR_MM, PIXELS = 3.6, 4.8, 640
 BASELINES = (-60.0, -30.0, 30.0, 60.0)
@@ -18,9 +18,9 @@ ALL = np.ones(4, bool)
 LASERS = np.arange(4)
 
 
-def line(pixels: int = PIXELS) -> Line:
+def line(pixels: int = PIXELS) -> LaserLine:
     ids = ("1", "2", "3", "4")
-    return Line("u", ids, np.array(BASELINES), 480.0, pixels / 2, pixels, speckle_sd_px=0.0)
+    return LaserLine("u", ids, np.array(BASELINES), 480.0, pixels / 2, pixels, speckle_sd_px=0.0)
 
 
 def four(range_mm: float) -> np.ndarray:
