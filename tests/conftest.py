@@ -51,7 +51,7 @@ SLOW = {
     "tests/unit/trials/thesis/test_thesis_chain.py",
     "tests/unit/viewer/test_window.py",
 }
-"""Unit tests of more than some 3 s of processor time a file, or of processes. `make quick` leaves them out."""
+"""Unit tests of processes, or of more than some 3 s of processor time per file; not in `make quick`."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
