@@ -9,11 +9,12 @@ INSTALLED := $(VENV)/.installed
 # The dependencies of the workbench alone, without those of its developers.
 RUNNABLE := $(VENV)/.runnable
 
-.PHONY: help demo test wheel lint bench prove crash lock clean schema
+.PHONY: help demo test quick wheel lint bench prove crash lock clean schema
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
 	@echo "make test   lint, type check and test everything; PYTHON=python3.13 with another interpreter"
+	@echo "make quick  lint, type check and the fast unit tests (a minute and a half)"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
 	@echo "make prove  stated uncertainties compared with 12 000 simulated calibrations (a few minutes)"
 	@echo "make crash  a session of 10 000 captures with random faults; none may be lost (a quarter of an hour)"
@@ -54,6 +55,9 @@ lint: $(INSTALLED)
 test: lint
 	$(BIN)/python -m pytest -m "not real_time and not wheel"
 	$(BIN)/python -m pytest -n 0 -m real_time
+
+quick: lint
+	$(BIN)/python -m pytest -m "not slow and not real_time" tests/unit
 
 wheel: $(INSTALLED)
 	$(BIN)/python -m pytest -n 0 -m wheel

@@ -17,11 +17,50 @@ REAL_TIME = {
 """They run processes of real-time priority and measure milliseconds. `make test` runs them alone: another
 worker that computes keeps their processes from running, as nothing does at a bench."""
 
+SLOW = {
+    "tests/unit/calibration/checks/test_cross_validation.py",
+    "tests/unit/calibration/checks/test_faults.py",
+    "tests/unit/calibration/checks/test_hypotheses.py",
+    "tests/unit/calibration/data/test_boards.py",
+    "tests/unit/calibration/design/test_expected_spot.py",
+    "tests/unit/calibration/design/test_forecast.py",
+    "tests/unit/calibration/estimation/test_batch.py",
+    "tests/unit/calibration/estimation/test_fisheye.py",
+    "tests/unit/calibration/estimation/test_fit.py",
+    "tests/unit/calibration/estimation/test_jit_cache.py",
+    "tests/unit/calibration/selection/test_outliers.py",
+    "tests/unit/calibration/verdict/test_comparison.py",
+    "tests/unit/cli/test_exit.py",
+    "tests/unit/cli/test_stdio.py",
+    "tests/unit/corners/test_board.py",
+    "tests/unit/devices/test_guarded_lasers.py",
+    "tests/unit/devices/test_registry.py",
+    "tests/unit/emulator/test_bench.py",
+    "tests/unit/emulator/test_board.py",
+    "tests/unit/emulator/test_camera.py",
+    "tests/unit/emulator/test_spot.py",
+    "tests/unit/optics/test_triangulate.py",
+    "tests/unit/procedure/engine/test_resume.py",
+    "tests/unit/ranging/test_lines.py",
+    "tests/unit/ranging/test_live.py",
+    "tests/unit/ranging/test_shape.py",
+    "tests/unit/report/test_board_page.py",
+    "tests/unit/sensor/test_calibrated.py",
+    "tests/unit/sensor/test_curves.py",
+    "tests/unit/spots/test_persistence.py",
+    "tests/unit/trials/thesis/test_thesis_chain.py",
+    "tests/unit/viewer/test_window.py",
+}
+"""Unit tests of processes, or of more than some 3 s of processor time per file; not in `make quick`."""
+
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests of these files, so that they can be chosen and left out."""
     for item in items:
-        if item.nodeid.partition("::")[0] in REAL_TIME:
+        file = item.nodeid.partition("::")[0]
+        if file in REAL_TIME:
             item.add_marker("real_time")
+        if file in SLOW:
+            item.add_marker("slow")
         if item.nodeid.startswith("tests/wheel/"):
             item.add_marker("wheel")

@@ -5,6 +5,10 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+import pytest
+
+from tests.conftest import REAL_TIME, SLOW
+
 ROOT = Path(__file__).parents[2]
 LEAST_SHARE = 0.9
 
@@ -21,6 +25,11 @@ def test_every_test_file_of_a_module_tests_something() -> None:
             node.name for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)
         ]
         assert any(name.startswith("test_") for name in functions), path
+
+
+@pytest.mark.parametrize("file", sorted(REAL_TIME | SLOW))
+def test_files_with_a_marker_exist(file: str) -> None:
+    assert (ROOT / file).is_file()
 
 
 def _test_of(module: Path) -> Path:

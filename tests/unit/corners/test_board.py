@@ -81,14 +81,15 @@ def test_errors_are_as_large_as_stated(tmp_path: Path) -> None:
     assert np.abs(z).max() < 5.0
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_without_noise_what_is_left_is_the_stated_floor(seed: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("seed", "placing"), list(zip(SEEDS, PLACINGS, strict=True)))
+def test_without_noise_what_is_left_is_the_stated_floor(
+    seed: int, placing: tuple[float, float, float], tmp_path: Path
+) -> None:
     rig = rig_of(seed, **NOISELESS)
-    for index, placing in enumerate(PLACINGS):
-        seen = look(rig, tmp_path / str(index), *placing, 1)
-        error = errors(find_board(seen.frames, rig.board), seen)
-        assert np.sqrt(np.mean(error**2)) < FLOOR_SD_PX
-        assert np.abs(error.mean(axis=0)).max() < FLOOR_SD_PX / 2
+    seen = look(rig, tmp_path, *placing, 1)
+    error = errors(find_board(seen.frames, rig.board), seen)
+    assert np.sqrt(np.mean(error**2)) < FLOOR_SD_PX
+    assert np.abs(error.mean(axis=0)).max() < FLOOR_SD_PX / 2
 
 
 def test_a_board_cut_by_the_frame_and_half_covered(tmp_path: Path) -> None:
