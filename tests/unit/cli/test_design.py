@@ -64,7 +64,7 @@ class TestDesign:
         )
         rig.write_text(text)
         outcome = workbench("design", "--rig", rig, "--standoffs", "10,500")
-        refused(outcome, 2, "standoff 10 mm: expected a laser's spot in the picture, there is none")
+        refused(outcome, 2, "standoff 10 mm:")
 
     def test_a_reach_that_is_none(self, workbench: Run, tmp_path: Path) -> None:
         rig = tmp_path / "rig.yaml"
