@@ -18,7 +18,7 @@ from workbench.devices.registry import load_bench_rig, open_bench
 from workbench.devices.watched import watched
 from workbench.model.errors import StoppedError
 from workbench.model.target import Placement
-from workbench.ranging.live import LiveRanger, check_same_sensor, latency_words
+from workbench.ranging.live import LiveRanger, check_same_sensor, latency_text
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.report.readings import reading_line
 
@@ -88,7 +88,7 @@ def _read_all(
                 say(f"hint: {_why_nothing(request, bench.virtual)}")
     finally:
         if request.stats:
-            say(latency_words(live.latencies_s, time.monotonic() - began))
+            say(latency_text(live.latencies_s, time.monotonic() - began))
 
 
 def _why_nothing(request: LiveRequest, virtual: bool) -> str:
