@@ -1,4 +1,4 @@
-"""Records of a fit: every value of the arrays, None for what was not measured, and an event that survives JSON."""
+"""Records of a fit: every value of the arrays, None where not measured, and an event that survives JSON."""
 
 from __future__ import annotations
 
