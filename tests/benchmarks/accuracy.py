@@ -11,7 +11,7 @@ from tests.benchmarks.others import OTHERS, cut_out
 from tests.benchmarks.render import Sensor, spot
 from workbench.model.arrays import FloatArray
 from workbench.spots import find_spots
-from workbench.spots.crlb import Camera, position_bound_px
+from workbench.spots.crlb import CameraNoise, position_bound_px
 
 WIDTHS_PX = (0.6, 1.0, 1.5, 2.5, 4.0)
 ELECTRONS = (1e3, 1e4, 1e5)
@@ -87,7 +87,7 @@ def rms(errors: FloatArray) -> float:
 
 def bound(width_px: float, electrons: float, phases: FloatArray) -> float:
     """Fisher bound, root mean square over phases and both axes."""
-    camera = Camera(SENSOR.electrons_per_dn, SENSOR.read_sd_electrons, BACKGROUND_ELECTRONS)
+    camera = CameraNoise(SENSOR.electrons_per_dn, SENSOR.read_sd_electrons, BACKGROUND_ELECTRONS)
     bounds = [position_bound_px(electrons, width_px, (float(u), float(v)), camera) for u, v in phases]
     return rms(np.array(bounds))
 

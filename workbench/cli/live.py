@@ -18,7 +18,7 @@ from workbench.devices.registry import load_bench_rig, open_bench
 from workbench.devices.watched import watched
 from workbench.model.errors import StoppedError
 from workbench.model.target import Placement
-from workbench.ranging.live import LiveRanger, check_same_sensor, latency_words
+from workbench.ranging.live import LiveRanger, check_same_sensor, latency_text
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.report.readings import reading_line
 
@@ -89,7 +89,7 @@ def _read_all(
                 print_message(f"hint: {_hint_without_spot(request, bench.virtual)}")
     finally:
         if request.stats:
-            print_message(latency_words(live.latencies_s, time.monotonic() - began))
+            print_message(latency_text(live.latencies_s, time.monotonic() - began))
 
 
 def _hint_without_spot(request: LiveRequest, virtual: bool) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from workbench.ranging.lines import NAMES, Line
+from workbench.ranging.lines import NAMES, LineShape
 from workbench.ranging.ranger import Reading
 from workbench.ranging.shape import Shape
 
@@ -39,7 +39,7 @@ def plain(reading: Reading) -> dict[str, Any]:
     }
 
 
-def _line(line: Line, reading: Reading) -> dict[str, Any]:
+def _line(line: LineShape, reading: Reading) -> dict[str, Any]:
     return {
         "line": NAMES[line.axis],
         "lasers": [reading.lasers[i].laser_id for i in line.indices],

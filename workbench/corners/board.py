@@ -1,4 +1,4 @@
-"""The printed board in frames: which of its corners are seen, where, and how well."""
+"""Detection of the printed board: identity, position and standard deviation of its corners."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from workbench.model.board import Board
 from workbench.model.errors import BadInputError
 
 FEWEST_CORNERS = 12
-"""A pose has six unknowns; this many corners over-determine it with room for a bad one."""
+"""Least number of corners: a pose has six unknowns, so that one bad corner is redundant."""
 ENLARGED = 2
-"""Markers are looked for in the frame enlarged: a cell of one needs some four pixels."""
+"""Factor by which the frame is enlarged for the marker detection; a marker's cell needs some four pixels."""
 NEIGHBOURS = 8
-"""Corners of markers that tell a board corner's surroundings: those of the two markers that touch it."""
+"""Marker corners for the local scale at a board corner: those of the two markers that touch it."""
 
 
 @dataclass(frozen=True)
 class BoardCorners:
-    """Corners of the board that were found, k of them."""
+    """The k corners of the board that were found."""
 
     ids: IndexArray
-    """(k,) their rows in `Board.corners_mm`."""
+    """(k,) rows in `Board.corners_mm`."""
     position_px: FloatArray
     """(k, 2)"""
     sd_px: FloatArray
     """(k, 2) 1 sigma."""
     spoiled: int
-    """Corners that were seen and are left out: something lay on them, or they lie at the frame's border."""
+    """Number of corners that were seen but could not be fitted: covered, or at the frame's border."""
 
 
 def find_board(frames: Sequence[Image], board: Board) -> BoardCorners:
-    """Find the board in the mean of frames, (height, width) each, taken while nothing moved.
+    """Find the board in the mean of frames (height, width) of a static scene.
 
     Raises:
-        BadInputError: the board cannot be found, with what was seen instead.
+        BadInputError: no frames, frames of different sizes, or fewer than FEWEST_CORNERS corners.
     """
     if not frames:
         raise BadInputError("expected at least one frame of the board, got none")
@@ -52,22 +52,22 @@ def find_board(frames: Sequence[Image], board: Board) -> BoardCorners:
     if len(ids) < FEWEST_CORNERS:
         raise BadInputError(
             f"expected at least {FEWEST_CORNERS} corners of the board, got {len(ids)} (from"
-            f" {len(markers.ids)} of its markers): more light on it, nearer, more of it in the frame?"
+            f" {len(markers.ids)} of its markers); use more light, a nearer board, or more of it in the frame"
         )
-    around = _surroundings(board.corners_mm[ids], markers)
-    fitted = fit_saddles(mean, start_px, around, board.square_mm, (board.square_mm - board.marker_mm) / 2)
+    px_per_mm = _px_per_mm(board.corners_mm[ids], markers)
+    fitted = fit_saddles(mean, start_px, px_per_mm, board.square_mm, (board.square_mm - board.marker_mm) / 2)
     good = fitted.good
     if int(good.sum()) < FEWEST_CORNERS:
         raise BadInputError(
             f"expected at least {FEWEST_CORNERS} clear corners of the board, got {int(good.sum())} of"
-            f" {len(ids)} that its markers point to: is it near enough, in focus, and evenly lit?"
+            f" {len(ids)} located by its markers; check its distance, focus, and even lighting"
         )
     return BoardCorners(ids[good], fitted.position_px[good], fitted.sd_px[good], int((~good).sum()))
 
 
 @dataclass(frozen=True)
 class _Markers:
-    """Markers of the board that were seen, m of them."""
+    """The m detected markers of the board."""
 
     ids: IndexArray
     corners_px: FloatArray
@@ -79,35 +79,35 @@ class _Markers:
 def _markers(mean: FloatArray, board: Board) -> _Markers:
     dictionary = _dictionary(board)
     detector = cv2.aruco.ArucoDetector(dictionary)
-    picture = cv2.resize(_stretched(mean), None, fx=ENLARGED, fy=ENLARGED, interpolation=cv2.INTER_CUBIC)
-    found, found_ids, _ = detector.detectMarkers(picture)
-    places = np.concatenate([_marker_places(board, block) for block in (0, 1)])
+    enlarged = cv2.resize(_stretched(mean), None, fx=ENLARGED, fy=ENLARGED, interpolation=cv2.INTER_CUBIC)
+    found, found_ids, _ = detector.detectMarkers(enlarged)
+    nominal = np.concatenate([_marker_corners_mm(board, block) for block in (0, 1)])
     ids = _ids(found_ids)
     corners = np.array(found, np.float64).reshape(-1, 4, 2)
-    known = (ids < len(places)) & (np.bincount(ids, minlength=1)[ids] == 1)
-    return _Markers(ids[known], (corners[known] + 0.5) / ENLARGED - 0.5, places[ids[known]])
+    known = (ids < len(nominal)) & (np.bincount(ids, minlength=1)[ids] == 1)
+    return _Markers(ids[known], (corners[known] + 0.5) / ENLARGED - 0.5, nominal[ids[known]])
 
 
 def _corners(mean: FloatArray, board: Board, markers: _Markers) -> tuple[IndexArray, FloatArray]:
-    """Ids and places (to a pixel) of the corners between markers that were seen."""
-    picture = _stretched(mean)
-    ids, places = [np.array([], np.intp)], [np.zeros((0, 2))]
+    """Ids (k,) and positions (k, 2), to a pixel, of the corners between detected markers."""
+    image = _stretched(mean)
+    ids, positions = [np.array([], np.intp)], [np.zeros((0, 2))]
     for block in (0, 1):
-        mine = markers.ids // board.markers == block
-        if not mine.any():
+        own = markers.ids // board.markers == block
+        if not own.any():
             continue
         detector = cv2.aruco.CharucoDetector(_charuco(board, block))
-        seen = tuple(markers.corners_px[mine].astype(np.float32)[:, None])
-        named = markers.ids[mine].astype(np.int32)[:, None]
-        found, found_ids, _, _ = detector.detectBoard(picture, markerCorners=seen, markerIds=named)
+        corners = tuple(markers.corners_px[own].astype(np.float32)[:, None])
+        marker_ids = markers.ids[own].astype(np.int32)[:, None]
+        found, found_ids, _, _ = detector.detectBoard(image, markerCorners=corners, markerIds=marker_ids)
         if numbers := _ids(found_ids).tolist():
             ids.append(np.array(numbers, np.intp) + block * board.corners_per_block)
-            places.append(np.asarray(found, np.float64).reshape(-1, 2))
-    return np.concatenate(ids), np.concatenate(places)
+            positions.append(np.asarray(found, np.float64).reshape(-1, 2))
+    return np.concatenate(ids), np.concatenate(positions)
 
 
-def _surroundings(corners_mm: FloatArray, markers: _Markers) -> FloatArray:
-    """(k, 2, 2) derivatives of the pixel position by the board's x, y at its corners, from what is near."""
+def _px_per_mm(corners_mm: FloatArray, markers: _Markers) -> FloatArray:
+    """(k, 2, 2) derivatives of the pixel position by the board's x, y at its corners, from markers nearby."""
     points_mm, points_px = markers.corners_mm.reshape(-1, 2), markers.corners_px.reshape(-1, 2)
     matrices = []
     for corner in corners_mm:
@@ -118,13 +118,13 @@ def _surroundings(corners_mm: FloatArray, markers: _Markers) -> FloatArray:
 
 
 def _stretched(mean: FloatArray) -> NDArray[np.uint8]:
-    """The frame with its tones spread over 8 bits: room light may leave the board in a few of them."""
+    """The frame with its contrast stretched to 8 bits; in room light the board may span a few levels only."""
     dark, bright = np.percentile(mean, (1, 99))
     return np.asarray(np.clip((mean - dark) / max(bright - dark, 1e-9) * 255, 0, 255), np.uint8)
 
 
 def _ids(found: object) -> IndexArray:
-    """OpenCV says None where it found none."""
+    """Ids as an array; OpenCV returns None for no ids."""
     return np.array([], np.intp) if found is None else np.asarray(found, np.intp).ravel()
 
 
@@ -138,7 +138,7 @@ def _charuco(board: Board, block: int) -> cv2.aruco.CharucoBoard:
     return cv2.aruco.CharucoBoard(size, board.square_mm, board.marker_mm, _dictionary(board), ids)
 
 
-def _marker_places(board: Board, block: int) -> FloatArray:
-    """(markers, 4, 2) corners of a block's markers, mm, clockwise from their top left."""
-    places = np.array(_charuco(board, block).getObjPoints(), np.float64)[:, :, :2]
-    return np.asarray(places + np.array([board.left_mm, board.block_tops_mm[block]]), np.float64)
+def _marker_corners_mm(board: Board, block: int) -> FloatArray:
+    """(markers, 4, 2) nominal corners of a block's markers, mm, clockwise from their top left."""
+    corners = np.array(_charuco(board, block).getObjPoints(), np.float64)[:, :, :2]
+    return np.asarray(corners + np.array([board.left_mm, board.block_tops_mm[block]]), np.float64)

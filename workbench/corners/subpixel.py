@@ -1,12 +1,12 @@
 """Sub-pixel position of a chessboard's corners, with its standard deviation.
 
-A corner as a lens shows it is fitted: two straight edges that cross, each blurred to an error function:
+The model of a corner is two straight edges that cross, each blurred to an error function:
 
     I(x) = a + b erf(d1 / (sqrt(2) w)) erf(d2 / (sqrt(2) w)),    d = distance from an edge through the corner
 
-Seven unknowns: the corner (u, v), the direction of each edge, the blur w, and the tones a, b. The true image
-of two edges that are not at right angles differs from the product, but is point-symmetric like it, so that
-the corner's place is not touched.
+It has seven unknowns: the corner (u, v), the direction of each edge, the blur w, and the tones a, b. The true
+image of two edges that are not at right angles differs from the product, but is point-symmetric like it, so
+that the position of the corner is not biased.
 """
 
 from __future__ import annotations
@@ -19,43 +19,44 @@ from scipy.special import erf
 from workbench.model.arrays import BoolArray, FloatArray
 
 WINDOW_PX = 6.0
-"""Radius. Lenses bend edges: over more than this a strong one moves the corner by a hundredth of a pixel."""
+"""Radius of a window. Distortion bends edges: in a larger one a strong lens moves the corner by 0.01 px."""
 SQUARE_SHARE = 0.45
-"""A window's radius is at most this share of a square: the next corner's edges stay out of it."""
+"""Largest radius of a window as a share of a square, so that it excludes the edges of the next corner."""
 MARKER_PAD_PX = 1.7
-"""Pixels this near a marker show its blur."""
+"""Distance from a marker within which pixels are affected by its blur."""
 NARROWEST_EDGE_PX = 0.7
-"""What must be left beside an edge between two markers; less of it tells neither its place nor its blur."""
+"""Least width of blank paper beside an edge between two markers."""
 STEPS = 25
 STEP_TOLERANCE_PX = 1e-4
 OUTLIER_SD = 4.5
-"""A pixel this far off is a hot one or dirt: in 150 pixels, one corner in a thousand loses a good one."""
+"""Residual from which a pixel is an outlier (hot, or dirt); 1 of 1000 corners loses a good pixel of 150."""
 TONES = (2.0, 98.0)
-"""Percentiles of the pixels about all corners: ink and paper."""
+"""Percentiles of the pixels about all corners that stand for ink and paper."""
 BLUR_RANGE_PX = (0.3, 4.0)
-"""A corner that wants less is sharper than its pixels, and one that wants more is none."""
+"""Range of the blur; a fit at either end is not a corner."""
 START_BLUR_PX = 0.8
 FARTHEST_MOVE_PX = 2.0
-"""From where the markers put the corner."""
+"""Largest distance of a fitted corner from its start."""
 WORST_MISFIT = 9.0
-"""Variance about the model over that of all corners: seven standard deviations of an honest one, and more."""
+"""Largest ratio of a corner's residual variance to that of all corners: over seven standard deviations."""
 FLATTEST_SINE = 0.2
+"""Least sine of the angle between the edges."""
 FAINTEST_SD = 2.0
-"""Contrast over the noise of one pixel."""
+"""Least contrast in units of the noise of one pixel."""
 FLOOR_SD_PX = 0.004
-"""What the model leaves out (edges bent by the lens), 1 sigma; the tests measure it without noise."""
+"""Error of the model (edges bent by the lens), 1 sigma; measured without noise by the tests."""
 
 
 @dataclass(frozen=True)
 class Saddles:
-    """Fitted corners, n of them."""
+    """The n fitted corners."""
 
     position_px: FloatArray
     """(n, 2)"""
     sd_px: FloatArray
-    """(n, 2) 1 sigma by axis, from the scatter of the pixels about the model."""
+    """(n, 2) 1 sigma by axis, from the residuals of the pixels."""
     good: BoolArray
-    """(n,) whether what was fitted is a corner; the rest of a bad one means nothing."""
+    """(n,) whether the fit is that of a corner; position and sd of others are meaningless."""
 
 
 def fit_saddles(
@@ -65,26 +66,26 @@ def fit_saddles(
 
     Args:
         image: (height, width), any linear unit.
-        start_px: (n, 2) where the corners are, to a pixel.
+        start_px: (n, 2) positions of the corners, to a pixel.
         px_per_mm: (n, 2, 2) derivatives of the pixel position by the board's x and y (columns), at each.
         square_mm: side of a square.
-        gap_mm: from the edge of a white square to its marker.
+        gap_mm: distance from the edge of a white square to its marker.
     """
     x, y, tone, use = _windows(image, start_px, px_per_mm, square_mm, gap_mm)
     p = _start(start_px, px_per_mm, tone, use)
-    # A hot pixel many times brighter than paper would take its corner along: first, none is.
+    # Clipped tones first: a hot pixel many times brighter than paper would dominate the fit of its corner.
     p = _improve(p, x, y, np.clip(tone, *np.percentile(tone, TONES)), use)
     rest = tone - _model(p, x, y)[0]
     scale = 1.4826 * float(np.median(np.abs(rest[use]))) if use.any() else 0.0
     use &= np.abs(rest) <= OUTLIER_SD * max(scale, 1e-12)
     p = _improve(p, x, y, tone, use)
-    return _judge(p, x, y, tone, use, start_px)
+    return _accepted(p, x, y, tone, use, start_px)
 
 
 def _windows(
     image: FloatArray, start_px: FloatArray, px_per_mm: FloatArray, square_mm: float, gap_mm: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Pixel positions x, y, their tones, and which of them count: all (n, pixels)."""
+    """Pixel positions x, y, their tones, and whether they are used: all (n, pixels)."""
     span = np.arange(-int(WINDOW_PX), int(WINDOW_PX) + 1)
     dy, dx = (grid.ravel() for grid in np.meshgrid(span, span, indexing="ij"))
     middle = np.rint(start_px).astype(np.intp)
@@ -100,15 +101,15 @@ def _windows(
     resolved = (clear_mm * side_px >= NARROWEST_EDGE_PX).all(axis=1)
     off_markers = (on_board < clear_mm[:, :, None]).any(axis=1)
     near = np.hypot(from_start[:, 0], from_start[:, 1]) <= radius[:, None]
-    # A window cut by the border is not symmetric about its corner any more.
+    # A window cut by the border is not symmetric about its corner, and biases it.
     whole = inside.all(axis=1)
     return x.astype(float), y.astype(float), tone, near & off_markers & (whole & resolved)[:, None]
 
 
 def _start(start_px: FloatArray, px_per_mm: FloatArray, tone: FloatArray, use: BoolArray) -> FloatArray:
-    """(n, 7) u, v, angles of both edges' normals, log of the blur, a, b (of either sign: set by the data)."""
+    """(n, 7) u, v, angles of both edges' normals, log of the blur, a, b (0: set by the first step)."""
     along_x, along_y = px_per_mm[:, :, 0], px_per_mm[:, :, 1]
-    # The edge along the board's y has its normal across it, on the side of the board's x; and so the other.
+    # The normal of the edge along the board's y points to the side of the board's x, and vice versa.
     angle_1 = np.arctan2(-along_y[:, 0], along_y[:, 1])
     angle_2 = np.arctan2(along_x[:, 0], -along_x[:, 1])
     counted = np.where(use, tone, np.nan)
@@ -140,14 +141,18 @@ def _model(p: FloatArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _improve(p: FloatArray, x: FloatArray, y: FloatArray, tone: FloatArray, use: BoolArray) -> FloatArray:
-    """Gauss-Newton steps, the first for the tones alone."""
+    """Gauss-Newton steps for all corners at once, the first for the tones alone.
+
+    The loop is written out because it solves n small problems together and limits each step: 200 calls of a
+    general solver would take many times as long.
+    """
     p = p.copy()
     value, jacobian = _model(p, x, y)
     p[:, 5:] += _step(jacobian[:, :, 5:], tone - value, use)
     for _ in range(STEPS):
         value, jacobian = _model(p, x, y)
         step = _step(jacobian, tone - value, use)
-        # What leads a step astray is a window without a corner; limits keep it from taking the rest along.
+        # In a window without a corner steps diverge; the limits keep its numbers finite.
         step[:, :2] = np.clip(step[:, :2], -0.5, 0.5)
         step[:, 2:5] = np.clip(step[:, 2:5], -0.3, 0.3)
         p += step
@@ -158,7 +163,7 @@ def _improve(p: FloatArray, x: FloatArray, y: FloatArray, tone: FloatArray, use:
 
 
 def _step(jacobian: FloatArray, rest: FloatArray, use: BoolArray) -> FloatArray:
-    """(n, unknowns) solution of the normal equations, in scaled unknowns and damped by rounding's size."""
+    """(n, unknowns) solution of the normal equations, with scaled unknowns and damping near rounding."""
     weighted = np.where(use[:, :, None], jacobian, 0.0)
     information = weighted.transpose(0, 2, 1) @ weighted
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", information), 1e-300))
@@ -167,15 +172,16 @@ def _step(jacobian: FloatArray, rest: FloatArray, use: BoolArray) -> FloatArray:
     return np.asarray(np.linalg.solve(unit, gradient[:, :, None])[:, :, 0] / scale)
 
 
-def _judge(
+def _accepted(
     p: FloatArray, x: FloatArray, y: FloatArray, tone: FloatArray, use: BoolArray, start_px: FloatArray
 ) -> Saddles:
+    """The corners with their standard deviations; those that fail a check are not `good`."""
     value, jacobian = _model(p, x, y)
     freedom = use.sum(axis=1) - p.shape[1]
     enough = freedom > p.shape[1]
     square = np.where(use, (tone - value) ** 2, 0.0).sum(axis=1)
     variance = square / np.maximum(freedom, 1)
-    # Noise is alike all over the frame: the corners' own estimates, 10 % each, are taken together.
+    # The noise is the same all over the frame: the corners' own estimates, 10 % each, are pooled.
     common = float(np.median(variance[enough])) if enough.any() else 0.0
     sane = (
         enough

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from workbench.model.arrays import FloatArray
 from workbench.model.lens import COEFFICIENTS, LensName
-from workbench.model.rig import LARGEST, MOST_PX, LaserId, NonNegativeFloat
+from workbench.model.rig import LARGEST, MOST_PX, ImageAxis, LaserId, NonNegativeFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 DeterminedBy = Literal["data", "joint", "prior"]
@@ -62,7 +62,7 @@ class LaserRay(FileModel):
     """Laser ray: the points origin + z direction in the camera frame, z in mm."""
 
     id: LaserId
-    axis: Literal["u", "v"]
+    axis: ImageAxis
     origin_mm: Vector3
     direction: Vector3
 

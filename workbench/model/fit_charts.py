@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.fit_event import FitFinished, ResidualRecord
-
-ImageAxis = Literal["u", "v"]
+from workbench.model.rig import ImageAxis
 
 
 def residual_chart(fit: FitFinished, axis: ImageAxis) -> Chart:

@@ -20,6 +20,8 @@ Name = Annotated[
     str, BeforeValidator(lambda v: str(v) if isinstance(v, int) and not isinstance(v, bool) else v)
 ]
 
+ImageAxis = Literal["u", "v"]
+"""Axis of the image: u to the right, v down."""
 LaserId = Annotated[Name, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 """Laser id; part of file names, therefore of letters, digits, `_`, `.` and `-`."""
 LARGEST = 1e6
@@ -108,7 +110,7 @@ class LaserSpec(FileModel):
     """One laser as a ray in the camera frame: origin (x, y, 0) mm, direction (tx, ty, 1)."""
 
     id: LaserId
-    axis: Literal["u", "v"]
+    axis: ImageAxis
     """Image axis along which the spot moves with range: u for a laser beside the camera, v above or below."""
     x_mm: Prior
     y_mm: Prior

@@ -12,7 +12,7 @@ from workbench.optics.rays import Plane
 
 
 class Pose(NamedTuple):
-    """How a board lies on a plane: its middle is the plane's point (x, y), `roll` turns it from x to y."""
+    """Pose of a board on a plane: its centre at the plane's point (x, y), rotated by `roll` from x to y."""
 
     plane: Plane
     x_mm: ArrayLike
@@ -23,7 +23,7 @@ class Pose(NamedTuple):
 def point_on_board(
     pose: Pose, across_mm: ArrayLike, down_mm: ArrayLike, into_mm: ArrayLike
 ) -> tuple[Array, Array, Array]:
-    """x, y, z of the board's points (x to the right, y down, z into the paper); shapes broadcast.
+    """Camera coordinates x, y, z of the board's points (right, down, into the paper); shapes broadcast.
 
     At roll 0 the board's x has no component along the camera's y. The three axes are orthonormal: the normal
     (-slope_x, -slope_y, 1), the direction (1, 0, slope_x) in the plane, and their cross product.

@@ -18,9 +18,9 @@ from workbench.model.arrays import FloatArray
 from workbench.optics.lens import EitherArray, LensModel, Numbers
 
 SERIES_BELOW = 0.01
-"""Squared radius below which atan(r) / r is summed as its series: r = 0 is then a point as any other."""
+"""Squared radius below which atan(r) / r is its power series, which has no singularity at r = 0."""
 SERIES_TERMS = 9
-"""The first one left out is below 0.01^9 / 19 = 5e-20."""
+"""Number of terms; the first omitted one is below 0.01^9 / 19 = 5e-20."""
 
 
 def _distort(coefficients: Numbers, x: EitherArray, y: EitherArray) -> tuple[EitherArray, EitherArray]:
@@ -39,9 +39,10 @@ def _undistorted_radius(angle_rad: FloatArray) -> FloatArray:
 
 
 def _angle_over_radius(r2: EitherArray) -> EitherArray:
-    """The function atan(r) / r of r^2; it has all derivatives, complex ones too, at r = 0.
+    """atan(r) / r as a function of r^2, analytic at r = 0.
 
-    Each branch gets harmless numbers where the other is taken: derivatives of both are computed everywhere.
+    JAX evaluates derivatives of both branches everywhere, so each branch gets safe inputs where the other is
+    selected.
     """
     xp: Any = jnp if isinstance(r2, jnp.ndarray) else np
     near = r2.real < SERIES_BELOW

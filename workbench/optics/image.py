@@ -1,4 +1,4 @@
-"""The picture: which positions lie in it, and how far a laser's spots in it stray from a straight line."""
+"""The image: positions inside it, and the deviation of a laser's spots from a straight line."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from workbench.optics.lens import LensModel
 from workbench.optics.rays import Ray, spot_at_inverse_depth
 
 STRAIGHT_PX = 1.0
-"""A laser's line that bends by less counts as straight."""
+"""Deviation below which a laser's line counts as straight."""
 LEAST_LENGTH_PX = 1e-9
-"""A direction that is shorter belongs to a spot that does not move: its line does not bend."""
+"""Length of a direction below which the spot does not move, and its line has no bend."""
 BEND_POINTS = 17
-"""Spots of a laser at which its line is evaluated, from infinity to the nearest depth."""
+"""Number of spots at which a laser's line is evaluated, from infinity to the nearest depth."""
 
 
 def inside_px(position_px: ArrayLike, size_px: ArrayLike) -> BoolArray:
-    """(..., 2) whether each coordinate u, v of positions (..., 2) lies in a picture (width, height).
+    """(..., 2) whether each coordinate u, v of positions (..., 2) lies in an image (width, height).
 
-    The centre of the first pixel is 0, its outer edge -0.5. A coordinate that is NaN lies nowhere.
+    The centre of the first pixel is 0, its outer edge -0.5. NaN is not inside.
     """
     position, size = np.asarray(position_px, float), np.asarray(size_px, float)
     return np.asarray((position >= -0.5) & (position < size - 0.5))
 
 
 def in_picture(position_px: ArrayLike, size_px: ArrayLike) -> BoolArray:
-    """(...) whether positions (..., 2) lie in a picture (width, height), both coordinates of them."""
+    """(...) whether both coordinates of positions (..., 2) lie in an image (width, height)."""
     return np.asarray(inside_px(position_px, size_px).all(axis=-1))
 
 
@@ -39,16 +39,16 @@ def bend_px(
     size_px: tuple[int, int],
     line: tuple[ArrayLike, ArrayLike],
 ) -> float:
-    """Largest distance of a laser's spots from a straight line; 0 if below `STRAIGHT_PX`.
+    """Largest distance of a laser's spots from a straight line, px; 0 if below `STRAIGHT_PX`.
 
-    Of spots in the picture, before the lens model folds over.
+    Spots outside the image or beyond the fold of the lens model do not count.
 
     Args:
-        model: kind of lens.
-        lens: (P,) its parameters, in the model's order.
-        ray: (4,) the laser's.
+        model: lens model.
+        lens: (P,) parameters of the lens, in the model's order.
+        ray: (4,) parameters of the laser's ray.
         nearest_mm: depth of the nearest spot; the farthest is at infinity.
-        size_px: (width, height) of the picture.
+        size_px: (width, height) of the image.
         line: a point of the line, (2,) pixels, and its direction (2,), of any length.
     """
     x_mm, y_mm, tx, ty = ray

@@ -1,4 +1,4 @@
-"""A lens model: what every kind of lens has to state of itself."""
+"""Lens models: parameters, projection and valid domain."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.lens import COEFFICIENTS, PINHOLE, LensName, lens_parameters
 
 EitherArray = Array | NDArray[Any]
-"""JAX's, or numpy's where all inputs are numpy's arrays."""
+"""A JAX array, or a numpy array where all inputs are numpy arrays."""
 Numbers = Sequence[ArrayLike] | EitherArray
 """A vector of parameters; each may itself be an array, and all broadcast against each other."""
 Distort = Callable[[Numbers, EitherArray, EitherArray], tuple[EitherArray, EitherArray]]
@@ -25,14 +25,14 @@ RadiusOfVariable = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class LensModel:
-    """A kind of lens: its parameters and its projection. There is one object of each kind.
+    """Lens model; there is one object of each.
 
-    A lens of this kind is a vector of numbers in the order of `parameters`: f, cx, cy in pixels (square
-    pixels), then the distortion coefficients, which have no unit and are all 0 for the undistorted lens.
+    A lens is a vector in the order of `parameters`: f, cx, cy in pixels (square pixels), then the distortion
+    coefficients, which have no unit and are all 0 for the undistorted lens.
     """
 
     name: LensName
-    """In rig files, and ROS's `distortion_model`."""
+    """Name in rig files, and ROS's `distortion_model`."""
     distort: Distort
     """Distorted normalised coordinates by coefficients and undistorted x = X/Z, y = Y/Z; shapes broadcast."""
     radial_terms: tuple[str, ...]
@@ -41,13 +41,12 @@ class LensModel:
     """Undistorted radius r = hypot(x, y) of the variable q >= 0 of that polynomial; infinite where no
     direction has this q. It increases with q."""
     trial_sd: Mapping[str, float]
-    """Prior standard deviation (1 sigma) of each coefficient that a rig file holds constant, where a fit
-    tests whether the data need it."""
+    """Prior sd (1 sigma) with which a fit tests coefficients that the rig file holds constant."""
     terms: tuple[str, ...]
-    """Terms that may be absent, the first to go first; a term of several coefficients has spaces between."""
+    """Terms that may be absent, the highest order first; spaces separate coefficients of one term."""
     polynomial_degree: int | None = None
-    """Degree of the distorted coordinates as polynomials in undistorted ones that move along a straight line;
-    None if they are no polynomials."""
+    """Degree of the distorted coordinates as polynomials along a straight line of undistorted ones; None if
+    they are not polynomials."""
 
     @property
     def coefficients(self) -> tuple[str, ...]:
@@ -56,7 +55,7 @@ class LensModel:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters, in the order of every vector of them."""
+        """Names of all parameters, in the order of a lens vector."""
         return lens_parameters(self.name)
 
     def project(self, lens: Numbers, x: ArrayLike, y: ArrayLike) -> tuple[EitherArray, EitherArray]:
@@ -66,11 +65,11 @@ class LensModel:
         return cx_px + f_px * x_distorted, cy_px + f_px * y_distorted
 
     def unfolded_radius(self, coefficients: Numbers) -> FloatArray:
-        """Undistorted radius up to which each direction has an image point of its own; infinity if no fold.
+        """Undistorted radius of the fold, up to which the projection is one-to-one; infinity without fold.
 
-        From there on the distorted radius shrinks, and even where it grows again further out the same image
-        points are shown twice. Tangential terms are neglected. The zeros of the slope 1 + 3 k1 q^2 + 5 k2 q^4
-        + ... are the inverse eigenvalues of the companion matrix of the polynomial in 1 / q^2.
+        Beyond it the distorted radius decreases, and where it increases again further out image points occur
+        twice. Tangential terms are neglected. The zeros of the slope 1 + 3 k1 q^2 + 5 k2 q^4 + ... are the
+        inverse eigenvalues of the companion matrix of the polynomial in 1 / q^2.
 
         Args:
             coefficients: (C, ...) distortion coefficients, in the model's order.
@@ -90,11 +89,11 @@ class LensModel:
             return self.undistorted_radius(1.0 / np.sqrt(np.maximum(largest, 0.0)))
 
     def is_unfolded(self, lens: Numbers, x: ArrayLike, y: ArrayLike) -> BoolArray:
-        """Whether (x, y) lies nearer to the axis than the model's first fold; shapes broadcast."""
+        """Whether (x, y) lies within the radius of the fold; shapes broadcast."""
         radius = np.hypot(np.asarray(x, float), np.asarray(y, float))
         return np.asarray(radius < self.unfolded_radius(lens[len(PINHOLE) :]))
 
 
 def as_array(x: ArrayLike) -> EitherArray:
-    """A JAX array, except that numpy's stay: the same maths then runs on complex numbers uncompiled."""
+    """A JAX array, or the numpy array unchanged: it may be complex, for complex-step derivatives."""
     return x if isinstance(x, np.ndarray) else jnp.asarray(x)

@@ -1,4 +1,4 @@
-"""The lens models that there are."""
+"""Lens models by name."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ LENS_MODELS: dict[LensName, LensModel] = {model.name: model for model in (PLUMB_
 
 
 def lens_model(name: LensName) -> LensModel:
-    """The lens model of a name."""
+    """Lens model by its name."""
     return LENS_MODELS[name]

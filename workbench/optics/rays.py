@@ -1,4 +1,4 @@
-"""Laser rays, and the image of their points. Camera frame: x right, y down, z forward, millimetres."""
+"""Laser rays and the images of their points. Camera frame: x right, y down, z forward, millimetres."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ def depth_on_plane(ray: Ray, plane: Plane) -> Array:
 def spot_at_inverse_depth(
     model: LensModel, lens: Numbers, ray: Ray, inverse_depth_per_mm: ArrayLike
 ) -> tuple[EitherArray, EitherArray]:
-    """Pixel position (u, v) of the ray's point at depth z = 1 / inverse_depth; 0 is the point at infinity.
+    """Pixel position (u, v) of the ray's point at depth z = 1 / inverse_depth; 0 is the vanishing point.
 
-    In inverse depth the undistorted image point moves along a straight line at constant speed, which is why
-    the ranger solves for it rather than for z.
+    The undistorted image point is linear in the inverse depth, which is why the ranger solves for it, not for
+    z.
 
     Args:
-        model: kind of lens.
-        lens: its parameters, in the model's order.
+        model: lens model.
+        lens: parameters of the lens, in the model's order.
         ray: the laser.
         inverse_depth_per_mm: 1 / z; shapes broadcast.
     """

@@ -1,6 +1,6 @@
-"""Depth of the point of a laser ray that a spot shows, and its derivatives by all parameters.
+"""Triangulation: depth of a laser's point from its spot, with derivatives by all parameters.
 
-For many sensors at once, and the reference of `workbench.sensor.curves`, which inverts one sensor fast.
+It can be batched over sensors, and is the reference for `workbench.sensor.curves`, which is fast for one.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from workbench.optics.lens import LensModel, Numbers
 from workbench.optics.rays import Ray, spot_at_inverse_depth
 
 ITERATIONS = 20
-"""Gauss-Newton steps. Each is exact except for distortion: six reach the last digit of a usual lens, ten that
-of a fisheye at 80 degrees; the rest is for lenses close to folding over, at a negligible cost."""
+"""Gauss-Newton steps. Each is exact except for distortion: six reach rounding for a usual lens, ten for a
+fisheye at 80 degrees; the others are for lenses close to their fold, at negligible cost."""
 
 
 class MeasuredSpot(NamedTuple):
@@ -36,9 +36,9 @@ class DepthEstimate(NamedTuple):
     """Depth z = 1 / inverse_depth, and the derivatives of z."""
 
     inverse_depth_per_mm: Array
-    """Not positive when the spot lies at or beyond the image of the laser's point at infinity."""
+    """Not positive where the spot lies at or beyond the laser's vanishing point."""
     across_sd: Array
-    """Distance of the spot from the laser's line in the image, signed, in standard deviations of the spot."""
+    """Signed distance of the spot from the laser's line in the image, in standard deviations of the spot."""
     z_sd_of_spot_mm: Array
     """1 sigma of z from the spot's own standard deviation."""
     dz_dlens: Array
@@ -54,15 +54,16 @@ class DepthEstimate(NamedTuple):
 def estimate_depth(model: LensModel, lens: Numbers, ray: Ray, spot: MeasuredSpot) -> DepthEstimate:
     """Maximum-likelihood depth of the point of `ray` that is seen at `spot`; scalars in, batch with `vmap`.
 
-    Args:
-        model: kind of lens.
-        lens: (P,) its parameters, in the model's order.
-        ray: the laser that made the spot.
-        spot: where it was measured.
+    The only unknown, the inverse depth w, is found by Gauss-Newton on the residual in standard deviations.
+    The loop is JAX-traceable, as `vmap` requires. Derivatives are those of the normal equation at the
+    optimum, neglecting the curvature of the residual across the laser's line, which is below the residual
+    over the focal length.
 
-    One unknown, the inverse depth w, by Gauss-Newton on the spot's distance in units of its standard
-    deviation. Derivatives are those of the solution of the normal equation at the optimum, neglecting the
-    curvature of the residual across the laser's line, which is below the residual over the focal length.
+    Args:
+        model: lens model.
+        lens: (P,) parameters of the lens, in the model's order.
+        ray: ray of the laser.
+        spot: the measured spot.
     """
     inverse_sd = jnp.array([1.0 / spot.u_sd_px, 1.0 / spot.v_sd_px])
 
@@ -77,7 +78,7 @@ def estimate_depth(model: LensModel, lens: Numbers, ray: Ray, spot: MeasuredSpot
         value, slope = jax.jvp(lambda w: residual(w, lens_vector, ray_vector), (w,), (jnp.ones_like(w),))
         return jnp.asarray(w - (slope @ value) / (slope @ slope))
 
-    # From infinity the first step is the pinhole's exact answer; distortion is left to the others.
+    # From infinity the first step is exact for a pinhole; the others correct for distortion.
     w = jax.lax.fori_loop(0, ITERATIONS, step, jnp.zeros(()))
     by_w, by_lens, by_ray = jax.jacfwd(residual, argnums=(0, 1, 2))(w, lens_vector, ray_vector)
     information = by_w @ by_w

@@ -1,4 +1,4 @@
-"""Lines of sight of pixels: the inverse of a lens model's projection, by Newton's method."""
+"""Undistortion: the inverse of a lens model's projection, by Newton's method."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from workbench.optics.lens import LensModel
 STEPS = 30
 CONVERGED_PX = 1e-9
 STEP = 1e-30
-"""Along the imaginary axis, for derivatives to the last digit."""
+"""Step along the imaginary axis, for derivatives exact to rounding."""
 
 
 def undistort(model: LensModel, lens: FloatArray, pixels: FloatArray) -> FloatArray:
-    """(n, 2) undistorted x = X/Z, y = Y/Z that a lens shows at pixels (n, 2); NaN where none is found.
+    """(n, 2) undistorted x = X/Z, y = Y/Z of pixels (n, 2); NaN where no solution is found.
 
-    Newton's steps start at the undistorted lens's answer for small angles, and approach the root from one
-    side on any radial curve that climbs, be it convex or concave. They stay nearer to the axis than the
-    model's first fold: a root beyond it is another direction's image point.
+    Newton's method starts at the solution for the undistorted lens; on an increasing radial curve, convex or
+    concave, it converges monotonically. Steps are limited to the radius of the model's fold: a root beyond it
+    is the image point of another direction. The loop solves all pixels together, two unknowns each.
 
     Args:
-        model: kind of lens.
-        lens: (P,) its parameters, in the model's order.
-        pixels: u, v.
+        model: lens model.
+        lens: (P,) parameters of the lens, in the model's order.
+        pixels: (n, 2) u, v.
     """
     seen = np.asarray(pixels, float).reshape(-1, 2)
     fold = model.unfolded_radius(lens[3:])
     xy = _before_fold((seen - lens[1:3]) / lens[0], np.zeros(len(seen)), fold)
-    with np.errstate(all="ignore"):  # of pixels without a root
+    with np.errstate(all="ignore"):  # pixels without a root
         for _ in range(STEPS):
             position, (by_x, by_y) = _project(model, lens, xy)
             miss = seen - position
@@ -44,7 +44,7 @@ def undistort(model: LensModel, lens: FloatArray, pixels: FloatArray) -> FloatAr
 
 
 def _before_fold(xy: FloatArray, radius: FloatArray, fold: FloatArray) -> FloatArray:
-    """(n, 2) points, those beyond the fold's radius moved to half way between `radius` (n,) and the fold."""
+    """(n, 2) points; those beyond the fold's radius are moved half way from `radius` (n,) to the fold."""
     reached = np.hypot(*xy.T)
     beyond = np.asarray(reached >= fold)
     share = np.where(beyond, 0.5 * (radius + fold) / np.where(beyond, reached, 1.0), 1.0)
@@ -54,7 +54,7 @@ def _before_fold(xy: FloatArray, radius: FloatArray, fold: FloatArray) -> FloatA
 def _project(
     model: LensModel, lens: FloatArray, xy: FloatArray
 ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-    """(n, 2) pixels, and (n, 2) their derivatives by x and by y."""
+    """(n, 2) pixels, and their derivatives by x (n, 2) and by y (n, 2)."""
     numbers = lens[:, None].astype(complex)
     x, y = xy.T.astype(complex)
     by_x = np.stack(model.project(numbers, x + 1j * STEP, y), axis=1)

@@ -1,1 +1,1 @@
-"""The ranger: from spots and a calibration to ranges."""
+"""Ranger: ranges and shapes from spots and a calibration."""

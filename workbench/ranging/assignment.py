@@ -1,4 +1,4 @@
-"""Which laser made which spot, when several are lit at once."""
+"""Assignment of spots to lasers when several are on at once."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from workbench.model.stats import chi2_sf
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
 MOST_MISFIT_SD = 6.0
-"""A spot farther from a laser's line is not that laser's: by chance one in 5e8 is."""
+"""Largest distance of a spot from its laser's line; 1 in 5e8 lies farther by chance."""
 IMPROBABLE = 1e-4
-"""Chance of distances from the lines as large as these, below which a way of dealing is out."""
+"""P value of the distances from the lines below which an assignment is rejected."""
 CLEARLY_BETTER = 2.0
-"""The best way is believed when the spread of the next best is this many times larger."""
+"""Ratio of the spread of the second best assignment to that of the best from which the best is accepted."""
 SMOOTH = 0.05
-"""Where spots are missing: the largest relative spread of inverse depths that is taken for one surface."""
+"""Largest relative spread of inverse depths on one surface, where spots are missing."""
 FEWEST_FOR_SMOOTH = 3
-"""Two spots lie on some surface whichever lasers made them."""
+"""Least number of spots for that test: two lie on some surface in any assignment."""
 MOST_LASERS = 6
 
 
 @dataclass(frozen=True)
-class Pairs:
-    """What each of L lasers would make of each of S spots."""
+class LaserSpotPairs:
+    """Range estimates of all pairs of L lasers and S spots."""
 
     ranges: RangeEstimates
     """Of the L x S pairs, row by row: laser 0 with every spot, laser 1, ..."""
     inverse_depth: FloatArray
-    """(L, S) not positive where the laser cannot have made the spot."""
+    """(L, S) not positive where the pair is impossible."""
     misfit_sd: FloatArray
-    """(L, S)"""
+    """(L, S) distance of the spot from the laser's line; infinite where the pair is impossible."""
 
     def chosen(self, lasers: IndexArray, spots: IndexArray) -> RangeEstimates:
-        """Ranges of some pairs."""
+        """Ranges of the pairs of lasers (n,) and spots (n,)."""
         return self.ranges.only(lasers * self.misfit_sd.shape[1] + spots)
 
 
-def pair_up(sensor: CalibratedSensor, position_px: FloatArray, sd_px: FloatArray) -> Pairs:
-    """Range every spot as if every laser had made it.
+def pair_up(sensor: CalibratedSensor, position_px: FloatArray, sd_px: FloatArray) -> LaserSpotPairs:
+    """Range every spot with every laser.
 
     Args:
         sensor: the calibrated sensor.
@@ -55,24 +55,24 @@ def pair_up(sensor: CalibratedSensor, position_px: FloatArray, sd_px: FloatArray
     inverse_depth = (1.0 / (ranges.range_mm + sensor.offset_mm)).reshape(lasers, spots)
     possible = (inverse_depth > 0) & (ranges.range_mm.reshape(lasers, spots) > 0)
     misfit = ranges.misfit_sd.reshape(lasers, spots)
-    return Pairs(ranges, np.where(possible, inverse_depth, -1.0), np.where(possible, misfit, np.inf))
+    return LaserSpotPairs(ranges, np.where(possible, inverse_depth, -1.0), np.where(possible, misfit, np.inf))
 
 
-def assign(pairs: Pairs, lasers: IndexArray) -> tuple[IndexArray, IndexArray] | None:
-    """Indices of lasers and of the spots that they made, equally many; None where the spots do not tell.
+def assign(pairs: LaserSpotPairs, lasers: IndexArray) -> tuple[IndexArray, IndexArray] | None:
+    """Indices of lasers and of their spots, equally many; None where the assignment is ambiguous.
 
-    Spots that lie off the line of every laser are other light. Each way of dealing the others to the lasers
-    puts them at distances from the lasers' lines and at inverse depths. Ways in which the distances are
-    improbable are out: the lines of real lasers, which are never quite coplanar, are often enough. Of the
-    rest, a surface that does not jump gives all lasers about the same inverse depth and a swap of two does
-    not, neighbouring baselines differing by half and more: the way with the smallest relative spread is
-    taken, if it is clearly so. Where spots are missing, the spread must be small, too. What remains
-    undecided, or wrong, is a target that jumps in depth as far as a swap would make it, seen by lasers whose
-    lines coincide.
+    Spots off the lines of all lasers are other light. Every injective assignment of the other spots is
+    enumerated. Assignments with improbable distances from the lasers' lines are rejected; this is often
+    sufficient, because the lines of real lasers are never quite coplanar. Of the rest, the assignment with
+    the smallest relative spread of inverse depths is taken, if the second best is clearly worse: on a
+    surface without jumps all lasers have nearly the same inverse depth, and exchanging two of them changes
+    it by half and more, the ratio of neighbouring baselines. Where spots are missing, the spread must also be
+    small. Undecided, or wrong, is a target with a jump in depth as large as an exchange would cause, seen by
+    lasers with coincident lines.
 
     Args:
         pairs: of all lasers with all spots.
-        lasers: (n,) indices of the lasers of one line that are lit.
+        lasers: (n,) indices of the lasers of one line that are on.
     """
     on_line = pairs.misfit_sd[lasers] < MOST_MISFIT_SD
     spots = np.flatnonzero(on_line.any(axis=0))
@@ -81,26 +81,25 @@ def assign(pairs: Pairs, lasers: IndexArray) -> tuple[IndexArray, IndexArray] | 
         return None
     if m == 0:
         return lasers[:0], spots
-    ways = _ways(n, m)
-    to, columns = lasers[ways], spots[None, :]
-    dealt = pairs.inverse_depth[to, columns]
+    to, columns = lasers[_assignments(n, m)], spots[None, :]
+    inverse_depth = pairs.inverse_depth[to, columns]
     misfit2 = (pairs.misfit_sd[to, columns] ** 2).sum(axis=1)
-    possible = (dealt > 0).all(axis=1) & (misfit2 < MOST_MISFIT_SD**2 * m)
+    possible = (inverse_depth > 0).all(axis=1) & (misfit2 < MOST_MISFIT_SD**2 * m)
     possible[possible] = chi2_sf(misfit2[possible], m) > IMPROBABLE
-    left = np.flatnonzero(possible)
-    if len(left) == 0:
+    remaining = np.flatnonzero(possible)
+    if len(remaining) == 0:
         return None
-    if len(left) == 1:
-        return to[left[0]], spots
-    spread = dealt[left].std(axis=1) / dealt[left].mean(axis=1)
+    if len(remaining) == 1:
+        return to[remaining[0]], spots
+    spread = inverse_depth[remaining].std(axis=1) / inverse_depth[remaining].mean(axis=1)
     best, next_best = np.partition(spread, 1)[:2]
     smooth = m == n or (m >= FEWEST_FOR_SMOOTH and best < SMOOTH < next_best)
     if next_best < CLEARLY_BETTER * best or not smooth:
         return None
-    return to[left[spread.argmin()]], spots
+    return to[remaining[spread.argmin()]], spots
 
 
 @lru_cache(maxsize=64)
-def _ways(lasers: int, spots: int) -> IndexArray:
-    """(ways, spots) every way of giving each spot a laser of its own."""
+def _assignments(lasers: int, spots: int) -> IndexArray:
+    """(assignments, spots) laser of each spot, for every injective assignment."""
     return np.array(list(permutations(range(lasers), spots)), np.intp)

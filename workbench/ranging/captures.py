@@ -1,4 +1,4 @@
-"""Ranging a captures file: rows to scenes, scenes to readings."""
+"""Readings of a captures file: rows grouped by scene, one reading for each scene."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from workbench.session.capture_spots import find_row_spots
 def scenes(rows: Sequence[CaptureRow]) -> dict[str, list[CaptureRow]]:
     """Rows by scene, in order of appearance.
 
-    A row whose laser is `all` is a scene by itself, as is a row that names none; others share the scene that
-    they name. A scene without a name is called by its row.
+    A row with the laser `all` is a scene of its own, as is a row without a scene; other rows share the scene
+    that they name. A scene without a name is named after its row.
     """
     named = {row.scene for row in rows}
     grouped: dict[str, list[CaptureRow]] = {}
@@ -32,26 +32,26 @@ def scenes(rows: Sequence[CaptureRow]) -> dict[str, list[CaptureRow]]:
                 name = f"{name} (row {row.row})"
         else:
             while name in grouped and grouped[name][0].laser_id == ALL_LASERS:
-                name = f"{name} (fired alone)"
+                name = f"{name} (one laser at a time)"
         grouped.setdefault(name, []).append(row)
     return grouped
 
 
 def read_captures(ranger: Ranger, rows: Sequence[CaptureRow]) -> Iterator[Reading]:
-    """One reading a scene, in order of appearance.
+    """One reading for each scene, in order of appearance.
 
     Raises:
         BadInputError: an image cannot be used, or a row names a laser that the calibration does not have.
     """
     lasers, known = (*ranger.sensor.ids, ALL_LASERS), ", ".join(ranger.sensor.ids)
-    strangers = [
+    unknown = [
         f"row {row.row}, column laser_id: expected {ALL_LASERS} or one of the calibration's lasers ({known}),"
         f" got {row.laser_id}"
         for row in rows
         if row.laser_id not in lasers
     ]
-    if strangers:
-        raise BadInputError("\n".join(strangers))
+    if unknown:
+        raise BadInputError("\n".join(unknown))
     for scene, members in scenes(rows).items():
         if members[0].laser_id == ALL_LASERS:
             finding = find_row_spots(
@@ -63,7 +63,7 @@ def read_captures(ranger: Ranger, rows: Sequence[CaptureRow]) -> Iterator[Readin
 
 
 def _read_alone(ranger: Ranger, scene: str, rows: Sequence[CaptureRow]) -> Reading:
-    """Rows that fired one laser each; repeats of a laser are averaged in pixels, range being convex in u."""
+    """Reading of rows of one laser each; repeats are averaged in pixels, because range is convex in u."""
     fired = list(dict.fromkeys(row.laser_id for row in rows))
     means = {i: _mean_position(ranger, [row for row in rows if row.laser_id == i]) for i in fired}
     seen = {i: mean for i, mean in means.items() if mean is not None}
@@ -76,8 +76,8 @@ def _read_alone(ranger: Ranger, scene: str, rows: Sequence[CaptureRow]) -> Readi
 def _mean_position(ranger: Ranger, rows: Sequence[CaptureRow]) -> tuple[FloatArray, FloatArray] | None:
     """(2,) mean u, v and their standard deviations; None when no row shows the laser's spot.
 
-    As the fit does it: weighted by the stated deviations, without repeats that lie far off, and with the
-    deviations enlarged where the repeats scatter significantly more than that.
+    As in the fit: weighted by the stated deviations, without outliers, and with the deviations scaled where
+    the repeats scatter significantly more.
     """
     found = [seen for row in rows if (seen := _position(ranger, row)) is not None]
     if not found:
@@ -91,7 +91,7 @@ def _mean_position(ranger: Ranger, rows: Sequence[CaptureRow]) -> tuple[FloatArr
 
 
 def _position(ranger: Ranger, row: CaptureRow) -> tuple[float, float, float, float] | None:
-    """u, v and their standard deviations of the one spot that a row shows or states."""
+    """u, v and their standard deviations of the only spot that a row shows or states; None otherwise."""
     if row.on is None:
         return row.u_px, row.v_px, row.u_sd_px, row.v_sd_px
     index = ranger.sensor.ids.index(row.laser_id)

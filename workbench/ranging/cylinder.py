@@ -1,4 +1,4 @@
-"""A circle through spots: the section of a cylinder that stands across the line of lasers."""
+"""Cylinder shape: a circle, the section of a cylinder across the line of lasers."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from workbench.ranging.points import Closest, Points
 
 STEPS = 12
 MOST_RELATIVE_SIGMA = 0.5
-"""A radius known worse tells nothing that a parabola does not."""
+"""Largest relative uncertainty of the radius; with more, a circle does not differ from a parabola."""
 LARGEST_MM = 1e5
-"""Of axis and radius: a circle that runs beyond is none. 60 mm aside it recedes by 0.02 mm, and its three
-parameters can hardly be told apart in 16 digits."""
+"""Largest axis position and radius. At this radius the surface recedes by 0.02 mm at 60 mm, and the three
+parameters are degenerate to rounding."""
 GRAZING = 0.1
-"""Cosine of the steepest incidence at which a spot is believed to lie on a circle."""
+"""Cosine of the steepest incidence of a spot on the circle."""
 
 
 @dataclass(frozen=True)
@@ -28,17 +28,17 @@ class CylinderFit:
     axis_range_mm: float
     radius_mm: float
     covariance: FloatArray
-    """(3, 3) of the three."""
+    """(3, 3) of axis position, axis range and radius."""
     by_range: FloatArray
-    """(3, n) their derivatives by the ranges that were fitted."""
+    """(3, n) derivatives by the fitted ranges."""
     by_place: FloatArray
-    """(3, n) and by the places: a place that errs by dx is a range that errs by -slope dx."""
+    """(3, n) derivatives by the positions: an error dx is equivalent to a range error -slope dx."""
     chi2: float
     freedom: int
 
     @property
     def radius_sigma_mm(self) -> float:
-        """1 sigma."""
+        """1 sigma of the radius."""
         return math.sqrt(self.covariance[2, 2])
 
     def closest(self, front_mm: tuple[float, float]) -> Closest:
@@ -53,19 +53,19 @@ class CylinderFit:
 
 
 def fit_cylinder(points: Points) -> CylinderFit | None:
-    """Maximum-likelihood circle, bulging towards the sensor; None where there is none to speak of.
+    """Maximum-likelihood circle, convex towards the sensor; None where the spots determine none.
 
-    None too where a spot would lie at grazing incidence or the radius would hardly be known: with as many
-    parameters as a parabola, a circle is worth telling only where it differs from one.
+    None too where a spot lies at grazing incidence, or the radius is uncertain by more than half: a circle
+    has as many parameters as a parabola, and is reported only where it differs from one.
     """
-    from workbench.ranging.shape_kernels import circle  # loads the compiler, which only a fit needs
+    from workbench.ranging.shape_kernels import circle  # loads the compiler
 
     start = _start(points)
     if start is None:
         return None
     try:
         found = circle(start, points.x_mm, points.range_mm, *points.covariances(), STEPS, GRAZING, LARGEST_MM)
-    except np.linalg.LinAlgError:  # so nearly a line that its three parameters are one
+    except np.linalg.LinAlgError:  # nearly a line: the three parameters are degenerate
         return None
     (x, z, radius), covariance, by_range, chi2 = found
     if not (math.isfinite(chi2) and (np.diag(covariance) > 0).all()):
@@ -77,9 +77,9 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
 
 
 def _start(points: Points) -> FloatArray | None:
-    """(3,) axis x, axis range, radius of the circle x^2 + r^2 = 2 a x + 2 b r + c: linear, not the best.
+    """(3,) axis x, axis range, radius of the algebraic fit x^2 + r^2 = 2 a x + 2 b r + c, which is linear.
 
-    Counted from the middle of the spots, where c is the mean of the left side; None for spots on a line.
+    Coordinates are relative to the centroid, where c is the mean of the left side; None for spots on a line.
     """
     middle_x, middle_r = float(points.x_mm.mean()), float(points.range_mm.mean())
     x, r = points.x_mm - middle_x, points.range_mm - middle_r

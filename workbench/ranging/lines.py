@@ -1,4 +1,4 @@
-"""One line of lasers: from the ranges of its spots to the shape before it."""
+"""Shape in front of one line of lasers, from the ranges of its spots."""
 
 from __future__ import annotations
 
@@ -9,48 +9,51 @@ from typing import Literal
 import numpy as np
 
 from workbench.model.arrays import FloatArray
+from workbench.model.rig import ImageAxis
 from workbench.ranging.points import Points
 from workbench.ranging.shape import Shape, fit_shape
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
-Axis = Literal["u", "v"]
-NAMES: dict[Axis, str] = {"u": "horizontal", "v": "vertical"}
+NAMES: dict[ImageAxis, str] = {"u": "horizontal", "v": "vertical"}
 Weights = Literal["information", "pixels"]
 
 
 @dataclass(frozen=True)
-class Line:
-    """The shape before one line of lasers, and the ranges that it was fitted to."""
+class LineShape:
+    """Shape in front of one line of lasers, and the ranges that it was fitted to."""
 
-    axis: Axis
+    axis: ImageAxis
     """Image axis along which the spots move with range: u for the horizontal line, v for the vertical one."""
     shape: Shape
     indices: tuple[int, ...]
-    """Which of the reading's ranges are its own."""
+    """Indices of the line's ranges among those of the reading."""
     closest_by_parameter: FloatArray
     """(P,) derivatives of the closest range by the calibration's parameters, through ranges and places."""
     closest_spot_sd_mm: FloatArray
-    """(n,) 1 sigma of the closest range by each spot's own noise."""
+    """(n,) 1 sigma of the closest range by the noise of each spot."""
 
 
-def line_of(
-    sensor: CalibratedSensor, axis: Axis, ids: Sequence[str], ranges: RangeEstimates, indices: Sequence[int]
-) -> Line:
-    """Fit the shape before one line.
+def fit_line(
+    sensor: CalibratedSensor,
+    axis: ImageAxis,
+    ids: Sequence[str],
+    ranges: RangeEstimates,
+    indices: Sequence[int],
+) -> LineShape:
+    """Fit the shape in front of one line.
 
-    A spot lies where its beam meets the surface, not where the beam starts; the error of that place comes
-    from the same calibration as that of the range. The front reaches from the first to the last laser of
-    the line, whether its spot was seen or not.
+    A spot lies where its beam meets the surface, not at the origin of the beam; errors of this position and
+    of the range are correlated, because both come from the calibration. The front reaches from the first to
+    the last laser of the line, with or without a spot.
 
     Args:
         sensor: the calibrated sensor.
-        axis: which line.
-        ids: the lasers of all ranges of the reading.
+        axis: the line.
+        ids: lasers of all ranges of the reading.
         ranges: all ranges of the reading.
-        indices: which of them belong to the line.
+        indices: indices of the line's ranges.
     """
-    mine = np.asarray(indices, np.intp)
-    own = ranges.only(mine)
+    own = ranges.only(np.asarray(indices, np.intp))
     place, by_parameter, tangent = sensor.places([ids[i] for i in indices], axis, own)
     c, spot = sensor.covariance, own.spot_sd_mm**2
     points = Points(
@@ -64,17 +67,17 @@ def line_of(
     shape = fit_shape(points, sensor.front_mm(axis))
     by_parameter = shape.closest_by_range @ own.by_parameter + shape.closest_by_place @ by_parameter
     spot_sd = (shape.closest_by_range + shape.closest_by_place * tangent) * own.spot_sd_mm
-    return Line(axis, shape, tuple(indices), by_parameter, spot_sd)
+    return LineShape(axis, shape, tuple(indices), by_parameter, spot_sd)
 
 
 def mean_of_lines(
-    lines: Sequence[Line], covariance: FloatArray, weights: Weights, size_px: tuple[int, int]
+    lines: Sequence[LineShape], covariance: FloatArray, weights: Weights, size_px: tuple[int, int]
 ) -> tuple[float, float]:
     """Mean of the lines' closest ranges and its 1 sigma, mm.
 
-    `information` weights by 1 / sigma^2, `pixels` by the pixels along each line, as the thesis does. What the
-    calibration has wrong is common to the lines and stays in sigma; `covariance` (P, P) is that of its
-    parameters.
+    `information` weights by 1 / sigma^2, `pixels` by the pixels along each line, as the thesis does. The
+    lines share the error of the calibration, which averaging does not reduce; `covariance` (P, P) is that of
+    its parameters.
     """
     by_information = [1.0 / line.shape.closest_sigma_mm**2 for line in lines]
     by_pixels = [float(size_px[0] if line.axis == "u" else size_px[1]) for line in lines]

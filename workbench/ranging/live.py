@@ -1,4 +1,4 @@
-"""Ranging on a bench, reading after reading, as fast as its camera delivers."""
+"""Live ranging on a bench, at the rate of its camera."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from workbench.ranging.ranger import Ranger, Reading
 from workbench.spots import Finding, Spot, SpotFinder, persistent_spots, position_text, refuse_stuck_beam
 
 LEASE_S = 2.0
-"""Longest time that a laser stays lit for one frame."""
-FEWEST_TO_TELL_P99 = 100
+"""Longest time that a laser stays on for one frame."""
+FEWEST_FOR_P99 = 100
 LATENCY_ADVICE = (
-    "count it with `workbench doctor`, and enter it in the rig file as the camera's latency_frames"
+    "measure it with `workbench doctor`, and enter it in the rig file as the camera's latency_frames"
 )
 
 
 def check_same_sensor(rig: Rig, calibration: Calibration) -> None:
-    """Refuse a calibration that was made of another sensor than the rig's.
+    """Refuse a calibration of another sensor than the rig's.
 
     Raises:
         BadInputError: image size, lasers, name or serial number differ.
@@ -40,8 +40,8 @@ def check_same_sensor(rig: Rig, calibration: Calibration) -> None:
     ):
         if of_rig != of_file:
             raise BadInputError(
-                f"calibration: expected one of this rig, whose {what} is {of_rig}, got one whose {what} is"
-                f" {of_file}; calibrate this rig, or give its own calibration"
+                f"calibration: {what}: expected that of this rig, {of_rig}, got {of_file}; calibrate this"
+                " rig, or use its own calibration"
             )
 
 
@@ -51,7 +51,7 @@ def _size(calibration: Calibration) -> tuple[int, int]:
 
 @dataclass
 class LiveRanger:
-    """Fires, grabs and ranges; keeps the time from the second frame of the last pair to the answer."""
+    """Switches lasers, grabs and ranges; records the time from a pair's second frame to the answer."""
 
     ranger: Ranger
     bench: Bench
@@ -60,19 +60,19 @@ class LiveRanger:
     _second_frame_at: float = 0.0
     _dark: Image | None = None
     _lamps: tuple[Spot, ...] = ()
-    """Lights on the lasers' lines before anything was fired."""
+    """Lights on the lasers' lines before any laser was switched on."""
 
     def get_ready(self) -> tuple[str, ...]:
-        """See that frames come, of the right size, before anything is fired; the errors of `read`.
+        """Check frames and their size before any laser is switched on; raises the errors of `read`.
 
         Returns:
-            What to warn of: lights that burn already.
+            Warnings of lights that are already on.
         """
         self._lamps = tuple(persistent_spots(self._look_again(), self._look_again))
-        return tuple(_burned(lamp) for lamp in self._lamps)
+        return tuple(_lamp_text(lamp) for lamp in self._lamps)
 
     def warm_up(self) -> None:
-        """Go once through everything that a reading needs, without firing: the first time, code is loaded."""
+        """Range a synthetic capture without lasers, so that the code of a reading is loaded and compiled."""
         width, height = self.ranger.size_px
         rows, columns = np.mgrid[0:height, 0:width]
         dark = np.random.default_rng(0).integers(5, 9, (height, width), dtype=np.uint8)
@@ -85,7 +85,7 @@ class LiveRanger:
         acquire(self.ranger, "warm-up", lambda ids: self._find(ids, on, dark))
 
     def read(self, scene: str) -> Reading:
-        """One reading.
+        """Take one reading.
 
         Raises:
             RigNotReadyError: a device does not answer.
@@ -108,7 +108,7 @@ class LiveRanger:
         return self._find(ids, on.image, off.image)
 
     def _look_for_stuck_beam(self, reading: Reading) -> Reading:
-        """Check the last frame with all lasers off; a light from before the first reading becomes a note.
+        """Check the last frame with all lasers off; a light known from before becomes a note.
 
         Raises:
             LaserOffNotConfirmedError: see `refuse_stuck_beam`.
@@ -119,7 +119,7 @@ class LiveRanger:
         known = refuse_stuck_beam(
             f"reading {reading.scene}", lights, self._look_again, LATENCY_ADVICE, self._lamps
         )
-        return replace(reading, notes=(*reading.notes, *map(_burned, known)))
+        return replace(reading, notes=(*reading.notes, *map(_lamp_text, known)))
 
     def _look_again(self) -> Sequence[Spot]:
         """Lights in the next frame; all lasers are off."""
@@ -138,19 +138,19 @@ class LiveRanger:
         return self._finders[ids].find(on, off)
 
 
-def _burned(light: Spot) -> str:
+def _lamp_text(light: Spot) -> str:
     return (
-        f"a light at {position_text(light)} burned before any laser was fired: a lamp, or a beam that was on"
+        f"a light at {position_text(light)} was on before any laser was switched on: a lamp, or a laser beam"
     )
 
 
-def latency_words(latencies_s: Sequence[float], elapsed_s: float) -> str:
-    """What `--stats` prints."""
+def latency_text(latencies_s: Sequence[float], elapsed_s: float) -> str:
+    """Text of `--stats`: rate, and percentiles of the latency."""
     if not latencies_s:
         return "no reading"
     p50, p99 = np.percentile(np.array(latencies_s) * 1e3, [50, 99])
     n = len(latencies_s)
-    few = f" (of {n} readings only)" if n < FEWEST_TO_TELL_P99 else ""
+    few = f" (of {n} readings only)" if n < FEWEST_FOR_P99 else ""
     return (
         f"{n} readings in {elapsed_s:.1f} s, {n / elapsed_s:.1f} a second, camera included; from the second"
         f" frame to the answer: p50 {p50:.2f} ms, p99 {p99:.2f} ms{few}"

@@ -1,4 +1,4 @@
-"""Polynomials through spots: range over the place along the front, by weighted least squares."""
+"""Polynomial shapes: range over the position along the front, by weighted least squares."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from workbench.model.arrays import FloatArray
 from workbench.ranging.points import Closest, Points
 
 STEPS = 3
-"""Gauss-Newton steps: the start is exact but for the curvature of inverse depth over a few deviations."""
+"""Gauss-Newton steps; the linear start differs only by the curvature of inverse depth over the noise. The
+loop is compiled (`shape_kernels.polynomial`): a reading has some microseconds for it."""
 
 
 @dataclass(frozen=True)
@@ -21,18 +22,18 @@ class PolynomialFit:
     coefficients: FloatArray
     """(degree + 1,) mm."""
     covariance: FloatArray
-    """(degree + 1, degree + 1) of them."""
+    """(degree + 1, degree + 1) of the coefficients."""
     by_range: FloatArray
-    """(degree + 1, n) their derivatives by the ranges that were fitted."""
+    """(degree + 1, n) derivatives by the fitted ranges."""
     by_place: FloatArray
-    """(degree + 1, n) and by the places: a place that errs by dx is a range that errs by -slope dx."""
+    """(degree + 1, n) derivatives by the positions: an error dx is equivalent to a range error -slope dx."""
     scale_mm: float
     chi2: float
     freedom: int
 
     @property
     def degree(self) -> int:
-        """Of the polynomial."""
+        """Degree of the polynomial."""
         return len(self.coefficients) - 1
 
     def per_mm(self) -> tuple[float, ...]:
@@ -42,7 +43,7 @@ class PolynomialFit:
     def closest(self, front_mm: tuple[float, float]) -> Closest:
         """Smallest range over the front.
 
-        Where the smallest range lies moves with the coefficients, but at a minimum that does not change it.
+        Its position depends on the coefficients too, but at a minimum this has no first-order effect.
         """
         places = np.array([*front_mm, *self._turns(front_mm)])
         powers = _powers(places / self.scale_mm, self.degree)
@@ -53,7 +54,7 @@ class PolynomialFit:
         return Closest(float(ranges[at]), sigma, float(places[at]), by @ self.by_range, by @ self.by_place)
 
     def _turns(self, front_mm: tuple[float, float]) -> list[float]:
-        """Places inside the front where the slope is 0."""
+        """Positions inside the front where the slope is 0."""
         if self.degree < 2:
             return []
         slope = self.coefficients[1:] * np.arange(1, self.degree + 1)
@@ -63,15 +64,13 @@ class PolynomialFit:
 
 
 def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
-    """Maximum-likelihood polynomial.
+    """Maximum-likelihood polynomial; None where it passes behind the pinhole or is not determined.
 
-    None where it would pass behind the pinhole at a spot, or where the spots do not determine it.
-
-    Weights are the inverse of the full covariance. Residuals are those of inverse depth, whose deviation is
-    the same wherever a spot lies: in ranges, the spots that noise put too near would get too much weight. An
-    error of a place counts by the slope of the polynomial there.
+    Weights are the inverse of the full covariance. Residuals are those of inverse depth, whose deviation does
+    not depend on the noise: weights by the measured ranges would favour spots that noise put too near. Errors
+    of the positions enter with the slope of the polynomial.
     """
-    from workbench.ranging.shape_kernels import polynomial  # loads the compiler, which only a fit needs
+    from workbench.ranging.shape_kernels import polynomial  # loads the compiler
 
     scale = float(np.abs(points.x_mm).max()) or 1.0
     measured = points.x_mm, degree, scale, points.range_mm, points.offset_mm
@@ -79,7 +78,7 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
         coefficients, covariance, by_range, by_place, chi2 = polynomial(
             *measured, *points.covariances(), STEPS
         )
-    except np.linalg.LinAlgError:  # ranges so far apart that the weights of all but a few vanish
+    except np.linalg.LinAlgError:  # ranges so different that all but a few weights vanish
         return None
     if not math.isfinite(chi2):
         return None

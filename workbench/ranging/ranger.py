@@ -1,4 +1,4 @@
-"""The ranger: spots and a calibration in, ranges and shapes with their uncertainty out."""
+"""Ranger: ranges and shapes, with their uncertainty, from spots and a calibration."""
 
 from __future__ import annotations
 
@@ -12,50 +12,51 @@ import numpy as np
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import Calibration
 from workbench.model.event import LaserRange
-from workbench.ranging.assignment import MOST_MISFIT_SD, Pairs, assign, pair_up
-from workbench.ranging.lines import NAMES, Axis, Line, Weights, line_of, mean_of_lines
+from workbench.model.rig import ImageAxis
+from workbench.ranging.assignment import MOST_MISFIT_SD, LaserSpotPairs, assign, pair_up
+from workbench.ranging.lines import NAMES, LineShape, Weights, fit_line, mean_of_lines
 from workbench.ranging.records import flag_notes, flat_range, laser_ranges
 from workbench.ranging.search_band import band
-from workbench.ranging.validity_checks import objections, outside_validity
+from workbench.ranging.validity_checks import failed_checks, outside_validity
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 from workbench.spots import Scanline, Spot
 
 NOTHING_SEEN = "no spot was seen"
 Status = Literal["done", "not_enough_points", "no_points"]
 MERGING_WIDTHS = 4.0
-"""Spots nearer than this to each other may be found as one."""
+"""Distance of two spots, in widths, below which they may be found as one."""
 SCANLINE_HALF_WIDTH_PX = 8.0
-"""A beam of 1.5 mm at the sensor's front spreads over some 8 px on either side of its line."""
+"""Half width of the search band: a beam of 1.5 mm at the sensor's front spans some 8 px on either side."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """The ranger's answer to one scene; mm, 1 sigma."""
+    """Result of ranging one scene; mm, 1 sigma."""
 
     scene: str
     status: Status
     closest_mm: float | None = None
-    """Smallest range over the front, by the shapes before the lines."""
+    """Smallest range over the front, by the shapes in front of the lines."""
     sigma_mm: float | None = None
     interval_mm: tuple[float, float] | None = None
-    """95 %, if the shape is the one told."""
+    """95 % interval, given the shape."""
     mean_mm: float | None = None
-    """Mean of the closest ranges of the lines; that of the only one where there is one."""
+    """Mean of the closest ranges of all lines."""
     mean_sigma_mm: float | None = None
     lasers: tuple[LaserRange, ...] = ()
     """In the calibration's order."""
-    lines: tuple[Line, ...] = ()
-    """The shape before each line of lasers that has a range; horizontal first."""
+    lines: tuple[LineShape, ...] = ()
+    """Shape in front of each line of lasers with a range; horizontal first."""
     flat_mm: float | None = None
     """Mean range of the lasers, weighted by their spots: the range of a flat target across the axis."""
     flat_sigma_mm: float | None = None
     notes: tuple[str, ...] = ()
-    """Why lasers have no range, and which ranges to take with care."""
+    """Reasons of missing ranges, and remarks on uncertain ones."""
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """The spots of a frame in which every laser is lit, as far as they tell their lasers."""
+    """Assignment of the spots of a frame with all lasers on."""
 
     lasers: IndexArray
     """(n,) indices of lasers with a spot."""
@@ -64,17 +65,17 @@ class Assignment:
     ranges: RangeEstimates
     """(n)"""
     ambiguous: tuple[str, ...]
-    """Lasers whose spots, if they have any, cannot be told apart: fire each alone."""
+    """Lasers without an unambiguous assignment, with or without a spot; each is to be captured alone."""
     notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Ranger:
-    """Consumes a calibration, and nothing else."""
+    """Ranger of one calibrated sensor; it needs the calibration only."""
 
     calibration: Calibration
     weights: Weights = "information"
-    """How the ranges of two lines are averaged."""
+    """Weights of the mean of two lines."""
 
     @cached_property
     def sensor(self) -> CalibratedSensor:
@@ -83,27 +84,26 @@ class Ranger:
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """(width, height) that frames must have."""
+        """(width, height) of frames."""
         return self.calibration.image_width, self.calibration.image_height
 
     @cached_property
     def scanlines(self) -> tuple[Scanline, ...]:
-        """The line in the image along which each laser's spot moves with range."""
+        """Image line along which the spot of each laser moves with range."""
         nearest, _ = self.calibration.laser_ranger.validity.standoff_mm
         return tuple(self._scanline(i, nearest) for i in self.sensor.ids)
 
     def searched(self, laser_ids: Sequence[str]) -> list[Scanline]:
-        """Where the spots of lasers that are lit together may lie: one band for each line of lasers.
+        """Search bands for lasers that are on together, one for each line of lasers.
 
-        The lines of lasers side by side all but coincide; to search each by itself would be the same work
-        several times over.
+        The scanlines of one line of lasers nearly coincide; searching each would repeat the same work.
         """
         if len(laser_ids) == 1:
             return [self._fields[laser_ids[0]]]
         return [
-            band([self._fields[i] for i in mine], axis)
+            band([self._fields[i] for i in own], axis)
             for axis, lasers in self._axes.items()
-            if (mine := [i for i in laser_ids if self.sensor.ids.index(i) in lasers])
+            if (own := [i for i in laser_ids if self.sensor.ids.index(i) in lasers])
         ]
 
     @cached_property
@@ -117,9 +117,9 @@ class Ranger:
         return {i: self.sensor.spot_px(i, ends) for i in self.sensor.ids}
 
     @cached_property
-    def _axes(self) -> dict[Axis, IndexArray]:
-        """The lasers of each line that there is."""
-        axes: tuple[Axis, ...] = ("u", "v")
+    def _axes(self) -> dict[ImageAxis, IndexArray]:
+        """Indices of the lasers of each line, by its image axis; no empty lines."""
+        axes: tuple[ImageAxis, ...] = ("u", "v")
         return {axis: lasers for axis in axes if len(lasers := self.sensor.lasers_on(axis))}
 
     def read_known(
@@ -132,102 +132,122 @@ class Ranger:
         notes: Sequence[str] = (),
         unseen: Sequence[str] = (),
     ) -> Reading:
-        """Range spots whose lasers are known, because each was fired alone.
+        """Range spots whose lasers are known, because each was on alone.
 
         Args:
             scene: name of the scene.
-            fired: how many lasers were fired; fewer spots make the status `not_enough_points`.
+            fired: number of lasers captured; with fewer ranges the status is `not_enough_points`.
             laser_ids: n lasers.
             position_px: (n, 2), NaN where a coordinate was not measured.
             sd_px: (n, 2) 1 sigma, NaN where not known.
-            notes: what is to be said of the captures.
-            unseen: lasers that were fired and made no spot.
+            notes: notes on the captures.
+            unseen: lasers captured without a spot.
         """
         ranges = self.sensor.ranges(laser_ids, position_px, sd_px)
         return self._answer(scene, fired, laser_ids, position_px, ranges, notes, unseen)
 
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
-        """Range the spots of a frame in which every laser is lit.
+        """Range the spots of a frame with all lasers on.
 
-        Lines of lasers whose spots cannot be told apart have no range: fire these lasers alone instead.
+        Lines of lasers with an ambiguous assignment have no range: capture these lasers one by one instead.
         """
         return self.read_assigned(scene, spots, self.assign_spots(spots))
 
-    def read_assigned(self, scene: str, spots: Sequence[Spot], dealt: Assignment) -> Reading:
-        """Range spots that have been dealt to their lasers."""
+    def read_assigned(self, scene: str, spots: Sequence[Spot], assignment: Assignment) -> Reading:
+        """Range spots that are assigned to their lasers."""
         if not spots:
             return Reading(scene, "no_points", notes=(NOTHING_SEEN,))
-        ids = [self.sensor.ids[i] for i in dealt.lasers]
-        mine = [spots[i] for i in dealt.spots.tolist()]
-        position, _ = spot_arrays(mine)
-        notes = (*dealt.notes, *flag_notes(ids, mine))
-        unseen = [i for i in self.sensor.ids if i not in ids and i not in dealt.ambiguous]
-        reading = self._answer(scene, len(self.sensor.ids), ids, position, dealt.ranges, notes, unseen)
-        if dealt.ambiguous and reading.status == "no_points":
+        ids = [self.sensor.ids[i] for i in assignment.lasers]
+        assigned = [spots[i] for i in assignment.spots.tolist()]
+        position, _ = spot_arrays(assigned)
+        notes = (*assignment.notes, *flag_notes(ids, assigned))
+        unseen = [i for i in self.sensor.ids if i not in ids and i not in assignment.ambiguous]
+        reading = self._answer(scene, len(self.sensor.ids), ids, position, assignment.ranges, notes, unseen)
+        if assignment.ambiguous and reading.status == "no_points":
             return Reading(scene, "not_enough_points", notes=reading.notes)
         return reading
 
     def assign_spots(self, spots: Sequence[Spot]) -> Assignment:
-        """Deal the spots of a frame in which every laser is lit to the lasers, each line apart.
+        """Assign the spots of a frame with all lasers on, each line of lasers independently.
 
-        A spot that two lines claim leaves both untold. A laser without a spot whose spot would lie where
-        another is leaves both of these untold: what is seen there may be the sum of the two.
+        Two lines that claim the same spot are both ambiguous. Where the spot of a laser without one would lie
+        on a spot of another laser, both lasers are ambiguous: the spot may be the sum of two.
         """
         pairs = pair_up(self.sensor, *spot_arrays(spots))
         found = {axis: assign(pairs, lasers) for axis, lasers in self._axes.items()}
         claimed = np.concatenate([np.empty(0, np.intp), *(f[1] for f in found.values() if f is not None)])
         twice = {i for i in claimed if (claimed == i).sum() > 1}
-        told = {axis: f for axis, f in found.items() if f is not None and twice.isdisjoint(f[1].tolist())}
-        lasers = np.concatenate([np.empty(0, np.intp), *(f[0] for f in told.values())])
-        dealt = np.concatenate([np.empty(0, np.intp), *(f[1] for f in told.values())])
-        hidden = [pair for axis in told for pair in self._hidden(spots, pairs, *told[axis], self._axes[axis])]
-        clear = ~np.isin(dealt, [spot for _, spot in hidden])
-        ambiguous = {int(i) for axis, all_ in self._axes.items() if axis not in told for i in all_}
-        ambiguous |= {laser for laser, _ in hidden} | set(lasers[~clear].tolist())
-        notes = self._what_is_left(pairs, len(spots), tuple(axis for axis in self._axes if axis not in told))
+        clear = {axis: f for axis, f in found.items() if f is not None and twice.isdisjoint(f[1].tolist())}
+        lasers = np.concatenate([np.empty(0, np.intp), *(f[0] for f in clear.values())])
+        assigned = np.concatenate([np.empty(0, np.intp), *(f[1] for f in clear.values())])
+        hidden = [
+            pair for axis in clear for pair in self._hidden(spots, pairs, *clear[axis], self._axes[axis])
+        ]
+        single = ~np.isin(assigned, [spot for _, spot in hidden])
+        ambiguous = {int(i) for axis, all_ in self._axes.items() if axis not in clear for i in all_}
+        ambiguous |= {laser for laser, _ in hidden} | set(lasers[~single].tolist())
+        notes = self._assignment_notes(pairs, len(spots), [axis for axis in self._axes if axis not in clear])
         notes += tuple(
-            f"{self.sensor.ids[laser]}: its spot may be one with that at u = {spots[spot].u_px:.0f},"
-            f" v = {spots[spot].v_px:.0f} px: fire each laser alone"
+            f"{self.sensor.ids[laser]}: its spot may be merged with that at u = {spots[spot].u_px:.0f},"
+            f" v = {spots[spot].v_px:.0f} px: capture each laser alone"
             for laser, spot in hidden
         )
         ids = tuple(i for n, i in enumerate(self.sensor.ids) if n in ambiguous)
-        lasers, dealt = lasers[clear], dealt[clear]
-        return Assignment(lasers, dealt, pairs.chosen(lasers, dealt), ids, notes)
+        lasers, assigned = lasers[single], assigned[single]
+        return Assignment(lasers, assigned, pairs.chosen(lasers, assigned), ids, notes)
 
     def _hidden(
-        self, spots: Sequence[Spot], pairs: Pairs, told: IndexArray, dealt: IndexArray, lasers: IndexArray
+        self,
+        spots: Sequence[Spot],
+        pairs: LaserSpotPairs,
+        seen: IndexArray,
+        assigned: IndexArray,
+        lasers: IndexArray,
     ) -> list[tuple[int, int]]:
-        """Lasers of a line without a spot, each with a spot that its own would lie on at a depth told."""
-        if len(told) in (0, len(lasers)):
+        """Lasers of a line without a spot, each with a spot that its own would merge with.
+
+        The expected spots are those at the ranges of the line's other lasers.
+
+        Args:
+            spots: all spots.
+            pairs: all pairs of lasers and spots.
+            seen: (n,) lasers of the line with a spot.
+            assigned: (n,) their spots.
+            lasers: all lasers of the line.
+        """
+        if len(seen) in (0, len(lasers)):
             return []
-        depth_mm = pairs.chosen(told, dealt).range_mm
-        depth_mm = depth_mm[np.isfinite(depth_mm)]
-        place, _ = spot_arrays(spots)
+        range_mm = pairs.chosen(seen, assigned).range_mm
+        range_mm = range_mm[np.isfinite(range_mm)]
+        position, _ = spot_arrays(spots)
         near_px = MERGING_WIDTHS * np.array([spot.width_px for spot in spots])
         hidden = []
-        for laser in np.setdiff1d(lasers, told).tolist():
-            expected = self.sensor.spot_px(self.sensor.ids[laser], depth_mm)
-            apart_px = np.hypot(*(expected[:, None] - place).T).min(axis=1, initial=np.inf)
-            hidden += [(laser, int(n)) for n in np.flatnonzero(apart_px < near_px)]
+        for laser in np.setdiff1d(lasers, seen).tolist():
+            expected = self.sensor.spot_px(self.sensor.ids[laser], range_mm)
+            distance_px = np.hypot(*(expected[:, None] - position).T).min(axis=1, initial=np.inf)
+            hidden += [(laser, int(n)) for n in np.flatnonzero(distance_px < near_px)]
         return hidden
 
     def alone(self, laser_id: str, spots: Sequence[Spot]) -> list[Spot]:
-        """The spots on the line of a laser that was fired alone; its own is known if there is one only."""
+        """Spots on the line of a laser that was on alone; a single one is that of the laser."""
         position, sd = spot_arrays(spots)
         ranges = self.sensor.ranges([laser_id] * len(spots), position, sd)
-        possible = (ranges.range_mm > 0) & np.isfinite(ranges.range_mm)  # not beyond infinity
+        possible = (ranges.range_mm > 0) & np.isfinite(ranges.range_mm)
         on_line = np.flatnonzero((ranges.misfit_sd < MOST_MISFIT_SD) & possible)
         return [spots[n] for n in on_line.tolist()]
 
-    def _what_is_left(self, pairs: Pairs, spots: int, ambiguous: tuple[Axis, ...]) -> tuple[str, ...]:
-        astray = int((pairs.misfit_sd >= MOST_MISFIT_SD).all(axis=0).sum())
-        notes = [f"{astray} of {spots} spots on no laser's line: other light"] if astray else []
+    def _assignment_notes(
+        self, pairs: LaserSpotPairs, spots: int, ambiguous: Sequence[ImageAxis]
+    ) -> tuple[str, ...]:
+        """Notes on spots off all lines, ambiguous lines, and too many spots."""
+        other = int((pairs.misfit_sd >= MOST_MISFIT_SD).all(axis=0).sum())
+        notes = [f"{other} of {spots} spots on no laser's line: other light"] if other else []
         if ambiguous:
             lines = " and ".join(f"{len(self._axes[axis])} {NAMES[axis]}" for axis in ambiguous)
             seen = f"{spots} spot{'s' * (spots != 1)}"
-            notes.append(f"{seen} of {lines} lasers cannot be told apart: fire each laser alone")
-        if spots - astray > len(self.sensor.ids):
-            notes.append("more spots than lasers: is this the calibration of this sensor?")
+            notes.append(f"ambiguous assignment of {seen} to {lines} lasers: capture each laser alone")
+        if spots - other > len(self.sensor.ids):
+            notes.append("more spots than lasers: check that this is the calibration of this sensor")
         return tuple(notes)
 
     def _answer(
@@ -240,14 +260,14 @@ class Ranger:
         notes: Sequence[str],
         unseen: Sequence[str],
     ) -> Reading:
-        against = objections(position_px, ranges, self.size_px)
-        said = [
+        failed = failed_checks(position_px, ranges, self.size_px)
+        all_notes = [
             *notes,
-            *(f"{i}: {why}" for i, why in zip(laser_ids, against, strict=True) if why is not None),
+            *(f"{i}: {check}" for i, check in zip(laser_ids, failed, strict=True) if check is not None),
         ]
-        good = [n for n, why in enumerate(against) if why is None]
+        good = [n for n, check in enumerate(failed) if check is None]
         if not good:
-            return Reading(scene, "no_points", notes=tuple(said) or (NOTHING_SEEN,))
+            return Reading(scene, "no_points", notes=tuple(all_notes) or (NOTHING_SEEN,))
         good.sort(key=lambda n: self.sensor.ids.index(laser_ids[n]))
         ids, position = [laser_ids[n] for n in good], position_px[good]
         ranges = ranges.only(np.array(good))
@@ -256,8 +276,8 @@ class Ranger:
         flat_mm, flat_sigma_mm = flat_range(ranges)
         lines = self._lines(ids, ranges)
         nearest = min((line.shape for line in lines), key=lambda shape: shape.closest_mm)
-        said += [self._why_unseen(i, flat_mm) for i in unseen]
-        said += outside_validity(lasers, self.calibration.laser_ranger.validity, self._calibrated_px)
+        all_notes += [self._unseen_note(i, flat_mm) for i in unseen]
+        all_notes += outside_validity(lasers, self.calibration.laser_ranger.validity, self._calibrated_px)
         return Reading(
             scene,
             status,
@@ -269,20 +289,20 @@ class Ranger:
             lines,
             flat_mm,
             flat_sigma_mm,
-            tuple(said),
+            tuple(all_notes),
         )
 
-    def _why_unseen(self, laser_id: str, range_mm: float) -> str:
+    def _unseen_note(self, laser_id: str, range_mm: float) -> str:
         if self.sensor.in_frame(laser_id, np.array([range_mm]))[0]:
             return f"{laser_id}: no spot was seen"
-        return f"{laser_id}: at {range_mm:.0f} mm its spot lies outside the picture"
+        return f"{laser_id}: at {range_mm:.0f} mm its spot lies outside the image"
 
-    def _lines(self, ids: Sequence[str], ranges: RangeEstimates) -> tuple[Line, ...]:
+    def _lines(self, ids: Sequence[str], ranges: RangeEstimates) -> tuple[LineShape, ...]:
         lines = []
         for axis, lasers in self._axes.items():
             names = {self.sensor.ids[i] for i in lasers}
-            if mine := [n for n, i in enumerate(ids) if i in names]:
-                lines.append(line_of(self.sensor, axis, ids, ranges, mine))
+            if own := [n for n, i in enumerate(ids) if i in names]:
+                lines.append(fit_line(self.sensor, axis, ids, ranges, own))
         return tuple(lines)
 
     def _scanline(self, laser_id: str, nearest_mm: float) -> Scanline:

@@ -14,15 +14,15 @@ from workbench.sensor.calibrated import RangeEstimates
 from workbench.spots import Failure, Spot
 
 FLAGGED = {
-    Failure.SATURATED: "is saturated: its range is known less well",
-    Failure.MERGED: "runs into another: both ranges err together",
-    Failure.AT_EDGE: "is cut by the edge of the picture",
+    Failure.SATURATED: "is saturated: its range is less certain",
+    Failure.MERGED: "overlaps another: the errors of both ranges are correlated",
+    Failure.AT_EDGE: "is cut by the edge of the image",
 }
-"""What of a spot's flags a range suffers from."""
+"""Text of the flags of a spot that affect its range."""
 
 
 def flag_notes(laser_ids: Sequence[str], spots: Sequence[Spot]) -> list[str]:
-    """A note for each flag of n spots, by their lasers."""
+    """Notes on the flags of n spots, with their lasers."""
     return [
         f"{laser_id}: its spot {words}"
         for laser_id, spot in zip(laser_ids, spots, strict=True)
@@ -35,7 +35,7 @@ def flag_notes(laser_ids: Sequence[str], spots: Sequence[Spot]) -> list[str]:
 def laser_ranges(
     laser_ids: Sequence[str], position_px: FloatArray, ranges: RangeEstimates, offset_mm: float
 ) -> tuple[LaserRange, ...]:
-    """A record for each of n ranges; positions (n, 2), NaN where a coordinate was not measured."""
+    """Records of n ranges; positions (n, 2), NaN where a coordinate was not measured."""
     records = []
     columns = zip(
         laser_ids, ranges.range_mm.tolist(), ranges.sigma_mm.tolist(), position_px.tolist(), strict=True
@@ -57,10 +57,10 @@ def laser_ranges(
 
 
 def flat_range(ranges: RangeEstimates) -> tuple[float, float]:
-    """Mean weighted by the spots' variances; its sigma from the full covariance.
+    """Mean range weighted by the spots' variances, and its sigma by the full covariance, mm.
 
-    The calibration's part is common to the lasers: weights by the full covariance would lean on differences
-    of nearly equal numbers for a gain that no bench would show.
+    The calibration's error is nearly common to all lasers: weights by the full covariance would depend on
+    small differences of its entries, for no measurable gain.
     """
     weight = 1.0 / ranges.spot_sd_mm**2
     weight = weight / weight.sum()

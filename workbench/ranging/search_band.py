@@ -1,4 +1,4 @@
-"""Where to search for the spots of a whole line of lasers."""
+"""Search band for the spots of a whole line of lasers."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from workbench.ranging.lines import Axis
+from workbench.model.rig import ImageAxis
 from workbench.spots import Scanline
 
 
-def band(lines: Sequence[Scanline], axis: Axis) -> Scanline:
-    """The narrowest band about a straight line through the ends of some scanlines that holds them all."""
+def band(lines: Sequence[Scanline], axis: ImageAxis) -> Scanline:
+    """Band about the least-squares line through the ends of some scanlines that contains all of them."""
     ends = np.array([(s.u0_px + k * s.du, s.v0_px + k * s.dv) for s in lines for k in (0.0, 1.0)])
     along, aside = (ends[:, 0], ends[:, 1]) if axis == "u" else (ends[:, 1], ends[:, 0])
     slope, at_0 = np.polyfit(along, aside, 1).tolist()

@@ -1,4 +1,4 @@
-"""The shape before one line of lasers: the simplest that its ranges do not reject."""
+"""Selection of the shape in front of one line of lasers: the simplest that its ranges do not reject."""
 
 from __future__ import annotations
 
@@ -14,104 +14,105 @@ from workbench.ranging.cylinder import CylinderFit, fit_cylinder
 from workbench.ranging.points import Closest, Points, interval_mm, probability
 from workbench.ranging.polynomial import PolynomialFit, fit_polynomial
 
-Kind = Literal["flat", "incline", "round", "cylinder", "unknown"]
+ShapeKind = Literal["flat", "incline", "round", "cylinder", "unknown"]
 SIGNIFICANCE = 0.01
-"""A shape is rejected when its residuals are less likely than this: one flat in a hundred is."""
+"""P value of the residuals below which a shape is rejected; 1 of 100 flat targets is."""
 CLEAR_ODDS = 10.0
-"""A cylinder is told from a parabola where the data make it so many times more likely."""
+"""Likelihood ratio from which a cylinder is preferred to a parabola."""
 
 
 @dataclass(frozen=True)
-class Tried:
-    """How one shape fared."""
+class ShapeTest:
+    """Test of one candidate shape."""
 
     name: str
     chi2: float
     freedom: int
     probability: float | None
-    """Of a chi2 at least as large if the shape is true; None where no freedom is left to test it with."""
+    """P value of `chi2`; None without degrees of freedom."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """What stands before one line of lasers; mm, radians, 1 sigma."""
+    """Surface in front of one line of lasers; mm, radians, 1 sigma."""
 
-    kind: Kind
+    kind: ShapeKind
     closest_mm: float
-    """Smallest range over the front; of a shape that is not known, the smallest range measured."""
+    """Smallest range over the front; of an unknown shape, the smallest measured range."""
     closest_sigma_mm: float
     closest_interval_mm: tuple[float, float]
-    """95 % if the shape is the one told; the upper end may be infinite. Where a parabola and a circle cannot
-    be told apart, it spans both of theirs."""
+    """95 % interval, given the kind; the upper end may be infinite. Where parabola and circle are not
+    distinguished, it covers the intervals of both."""
     closest_x_mm: float
-    """Where on the front."""
+    """Position of the smallest range along the front."""
     closest_by_range: FloatArray
     """(n,) derivatives of `closest_mm` by the ranges."""
     closest_by_place: FloatArray
-    """(n,) and by the places of the spots along the front."""
+    """(n,) derivatives of `closest_mm` by the positions of the spots along the front."""
     degree: int | None = None
-    """Of the polynomial; 0 for a flat, 1 for an incline."""
+    """Degree of the polynomial; 0 for a flat, 1 for an incline."""
     coefficients: tuple[float, ...] = ()
     """range = sum of coefficients[k] x^k, x and range in mm."""
     angle_rad: float | None = None
-    """Of an incline; positive where the surface recedes towards greater x."""
+    """Angle of an incline; positive where the surface recedes towards greater x."""
     angle_sigma_rad: float | None = None
     cylinder: CylinderFit | None = None
-    """Where a circle fits the points, also when a parabola does as well."""
+    """Circle where one fits the points, also where a parabola fits as well."""
     probability: float | None = None
-    """Of residuals at least as large as found, if the shape is true; None where nothing was left to test."""
-    tried: tuple[Tried, ...] = ()
-    """In the order of trial; the one that was taken, if any, is the last but for a rival of its size."""
+    """P value of the residuals; None without degrees of freedom."""
+    tried: tuple[ShapeTest, ...] = ()
+    """Tests in the order made; the last is that of the selected shape, or of its rival with as many
+    parameters."""
 
 
 def fit_shape(points: Points, front_mm: tuple[float, float] | None = None) -> Shape:
     """Shape of n spots, n at least 1.
 
-    Flat, incline, polynomial of degree 2 (or a circle, which has as many parameters) up to n - 1: the first
-    whose residuals are not improbable. A polynomial of degree n - 1 passes through every point and cannot be
-    rejected. One point tells no shape, nor does a shape that reaches back to the sensor.
+    Candidates are flat, incline, and polynomials of degree 2 (or a circle, which has as many parameters) to
+    n - 1; the first that is not rejected is selected. A polynomial of degree n - 1 passes through every point
+    and cannot be rejected. The shape is unknown for a single point, and where it reaches back to the sensor.
 
     Args:
         points: the spots of one line.
-        front_mm: from where to where on the front the closest range is sought; the outermost spots if None.
+        front_mm: ends of the front, over which the closest range is sought; the outermost spots if None.
     """
     front = front_mm or (float(points.x_mm.min()), float(points.x_mm.max()))
-    tried: list[Tried] = []
+    tried: list[ShapeTest] = []
     shape = next(_not_rejected(points, front, tried), None) if len(points) > 1 else None
     if shape is None or shape.closest_mm <= max(0.0, -points.offset_mm):
         return _unknown(points, tuple(tried))
     return replace(shape, tried=tuple(tried))
 
 
-def _not_rejected(points: Points, front: tuple[float, float], tried: list[Tried]) -> Iterator[Shape]:
-    """Shapes that the data do not reject, simplest first; tells in `tried` how each fared."""
+def _not_rejected(points: Points, front: tuple[float, float], tried: list[ShapeTest]) -> Iterator[Shape]:
+    """Shapes that the data do not reject, simplest first; each test is appended to `tried`."""
     for degree in range(len(points)):
         fit = fit_polynomial(points, degree)
-        stands = fit is not None and _stands(f"degree {degree}", fit, tried)
+        passes = fit is not None and _passes(f"degree {degree}", fit, tried)
         circle = fit_cylinder(points) if degree == 2 else None
-        if circle is not None and not _stands("cylinder", circle, tried):
+        if circle is not None and not _passes("cylinder", circle, tried):
             circle = None
-        if circle is not None and (fit is None or not stands or _is_clear(circle, fit)):
+        if circle is not None and (fit is None or not passes or _is_clear(circle, fit)):
             yield _of_cylinder(points, circle, front)
-        elif fit is not None and stands:
+        elif fit is not None and passes:
             yield _of_polynomial(points, fit, circle, front)
 
 
-def _stands(name: str, fit: PolynomialFit | CylinderFit, tried: list[Tried]) -> bool:
-    chance = probability(fit.chi2, fit.freedom)
-    tried.append(Tried(name, fit.chi2, fit.freedom, chance))
-    return chance is None or chance >= SIGNIFICANCE
+def _passes(name: str, fit: PolynomialFit | CylinderFit, tried: list[ShapeTest]) -> bool:
+    p = probability(fit.chi2, fit.freedom)
+    tried.append(ShapeTest(name, fit.chi2, fit.freedom, p))
+    return p is None or p >= SIGNIFICANCE
 
 
 def _is_clear(circle: CylinderFit, parabola: PolynomialFit) -> bool:
-    """Both have three parameters, so that the odds are the ratio of their likelihoods."""
+    """Whether the likelihood ratio prefers the circle; both have three parameters, so that it is the odds."""
     return parabola.chi2 - circle.chi2 > 2.0 * math.log(CLEAR_ODDS)
 
 
 def _of_polynomial(
     points: Points, fit: PolynomialFit, circle: CylinderFit | None, front: tuple[float, float]
 ) -> Shape:
-    kinds: dict[int, Kind] = {0: "flat", 1: "incline"}
+    kinds: dict[int, ShapeKind] = {0: "flat", 1: "incline"}
     shape = _shape(kinds.get(fit.degree, "round"), fit.closest(front), points)
     if circle is not None:
         nearest, farthest = shape.closest_interval_mm
@@ -136,7 +137,7 @@ def _of_cylinder(points: Points, circle: CylinderFit, front: tuple[float, float]
     return replace(shape, cylinder=circle, probability=probability(circle.chi2, circle.freedom))
 
 
-def _unknown(points: Points, tried: tuple[Tried, ...]) -> Shape:
+def _unknown(points: Points, tried: tuple[ShapeTest, ...]) -> Shape:
     nearest = int(np.argmin(points.range_mm))
     closest = Closest(
         float(points.range_mm[nearest]),
@@ -148,7 +149,7 @@ def _unknown(points: Points, tried: tuple[Tried, ...]) -> Shape:
     return replace(_shape("unknown", closest, points), tried=tried)
 
 
-def _shape(kind: Kind, closest: Closest, points: Points) -> Shape:
+def _shape(kind: ShapeKind, closest: Closest, points: Points) -> Shape:
     return Shape(
         kind=kind,
         closest_mm=closest.range_mm,

@@ -1,6 +1,7 @@
-"""The compiled inner loops of the shape fits. Import it only where one runs: numba takes long to load.
+"""Compiled inner loops of the shape fits. Imported only inside functions, because numba takes long to load.
 
-As numpy, a fit of four points is a hundred calls of a microsecond each; compiled it is a few microseconds.
+With numpy, a fit of four points is a hundred calls of a microsecond each; compiled it takes a few
+microseconds.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ def polynomial(
     """Fit range = sum of coefficients[k] (x / scale)^k; see `fit_polynomial`.
 
     Returns:
-        coefficients (p,), covariance (p, p), derivatives by the ranges (p, n) and by the places (p, n), chi2
-        (not a number where the polynomial passes behind the pinhole at a point).
+        coefficients (p,), covariance (p, p), derivatives by the ranges (p, n) and by the positions (p, n),
+        chi2 (NaN where the polynomial passes behind the pinhole at a point).
     """
     powers, slopes = np.ones((len(x_mm), degree + 1)), np.zeros((len(x_mm), degree + 1))
     for k in range(1, degree + 1):
@@ -103,8 +104,8 @@ def circle(
     """Fit the circle (axis x, axis range, radius) from `start` (3,); see `fit_cylinder`.
 
     Returns:
-        the circle (3,), covariance (3, 3), derivatives by the ranges (3, n), chi2 (not a number where a point
-        lies on the far side or at grazing incidence, or the circle runs away).
+        the circle (3,), covariance (3, 3), derivatives by the ranges (3, n), chi2 (NaN where a point lies on
+        the far side or at grazing incidence, or the circle diverges).
     """
     n = len(x_mm)
     at = start.copy()

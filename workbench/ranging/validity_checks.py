@@ -1,4 +1,4 @@
-"""Why a spot has no range, and which ranges to take with care."""
+"""Validity checks of spots and ranges: why a spot has no range, and ranges outside the calibration."""
 
 from __future__ import annotations
 
@@ -14,59 +14,61 @@ from workbench.ranging.assignment import MOST_MISFIT_SD
 from workbench.sensor.calibrated import RangeEstimates
 
 MOST_RELATIVE_SIGMA = 0.5
-"""Beyond, the spot is so near to its place at infinity that its range may be anything."""
+"""Largest relative uncertainty of a range; beyond it the spot lies too near its vanishing point."""
 LEAST_BEYOND_PX = 0.5
-"""Beyond the calibrated field by less than this is not worth telling."""
+"""Distance from the calibrated field below which no remark is made."""
 
 
-def objections(position_px: FloatArray, ranges: RangeEstimates, size_px: tuple[int, int]) -> list[str | None]:
-    """For each of n spots why it cannot give a range; None where it can.
+def failed_checks(
+    position_px: FloatArray, ranges: RangeEstimates, size_px: tuple[int, int]
+) -> list[str | None]:
+    """The failed validity check of each of n spots; None where its range is valid.
 
     Args:
         position_px: (n, 2) u, v; NaN where a coordinate was not measured.
-        ranges: what the sensor makes of them.
-        size_px: (width, height) of the picture.
+        ranges: range estimates of the spots.
+        size_px: (width, height) of the image.
     """
-    why: list[str | None] = [None] * len(position_px)
+    failed: list[str | None] = [None] * len(position_px)
     bound = MOST_RELATIVE_SIGMA * ranges.range_mm
     good = (ranges.misfit_sd < MOST_MISFIT_SD) & (ranges.sigma_mm < bound) & np.isfinite(ranges.range_mm)
     good &= in_picture(position_px, size_px)
     for n in np.flatnonzero(~good).tolist():
         range_mm, sigma_mm, misfit_sd = ranges.range_mm[n], ranges.sigma_mm[n], ranges.misfit_sd[n]
-        why[n] = _objection(position_px[n], range_mm, sigma_mm, misfit_sd, np.array(size_px, float))
-    return why
+        failed[n] = _failed_check(position_px[n], range_mm, sigma_mm, misfit_sd, np.array(size_px, float))
+    return failed
 
 
-def _objection(
+def _failed_check(
     position: FloatArray, range_mm: float, sigma_mm: float, misfit_sd: float, size: FloatArray
 ) -> str | None:
     seen = np.isfinite(position)
     if not (seen.any() and inside_px(position, size)[seen].all()):
-        return "its spot lies outside the picture"
+        return "its spot lies outside the image"
     if np.isnan(range_mm):
-        return "its spot lies where the lens model folds over: at no range would it be seen there"
+        return "its spot lies beyond the fold of the lens model, where the laser has no spot at any range"
     if not misfit_sd < MOST_MISFIT_SD:
         return (
-            f"its spot lies {misfit_sd:.0f} sd off the laser's line: another light, or the sensor has moved"
+            f"its spot lies {misfit_sd:.0f} sd from the laser's line: other light, or the sensor has changed"
         )
     if not np.isfinite(range_mm):
-        return "its spot lies at or beyond the place of a target at infinity"
+        return "its spot lies at or beyond the laser's vanishing point"
     if range_mm <= 0:
-        return "its spot would lie behind the reference plane"
+        return "its range lies behind the reference plane"
     if not sigma_mm < MOST_RELATIVE_SIGMA * range_mm:
-        return f"its range of {range_mm:.0f} mm is known to {sigma_mm:.0f} mm only"
+        return f"its range of {range_mm:.0f} mm is too uncertain ({sigma_mm:.0f} mm, 1 sigma)"
     return None
 
 
 def outside_validity(
     lasers: Sequence[LaserRange], validity: Validity, calibrated_px: Mapping[str, FloatArray]
 ) -> list[str]:
-    """A remark for each range that the calibration was not measured at, and how far off the spot lies.
+    """Remarks on ranges outside the calibration's standoffs, with the distance of the spot from its field.
 
     Args:
-        lasers: ranges.
+        lasers: the ranges.
         validity: nearest and farthest standoff of the calibration.
-        calibrated_px: (2, 2) for each laser: u, v of its spot at these.
+        calibrated_px: (2, 2) for each laser: u, v of its spot at these standoffs.
     """
     nearest, farthest = validity.standoff_mm
     remarks = []
@@ -88,7 +90,7 @@ def outside_validity(
 
 
 def _beyond_px(laser: LaserRange, near: FloatArray, far: FloatArray) -> float:
-    """How far a spot lies outside the part of its line where the calibration saw it (0: inside)."""
+    """Distance of a spot from the calibrated part of its line, px; 0 inside."""
     along, length = near - far, float(np.hypot(*(near - far)))
     seen = np.array([far[n] if p is None else p for n, p in enumerate((laser.u_px, laser.v_px))])
     if length == 0:

@@ -1,16 +1,16 @@
-"""A calibrated sensor: the numbers of a calibration, as arrays that turn spots into ranges and back."""
+"""Calibrated sensor: ranges from spots and spots from ranges, with their covariance, by a calibration."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.calibration import Calibration
+from workbench.model.rig import ImageAxis
 from workbench.optics.image import bend_px, in_picture
 from workbench.optics.lens import LensModel
 from workbench.optics.lens_models import lens_model
@@ -20,7 +20,7 @@ from workbench.sensor.curves import SpotCurves
 
 @dataclass(frozen=True)
 class RangeEstimates:
-    """Ranges from the reference plane of n spots, mm; not finite where a spot admits none."""
+    """Ranges of n spots from the reference plane, mm; not finite where a spot has no range."""
 
     range_mm: FloatArray
     """(n,)"""
@@ -29,7 +29,7 @@ class RangeEstimates:
     by_parameter: FloatArray
     """(n, P) derivatives of the ranges by the parameters of the calibration, in the order of its names."""
     covariance_mm2: FloatArray
-    """(n, n) of everything: spots and calibration. Ranges from one calibration share its error."""
+    """(n, n) of the ranges, by spots and calibration; ranges of one calibration share its error."""
     misfit_sd: FloatArray
     """(n,) distance of each spot from its laser's line, in standard deviations of spot and line together."""
 
@@ -39,7 +39,7 @@ class RangeEstimates:
         return np.sqrt(np.diag(self.covariance_mm2))
 
     def only(self, index: IndexArray | BoolArray) -> RangeEstimates:
-        """Some of them."""
+        """Estimates of the spots `index`."""
         return RangeEstimates(
             self.range_mm[index],
             self.spot_sd_mm[index],
@@ -51,11 +51,11 @@ class RangeEstimates:
 
 @dataclass(frozen=True)
 class CalibratedSensor:
-    """A calibration as arrays."""
+    """Sensor of a calibration."""
 
     calibration: Calibration
-    moved: Mapping[str, float] = field(default_factory=dict)
-    """Parameters with another value than the calibration's, by name."""
+    overrides: Mapping[str, float] = field(default_factory=dict)
+    """Parameters with another value than in the calibration, by name."""
 
     @cached_property
     def ids(self) -> tuple[str, ...]:
@@ -64,7 +64,7 @@ class CalibratedSensor:
 
     @cached_property
     def _geometry(self) -> dict[str, float]:
-        return self.calibration.geometry() | dict(self.moved)
+        return self.calibration.geometry() | dict(self.overrides)
 
     @cached_property
     def _model(self) -> LensModel:
@@ -95,12 +95,12 @@ class CalibratedSensor:
         """(P, P) of the calibration's parameters."""
         return self.calibration.laser_ranger.parameters.covariance_array
 
-    def lasers_on(self, axis: Literal["u", "v"]) -> IndexArray:
+    def lasers_on(self, axis: ImageAxis) -> IndexArray:
         """Indices of the lasers whose spots move along an image axis."""
         lasers = self.calibration.laser_ranger.lasers
         return np.array([n for n, laser in enumerate(lasers) if laser.axis == axis], np.intp)
 
-    def front_mm(self, axis: Literal["u", "v"]) -> tuple[float, float]:
+    def front_mm(self, axis: ImageAxis) -> tuple[float, float]:
         """From the first to the last laser of a line, mm along x or y."""
         origins = self._rays[self.lasers_on(axis), RAY.index("x_mm" if axis == "u" else "y_mm")]
         return float(origins.min()), float(origins.max())
@@ -133,18 +133,18 @@ class CalibratedSensor:
         Args:
             laser_ids: the laser of each spot, n of them.
             position_px: (n, 2) u, v; NaN where a coordinate was not measured.
-            sd_px: (n, 2) 1 sigma of the spot's own noise; NaN where not known: the calibration's is used.
-                The speckle's is added here.
+            sd_px: (n, 2) 1 sigma of the spot's noise without speckle, which is added here; NaN: that of the
+                calibration.
         """
         return self.ranges_of(np.array([self.ids.index(i) for i in laser_ids], np.intp), position_px, sd_px)
 
     def ranges_of(self, laser: IndexArray, position_px: FloatArray, sd_px: FloatArray) -> RangeEstimates:
-        """As `ranges`, of lasers by their indices (n,) in the order of `ids`."""
+        """`ranges` for lasers given by their indices (n,) in the order of `ids`."""
         noise = self.calibration.laser_ranger.noise
         measured = np.isfinite(position_px)
         own_sd = np.where(np.isfinite(sd_px), sd_px, noise.spot_sd_px)
         inverse_sd = measured / np.hypot(own_sd, noise.speckle_sd_px)
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # at infinity, or nowhere
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # no range, or infinite
             found = self._curves.invert(laser, np.where(measured, position_px, 0.0), inverse_sd)
             w = found.inverse_depth_per_mm
             range_mm = np.where(w <= 0, np.inf, 1.0 / w) - self.offset_mm
@@ -158,38 +158,36 @@ class CalibratedSensor:
         return RangeEstimates(range_mm, found.z_sd_of_spot_mm, gradient, covariance, misfit_sd)
 
     def places(
-        self, laser_ids: Sequence[str], axis: Literal["u", "v"], ranges: RangeEstimates
+        self, laser_ids: Sequence[str], axis: ImageAxis, ranges: RangeEstimates
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Positions of n spots along x (axis u) or y (axis v), origin + tangent x depth.
 
         Returns:
-            (n,) positions, mm; (n, P) their derivatives by the parameters of the calibration; (n,) tangents,
-            which are their derivatives by range.
+            (n,) positions, mm; (n, P) derivatives by the parameters of the calibration; (n,) derivatives by
+            the range (the tangents).
         """
         names = ("x_mm", "tx") if axis == "u" else ("y_mm", "ty")
         laser = [self.ids.index(i) for i in laser_ids]
         origin, tangent = (self._rays[laser, RAY.index(name)] for name in names)
         depth = ranges.range_mm + self.offset_mm
         gradient = ranges.by_parameter * tangent[:, None]
-        gradient[:, self._columns["offset_mm"]] = (
-            0.0  # the spot stays where the plane is counted from elsewhere
-        )
+        gradient[:, self._columns["offset_mm"]] = 0.0  # the reference plane does not affect the position
         rows = np.arange(len(laser))
         for name, slope in zip(names, (np.ones(len(laser)), depth), strict=True):
             gradient[rows, [self._columns[f"{i}.{name}"] for i in laser_ids]] += slope
         return origin + tangent * depth, gradient, tangent
 
     def relative_range_sd(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
-        """(n,) 1 sigma of a single range over the range, for spots of the calibration's typical noise."""
+        """(n,) relative 1 sigma of a single range, for spots with the noise in the calibration."""
         return np.asarray(self.typical_ranges(laser_id, range_mm).sigma_mm / range_mm)
 
     def typical_ranges(self, laser_id: str, range_mm: FloatArray) -> RangeEstimates:
-        """Estimates from spots of the calibration's typical noise at (n,) ranges."""
+        """Estimates at ranges (n,), for spots with the noise in the calibration."""
         typical = np.full((len(range_mm), 2), np.nan)
         return self.ranges([laser_id] * len(range_mm), self.spot_px(laser_id, range_mm), typical)
 
     def in_frame(self, laser_id: str, range_mm: FloatArray) -> BoolArray:
-        """(n,) whether the laser's spot lies in the image, where the lens model does not fold over."""
+        """(n,) whether the laser's spot lies in the image and before the fold of the lens model."""
         inside = in_picture(self.spot_px(laser_id, range_mm), self._size_px)
         laser, w = self._points(laser_id, range_mm)
         x, y, tx, ty = self._rays[laser].T
@@ -209,7 +207,7 @@ class CalibratedSensor:
 
     @property
     def _size_px(self) -> tuple[int, int]:
-        """(width, height) of the picture."""
+        """(width, height) of the image."""
         return self.calibration.image_width, self.calibration.image_height
 
     def _points(self, laser_id: str, range_mm: FloatArray) -> tuple[IndexArray, FloatArray]:
@@ -218,7 +216,7 @@ class CalibratedSensor:
         return index, 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
 
     def _by_parameter(self, laser: IndexArray, own: FloatArray) -> FloatArray:
-        """(n, P) from (n, C) derivatives by lens and own ray; those by other lasers' rays are 0."""
+        """(n, P) derivatives from those by the lens and the laser's own ray (n, C); 0 by other rays."""
         gradient = np.zeros((len(laser), len(self._columns)))
         gradient[np.arange(len(laser))[:, None], self._own_columns[laser]] = own
         return gradient

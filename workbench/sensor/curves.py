@@ -1,8 +1,8 @@
-"""Each laser's spot in the image as a curve over inverse depth, tabulated from the model in `optics`.
+"""Spot curves: image position of each laser's spot over inverse depth, tabulated from the model in `optics`.
 
-A ranger inverts these curves a thousand times a second; a call of the model itself takes as long as finding
-the spots. A table holds the spot's coordinates and their derivatives by every parameter; how it interpolates
-depends on the lens model, see `workbench.sensor.interpolation`.
+A ranger inverts these curves a thousand times a second, and one call of the model itself takes as long as
+finding the spots. A table holds the coordinates of the spot and their derivatives by every parameter; the
+interpolation depends on the lens model, see `workbench.sensor.interpolation`.
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ from workbench.optics.rays import RAY, Ray, spot_at_inverse_depth
 from workbench.sensor.interpolation import image_line, interpolations
 
 STEP = 1e-30
-"""Along the imaginary axis: its square is nothing beside any number of the model."""
+"""Step along the imaginary axis; its square vanishes beside any number of the model."""
 AGREEMENT = 1e-11
-"""Largest difference between table and model at the checks, over the largest value there."""
+"""Largest difference between table and model at the checks, relative to the largest value there."""
 CONVERGED = 1e-9
-"""Largest last step in the variable s of the interpolation; steps shrink by their own square.
+"""Largest last step in the variable s of the interpolation; convergence is quadratic.
 
-For a polynomial 1 is an angle of 45 degrees from the beam, for a series one of 90 degrees.
+s = 1 is an angle of 45 degrees from the beam for a polynomial, of 90 degrees for a series.
 """
 ITERATIONS = 20
-"""Gauss-Newton steps at most. Each is exact except for distortion; six reach the last digit as a rule."""
+"""Largest number of Gauss-Newton steps. Each is exact except for distortion; six usually reach rounding."""
 
 
-class Inverted(NamedTuple):
-    """n spots brought back to their rays; see `workbench.optics.triangulate.DepthEstimate`."""
+class InvertedSpots(NamedTuple):
+    """Depths of n spots; see `workbench.optics.triangulate.DepthEstimate`."""
 
     inverse_depth_per_mm: FloatArray
-    """(n,) not positive where the spot lies at or beyond the image of the laser's point at infinity; not a
-    number where no depth before the lens model folds over puts the laser's spot there."""
+    """(n,) not positive where the spot lies at or beyond the laser's vanishing point; NaN where no depth
+    within the valid domain of the lens model gives this spot."""
     across_sd: FloatArray
-    """(n,) distance from the laser's line, signed, in standard deviations of the spot."""
+    """(n,) signed distance from the laser's line, in standard deviations of the spot."""
     z_sd_of_spot_mm: FloatArray
-    """(n,)"""
+    """(n,) 1 sigma of the depth by the spot's noise."""
     dz: FloatArray
-    """(n, C) derivatives of depth by the lens's parameters and the ray's four."""
+    """(n, C) derivatives of the depth by the parameters of the lens and of the ray."""
     dacross: FloatArray
     """(n, C) derivatives of `across_sd`."""
 
 
 class SpotCurves:
-    """The curves of the lasers `rays` (L, 4) seen through `lens`, a vector in the order of its `model`."""
+    """Spot curves of lasers with `rays` (L, 4) and a `lens` vector in the order of its `model`."""
 
     def __init__(self, model: LensModel, lens: FloatArray, rays: FloatArray) -> None:
         self._columns = len(model.parameters) + len(RAY)
@@ -61,39 +61,41 @@ class SpotCurves:
             if (difference <= AGREEMENT * np.abs(values).max(axis=(0, 1)) + 1e-300).all():
                 break
         else:
-            raise ValueError(f"a lens {model.name} is not interpolated in inverse depth by {terms} terms")
-        place = table[:, :, :2]
-        self._place_and_slope = np.concatenate((place, self._by.derivative(place)), axis=2)
+            raise ValueError(f"lens {model.name}: no interpolation in inverse depth with up to {terms} terms")
+        position = table[:, :, :2]
+        self._position_and_slope = np.concatenate((position, self._by.derivative(position)), axis=2)
         self._derivatives = table[:, :, 2:]
         self._unfolded = self._unfolded_between(rays, float(model.unfolded_radius(lens[len(PINHOLE) :])))
-        """(L, 2) s between which the lens model has not folded over."""
+        """(L, 2) ends of s before the fold of the lens model."""
         self._starts = self._by.starts
-        self._start_px = (self._by.basis(self._starts) @ self._place_and_slope)[:, :, :2]
+        self._start_px = (self._by.basis(self._starts) @ self._position_and_slope)[:, :, :2]
         lower, upper = self._unfolded.T[:, :, None]
         self._may_start = (self._starts > lower) & (self._starts < upper)
-        """(L, G) whether the lens model has not folded over at this start."""
+        """(L, G) whether the start lies before the fold of the lens model."""
 
     def spots(self, laser: IndexArray, inverse_depth_per_mm: FloatArray) -> FloatArray:
-        """(n, 2) pixels where points of the lasers `laser` (n,) at inverse depths (n,) appear."""
-        return self._at(self._place_and_slope[laser, :, :2], self._variable(laser, inverse_depth_per_mm))
+        """(n, 2) pixel positions of points of the lasers `laser` (n,) at inverse depths (n,)."""
+        return self._at(self._position_and_slope[laser, :, :2], self._variable(laser, inverse_depth_per_mm))
 
     def gradients(self, laser: IndexArray, inverse_depth_per_mm: FloatArray) -> FloatArray:
-        """(n, 2, C + 1) derivatives of `spots` by the lens's parameters, the ray's four, inverse depth."""
+        """(n, 2, C + 1) derivatives of `spots` by the parameters of lens and ray, and by inverse depth."""
         s = self._variable(laser, inverse_depth_per_mm)
         own = self._at(self._derivatives[laser], s).reshape(len(laser), 2, self._columns)
         dw_ds = self._unit[laser] * self._by.argument_slope(s)
-        slope = self._at(self._place_and_slope[laser], s)[:, 2:] / dw_ds[:, None]
+        slope = self._at(self._position_and_slope[laser], s)[:, 2:] / dw_ds[:, None]
         return np.concatenate((own, slope[:, :, None]), axis=2)
 
-    def invert(self, laser: IndexArray, position_px: FloatArray, inverse_sd: FloatArray) -> Inverted:
+    def invert(self, laser: IndexArray, position_px: FloatArray, inverse_sd: FloatArray) -> InvertedSpots:
         """Maximum-likelihood inverse depths of n spots, by Gauss-Newton from the nearest start.
+
+        The loop is hot: it solves all spots of a reading together, one unknown each, in microseconds.
 
         Args:
             laser: (n,) index of each spot's laser.
             position_px: (n, 2) finite.
             inverse_sd: (n, 2) 1 / sigma; 0 for a coordinate that was not measured.
         """
-        curve, s = self._place_and_slope[laser], self._start(laser, position_px, inverse_sd)
+        curve, s = self._position_and_slope[laser], self._start(laser, position_px, inverse_sd)
         for _ in range(ITERATIONS):
             seen = self._at(curve, s)
             residual, slope = (seen[:, :2] - position_px) * inverse_sd, seen[:, 2:] * inverse_sd
@@ -102,7 +104,7 @@ class SpotCurves:
             s = self._by.within(s - step)
             if not (np.abs(step) > CONVERGED).any():
                 break
-        # The residual across the line no longer changes; the rest is evaluated once, at the end.
+        # At convergence the residual is that across the line; derivatives are evaluated once, here.
         own = self._at(self._derivatives[laser], s).reshape(len(s), 2, self._columns)
         by = own * inverse_sd[:, :, None]
         lower, upper = self._unfolded[laser].T
@@ -113,7 +115,7 @@ class SpotCurves:
         dz_ds = unit * self._by.argument_slope(s) / w**2
         along = slope * (dz_ds / information)[:, None]
         across = np.stack((-slope[:, 1], slope[:, 0]), axis=1) / root[:, None]
-        return Inverted(
+        return InvertedSpots(
             w,
             _dot(across, residual),
             dz_ds / root,
@@ -133,7 +135,7 @@ class SpotCurves:
         return self._by.variable(inverse_depth_per_mm / self._unit[laser] + self._at_infinity[laser])
 
     def _unfolded_between(self, rays: FloatArray, radius: float) -> FloatArray:
-        """(L, 2) s of the ends of the part of each line nearer to the axis than `radius`; NaN if none is."""
+        """(L, 2) s at the ends of the part of each line within `radius` of the axis; NaN if there is none."""
         line = image_line(rays)
         with np.errstate(invalid="ignore"):
             half = np.sqrt(radius**2 - line.off_axis**2)
@@ -142,13 +144,13 @@ class SpotCurves:
         return np.stack([self._variable(lasers, end / line.baseline_mm) for end in ends.T], axis=1)
 
     def _at(self, table: FloatArray, s: FloatArray) -> FloatArray:
-        """(n, m) of tables (n, terms, m), each at its own s (n,)."""
+        """(n, m) values of tables (n, terms, m), each at its own s (n,)."""
         values: FloatArray = np.matmul(self._by.basis(s)[:, None, :], table)[:, 0]
         return values
 
 
 def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """(n,) of rows of two."""
+    """(n,) dot products of rows (n, 2)."""
     products: FloatArray = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]
     return products
 
@@ -156,8 +158,8 @@ def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
 def _model(model: LensModel, lens: FloatArray, rays: FloatArray, inverse_depth: FloatArray) -> FloatArray:
     """(L, n, 2 + 2 C) u, v, then the derivatives of u and of v by the C parameters of lens and ray.
 
-    By a step along the imaginary axis, exact to the last digit (W. Squire and G. Trapp, SIAM Rev. 40 (1998)
-    110). For so few points a compiled program takes far longer to load than this.
+    Complex-step derivatives, exact to rounding (W. Squire and G. Trapp, SIAM Rev. 40 (1998) 110). For so few
+    points a compiled program takes far longer to load.
     """
     inputs = np.concatenate((np.broadcast_to(lens, (len(rays), len(lens))), rays), axis=1)
     columns = inputs.shape[1]

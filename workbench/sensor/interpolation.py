@@ -1,7 +1,8 @@
-"""Interpolation of a spot's curve along its laser: exact polynomials, or Chebyshev series in an angle.
+"""Interpolation of spot curves: exact polynomials, or Chebyshev series in an angle.
 
-The argument t of a curve is linear in the inverse depth: inverse depth / unit + t at infinity, both by the
-laser. A table has one column for each quantity that is interpolated, and one row for each term.
+The argument t of a curve is linear in the inverse depth: inverse depth / unit + t at infinity, with both
+constants specific to the laser. A table has one column for each interpolated quantity, and one row for each
+term.
 """
 
 from __future__ import annotations
@@ -15,28 +16,28 @@ from workbench.model.arrays import FloatArray
 from workbench.optics.lens import LensModel
 
 LEAST_BASELINE_MM = 1e-3
-"""Shorter baselines are replaced by this: the spot of such a laser does not move."""
+"""Least baseline; the spot of a laser with a shorter one does not move."""
 POLYNOMIAL_CHECKS = 5
 SERIES_TERMS = (16, 24, 32, 48, 64, 96, 128)
-"""Lengths of the Chebyshev series that are tried, the shortest first."""
+"""Lengths of the Chebyshev series, tried in this order."""
 STARTS = 33
-"""Angles from which an inversion may start, 6 degrees apart."""
+"""Number of starting angles of an inversion, 6 degrees apart."""
 QUARTER_TURN_RAD = np.pi / 2
 
 
 class ImageLine(NamedTuple):
-    """Lines of L lasers in undistorted coordinates x = X/Z, y = Y/Z, along which their points move."""
+    """Image lines of L lasers in undistorted coordinates x = X/Z, y = Y/Z."""
 
     baseline_mm: FloatArray
-    """(L,) distance along the line by the inverse depth in 1/mm."""
+    """(L,) derivative of the position along the line by the inverse depth."""
     at_infinity: FloatArray
-    """(L,) place along the line of the point at infinity, from the point nearest to the axis."""
+    """(L,) position of the vanishing point along the line, from the point nearest to the axis."""
     off_axis: FloatArray
     """(L,) distance of the line from the axis."""
 
 
 def image_line(rays: FloatArray) -> ImageLine:
-    """Lines of rays (L, 4)."""
+    """Image lines of rays (L, 4)."""
     origin, direction = rays[:, :2], rays[:, 2:]
     baseline = np.maximum(np.hypot(*origin.T), LEAST_BASELINE_MM)
     along = origin / baseline[:, None]
@@ -45,22 +46,22 @@ def image_line(rays: FloatArray) -> ImageLine:
 
 
 class Interpolation(Protocol):
-    """Functions of t by their values at nodes; s is the variable in which they are smooth."""
+    """Interpolation of functions of t from values at nodes, in a variable s in which they are smooth."""
 
     terms: int
 
     def scale(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(L,) unit of inverse depth, 1/mm, and (L,) t at infinity, of rays (L, 4)."""
+        """(L,) unit of inverse depth, 1/mm, and (L,) t at infinity, for rays (L, 4)."""
         ...
 
     @property
     def nodes(self) -> FloatArray:
-        """(terms,) s at which values determine a table."""
+        """(terms,) s of the nodes."""
         ...
 
     @property
     def checks(self) -> FloatArray:
-        """(m,) s between the nodes, at which a table is held against the function."""
+        """(m,) s between the nodes, at which a table is compared with the function."""
         ...
 
     def variable(self, t: FloatArray) -> FloatArray:
@@ -84,20 +85,20 @@ class Interpolation(Protocol):
         ...
 
     def within(self, s: FloatArray) -> FloatArray:
-        """(n,) s, moved to where the table holds."""
+        """(n,) s, limited to the domain of the table."""
         ...
 
     @property
     def starts(self) -> FloatArray:
-        """(G,) s in rising order: an inversion starts at one of them."""
+        """(G,) starting values of an inversion, in rising order."""
         ...
 
 
-class Polynomial:
-    """Powers of t itself: exact for functions that are polynomials of degree `terms` - 1, at any t.
+class PolynomialInterpolation:
+    """Powers of t: exact at any t for functions that are polynomials of degree `terms` - 1.
 
-    t is the inverse depth times the laser's baseline: the tangent of the angle between the beam and the line
-    of sight, if the beam is parallel to the axis. Few images show spots beyond t = 1.
+    t is the inverse depth times the laser's baseline: for a beam parallel to the axis, the tangent of the
+    angle between beam and line of sight. Few images show spots beyond t = 1.
     """
 
     def __init__(self, terms: int) -> None:
@@ -147,18 +148,17 @@ class Polynomial:
 
     @property
     def starts(self) -> FloatArray:
-        """See `Interpolation`. From infinity the first step is the pinhole's exact answer."""
+        """See `Interpolation`. From infinity the first step is exact for a pinhole."""
         return np.zeros(1)
 
 
 class AngleSeries:
     """Chebyshev series in the angle atan(t), s = 1 at 90 degrees.
 
-    The angle is that in the plane through beam and pinhole, from the line of sight nearest to the axis to
-    the line of sight of the laser's point. In inverse depth a fisheye's curve bends ever more the nearer the
-    target is; in this angle it is all but a straight line, up to targets at no depth (s = 1), whatever the
-    beam's tilt. Series of smooth functions converge geometrically (L. N. Trefethen, "Approximation Theory and
-    Approximation Practice" (2013), ch. 8).
+    The angle lies in the plane through beam and pinhole, from the line of sight nearest to the axis to that
+    of the laser's point. Over inverse depth a fisheye's curve is strongly curved at near targets; over this
+    angle it is nearly straight up to depth 0 (s = 1), for any tilt of the beam. Series of analytic functions
+    converge geometrically (L. N. Trefethen, "Approximation Theory and Approximation Practice" (2013), ch. 8).
     """
 
     def __init__(self, terms: int) -> None:
@@ -177,7 +177,7 @@ class AngleSeries:
 
     @property
     def checks(self) -> FloatArray:
-        """See `Interpolation`; in the middle between nodes the error of a series is largest."""
+        """See `Interpolation`; midway between nodes the error of a series is largest."""
         return np.cos(np.pi * np.arange(1, self.terms) / self.terms)
 
     def variable(self, t: FloatArray) -> FloatArray:
@@ -198,7 +198,7 @@ class AngleSeries:
 
     def derivative(self, table: FloatArray) -> FloatArray:
         """See `Interpolation`."""
-        # Imported where it is used: a command on a rig without a fisheye starts 3 ms earlier.
+        # Imported here: commands on a rig without a fisheye start 3 ms earlier.
         from numpy.polynomial.chebyshev import chebder
 
         slope = np.zeros_like(table)
@@ -211,12 +211,12 @@ class AngleSeries:
 
     @property
     def starts(self) -> FloatArray:
-        """See `Interpolation`. A step over a wide angle may end beyond the fold of the lens model."""
+        """See `Interpolation`. Several, because a step over a wide angle may end beyond the lens's fold."""
         return np.linspace(-1.0, 1.0, STARTS)
 
 
 def interpolations(model: LensModel) -> Iterable[Interpolation]:
-    """Those that may hold for the spots of a lens model, the fastest first."""
+    """Interpolations to try for the spots of a lens model, the fastest first."""
     if model.polynomial_degree is not None:
-        return (Polynomial(model.polynomial_degree + 1),)
+        return (PolynomialInterpolation(model.polynomial_degree + 1),)
     return (AngleSeries(terms) for terms in SERIES_TERMS)

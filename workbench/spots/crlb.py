@@ -1,7 +1,4 @@
-"""The Fisher bound: how well any unbiased estimator can know the centre of a spot.
-
-Derivation: docs/spots.md.
-"""
+"""Cramer-Rao lower bound of the position of a spot. Derivation: docs/spots.md."""
 
 from __future__ import annotations
 
@@ -22,15 +19,15 @@ _REACH_WIDTHS = 7.0
 
 
 @dataclass(frozen=True)
-class Camera:
-    """What turns light into numbers; the numbers are whole."""
+class CameraNoise:
+    """Noise of a camera that delivers whole numbers."""
 
     electrons_per_dn: float
     read_sd_electrons: float
     background_electrons: float
 
 
-def pixel_information(electrons: float, camera: Camera) -> float:
+def pixel_information(electrons: float, camera: CameraNoise) -> float:
     """Fisher information (1 / electrons^2) of one pixel's number about its mean number of electrons.
 
     Exact for Poisson electrons, Gaussian read noise and rounding, averaged over the position of the mean
@@ -46,32 +43,32 @@ def pixel_information(electrons: float, camera: Camera) -> float:
     mass = np.exp(xlogy(count, electrons) - electrons - gammaln(count + 1.0))
     by_mean = np.concatenate([[0.0], mass[:-1]]) - mass
     reach = 6.0 * np.sqrt(electrons + read**2) + step
-    told = []
+    information = []
     for phase in np.linspace(0.0, 1.0, 5)[:-1]:
         numbers = np.arange(np.floor((electrons - reach) / step), np.ceil((electrons + reach) / step)) + phase
         edges = (np.append(numbers, numbers[-1] + 1.0) - 0.5) * step
         share = np.diff(norm_cdf((edges[:, None] - count) / read), axis=0)
         chance = share @ mass
         seen = chance > 1e-12
-        told.append(float((((share @ by_mean)[seen]) ** 2 / chance[seen]).sum()))
-    return float(np.mean(told))
+        information.append(float((((share @ by_mean)[seen]) ** 2 / chance[seen]).sum()))
+    return float(np.mean(information))
 
 
-def _variance(electrons: float, camera: Camera) -> float:
-    """Of a pixel's number, electrons^2: shot, read, rounding."""
+def _variance(electrons: float, camera: CameraNoise) -> float:
+    """Variance of a pixel's number, electrons^2: shot noise, read noise, rounding."""
     return electrons + camera.read_sd_electrons**2 + camera.electrons_per_dn**2 / 12.0
 
 
 @lru_cache(maxsize=16)
-def _excess_curve(camera: Camera) -> tuple[FloatArray, FloatArray]:
-    """How much more than the inverse variance a pixel tells, over the mean; 1 above `_MANY_ELECTRONS`."""
+def _excess_curve(camera: CameraNoise) -> tuple[FloatArray, FloatArray]:
+    """Means, and the ratio of a pixel's information to its inverse variance; 1 above `_MANY_ELECTRONS`."""
     means = np.geomspace(0.05, _MANY_ELECTRONS, 24)
     excess = np.array([pixel_information(float(m), camera) * _variance(float(m), camera) for m in means])
     return means, np.append(excess[:-1], 1.0)
 
 
 def fisher_matrix(
-    electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera
+    electrons: float, width_px: float, phase_px: tuple[float, float], camera: CameraNoise
 ) -> FloatArray:
     """(6, 6) information about background, flux, u, v, ln width along u and along v of a round spot.
 
@@ -94,9 +91,9 @@ def fisher_matrix(
 
 
 def position_bound_px(
-    electrons: float, width_px: float, phase_px: tuple[float, float], camera: Camera
+    electrons: float, width_px: float, phase_px: tuple[float, float], camera: CameraNoise
 ) -> FloatArray:
-    """(2,) lowest standard deviation of u and v for an unbiased estimator to which nothing else is known."""
+    """(2,) lowest standard deviation of u and v, px, of an unbiased estimator without prior knowledge."""
     cov = np.linalg.inv(fisher_matrix(electrons, width_px, phase_px, camera))
     bound: FloatArray = np.sqrt(np.diag(cov)[2:4])
     return bound

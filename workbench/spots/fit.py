@@ -10,7 +10,7 @@ import numpy as np
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.spots.kernels.columns import ACCEPTANCE_COLUMNS
 from workbench.spots.kernels.single import score
-from workbench.spots.noise import Noise
+from workbench.spots.noise import PixelNoise
 
 
 class Windows(NamedTuple):
@@ -51,7 +51,7 @@ class SpotFit:
     """(n, ACCEPTANCE_COLUMNS) what a window is accepted by; see `kernels.columns`."""
 
 
-def fit_spots(win: Windows, start: FloatArray, noise: Noise) -> SpotFit:
+def fit_spots(win: Windows, start: FloatArray, noise: PixelNoise) -> SpotFit:
     """Fit one spot per window; the photon-transfer slope is measured from the residuals on the way.
 
     Args:

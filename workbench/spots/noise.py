@@ -15,7 +15,7 @@ ROUNDING_DN2 = 1.0 / 12.0
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class PixelNoise:
     """Variance of a pixel as a straight line over its expected signal (photon transfer)."""
 
     floor_dn2: FloatArray
@@ -34,7 +34,7 @@ def level_and_variance(values: Float32Array) -> tuple[float, float]:
 
 
 def photon_transfer_slope(
-    signal: FloatArray, residual: FloatArray, weight: FloatArray, leverage: FloatArray, noise: Noise
+    signal: FloatArray, residual: FloatArray, weight: FloatArray, leverage: FloatArray, noise: PixelNoise
 ) -> FloatArray:
     """(n,) variance per signal (DN) measured from the residuals of all spots of a frame.
 

@@ -45,6 +45,14 @@ class Search:
         return Finding(tuple(spots), self._failures(pair, scenes, traces, spots))
 
     def _search(self, scenes: list[PairSignal]) -> list[FittedSpot]:
+        """Spots of all strips, by the cheapest search that explains the frame.
+
+        Peaks are searched at a fine scale first, then at a coarse one: smoothing with the width of a spot
+        maximises its signal-to-noise ratio (matched filter). With as many clear, separate spots as lasers on,
+        the result is final: the common case. Otherwise overlapping spots are fitted jointly, and elongated
+        ones are tried as two; while spots are still missing, they are searched in the residuals of the joint
+        fits. Each addition must pass the F test of `deblending.blend`.
+        """
         traces: list[FittedSpot] = []
         for scale in (FINE_PX, COARSE_PX):
             for scene in scenes:

@@ -8,8 +8,9 @@ from typing import get_args
 import rerun as rr
 
 from workbench.model.event import FitFinished, ParameterRecord, ResidualRecord
-from workbench.model.fit_charts import ImageAxis, residual_chart
+from workbench.model.fit_charts import residual_chart
 from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
+from workbench.model.rig import ImageAxis
 from workbench.model.table import Table
 from workbench.viewer import documents
 from workbench.viewer import entities as at

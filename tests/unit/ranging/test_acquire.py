@@ -62,7 +62,7 @@ def test_a_spot_that_may_be_two_is_not_ranged_and_both_lasers_fire_alone(ranger:
     assert [laser.range_mm for laser in reading.lasers] == pytest.approx([3000.0] * 4)
     lit = crossing.read_lit("s", spots(crossing, dict.fromkeys(("L2", "L3", "L4"), 3000.0)))
     assert [laser.laser_id for laser in lit.lasers] == ["L3", "L4"]
-    assert any(note.startswith("L1: its spot may be one with that at u = ") for note in lit.notes)
+    assert any(note.startswith("L1: its spot may be merged with that at u = ") for note in lit.notes)
 
 
 def moved_onto(ranger: Ranger, laser_id: str, other: str, range_mm: float) -> Ranger:
@@ -122,4 +122,4 @@ def test_alternative_capture_that_tells_nothing_says_what_was_seen(
     reading = acquire(coplanar, "s", shoot)
     assert (reading.status, reading.closest_mm) == ("not_enough_points", None)
     assert "1 of 3 spots on no laser's line: other light" in reading.notes
-    assert reading.notes[-4:] == tuple(f"{i}: fired alone, {words} on its line" for i in IDS)
+    assert reading.notes[-4:] == tuple(f"{i}: on alone, {words} on its line" for i in IDS)

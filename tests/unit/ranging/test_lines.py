@@ -10,7 +10,8 @@ import pytest
 from tests.support.rangers import IDS, X_MM, positions, ranger_in
 from tests.support.rigs import World, thesis_rig
 from tests.support.surfaces import X, flat, incline, seen
-from workbench.ranging.lines import Axis, Line, line_of, mean_of_lines
+from workbench.model.rig import ImageAxis
+from workbench.ranging.lines import LineShape, fit_line, mean_of_lines
 from workbench.ranging.ranger import Ranger
 from workbench.ranging.shape import fit_shape
 from workbench.sensor.calibrated import CalibratedSensor
@@ -57,10 +58,10 @@ def test_angle_and_closest_range_lie_where_stated_whatever_the_calibration() -> 
         assert abs(z.mean()) < 3.5 / np.sqrt(len(z))
 
 
-def line(axis: Axis, range_mm: float, spot_sd_mm: float, by_parameter: float) -> Line:
+def line(axis: ImageAxis, range_mm: float, spot_sd_mm: float, by_parameter: float) -> LineShape:
     """A line whose closest range rests on one spot and one parameter of the calibration."""
     shape = replace(fit_shape(seen(X, flat(range_mm)(X))), closest_sigma_mm=spot_sd_mm)
-    return Line(axis, shape, (0,), np.array([by_parameter]), np.array([spot_sd_mm]))
+    return LineShape(axis, shape, (0,), np.array([by_parameter]), np.array([spot_sd_mm]))
 
 
 def test_lines_are_weighted_by_information_or_by_pixels() -> None:
@@ -91,8 +92,8 @@ def test_derivatives_of_the_closest_range_by_the_calibration_are_those_of_differ
     sensor, names = ranger.sensor, ranger.calibration.laser_ranger.parameters.names
     value, step = ranger.calibration.geometry()[name], {"f_px": 1e-2}.get(name, 1e-4)
 
-    def closest(moved: CalibratedSensor) -> Line:
-        return line_of(moved, "u", IDS, moved.ranges(IDS, pixels, sd), range(4))
+    def closest(moved: CalibratedSensor) -> LineShape:
+        return fit_line(moved, "u", IDS, moved.ranges(IDS, pixels, sd), range(4))
 
     ahead, back = (
         closest(CalibratedSensor(ranger.calibration, {name: value + sign * step})).shape.closest_mm

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from tests.support.statistics import spread
-from workbench.ranging.points import REACH, Points, interval_mm, probability
+from workbench.ranging.points import COVERAGE_FACTOR, Points, interval_mm, probability
 
 
 @pytest.mark.parametrize("relative", [0.02, 0.1, 0.2])
@@ -31,9 +31,9 @@ def test_an_interval_may_have_no_far_end() -> None:
 
 
 def test_points_that_cannot_be() -> None:
-    with pytest.raises(ValueError, match="all differ"):
+    with pytest.raises(ValueError, match="different positions"):
         Points(np.zeros(2), np.full(2, 500.0), np.eye(2))
-    with pytest.raises(ValueError, match="before the pinhole"):
+    with pytest.raises(ValueError, match="in front of the pinhole"):
         Points(np.arange(2.0), np.array([500.0, 20.0]), np.eye(2), offset_mm=-30.0)
 
 
@@ -48,7 +48,7 @@ def test_ends_of_an_interval_are_symmetric_in_inverse_depth(
     step = stats.norm.ppf(0.975) * sigma / depth**2
     assert 1 / nearest == pytest.approx(1 / depth + step)
     assert 1 / farthest == pytest.approx(1 / depth - step)
-    assert stats.norm.cdf(REACH) == pytest.approx(0.975)
+    assert stats.norm.cdf(COVERAGE_FACTOR) == pytest.approx(0.975)
 
 
 def test_behind_the_pinhole_anything_before_it_is_possible() -> None:

@@ -19,9 +19,9 @@ from workbench.spots import Failure, Finding
 @pytest.mark.parametrize(
     ("flag", "words"),
     [
-        (Failure.SATURATED, "is saturated: its range is known less well"),
-        (Failure.MERGED, "runs into another: both ranges err together"),
-        (Failure.AT_EDGE, "is cut by the edge of the picture"),
+        (Failure.SATURATED, "is saturated: its range is less certain"),
+        (Failure.MERGED, "overlaps another: the errors of both ranges are correlated"),
+        (Failure.AT_EDGE, "is cut by the edge of the image"),
     ],
 )
 def test_what_a_range_suffers_from_is_told(ranger: Ranger, flag: Failure, words: str) -> None:

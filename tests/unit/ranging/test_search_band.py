@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from workbench.ranging.lines import Axis
+from workbench.model.rig import ImageAxis
 from workbench.ranging.search_band import band
 from workbench.spots import Scanline
 
 
 @pytest.mark.parametrize("axis", ["u", "v"])
-def test_one_band_holds_the_scanlines_of_a_line(axis: Axis) -> None:
+def test_one_band_holds_the_scanlines_of_a_line(axis: ImageAxis) -> None:
     rng = np.random.default_rng(3)
     lines = []
     for along in (-200.0, -90.0, 100.0, 210.0):

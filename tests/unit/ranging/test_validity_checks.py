@@ -9,17 +9,17 @@ from tests.support.rangers import IDS, spots
 from workbench.model.calibration import Validity
 from workbench.model.event import LaserRange
 from workbench.ranging.ranger import Ranger
-from workbench.ranging.validity_checks import objections, outside_validity
+from workbench.ranging.validity_checks import failed_checks, outside_validity
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
 
 @pytest.mark.parametrize(
     ("u_px", "v_px", "why"),
     [
-        (300.0, -5.0, "outside the picture"),
-        (300.0, 481.0, "outside the picture"),
-        (645.0, 240.0, "outside the picture"),
-        (300.0, 300.0, "off the laser's line"),
+        (300.0, -5.0, "outside the image"),
+        (300.0, 481.0, "outside the image"),
+        (645.0, 240.0, "outside the image"),
+        (300.0, 300.0, "from the laser's line"),
     ],
 )
 def test_a_spot_that_cannot_be_the_laser_s_has_no_range(
@@ -36,16 +36,16 @@ def test_a_spot_where_the_lens_model_folds_over_has_no_range(ranger: Ranger) -> 
     (far,) = folding.spot_px("L4", np.array([np.inf]))
     beyond = np.array([[20.0, far[1]]])
     ranges = folding.ranges(["L1"], beyond, np.full((1, 2), 0.05))
-    (why,) = objections(beyond, ranges, ranger.size_px)
+    (why,) = failed_checks(beyond, ranges, ranger.size_px)
     assert why is not None
-    assert "folds over" in why
+    assert "fold of the lens model" in why
 
 
 def test_a_spot_all_but_at_infinity_has_no_range(ranger: Ranger) -> None:
     spot = ranger.sensor.spot_px("L4", np.array([3e6]))
     reading = ranger.read_known("s", 1, ["L4"], spot, np.full((1, 2), 0.05))
     assert reading.status == "no_points"
-    assert "mm only" in reading.notes[0] or "infinity" in reading.notes[0]
+    assert "1 sigma" in reading.notes[0] or "vanishing point" in reading.notes[0]
 
 
 def test_a_range_beyond_the_calibrated_ones_is_marked(ranger: Ranger) -> None:
@@ -102,13 +102,13 @@ def test_limits_of_what_gives_a_range(
     ranges = RangeEstimates(
         np.full(1, range_mm), sigma, np.zeros((1, 1)), np.diag(sigma**2), np.full(1, misfit_sd)
     )
-    (why,) = objections(np.array([[u_px, 240.0]]), ranges, (640, 480))
+    (why,) = failed_checks(np.array([[u_px, 240.0]]), ranges, (640, 480))
     assert (why is None) == good
 
 
 def test_a_spot_of_one_coordinate_is_inside_by_that_one() -> None:
     ranges = RangeEstimates(np.full(2, 500.0), np.ones(2), np.zeros((2, 1)), np.eye(2), np.zeros(2))
-    why = objections(np.array([[300.0, np.nan], [700.0, np.nan]]), ranges, (640, 480))
+    why = failed_checks(np.array([[300.0, np.nan], [700.0, np.nan]]), ranges, (640, 480))
     assert why[0] is None
     assert why[1] is not None
 

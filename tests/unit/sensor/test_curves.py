@@ -90,10 +90,10 @@ def test_no_spots() -> None:
 
 def test_a_lens_that_no_table_holds_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer terms than the lens has stand for a lens with more than there are terms."""
-    with pytest.raises(ValueError, match="by 6 terms"):
+    with pytest.raises(ValueError, match="6 terms"):
         SpotCurves(replace(PLUMB_BOB, polynomial_degree=5), LENSES["barrel"][1], RAYS)
     monkeypatch.setattr(interpolation, "SERIES_TERMS", (8, 12))
-    with pytest.raises(ValueError, match="by 12 terms"):
+    with pytest.raises(ValueError, match="12 terms"):
         SpotCurves(*LENSES["fisheye"], RAYS)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from workbench.optics.equidistant import EQUIDISTANT
 from workbench.optics.plumb_bob import PLUMB_BOB
-from workbench.sensor.interpolation import AngleSeries, Interpolation, Polynomial, interpolations
+from workbench.sensor.interpolation import AngleSeries, Interpolation, PolynomialInterpolation, interpolations
 
 T = np.array([-3.0, -0.4, 0.0, 1e-6, 0.7, 2.5])
 
@@ -16,7 +16,7 @@ def table(by: Interpolation, values: np.ndarray) -> np.ndarray:
     return np.linalg.solve(by.basis(by.nodes), values)[None, :, None]
 
 
-@pytest.mark.parametrize("by", [Polynomial(8), AngleSeries(24)], ids=["polynomial", "series"])
+@pytest.mark.parametrize("by", [PolynomialInterpolation(8), AngleSeries(24)], ids=["polynomial", "series"])
 def test_variable_and_argument_are_inverse(by: Interpolation) -> None:
     s = by.variable(T)
     np.testing.assert_allclose(by.argument(s), T, rtol=1e-14, atol=1e-16)
@@ -26,7 +26,7 @@ def test_variable_and_argument_are_inverse(by: Interpolation) -> None:
 
 
 def test_a_polynomial_is_exact_far_beyond_its_nodes() -> None:
-    by, coefficients = Polynomial(8), np.array([1.0, -2.0, 0.5, 3.0, 0.0, -1.0, 0.2, 0.1])
+    by, coefficients = PolynomialInterpolation(8), np.array([1.0, -2.0, 0.5, 3.0, 0.0, -1.0, 0.2, 0.1])
     found = table(by, np.polynomial.polynomial.polyval(by.nodes, coefficients))
     np.testing.assert_allclose(
         (by.basis(T) @ found)[0, :, 0], np.polynomial.polynomial.polyval(T, coefficients), rtol=1e-12
@@ -57,7 +57,7 @@ def test_a_series_in_the_angle_converges_geometrically() -> None:
 
 def test_a_lens_says_which_interpolation_holds() -> None:
     (by,) = interpolations(PLUMB_BOB)
-    assert isinstance(by, Polynomial)
+    assert isinstance(by, PolynomialInterpolation)
     assert by.terms == 8
     lengths = [by.terms for by in interpolations(EQUIDISTANT)]
     assert lengths == sorted(lengths)

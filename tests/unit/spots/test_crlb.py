@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from workbench.spots.crlb import Camera, fisher_matrix, pixel_information, position_bound_px
+from workbench.spots.crlb import CameraNoise, fisher_matrix, pixel_information, position_bound_px
 
-FINE = Camera(electrons_per_dn=0.5, read_sd_electrons=5.0, background_electrons=5.0)
+FINE = CameraNoise(electrons_per_dn=0.5, read_sd_electrons=5.0, background_electrons=5.0)
 
 
 @pytest.mark.parametrize("electrons", [0.5, 10.0, 100.0, 399.0])
@@ -20,7 +20,7 @@ def test_information_of_a_pixel_is_at_least_the_inverse_variance(electrons: floa
 
 def test_information_of_a_pixel_agrees_with_the_score_of_simulated_numbers() -> None:
     rng, trials, step = np.random.default_rng(2), 400_000, 0.5
-    camera = Camera(1.0, 2.0, 0.0)
+    camera = CameraNoise(1.0, 2.0, 0.0)
     bins = np.arange(-20, 80)
 
     def numbers(mean: float) -> np.ndarray:
@@ -39,14 +39,14 @@ def test_information_of_a_pixel_agrees_with_the_score_of_simulated_numbers() -> 
 
 def test_bright_wide_spot_reaches_the_shot_noise_limit() -> None:
     # Without read noise and with pixels small against the spot: sd = width / sqrt(electrons).
-    camera = Camera(1e-3, 1e-3, 1e-6)
+    camera = CameraNoise(1e-3, 1e-3, 1e-6)
     bound = position_bound_px(1e9, 4.0, (0.1, -0.3), camera)
     np.testing.assert_allclose(bound, np.sqrt(16.0 + 1.0 / 12.0) / np.sqrt(1e9), rtol=5e-3)
 
 
 def test_read_noise_limit_is_the_sampled_one() -> None:
     # Constant noise s a pixel: sd = s * sqrt(8 pi) * width^2 / electrons, for pixels small against the spot.
-    camera = Camera(1e-3, 100.0, 1e-6)
+    camera = CameraNoise(1e-3, 100.0, 1e-6)
     bound = position_bound_px(10.0, 4.0, (0.0, 0.0), camera)
     np.testing.assert_allclose(bound, 100.0 * np.sqrt(8 * np.pi) * 16.0 / 10.0, rtol=0.02)
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.draw import Drawn, Sensor, draw
 from workbench.spots import Scanline, find_spots
-from workbench.spots.crlb import Camera, position_bound_px
+from workbench.spots.crlb import CameraNoise, position_bound_px
 from workbench.spots.psf import derivatives
 
 SENSOR = Sensor()
@@ -43,7 +43,7 @@ def test_centre_at_the_fisher_bound_with_an_honest_deviation(
     width: float, electrons: float, seed: int
 ) -> None:
     errors, sds, phases = measured(width, electrons, seed)
-    camera = Camera(SENSOR.electrons_per_dn, SENSOR.read_sd, 5.0)
+    camera = CameraNoise(SENSOR.electrons_per_dn, SENSOR.read_sd, 5.0)
     bounds = [position_bound_px(electrons, width, (u - 0.5, v - 0.5), camera) for u, v in phases[:8]]
     ratio = np.sqrt((errors**2).mean() / np.mean(np.square(bounds)))
     assert 1 - RMS_MARGIN < ratio < 1.15 + RMS_MARGIN

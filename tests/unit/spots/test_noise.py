@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from workbench.spots.noise import ROUNDING_DN2, Noise, level_and_variance, photon_transfer_slope
+from workbench.spots.noise import ROUNDING_DN2, PixelNoise, level_and_variance, photon_transfer_slope
 
 SAMPLES = 1200
 """Pixels that the estimate is taken from, in a strip of many more."""
@@ -41,8 +41,8 @@ def drawn(slope: float, seed: int, windows: int = 6) -> tuple[np.ndarray, np.nda
     return signal, rng.normal(0.0, np.sqrt(variance)), 1.0 / variance
 
 
-def noise(windows: int, assumed: float) -> Noise:
-    return Noise(np.full(windows, 4.0), np.full(windows, assumed))
+def noise(windows: int, assumed: float) -> PixelNoise:
+    return PixelNoise(np.full(windows, 4.0), np.full(windows, assumed))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

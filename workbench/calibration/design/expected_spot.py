@@ -8,13 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from workbench.calibration.data.observations import Observation, group
+from workbench.calibration.data.observations import MeanObservations, Observation, group
 from workbench.calibration.design.expectation import Expectation
+from workbench.calibration.estimation.gauss_newton import gauss_newton
 from workbench.calibration.model.parameters import ParameterTable, sensor_parameters
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig
 
-ROUNDS = 5
+STEPS = 4
 """Gauss-Newton steps; the second already changes a spot by less than a pixel."""
 SURE_SD = 2.0
 """Distance from the image's edge, in standard deviations, from which a spot counts as inside or outside."""
@@ -38,8 +39,7 @@ def expected_spot(
     """Predict a laser's spot on a square flat target.
 
     The sensor alone is fitted; errors of the placements count as noise of the spots, which is accurate to
-    some pixels. The Gauss-Newton steps are written out, because the noise is renewed in each from the
-    derivatives by the placement errors; a solver with a fixed cost function would converge to another point.
+    some pixels. That noise depends on the derivatives of the spots, and is renewed in each step.
 
     Args:
         rig: priors, size of the image.
@@ -50,20 +50,38 @@ def expected_spot(
     cells, _ = group(observations, rig.laser_ids, rig.noise)
     standoffs = np.array([*(p.standoff_mm for p in cells.placements), standoff_mm])
     table = ParameterTable(sensor_parameters(rig))
-    y = np.zeros(len(table.prior_sd))
-    for _ in range(ROUNDS):
+
+    def spots(y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         sensors = (table.prior_mean + y * table.prior_sd)[None]
-        spot, slopes, sd = (part[0] for part in Expectation(rig, sensors).spots(standoffs))
-        at = cells.placement, cells.laser
-        noise = np.hypot(sd[at], cells.sd_px)
-        seen = np.isfinite(cells.position_px)
-        rows = (slopes[at] / noise[..., None])[seen]
-        residual = ((cells.position_px - spot[at]) / noise)[seen]
-        covariance = np.linalg.inv(np.eye(len(y)) + rows.T @ rows)
-        y = covariance @ (rows.T @ (residual + rows @ y))
+        position, slopes, sd = (part[0] for part in Expectation(rig, sensors).spots(standoffs))
+        return position, slopes, sd
+
+    y = gauss_newton(lambda y: _residuals(cells, y, *spots(y)), np.zeros(len(table.prior_sd)), STEPS)
+    spot, slopes, sd = spots(y)
+    rows = _residuals(cells, y, spot, slopes, sd)[1]
+    covariance = np.linalg.inv(rows.T @ rows)
     asked = len(standoffs) - 1, rig.laser_ids.index(laser_id)
     sd_px = np.sqrt(((slopes[asked] @ covariance) * slopes[asked]).sum(axis=-1) + sd[asked] ** 2)
     return _placed(rig, spot[asked], sd_px)
+
+
+def _residuals(
+    cells: MeanObservations, y: FloatArray, spot: FloatArray, slopes: FloatArray, sd: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Residuals of the measured coordinates and of the priors, in standard deviations, and derivatives by y.
+
+    Args:
+        cells: the mean observations.
+        y: (S,) parameters in prior sd.
+        spot: (J, L, 2) predicted positions; `slopes` and `sd` as returned by `Expectation.spots`.
+        slopes: (J, L, 2, S)
+        sd: (J, L, 2)
+    """
+    at, measured = (cells.placement, cells.laser), np.isfinite(cells.position_px)
+    noise = np.hypot(sd[at], cells.sd_px)
+    residual = ((spot[at] - cells.position_px) / noise)[measured]
+    rows = (slopes[at] / noise[..., None])[measured]
+    return np.concatenate([residual, y]), np.vstack([rows, np.eye(len(y))])
 
 
 def _placed(rig: Rig, spot: FloatArray, sd: FloatArray) -> ExpectedSpot:

@@ -6,19 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.calibration.estimation.gauss_newton import gauss_newton
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import Calibration
 from workbench.model.errors import BadInputError
 from workbench.model.stats import chi2_sf
 from workbench.sensor.calibrated import CalibratedSensor
 
-Pairs = list[tuple[str, FloatArray]]
+RangesByLaser = list[tuple[str, FloatArray]]
 """Laser ids, each with ranges in mm."""
 SIGNIFICANCE = 0.01
 """P value of the differences below which the sensor has changed."""
 RANGES = 12
 """Number of ranges at which the calibrations are compared."""
-GAUSS_NEWTON_STEPS = 5
+GAUSS_NEWTON_STEPS = 4
 SMALLEST_VARIANCE = 1e-6
 """Share of the largest variance below which directions of the differences are omitted: there the stated
 variances are smaller than the error of linearising the difference."""
@@ -91,17 +92,17 @@ def _numbers(calibration: Calibration) -> tuple[object, ...]:
     return calibration.geometry(), ours.lasers, ours.noise, ours.parameters, ours.validity
 
 
-def _spots(sensor: CalibratedSensor, pairs: Pairs) -> FloatArray:
+def _spots(sensor: CalibratedSensor, pairs: RangesByLaser) -> FloatArray:
     """(n,) predicted positions of the spots along each laser's axis, px."""
     return np.concatenate([sensor.spot_px(i, r)[:, _axis(sensor, i)] for i, r in pairs])
 
 
-def _spot_gradient(sensor: CalibratedSensor, pairs: Pairs) -> FloatArray:
+def _spot_gradient(sensor: CalibratedSensor, pairs: RangesByLaser) -> FloatArray:
     """(n, P) derivatives of `_spots` by the parameters."""
     return np.concatenate([sensor.spot_gradient(i, r)[:, _axis(sensor, i)] for i, r in pairs])
 
 
-def _spot_covariance(sensor: CalibratedSensor, pairs: Pairs) -> FloatArray:
+def _spot_covariance(sensor: CalibratedSensor, pairs: RangesByLaser) -> FloatArray:
     """(n, n) covariance of `_spots` by that of the calibration, px^2."""
     gradient = _spot_gradient(sensor, pairs)
     return gradient @ sensor.calibration.laser_ranger.parameters.covariance_array @ gradient.T
@@ -111,7 +112,7 @@ def _axis(sensor: CalibratedSensor, laser_id: str) -> int:
     return "uv".index(sensor.calibration.laser_ranger.lasers[sensor.ids.index(laser_id)].axis)
 
 
-def _differences(a: CalibratedSensor, b: CalibratedSensor, pairs: Pairs) -> tuple[Difference, ...]:
+def _differences(a: CalibratedSensor, b: CalibratedSensor, pairs: RangesByLaser) -> tuple[Difference, ...]:
     found = []
     for laser_id, at in pairs:
         spots = a.spot_px(laser_id, at)
@@ -141,7 +142,7 @@ def _laser_ids(calibration: Calibration) -> tuple[str, ...]:
     return tuple(laser.id for laser in calibration.laser_ranger.lasers)
 
 
-def _visible(a: CalibratedSensor, b: CalibratedSensor, grid: FloatArray) -> Pairs:
+def _visible(a: CalibratedSensor, b: CalibratedSensor, grid: FloatArray) -> RangesByLaser:
     """Each laser with the ranges at which both calibrations predict its spot in the image."""
     return [(i, grid[a.in_frame(i, grid) & b.in_frame(i, grid)]) for i in a.ids]
 
@@ -153,7 +154,9 @@ def _whitener(covariance: FloatArray) -> FloatArray:
     return np.asarray((direction[:, kept] / np.sqrt(variance[kept])).T)
 
 
-def _explanations(a: CalibratedSensor, b: Calibration, pairs: Pairs, whiten: FloatArray) -> tuple[str, ...]:
+def _explanations(
+    a: CalibratedSensor, b: Calibration, pairs: RangesByLaser, whiten: FloatArray
+) -> tuple[str, ...]:
     """Parameters of B each of which, refitted alone, leaves no significant difference from A."""
     expected = _spots(a, pairs)
     parameters = b.laser_ranger.parameters
@@ -169,21 +172,18 @@ def _explanations(a: CalibratedSensor, b: Calibration, pairs: Pairs, whiten: Flo
 
 
 def _refitted_chi2(
-    b: Calibration, pairs: Pairs, whiten: FloatArray, expected: FloatArray, column: int, value: float
+    b: Calibration, pairs: RangesByLaser, whiten: FloatArray, expected: FloatArray, column: int, value: float
 ) -> float:
-    """Chi-square of the differences with one parameter of B fitted to A (scalar Gauss-Newton from `value`).
-
-    The steps are written out: gradients come from the sensor's JAX curves, and five steps of one parameter
-    are enough for a chi-square that is compared with a threshold.
-    """
+    """Chi-square of the differences with one parameter of B fitted to A, from its `value`."""
     name = b.laser_ranger.parameters.names[column]
-    chi2 = float("inf")
-    for _ in range(GAUSS_NEWTON_STEPS):
-        sensor = CalibratedSensor(b, {name: value})
-        white = whiten @ (_spots(sensor, pairs) - expected)
-        chi2 = float(white @ white)
-        slope = whiten @ _spot_gradient(sensor, pairs)[:, column]
-        if not (strength := float(slope @ slope)):
-            break
-        value -= float(slope @ white) / strength
-    return chi2
+
+    def residual(sensor: CalibratedSensor) -> FloatArray:
+        return whiten @ (_spots(sensor, pairs) - expected)
+
+    def linearise(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        sensor = CalibratedSensor(b, {name: float(x[0])})
+        return residual(sensor), whiten @ _spot_gradient(sensor, pairs)[:, column : column + 1]
+
+    fitted = gauss_newton(linearise, np.array([value]), GAUSS_NEWTON_STEPS)
+    white = residual(CalibratedSensor(b, {name: float(fitted[0])}))
+    return float(white @ white)

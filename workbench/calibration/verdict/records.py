@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isnan
+from math import isfinite
 
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.verdict.assessment import Assessment, determined_by
@@ -66,14 +66,14 @@ def _residuals(fit: CalibrationFit) -> tuple[ResidualRecord, ...]:
         ResidualRecord(
             laser_id=fit.rig.laser_ids[laser],
             standoff_mm=cells.placements[placement].standoff_mm,
-            u_px=_none_if_nan(u),
-            v_px=_none_if_nan(v),
-            u_sd_px=_none_if_nan(u_sd),
-            v_sd_px=_none_if_nan(v_sd),
+            u_px=_finite_or_none(u),
+            v_px=_finite_or_none(v),
+            u_sd_px=_finite_or_none(u_sd),
+            v_sd_px=_finite_or_none(v_sd),
         )
         for laser, placement, (u, v), (u_sd, v_sd) in columns
     )
 
 
-def _none_if_nan(value: float) -> float | None:
-    return None if isnan(value) else value
+def _finite_or_none(value: float) -> float | None:
+    return value if isfinite(value) else None

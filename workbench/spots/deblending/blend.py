@@ -14,13 +14,13 @@ import numpy as np
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.spot import Failure, Spot
 from workbench.spots.deblending.clusters import TAIL_WIDTHS, mixes, stands_alone
-from workbench.spots.deblending.joint_fit import Joint, evidence, fit_joint, halves, hidden_spot
+from workbench.spots.deblending.joint_fit import JointFit, evidence, fit_joint, halves, hidden_spot
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.acceptance import without_outliers
 from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U
 from workbench.spots.kernels.windows import half_for, mark_light, mark_strip
 from workbench.spots.measure import FittedSpot, spot_flags
-from workbench.spots.noise import Noise
+from workbench.spots.noise import PixelNoise
 from workbench.spots.pair import PairSignal
 from workbench.spots.psf import principal_axes
 
@@ -59,7 +59,7 @@ class Blend:
         self.scene = group[0].scene
         # To start from: of several measured slopes the lowest, for misfits only raise them.
         slope = min(t.slope_dn for t in group)
-        self.noise = Noise(np.array([self.scene.variance]), np.array([slope]))
+        self.noise = PixelNoise(np.array([self.scene.variance]), np.array([slope]))
         points = np.array([t.params[U:LN_SU] for t in group])
         reach = reach_px or max(t.reach_px for t in group)
         u, v = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -81,7 +81,7 @@ class Blend:
         """(n, 6) their parameters, in pixels of the window."""
         return np.array([t.params[:SHEAR] for t in traces]) - (0, 0, self.col0, self.row0, 0, 0)
 
-    def as_traces(self, joint: Joint) -> list[FittedSpot]:
+    def as_traces(self, joint: JointFit) -> list[FittedSpot]:
         """The spots of a fit, in pixels of the image."""
         absolute = joint.params + np.array([0, 0, self.col0, self.row0, 0, 0])
         traces = []
@@ -125,7 +125,7 @@ class _Asked(NamedTuple):
     least_share: float
 
 
-def _is_better(one: Joint, two: Joint, win: Windows, asked: _Asked) -> bool:
+def _is_better(one: JointFit, two: JointFit, win: Windows, asked: _Asked) -> bool:
     """Whether the data ask for the spots that `two` has and `one` has not.
 
     `one` was fitted with the weights of `two`.
@@ -146,7 +146,7 @@ def _is_better(one: Joint, two: Joint, win: Windows, asked: _Asked) -> bool:
     )
 
 
-def _is_sound(joint: Joint, win: Windows) -> bool:
+def _is_sound(joint: JointFit, win: Windows) -> bool:
     points = joint.params[:, U:LN_SU]
     return joint.converged and bool((points >= 0).all() and (points < np.array(win.shape[::-1])).all())
 
@@ -173,7 +173,7 @@ def fit_blends(
     return [group[i] for i in kept] if best is None else crowd.as_traces(best)
 
 
-def _needed(crowd: Blend, start: FloatArray, alone: BoolArray) -> tuple[Joint | None, list[int]]:
+def _needed(crowd: Blend, start: FloatArray, alone: BoolArray) -> tuple[JointFit | None, list[int]]:
     """The fit of the spots that the data ask for, and their indices; no fit where there is no sound one.
 
     All at first, then without the least certain one: to a model that lacks a spot its light is noise, and in
@@ -194,7 +194,7 @@ def _needed(crowd: Blend, start: FloatArray, alone: BoolArray) -> tuple[Joint | 
     return None, kept
 
 
-def _least_certain(full: Joint, start: FloatArray, open_: list[int]) -> int:
+def _least_certain(full: JointFit, start: FloatArray, open_: list[int]) -> int:
     """Of the spots `open_` the one to leave out first.
 
     Spots of a fit that did not converge tell nothing: most likely two of them are one, the nearest two.
@@ -265,7 +265,7 @@ def split(scenes: Sequence[PairSignal], trace: FittedSpot, others: list[FittedSp
     return crowd.as_traces(two)
 
 
-def _settled(win: Windows, start: FloatArray, noise: Noise) -> Joint:
+def _settled(win: Windows, start: FloatArray, noise: PixelNoise) -> JointFit:
     """Fit with the noise that the model itself measures, without pixels that no spot explains."""
     for _ in range(_TURNS):
         joint = fit_joint(win, start, noise)

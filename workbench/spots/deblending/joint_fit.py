@@ -12,7 +12,7 @@ from workbench.spots.fit import Windows
 from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U, V
 from workbench.spots.kernels.joint import score_together
 from workbench.spots.kernels.joint_sums import OWN, SHARED
-from workbench.spots.noise import Noise, photon_transfer_slope
+from workbench.spots.noise import PixelNoise, photon_transfer_slope
 from workbench.spots.psf import principal_axes
 
 _HIDDEN_SD = 5.0
@@ -22,7 +22,7 @@ _SECOND_ORDER = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class JointFit:
     """Spots of one window that share their widths: lasers of one kind on one target."""
 
     params: FloatArray
@@ -37,12 +37,14 @@ class Joint:
     """(height, width), DN."""
     weight: FloatArray
     """(height, width) inverse variance, 0 where unused."""
-    noise: Noise
+    noise: PixelNoise
     """With the photon-transfer slope that the residuals tell, unless the weights were fixed."""
     converged: bool
 
 
-def fit_joint(win: Windows, start: FloatArray, noise: Noise, weight: FloatArray | None = None) -> Joint:
+def fit_joint(
+    win: Windows, start: FloatArray, noise: PixelNoise, weight: FloatArray | None = None
+) -> JointFit:
     """Fit k spots in a single window (n = 1).
 
     Args:
@@ -72,8 +74,8 @@ def fit_joint(win: Windows, start: FloatArray, noise: Noise, weight: FloatArray 
     sd[:, 1:] = _with_second_order(sd[:, 1:], np.exp(params[:, LN_SU:SHEAR]))
     if weight is None:
         measured = photon_transfer_slope(signal[None], residual[None], used[None], leverage[None], noise)
-        noise = Noise(noise.floor_dn2, measured)
-    return Joint(params, sd, float(np.vdot(used, residual**2)), signal, residual, used, noise, converged)
+        noise = PixelNoise(noise.floor_dn2, measured)
+    return JointFit(params, sd, float(np.vdot(used, residual**2)), signal, residual, used, noise, converged)
 
 
 def _with_second_order(sd_px: FloatArray, width_px: FloatArray) -> FloatArray:
@@ -107,7 +109,7 @@ def evidence(one: float, two: float, pixels: int, parameters: int) -> float:
     return (one - two) / 3.0 / max(left, 1e-12)
 
 
-def hidden_spot(joint: Joint, win: Windows, allowed: BoolArray) -> FloatArray | None:
+def hidden_spot(joint: JointFit, win: Windows, allowed: BoolArray) -> FloatArray | None:
     """(6,) first guess of a spot of the same widths that stands out of the residuals; None without one."""
     su, sv = np.exp(joint.params[0, LN_SU:SHEAR])
     weight, residual = joint.weight, joint.residual
@@ -115,14 +117,14 @@ def hidden_spot(joint: Joint, win: Windows, allowed: BoolArray) -> FloatArray | 
     excess = weight * np.minimum(residual, cv2.dilate(residual, _AROUND))
     matched = cv2.GaussianBlur(excess, (0, 0), sigmaX=su, sigmaY=sv, borderType=cv2.BORDER_CONSTANT)
     # The square of a Gaussian is a Gaussian narrower by sqrt(2), of the sum 1 / (4 pi su sv).
-    told = cv2.GaussianBlur(
+    information = cv2.GaussianBlur(
         weight, (0, 0), sigmaX=su / 2**0.5, sigmaY=sv / 2**0.5, borderType=cv2.BORDER_CONSTANT
     )
-    told = np.maximum(told / (4.0 * np.pi * su * sv), 1e-12)
-    height = np.where(allowed, matched / np.sqrt(told), 0.0)
+    information = np.maximum(information / (4.0 * np.pi * su * sv), 1e-12)
+    height = np.where(allowed, matched / np.sqrt(information), 0.0)
     row, col = np.unravel_index(int(height.argmax()), win.shape)
     if height[row, col] < _HIDDEN_SD:
         return None
     hidden: FloatArray = joint.params[0].copy()
-    hidden[FLUX], hidden[U], hidden[V] = matched[row, col] / told[row, col], col, row
+    hidden[FLUX], hidden[U], hidden[V] = matched[row, col] / information[row, col], col, row
     return hidden

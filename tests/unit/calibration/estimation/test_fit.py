@@ -205,7 +205,7 @@ def test_a_laser_unknown_to_the_rig() -> None:
 
 
 def test_nothing_to_fit() -> None:
-    with pytest.raises(BadInputError, match="no spot is left"):
+    with pytest.raises(BadInputError):
         fit(thesis_rig(), [])
 
 
@@ -220,7 +220,7 @@ def test_standoffs_are_named_in_the_residuals() -> None:
 def test_a_target_behind_the_pinhole() -> None:
     rig = thesis_rig()
     bench = rig.bench.model_copy(update={"offset_mm": prior(-300.0, 5.0)})
-    with pytest.raises(BadInputError, match=r"125 mm, which rig thesis puts at a depth of -175 mm"):
+    with pytest.raises(BadInputError, match=r"125 mm.*-175 mm"):
         fit(rig.model_copy(update={"bench": bench}), World(rig, 1).observations(repeats=1))
 
 

@@ -22,7 +22,7 @@ from workbench.spots.kernels.acceptance import (
     without_outliers,
 )
 from workbench.spots.kernels.columns import FLUX, WORST_EXCESS, U, V
-from workbench.spots.noise import Noise
+from workbench.spots.noise import PixelNoise
 
 HALF, WINDOWS = 5, 400
 SIDE = 2 * HALF + 1
@@ -44,7 +44,7 @@ def windows(used: str, seed: int, sd: float = 1.0) -> Windows:
 def test_the_noise_at_the_rim_does_not_depend_on_how_much_of_it_is_used(used: str, count: int) -> None:
     win = windows(used, 1)
     start = np.tile([0.0, 4000.0, HALF, HALF, 0.3, 0.3], (WINDOWS, 1))
-    judged = fit_spots(win, start, Noise(np.ones(WINDOWS), np.full(WINDOWS, 1e-3))).judged
+    judged = fit_spots(win, start, PixelNoise(np.ones(WINDOWS), np.full(WINDOWS, 1e-3))).judged
     assert (judged[:, 8] == count).all()
     # The mean of `count` squared normal numbers has sd sqrt(2 / count); the fit takes the leverage of six
     # parameters, of which the background's share of the rim is the larger part: 4 % at most.

@@ -13,7 +13,7 @@ from workbench.model.arrays import FloatArray
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.columns import BACKGROUND, FLUX, LN_SU, LN_SV, U, V
 from workbench.spots.kernels.joint import score_together
-from workbench.spots.noise import Noise
+from workbench.spots.noise import PixelNoise
 
 SHAPE = (21, 27)
 FLOOR, SLOPE = 4.0, 0.5
@@ -90,7 +90,7 @@ def test_one_spot_alone_is_fitted_as_by_itself(seed: int) -> None:
     true = spots_of((13.3, 9.7))
     data = drawn(true, seed)
     win = Windows(data[None], np.ones((1, *SHAPE), bool), np.full((1, *SHAPE), np.inf))
-    alone = fit_spots(win, true, Noise(np.full(1, FLOOR), np.full(1, SLOPE)))
+    alone = fit_spots(win, true, PixelNoise(np.full(1, FLOOR), np.full(1, SLOPE)))
     # That one measures the slope of its noise; with the same weights the two are one.
     joint = scored(data, true, alone.weight[0])
     sd = np.sqrt(np.diag(joint.cov))

@@ -9,7 +9,7 @@ from tests.support.spot_models import ROUND, drawn_windows
 from workbench.spots.fit import fit_spots
 from workbench.spots.kernels.columns import FLUX
 from workbench.spots.kernels.photon_transfer import transfer_slope
-from workbench.spots.noise import Noise
+from workbench.spots.noise import PixelNoise
 
 
 @pytest.mark.parametrize("tilted", [False, True])
@@ -17,7 +17,7 @@ def test_the_slope_of_the_light_s_variance_is_measured(tilted: bool) -> None:
     params = ROUND.copy()
     params[:, FLUX] = 4e4
     params = np.append(params, [[0.3]], axis=1) if tilted else params
-    noise = Noise(np.array([4.0]), np.array([1.3]))
+    noise = PixelNoise(np.array([4.0]), np.array([1.3]))
     seeds = range(60)
     slopes = [fit_spots(drawn_windows(params, (15, 15), seed), params, noise).slope_dn[0] for seed in seeds]
     # The variance of the light was drawn with a slope of 1, the fit starts at 1.3. With some forty telling

@@ -22,7 +22,7 @@ from workbench.spots.kernels.columns import (
     U,
     V,
 )
-from workbench.spots.noise import Noise
+from workbench.spots.noise import PixelNoise
 from workbench.spots.psf import derivatives
 
 
@@ -34,8 +34,8 @@ def test_the_fit_solves_its_equations_as_the_written_out_sums_state_them(tilted:
         params = np.append(params, [[0.3], [-0.2]], axis=1)
     win = drawn_windows(params, (11, 13))
     # Fitted from its own end once more, the model moves by less than the step's tolerance.
-    start = fit_spots(win, params, Noise(np.full(2, 4.0), np.ones(2))).params
-    fit = fit_spots(win, start, Noise(np.full(2, 4.0), np.ones(2)))
+    start = fit_spots(win, params, PixelNoise(np.full(2, 4.0), np.ones(2))).params
+    fit = fit_spots(win, start, PixelNoise(np.full(2, 4.0), np.ones(2)))
     assert fit.converged.all()
     rows = derivatives(start, (11, 13)).reshape(2, params.shape[1], -1)
     signal = start[:, FLUX, None] * rows[:, FLUX]
@@ -52,7 +52,7 @@ def test_a_window_is_accepted_by_numbers_that_numpy_finds_as_well() -> None:
     params = np.vstack([ROUND, ROUND + 0.1])
     params[:, FLUX] = 4e4, 3e4
     win = drawn_windows(params, (11, 13))
-    fit = fit_spots(win, params, Noise(np.full(2, 4.0), np.ones(2)))
+    fit = fit_spots(win, params, PixelNoise(np.full(2, 4.0), np.ones(2)))
     excess = fit.residual**2 * fit.weight
     rim = np.ones((11, 13), bool)
     rim[1:-1, 1:-1] = False
@@ -81,7 +81,7 @@ def test_a_pixel_that_may_be_clipped_is_left_out_whatever_it_reads() -> None:
     win = drawn_windows(params, (15, 15))
     clip_dn = 0.6 * float((4e4 * derivatives(params, (15, 15))[0, FLUX]).max())
     clipped = win._replace(clip_dn=np.full_like(win.data, clip_dn), usable=win.usable & (win.data < clip_dn))
-    fit = fit_spots(clipped, params, Noise(np.full(1, 4.0), np.ones(1)))
+    fit = fit_spots(clipped, params, PixelNoise(np.full(1, 4.0), np.ones(1)))
     assert fit.converged.all()
     sd = np.sqrt(4.0 + fit.slope_dn[0] * np.maximum(fit.signal, 0.0))
     near = fit.signal + fit.params[:, BACKGROUND, None, None] > clip_dn - 2.0 * sd
@@ -94,7 +94,7 @@ def test_a_tilted_ellipse_is_told_by_the_score_of_its_shear() -> None:
     upright = ROUND.copy()
     upright[:, FLUX] = 4e4
     tilted = np.append(upright, [[0.3]], axis=1)
-    noise = Noise(np.full(1, 4.0), np.ones(1))
+    noise = PixelNoise(np.full(1, 4.0), np.ones(1))
     scores = [
         fit_spots(drawn_windows(p, (15, 15)), upright, noise).judged[0, SHEAR_SCORE]
         for p in (upright, tilted)
