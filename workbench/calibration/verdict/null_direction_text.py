@@ -5,27 +5,31 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import hypot
+from math import atan, degrees, hypot
 
-from workbench.calibration.model.parameters import PRINT
+from workbench.calibration.model.parameters import DRIFT, PRINT
 from workbench.model.lens import COEFFICIENTS, PINHOLE
-from workbench.model.rig import Rig
+from workbench.model.rig import TARGET_TILT, Rig
 
 LEAST_PART = 0.3
 """What moves the spots by less than this part of what the strongest of a combination does is not named."""
-LEAST_EFFECT = 0.01
-"""Standard deviations of all spots together: less than this is nothing."""
+LEAST_EFFECT = 0.5
+"""Standard deviations of all spots together: no test of the data sees less than this."""
 OTHERS = 3
 """More than so many kinds that trade with one are not told apart by reading."""
 BASELINE = "baseline"
 ACROSS = "position across"
 POINTING = {"tx": "pointing along u", "ty": "pointing along v"}
-REMEDIES = {
-    "ruler_scale": "check the ruler against a better one",
-    **dict.fromkeys(PRINT, "check the board's printed ruler against a steel one"),
-    "offset_mm": "measure the offset of the reference plane",
-    BASELINE: "measure a baseline more closely",
-    **dict.fromkeys((*PINHOLE, *chain(*COEFFICIENTS.values())), "use the printed board (workbench target)"),
+BOARD = "use the printed board (workbench target)"
+SQUARE = "measure the target's tilt with a square or level"
+REMEDIES: dict[str, tuple[str, ...]] = {
+    "ruler_scale": ("check the ruler against a better one",),
+    **dict.fromkeys(PRINT, ("check the board's printed ruler against a steel one",)),
+    "offset_mm": ("measure the offset of the reference plane",),
+    BASELINE: ("measure a baseline more closely",),
+    **dict.fromkeys(TARGET_TILT, (SQUARE, BOARD)),
+    **dict.fromkeys(DRIFT, ("return to a standoff at the end of the session",)),
+    **dict.fromkeys((*PINHOLE, *chain(*COEFFICIENTS.values())), (BOARD,)),
 }
 SHARED = {
     "f_px": "the focal length",
@@ -33,6 +37,14 @@ SHARED = {
     "offset_mm": "the reference plane's offset",
     "ruler_scale": "the ruler's scale",
     **dict.fromkeys(PRINT, "the board's scale"),
+    **dict(
+        zip(
+            TARGET_TILT,
+            ("the target's common tilt about the vertical", "the target's common tilt about the horizontal"),
+            strict=True,
+        )
+    ),
+    **dict(zip(DRIFT, ("the drift of the image along u", "the drift of the image along v"), strict=True)),
 }
 """What all lasers share, in words; the other terms are the lens's."""
 LENGTHS = ("ruler_scale", *PRINT)
@@ -136,8 +148,8 @@ def remedy(groups: Sequence[Group], each: Sequence[str] = ()) -> str:
         return APART
     kinds = {group.kind for group in groups}
     only_lengths = kinds.intersection(LENGTHS)
-    fitting = [text for kind, text in REMEDIES.items() if kind in (only_lengths or kinds)]
-    return ", or ".join(dict.fromkeys(fitting)) or APART
+    fitting = [texts for kind, texts in REMEDIES.items() if kind in (only_lengths or kinds)]
+    return ", or ".join(dict.fromkeys(chain(*fitting))) or APART
 
 
 def own_laser(rig: Rig, groups: Sequence[Group]) -> str:
@@ -156,6 +168,8 @@ def _shown(kind: str, value: float, change: float) -> tuple[float, str]:
         return 100.0 * change / value, "%"
     if kind in LENGTHS:
         return 100.0 * change, "%"
+    if kind in TARGET_TILT:
+        return degrees(atan(value + change) - atan(value)), "deg"
     if kind in POINTING.values():
         return 1000.0 * change, "mrad"
     if kind in (BASELINE, ACROSS):

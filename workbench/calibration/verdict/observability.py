@@ -25,10 +25,13 @@ from workbench.calibration.verdict.null_direction_text import (
     remedy,
 )
 from workbench.model.arrays import FloatArray
-from workbench.model.rig import Rig
+from workbench.model.rig import TARGET_TILT, Rig
 
-REFERENCE_FIRST = ("ruler_scale", *PRINT, "offset_mm")
-"""Parameters that all spots share, in the order in which they are taken; the lens's follow."""
+REFERENCE_FIRST = ("ruler_scale", *PRINT, "offset_mm", "f_px", *TARGET_TILT)
+"""Parameters that all spots share, in the order in which they are taken; the rest of the lens follows.
+
+A slope is a depth over a length across: it scales with f_px and the baselines, and is taken after them.
+"""
 NOT_HURT = 1 / 3
 """A direction that moves ranges by less than this part of their sd adds at most some 5 % to it."""
 WIDE_PRIOR_SD = 10.0
@@ -155,7 +158,7 @@ def _posterior(
 def _directions(posterior: _Posterior) -> Iterator[tuple[int, FloatArray]]:
     """Each pivot, and (F,) how all move: the pivot by its posterior sd, the others to hide it."""
     names = posterior.names
-    order = (*REFERENCE_FIRST, *posterior.rig.camera.lens_priors)
+    order = dict.fromkeys((*REFERENCE_FIRST, *posterior.rig.camera.lens_priors))
     shared = [names.index(name) for name in order if name in names]
     rest = list(range(len(names)))
     for pivot in [*shared, *(i for i in rest if i not in shared)]:
