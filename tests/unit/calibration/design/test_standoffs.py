@@ -42,7 +42,8 @@ class TestProposal:
         """By other sensors than those the proposal was made for."""
         rng = np.random.default_rng(99)
         table = drawn_sensors(RIG).table
-        sensors = Expectation(RIG, table.prior_mean + table.prior_sd * rng.standard_normal((64, 26)))
+        drawn = rng.standard_normal((64, len(table.parameters)))
+        sensors = Expectation(RIG, table.prior_mean + table.prior_sd * drawn)
         aim = Aim.of(sensors, np.geomspace(100.0, 5000.0, 25), RIG.noise)
         choice = Choice.of(sensors, np.array(standoffs), 10, aim)
         return choice.worst(range(len(standoffs)))

@@ -104,7 +104,7 @@ def test_the_optimum_is_scipy_s(seed: int) -> None:
             key, s = cells.placements[placement].key, cells.placements[placement].standoff_mm
             z0 = s * (1 + values["ruler_scale"]) + values[f"{key}.error_mm"] + values["offset_mm"]
             tilts = np.arctan([values[f"{key}.slope_x"], values[f"{key}.slope_y"]])
-            pixel = model.pixel(rig.laser_ids[laser], z0, *tilts)
+            pixel = model.pixel(rig.laser_ids[laser], z0, *(tilts + model.common_tilt))
             data.append((pixel - cells.position_px[n]) / (result.noise_scale * cells.sd_px[n]))
         return np.concatenate([np.ravel(data), y])
 
@@ -135,7 +135,7 @@ def test_the_truth_lies_where_the_covariance_says() -> None:
         error = result.values[free] - np.array([world.values[name] for name in names])
         distance2 += float(error @ np.linalg.solve(result.covariance[np.ix_(free, free)], error))
         count += len(free)
-    # Chi-square of 40 x 23 degrees of freedom: its mean square is known to sqrt(2 / 920) = 4.7 %. Deviations
+    # Chi-square of 40 x 25 degrees of freedom: its mean square is known to sqrt(2 / 1000) = 4.5 %. Deviations
     # stated 10 % too large or too small would show as 0.83 or 1.23.
     assert distance2 / count == pytest.approx(1.0, abs=3.5 * np.sqrt(2 / count))
 

@@ -57,8 +57,6 @@ def test_one_cell_is_the_spot_of_its_inputs() -> None:
         z0 = standoff * (1 + world.values["ruler_scale"]) + world.values["offset_mm"]
         expected = world.pixel("L3", z0, *world.common_tilt)
         np.testing.assert_allclose([found[0][n], found[1][n]], expected, rtol=1e-9)
-            [found[0][n], found[1][n]], world.pixel("L3", z0, *world.common_tilt), rtol=1e-9
-        )
 
 
 @pytest.mark.parametrize("roll_rad", [0.0, 0.3, -1.5])
