@@ -24,7 +24,7 @@ from workbench.model.rig import NoiseSpec, Rig
 
 RANGES_MM = np.geomspace(100.0, 5000.0, 18)
 DRAWS = 256
-SEARCH_DRAWS = 32
+SEARCH_DRAWS = 64
 """Enough to rank designs by: all are ranked by the same sensors."""
 SEED = 2001
 CANDIDATES = 45
