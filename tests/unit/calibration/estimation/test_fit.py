@@ -141,6 +141,19 @@ def test_the_truth_lies_where_the_covariance_says() -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_a_drift_with_a_prior_is_found_where_standoffs_are_shuffled(seed: int) -> None:
+    spread = prior(0.0, 1.0)
+    bench = thesis_rig().bench.model_copy(update={"drift_u_px": spread, "drift_v_px": spread})
+    rig = thesis_rig().model_copy(update={"bench": bench})
+    world = World(rig, seed)
+    shuffled = np.random.default_rng(seed).permutation(STANDOFFS_MM).tolist()
+    result = fit(rig, world.observations(tuple(shuffled)))
+    for name in ("drift_u_px", "drift_v_px"):
+        assert deviation(result, name) < 0.2
+        assert abs(value(result, name) - world.values[name]) < 4 * deviation(result, name)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_flat_does_not_give_the_focal_length(seed: int) -> None:
     result = fit(thesis_rig(), World(thesis_rig(), seed).observations())
     names = [p.name for p in result.table.parameters]
