@@ -84,7 +84,7 @@ def write_captures(rig: Rig, path: Path) -> int:
     truth[:, 3:5] = 0.0  # every spot in the frame
     truth[:, 1:3] = 319.5, 239.5
     z0 = simulate.depths(rig, truth, STANDOFFS_MM, rng.normal(0.0, 0.3, (1, len(STANDOFFS_MM))))
-    centre = simulate.spots(rig, truth, z0, np.zeros((*z0.shape, 2)))[0]
+    centre = simulate.spots(rig, truth, z0, simulate.tilted(rig, truth, np.zeros((*z0.shape, 2))))[0]
     centre = centre + rng.normal(0.0, rig.noise.speckle_sd_px, centre.shape)
     rows = ["laser_id,standoff_mm,repeat,u_px,v_px"]
     for standoff, spots in zip(STANDOFFS_MM, centre, strict=True):

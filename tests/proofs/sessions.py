@@ -188,7 +188,13 @@ def _ranged(sensor: CalibratedSensor, seen: FloatArray) -> tuple[FloatArray, Flo
 def _truth(rig: Rig, path: Path) -> FloatArray:
     """(S,) in the order of `simulate.names`."""
     told = YAML(typ="safe").load(path)
-    common = [float(told.get(name, 0.0)) for name in (*simulate.LENSES[rig.camera.lens], *simulate.BENCH)]
+    tilt = {
+        f"target_slope_{axis}": np.tan(np.radians(told[f"target_{turn}_deg"]))
+        for axis, turn in (("x", "yaw"), ("y", "pitch"))
+    }
+    steady = dict.fromkeys(("drift_u_px", "drift_v_px"), 0.0)
+    bench = told | tilt | steady
+    common = [float(bench[name]) for name in (*simulate.LENSES[rig.camera.lens], *simulate.BENCH)]
     rays = [float(told["lasers"][laser][name]) for laser in rig.laser_ids for name in simulate.RAY]
     return np.array([*common, *rays])
 

@@ -109,14 +109,15 @@ def test_sessions_are_missed_where_their_intervals_are_wrong(
     scale: float, bias: float, missed: set[str]
 ) -> None:
     rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
-    rng, free = np.random.default_rng(8), 23
+    size, free = len(simulate.names(rig)), sum(prior.sd > 0 for prior in simulate.priors(rig))
+    rng = np.random.default_rng(8)
     drawn = []
     for _ in range(100):
-        z, ranges = scale * rng.normal(size=26) + bias, scale * rng.normal(size=(10, 4)) + bias
+        z, ranges = scale * rng.normal(size=size) + bias, scale * rng.normal(size=(10, 4)) + bias
         ranges[0, 0] = np.nan
         drawn.append(sessions.Outcome(z, ranges, 0.01 * ranges, float((z[:free] ** 2).sum()), free))
     lines, misses = sessions.scores(rig, drawn)
-    assert len(lines) == 1 + 26 + 39 + 3
+    assert len(lines) == 1 + size + 39 + 3
     told = {what for what in ("rms", "within", "mean") if sum(what in miss for miss in misses) > 30}
     assert told >= missed
     assert bool(misses) == bool(missed)

@@ -56,7 +56,7 @@ def ideal_rig(
             "driver": "emulated",
             "camera": {**default, **(camera or {})},
             "lasers": lasers or (laser("L1", 60.0),),
-            "bench": bench or {},
+            "bench": {"target_tilt_sd_deg": 0.0, **(bench or {})},
             "emulator": block,
         }
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -150,7 +150,10 @@ class World:
     def observations(
         self, standoffs_mm: tuple[float, ...] = STANDOFFS_MM, repeats: int = 5, session: int = 1
     ) -> list[Observation]:
-        """A whole calibration: placement errors, tilts, speckle and noise drawn from the rig's tolerances."""
+        """A whole calibration: placement errors, tilts, speckle and noise drawn from the rig's tolerances.
+
+        The image drifts linearly from the first observation to the last.
+        """
         rng = np.random.default_rng([self.seed, session])
         bench, noise = self.rig.bench, self.rig.noise
         found = []
@@ -169,7 +172,12 @@ class World:
                                 source, laser.id, f"{standoff:g}", standoff, repeat, float(u), float(v)
                             )
                         )
-        return found
+        drift = np.array([self.values["drift_u_px"], self.values["drift_v_px"]])
+        shifts = np.linspace(-0.5, 0.5, len(found))[:, None] * drift
+        return [
+            replace(s, u_px=s.u_px + float(du), v_px=s.v_px + float(dv))
+            for s, (du, dv) in zip(found, shifts, strict=True)
+        ]
 
 
 def board_rig(print_scale: Prior | None = None) -> Rig:

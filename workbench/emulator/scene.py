@@ -20,6 +20,7 @@ from workbench.emulator.surfaces import (
     wall_in_mirror,
 )
 from workbench.emulator.truth import (
+    BoardError,
     PlacementError,
     Truth,
     TruthFile,
@@ -77,10 +78,11 @@ class BenchScene:
         )
         z_mm = placement.standoff_mm * (1 + self._truth.ruler_scale) + error.error_mm + self._truth.offset_mm
         if isinstance(placement.target, BoardTarget):
-            self._put_board(placement.target, z_mm, error, placement.key)
+            aside = self._put_board(placement.target, z_mm, error, placement.key)
+            self._file.add(placement.key, own, aside)
         else:
             self._surfaces = _surfaces(placement.target, z_mm, error, self._spec.surface)
-            self._file.add(placement.key, error)
+            self._file.add(placement.key, own)
         self._key = placement.key
         self._spots, self._picture = {}, None
         self.moves += 1
@@ -120,12 +122,13 @@ class BenchScene:
     def _print(self) -> Print:
         return Print(self._rig.board, self._spec.surface.ink_albedo / self._spec.surface.albedo)
 
-    def _put_board(self, target: BoardTarget, z_mm: float, error: PlacementError, key: str) -> None:
+    def _put_board(self, target: BoardTarget, z_mm: float, error: PlacementError, key: str) -> BoardError:
+        """Where a hand has put the board on its plane."""
         _check_turn("board", target.yaw_deg + error.yaw_deg, target.pitch_deg + error.pitch_deg)
         aside = draw_board_error(self._truth, self._spec, key, z_mm)
         board = stand(target, z_mm, error, aside, self._truth, self._print, self._spec.surface)
         self._surfaces = [(board, 1.0)]
-        self._file.add(key, error, aside)
+        return aside
 
     def _paint(self, laser_id: str) -> list[SpotImage]:
         painter = SpotPainter(self._spec, self._lens(), self._image, self._truth.f_px)

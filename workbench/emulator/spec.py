@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, ValidationInfo, field_validator
 from workbench.model.errors import BadInputError
 from workbench.model.lens import COEFFICIENTS
 from workbench.model.problems import problems
-from workbench.model.rig import NonNegativeFloat, PositiveFloat, Rig
+from workbench.model.rig import NonNegativeFloat, PositiveFloat, Rig, TiltAngle
 from workbench.model.yamlfile import FileModel
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -154,8 +154,8 @@ class TruthSpec(FileModel):
     k4: float | None = None
     offset_mm: float | None = None
     ruler_scale: float | None = None
-    target_yaw_deg: float | None = None
-    target_pitch_deg: float | None = None
+    target_yaw_deg: TiltAngle | None = None
+    target_pitch_deg: TiltAngle | None = None
     print_scale: float | None = None
     bow_x_mm: float | None = None
     bow_y_mm: float | None = None

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TypeVar
 
 from workbench.model.errors import BadInputError
-from workbench.model.rig import Prior, Rig
+from workbench.model.rig import TARGET_TILT, Prior, Rig
 from workbench.model.yamlfile import FileModel
 
 TILTS = "tilts"
@@ -16,6 +16,8 @@ Part = TypeVar("Part", bound=FileModel)
 
 def fix_parameters(rig: Rig, names: Iterable[str]) -> Rig:
     """Rig with parameters made constant, by their names in the calibration: `k2`, `L1.tx`; or `tilts`.
+
+    Either slope of the common tilt stands for both: the rig file states one sd for the two.
 
     Raises:
         BadInputError: the rig has no such parameter.
@@ -27,7 +29,9 @@ def fix_parameters(rig: Rig, names: Iterable[str]) -> Rig:
 
 def _fix_one(rig: Rig, name: str) -> Rig:
     if name == TILTS:
-        return rig.model_copy(update={"bench": rig.bench.model_copy(update={"tilt_sd_deg": 0.0})})
+        return _with_bench(rig, "tilt_sd_deg", 0.0)
+    if name in TARGET_TILT:
+        return _with_bench(rig, "target_tilt_sd_deg", 0.0)
     laser_id, _, of_ray = name.rpartition(".")
     if laser_id in rig.laser_ids and of_ray in _priors(rig.lasers[0]):
         index = rig.laser_ids.index(laser_id)
@@ -38,8 +42,12 @@ def _fix_one(rig: Rig, name: str) -> Rig:
     if name in _priors(rig.bench):
         return rig.model_copy(update={"bench": _constant(rig.bench, name)})
     rays = [f"{i}.{p}" for i in rig.laser_ids for p in _priors(rig.lasers[0])]
-    known = ", ".join([*rig.camera.lens_priors, *_priors(rig.bench), TILTS, *rays])
+    known = ", ".join([*rig.camera.lens_priors, *_priors(rig.bench), *TARGET_TILT, TILTS, *rays])
     raise BadInputError(f"parameter {name}: expected one of {known}")
+
+
+def _with_bench(rig: Rig, key: str, value: float) -> Rig:
+    return rig.model_copy(update={"bench": rig.bench.model_copy(update={key: value})})
 
 
 def _priors(part: FileModel) -> list[str]:

@@ -54,6 +54,8 @@ def exactly(value: float) -> Prior:
     return Prior(value=value, sd=0.0)
 
 
+TARGET_TILT = ("target_slope_x", "target_slope_y")
+"""Parameters of a calibration: tilt of the target that all placements share, as slopes."""
 TiltAngle = Annotated[float, Field(ge=-60, le=60)]
 TiltSd = Annotated[float, Field(ge=0, le=45)]
 

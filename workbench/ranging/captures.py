@@ -32,7 +32,7 @@ def scenes(rows: Sequence[CaptureRow]) -> dict[str, list[CaptureRow]]:
                 name = f"{name} (row {row.row})"
         else:
             while name in grouped and grouped[name][0].laser_id == ALL_LASERS:
-                name = f"{name} (one laser at a time)"
+                name = f"{name} (fired alone)"
         grouped.setdefault(name, []).append(row)
     return grouped
 

@@ -62,7 +62,8 @@ def test_a_whole_bench_shows_its_truth(tmp_path: Path, seed: int) -> None:
 def _predicted(truth: Any, name: str, standoff: float, key: str) -> tuple[float, float]:
     laser, placed = truth["lasers"][name], truth["placements"][key]
     z0 = standoff * (1 + truth["ruler_scale"]) + placed["error_mm"] + truth["offset_mm"]
-    slope = np.tan(np.radians([placed["yaw_deg"], placed["pitch_deg"]]))
+    turn = np.array([truth[f"target_{name}"] + placed[name] for name in ("yaw_deg", "pitch_deg")])
+    slope = np.tan(np.radians(turn))
     start, direction = np.array([laser["x_mm"], laser["y_mm"]]), np.array([laser["tx"], laser["ty"]])
     z = (z0 + slope @ start) / (1 - slope @ direction)
     x, y = (start + z * direction) / z

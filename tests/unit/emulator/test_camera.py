@@ -14,7 +14,7 @@ from tests.support.ideal import exact, ideal_rig, laser, moments
 from tests.support.virtual_bench import emulated_thesis, put, shot
 from workbench.emulator import open_bench
 from workbench.emulator.spot import SpotImage
-from workbench.model.arrays import Image
+from workbench.model.arrays import FloatArray, Image
 
 
 def brightness(image: Image) -> int:
@@ -175,9 +175,31 @@ def test_warm_up_moves_spots_outward_and_dies_away(tmp_path: Path) -> None:
     assert drift == pytest.approx(0.01 * warm_px * np.exp([0, -1, -3]), abs=0.05)
 
 
+def test_the_image_drifts_by_the_frames_since_the_bench_was_opened(tmp_path: Path) -> None:
+    drift = {"u_px_per_frame": 0.05, "v_px_per_frame": -0.02}
+    with open_bench(ideal_rig(drift=drift, lens={"blur_px": 0.7}), tmp_path / "s") as bench:
+        put(bench, 500.0)
+        bench.camera.exposure_s = 1e-4
+        places = []
+        with bench.lasers.lit(["L1"], for_s=20.0):
+            for frame in range(61):
+                if frame == 30:
+                    bench.mark("another capture")
+                image = bench.camera.grab().image
+                if frame in (0, 20, 60):
+                    places.append(_centre_uv(image))
+    square = np.array([319.5 + 533.3 * 60 / 500, 239.5])
+    expected = square + np.outer([0, 20, 60], [0.05, -0.02])
+    np.testing.assert_allclose(places, expected, rtol=0, atol=0.05)
+
+
 def _centre(image: NDArray[Any]) -> float:
+    return float(_centre_uv(image)[0])
+
+
+def _centre_uv(image: NDArray[Any]) -> FloatArray:
     signal = np.maximum(image.astype(np.float64) - 0.03 * 255 - 2, 0).astype(np.float32)
-    return float(moments(SpotImage(0, 0, signal))[0][0])
+    return moments(SpotImage(0, 0, signal))[0]
 
 
 def test_a_stuck_beam_shows_in_a_dark_frame(tmp_path: Path) -> None:

@@ -8,7 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.support.ideal import CX, F, exact, ideal_rig, laser, moments, painted, scene_of
+from tests.support.ideal import CX, CY, F, exact, ideal_rig, laser, moments, painted, scene_of
+from tests.support.rigs import opencv_pixels
+from tests.support.virtual_bench import read_truth
+from workbench.emulator.lens import Drift
+from workbench.model.arrays import FloatArray
 from workbench.model.errors import BadInputError
 from workbench.model.target import CylinderTarget, FlatTarget, NoTarget, Placement
 
@@ -80,6 +84,44 @@ def test_tilt_of_the_placement_adds_to_the_targets(tmp_path: Path) -> None:
     rig = ideal_rig(truth={"placements": {"P": {"yaw_deg": 10.0, "pitch_deg": 0.0}}})
     centre, _ = moments(painted(rig, tmp_path, 500.0, FlatTarget(yaw_deg=20.0)))
     assert centre[0] == pytest.approx(CX + F * 60 / (500 + 60 * np.tan(np.radians(30))), abs=0.01)
+
+
+@pytest.mark.parametrize(("yaw", "pitch"), [(0.0, 0.0), (4.0, 0.0), (0.0, -6.0), (-12.0, 9.0)])
+def test_a_common_tilt_adds_to_every_placement_s_own(tmp_path: Path, yaw: float, pitch: float) -> None:
+    """Where OpenCV projects the point in which linear algebra has the ray meet the plane."""
+    own = {"A": {"yaw_deg": 1.5, "pitch_deg": -2.0}, "B": {"yaw_deg": -3.0, "pitch_deg": 0.5}}
+    truth = {"target_yaw_deg": yaw, "target_pitch_deg": pitch, "placements": own}
+    rig = ideal_rig(laser("L", 60.0, 40.0, 0.01, -0.02), camera={"k1": exact(-0.2)}, truth=truth)
+    scene = scene_of(rig, tmp_path)
+    for key, standoff in (("A", 300.0), ("B", 700.0)):
+        scene.place(Placement(key=key, standoff_mm=standoff))
+        turn = np.radians([yaw + own[key]["yaw_deg"], pitch + own[key]["pitch_deg"]])
+        system = np.array([[1, 0, -0.01], [0, 1, 0.02], [*-np.tan(turn), 1.0]])
+        point = np.linalg.solve(system, [60.0, 40.0, standoff])
+        centre, _ = moments(scene.spots("L")[0])
+        assert centre == pytest.approx(projected(point), abs=0.01)
+
+
+def test_the_truth_of_a_placement_is_its_own_tilt(tmp_path: Path) -> None:
+    truth = {"target_yaw_deg": 4.0, "placements": {"P": {"yaw_deg": 1.5}}}
+    scene_of(ideal_rig(truth=truth), tmp_path).place(Placement(key="P", standoff_mm=500.0))
+    written = read_truth(tmp_path / "truth.yaml")
+    assert (written["target_yaw_deg"], written["placements"]["P"]["yaw_deg"]) == (4.0, 1.5)
+
+
+def test_a_drift_moves_the_picture_as_a_moved_image_centre_does(tmp_path: Path) -> None:
+    scene = scene_of(ideal_rig(laser("L", 60.0, 40.0), camera={"k1": exact(-0.2)}), tmp_path)
+    scene.place(Placement(key="P", standoff_mm=500.0))
+    for u_px, v_px in ((0.0, 0.0), (3.25, -1.5), (-0.4, 0.0)):
+        centre, _ = moments(scene.spots("L", Drift(u_px=u_px, v_px=v_px))[0])
+        expected = projected(np.array([60.0, 40.0, 500.0]), CX + u_px, CY + v_px)
+        assert centre == pytest.approx(expected, abs=0.01)
+
+
+def projected(point_mm: FloatArray, cx: float = CX, cy: float = CY) -> FloatArray:
+    """(2,) where OpenCV has a point (3,) in the picture of a lens with k1 = -0.2."""
+    values = [F, cx, cy, -0.2, 0.0, 0.0, 0.0, 0.0]
+    return np.asarray(opencv_pixels("plumb_bob", values, point_mm[None])[0])
 
 
 def test_a_plane_on_edge_is_refused(tmp_path: Path) -> None:

@@ -30,6 +30,8 @@ def test_truths_follow_the_tolerances() -> None:
         "cx": [(t.cx_px - 319.5) / 40 for t in truths],
         "offset": [t.offset_mm / 5 for t in truths],
         "scale": [t.ruler_scale / 0.0005 for t in truths],
+        "common yaw": [t.target_yaw_deg / 0.5 for t in truths],
+        "common pitch": [t.target_pitch_deg / 0.5 for t in truths],
         "L1 x": [(t.lasers["L1"].x_mm + 60) / 0.2 for t in truths],
         "L4 ty": [t.lasers["L4"].ty / 0.005 for t in truths],
     }

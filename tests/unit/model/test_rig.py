@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -135,6 +137,41 @@ def test_the_reach_of_a_bench_is_from_near_to_far(reach_mm: tuple[float, float])
     with pytest.raises(ValidationError) as caught:
         BenchSpec.model_validate({"reach_mm": reach_mm})
     assert caught.value.errors()[0]["loc"][0] == "reach_mm"
+
+
+def test_a_common_tilt_is_a_slope_with_the_deviation_of_its_angle() -> None:
+    """By differences of the tangent; half a degree about each axis where nothing is stated."""
+    for slope in (BenchSpec().target_slope_x, BenchSpec().target_slope_y):
+        assert slope.value == 0.0
+        assert slope.sd == pytest.approx(np.radians(0.5))
+    bench = BenchSpec(target_yaw_deg=-20.0, target_pitch_deg=35.0, target_tilt_sd_deg=0.2)
+    for slope, angle in ((bench.target_slope_x, -20.0), (bench.target_slope_y, 35.0)):
+        below, at, above = np.tan(np.radians([angle - 1e-4, angle, angle + 1e-4]))
+        assert slope.value == pytest.approx(at)
+        assert slope.sd == pytest.approx(0.2 * (above - below) / 2e-4, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("key", "good", "bad"),
+    [
+        ("target_yaw_deg", (-60.0, 60.0), (-60.1, 60.1, float("nan"))),
+        ("target_pitch_deg", (-60.0, 60.0), (-60.1, 60.1, float("inf"))),
+        ("target_tilt_sd_deg", (0.0, 45.0), (-0.1, 45.1, float("nan"))),
+        ("drift_u_px", ({"value": -0.3, "sd": 0.0}, {"value": 0.0, "sd": 0.3}), (0.3, {"value": 0.3})),
+        ("drift_v_px", ({"value": -0.3, "sd": 0.0}, {"value": 0.0, "sd": 0.3}), (0.3, {"sd": -0.3})),
+    ],
+)
+def test_common_tilt_and_drift_have_bounds(key: str, good: Sequence[Any], bad: Sequence[Any]) -> None:
+    for value in good:
+        BenchSpec.model_validate({key: value})
+    for value in bad:
+        with pytest.raises(ValidationError) as caught:
+            BenchSpec.model_validate({key: value})
+        assert caught.value.errors()[0]["loc"][0] == key
+
+
+def test_an_image_does_not_drift_unless_stated() -> None:
+    assert BenchSpec().drift_u_px == BenchSpec().drift_v_px == Prior(value=0.0, sd=0.0)
 
 
 def test_lasers_have_ids_that_differ_and_there_is_at_least_one() -> None:

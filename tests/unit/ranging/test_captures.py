@@ -80,7 +80,7 @@ def test_no_row_is_lost_where_lasers_lit_together_and_alone_share_a_scene(tmp_pa
     grouped = scenes(load_captures(path))
     assert {name: [row.row for row in rows] for name, rows in grouped.items()} == {
         "s": [2],
-        "s (one laser at a time)": [3, 6],
+        "s (fired alone)": [3, 6],
         "s (row 5)": [4],
         "s (row 5) (row 5)": [5],
         "t": [7, 9],

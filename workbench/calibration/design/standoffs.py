@@ -24,7 +24,7 @@ from workbench.model.rig import NoiseSpec, Rig
 
 RANGES_MM = np.geomspace(100.0, 5000.0, 18)
 DRAWS = 256
-SEARCH_DRAWS = 32
+SEARCH_DRAWS = 64
 """Number of sensors in the search; enough, because all designs are ranked by the same sensors."""
 SEED = 2001
 CANDIDATES = 45

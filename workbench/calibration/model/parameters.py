@@ -11,14 +11,12 @@ import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.board import BOW
-from workbench.model.rig import Prior, Rig
+from workbench.model.rig import TARGET_TILT, Prior, Rig
 from workbench.optics.rays import RAY
 
-TILT = ("target_slope_x", "target_slope_y")
-"""Tilt of the target that all placements share, as slopes."""
 DRIFT = ("drift_u_px", "drift_v_px")
 """Shift of the image over the session, from the first capture to the last."""
-REFERENCE = ("offset_mm", "ruler_scale", *TILT, *DRIFT)
+REFERENCE = ("offset_mm", "ruler_scale", *TARGET_TILT, *DRIFT)
 """Of the bench during the session; `offset_mm` alone is of use afterwards."""
 PLACEMENT = ("error_mm", "slope_x", "slope_y")
 PRINT = ("print_scale",)

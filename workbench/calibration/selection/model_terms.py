@@ -20,14 +20,14 @@ from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import CalibrationFit, fit_cells, table_of
 from workbench.calibration.estimation.problem import LeastSquaresProblem
-from workbench.calibration.model.parameters import DRIFT, TILT
+from workbench.calibration.model.parameters import DRIFT
 from workbench.calibration.selection.drift import drift_is_shown, fit_with_drift, with_drift
 from workbench.calibration.selection.outliers import fit_without_outliers, without_outliers
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import TermSummary, TermVerdict
 from workbench.model.fit_event import Rejected
 from workbench.model.nested import TILTS
-from workbench.model.rig import Prior, Rig
+from workbench.model.rig import TARGET_TILT, Prior, Rig
 from workbench.model.stats import chi2_sf
 from workbench.optics.image import in_picture
 from workbench.optics.lens_models import lens_model
@@ -114,7 +114,7 @@ def _freed(rig: Rig, names: Sequence[str]) -> Rig:
 def _candidates(fitted: CalibrationFit) -> list[str]:
     """Names of the terms of a fit, the highest order first."""
     names = {p.name for p in fitted.table.parameters if p.prior.sd > 0}
-    orders = (*fitted.layout.model.terms, "ruler_scale", " ".join(TILT), " ".join(DRIFT))
+    orders = (*fitted.layout.model.terms, "ruler_scale", " ".join(TARGET_TILT), " ".join(DRIFT))
     found = [there for term in orders if (there := " ".join(n for n in term.split() if n in names))]
     return [*found, TILTS] if len(_indices(fitted, TILTS)) else found
 

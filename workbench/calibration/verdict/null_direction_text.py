@@ -5,28 +5,48 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import hypot
+from math import atan, degrees, hypot
 
-from workbench.calibration.model.parameters import PRINT
+from workbench.calibration.model.parameters import DRIFT, PRINT
 from workbench.model.lens import COEFFICIENTS, PINHOLE
-from workbench.model.rig import Rig
+from workbench.model.rig import TARGET_TILT, Rig
 
 LEAST_PART = 0.3
 """Least effect on the spots, as a share of the strongest, for a parameter to be part of the text."""
-LEAST_EFFECT = 0.01
-"""Effect on all spots together, in standard deviations, below which a parameter has none."""
+LEAST_EFFECT = 0.5
+"""Effect on all spots together, in standard deviations, below which no test of the data sees it."""
 OTHERS = 3
 """Largest number of kinds beside the pivot's in one text."""
 BASELINE = "baseline"
 ACROSS = "position across the baseline"
 POINTING = {"tx": "pointing along u", "ty": "pointing along v"}
-REMEDIES = {
-    "ruler_scale": "check the ruler against a more accurate one",
-    **dict.fromkeys(PRINT, "check the board's printed ruler against a steel ruler"),
-    "offset_mm": "measure the offset of the reference plane",
-    BASELINE: "measure one baseline more accurately",
-    **dict.fromkeys((*PINHOLE, *chain(*COEFFICIENTS.values())), "use the printed board"),
+BOARD = "use the printed board"
+SQUARE = "measure the target's tilt with a square or level"
+REMEDIES: dict[str, tuple[str, ...]] = {
+    "ruler_scale": ("check the ruler against a more accurate one",),
+    **dict.fromkeys(PRINT, ("check the board's printed ruler against a steel ruler",)),
+    "offset_mm": ("measure the offset of the reference plane",),
+    BASELINE: ("measure one baseline more accurately",),
+    **dict.fromkeys(TARGET_TILT, (SQUARE, BOARD)),
+    **dict.fromkeys(DRIFT, ("return to a standoff at the end of the session",)),
+    **dict.fromkeys((*PINHOLE, *chain(*COEFFICIENTS.values())), (BOARD,)),
 }
+SHARED = {
+    "f_px": "the focal length",
+    **dict.fromkeys(("cx_px", "cy_px"), "the image centre"),
+    "offset_mm": "the reference plane's offset",
+    "ruler_scale": "the ruler's scale",
+    **dict.fromkeys(PRINT, "the board's scale"),
+    **dict(
+        zip(
+            TARGET_TILT,
+            ("the target's common tilt about the vertical", "the target's common tilt about the horizontal"),
+            strict=True,
+        )
+    ),
+    **dict(zip(DRIFT, ("the drift of the image along u", "the drift of the image along v"), strict=True)),
+}
+"""What all lasers share, in words; the other terms are the lens's."""
 LENGTHS = ("ruler_scale", *PRINT)
 """Scales of all lengths. Where one takes part, only a more accurate ruler separates the parameters."""
 APART = "place the target at standoffs farther apart"
@@ -134,8 +154,8 @@ def remedy(groups: Sequence[ParameterGroup], each: Sequence[str] = ()) -> str:
         return APART
     kinds = {group.kind for group in groups}
     only_lengths = kinds.intersection(LENGTHS)
-    fitting = [text for kind, text in REMEDIES.items() if kind in (only_lengths or kinds)]
-    return " or ".join(dict.fromkeys(fitting)) or APART
+    fitting = [texts for kind, texts in REMEDIES.items() if kind in (only_lengths or kinds)]
+    return " or ".join(dict.fromkeys(chain(*fitting))) or APART
 
 
 def advice(remedy: str) -> str:
@@ -159,6 +179,8 @@ def _shown(kind: str, value: float, change: float) -> tuple[float, str]:
         return 100.0 * change / value, "%"
     if kind in LENGTHS:
         return 100.0 * change, "%"
+    if kind in TARGET_TILT:
+        return degrees(atan(value + change) - atan(value)), "deg"
     if kind in POINTING.values():
         return 1000.0 * change, "mrad"
     if kind in (BASELINE, ACROSS):

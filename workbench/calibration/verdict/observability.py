@@ -27,10 +27,13 @@ from workbench.calibration.verdict.null_direction_text import (
     remedy,
 )
 from workbench.model.arrays import FloatArray
-from workbench.model.rig import Rig
+from workbench.model.rig import TARGET_TILT, Rig
 
-REFERENCE_FIRST = ("ruler_scale", *PRINT, "offset_mm")
-"""Parameters that all spots depend on, in the order in which they are taken; those of the lens follow."""
+REFERENCE_FIRST = ("ruler_scale", *PRINT, "offset_mm", "f_px", *TARGET_TILT)
+"""Parameters that all spots share, in the order in which they are taken; the rest of the lens follows.
+
+A slope is a depth over a length across: it scales with f_px and the baselines, and is taken after them.
+"""
 NOT_HURT = 1 / 3
 """Change of ranges, in their sd, below which a direction does not affect them: it adds at most some 5 %."""
 WIDE_PRIOR_SD = 10.0
@@ -164,7 +167,7 @@ def _directions(posterior: _Posterior) -> Iterator[tuple[int, FloatArray]]:
     (A + 1 / WIDE_PRIOR_SD^2)^-1 e, normalised at the pivot.
     """
     names = posterior.names
-    order = (*REFERENCE_FIRST, *posterior.rig.camera.lens_priors)
+    order = dict.fromkeys((*REFERENCE_FIRST, *posterior.rig.camera.lens_priors))
     shared = [names.index(name) for name in order if name in names]
     rest = list(range(len(names)))
     for pivot in [*shared, *(i for i in rest if i not in shared)]:

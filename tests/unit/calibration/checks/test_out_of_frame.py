@@ -36,10 +36,16 @@ def test_the_limit_is_the_edge_of_the_outermost_pixel(
     fitted: CalibrationFit, laser_id: str, side: float
 ) -> None:
     """The standoff at which the fitted spot crosses the edge, found by bisection of its curve."""
-    index, offset = fitted.rig.laser_ids.index(laser_id), fitted.layout.offset
+    index = fitted.rig.laser_ids.index(laser_id)
+    value = dict(zip((p.name for p in fitted.table.parameters), fitted.values.tolist(), strict=True))
+    slope = np.array([value["target_slope_x"], value["target_slope_y"]])
+    origin, direction = (
+        np.array([value[f"{laser_id}.{n}"] for n in names]) for names in (("x_mm", "y_mm"), ("tx", "ty"))
+    )
 
     def u(standoff_mm: float) -> float:
-        depth = standoff_mm * (1 + fitted.values[fitted.layout.ruler_scale]) + fitted.values[offset]
+        z0 = standoff_mm * (1 + value["ruler_scale"]) + value["offset_mm"]
+        depth = (z0 + slope @ origin) / (1 - slope @ direction)
         return float(fitted.curves.spots(np.array([index]), np.array([1 / depth]))[0, 0])
 
     near, far = 30.0, 3000.0

@@ -32,6 +32,16 @@ def test_a_deviation_not_stated_is_the_rig_s() -> None:
     np.testing.assert_allclose(cells.sd_px[0], [np.hypot(0.1, 0.04), np.hypot(1.0, 0.04)])
 
 
+def test_the_time_of_a_cell_is_its_mean_place_in_the_order_of_capture() -> None:
+    order = ["a", "b", "b", "a", "a"]
+    rows = [Observation(f"row {i}", laser, "p", 500.0, i, 1.0, 2.0) for i, laser in enumerate(order)]
+    cells, _ = group(rows, ["a", "b"], NOISE)
+    by_laser = dict(zip(cells.laser.tolist(), cells.time.tolist(), strict=True))
+    # Five captures from -0.5 to 0.5: a is the first, fourth and fifth, b the second and third.
+    assert by_laser[0] == pytest.approx((-0.5 + 0.25 + 0.5) / 3)
+    assert by_laser[1] == pytest.approx((-0.25 + 0.0) / 2)
+
+
 def test_cells_by_laser_and_placement() -> None:
     rows = [
         Observation(f"row {i}", laser, place, float(place), 0, 1.0, 2.0)

@@ -86,7 +86,8 @@ def test_spots_and_their_derivatives_are_those_of_opencv_s_lens() -> None:
     def pixels(at: np.ndarray, error_mm: float = 0.0, yaw: float = 0.0, pitch: float = 0.0) -> np.ndarray:
         world.values = dict(zip(names, at, strict=True))
         z0 = standoffs * (1 + world.values["ruler_scale"]) + world.values["offset_mm"] + error_mm
-        return np.array([[world.pixel(i, z, yaw, pitch) for i in rig.laser_ids] for z in z0])
+        tilt = np.array([yaw, pitch]) + world.common_tilt
+        return np.array([[world.pixel(i, z, *tilt) for i in rig.laser_ids] for z in z0])
 
     np.testing.assert_allclose(spot, pixels(values), rtol=1e-9)
     sd = expectation.table.prior_sd

@@ -102,7 +102,7 @@ def test_the_optimum_is_scipy_s(solved: Both, index: int) -> None:
                 world.values[f"{info.key}.{name}"] for name in ("error_mm", "slope_x", "slope_y")
             )
             z0 = info.standoff_mm * (1 + world.values["ruler_scale"]) + error + world.values["offset_mm"]
-            pixel = world.pixel(single.rig.laser_ids[laser], z0, *np.arctan(slopes))
+            pixel = world.pixel(single.rig.laser_ids[laser], z0, *(np.arctan(slopes) + world.common_tilt))
             data.append((pixel - cells.position_px[n]) / (single.noise_scale * cells.sd_px[n]))
         return np.concatenate([np.ravel(data), y])
 

@@ -104,7 +104,7 @@ def test_the_optimum_is_scipy_s(seed: int) -> None:
             key, s = cells.placements[placement].key, cells.placements[placement].standoff_mm
             z0 = s * (1 + values["ruler_scale"]) + values[f"{key}.error_mm"] + values["offset_mm"]
             tilts = np.arctan([values[f"{key}.slope_x"], values[f"{key}.slope_y"]])
-            pixel = model.pixel(rig.laser_ids[laser], z0, *tilts)
+            pixel = model.pixel(rig.laser_ids[laser], z0, *(tilts + model.common_tilt))
             data.append((pixel - cells.position_px[n]) / (result.noise_scale * cells.sd_px[n]))
         return np.concatenate([np.ravel(data), y])
 
@@ -135,9 +135,22 @@ def test_the_truth_lies_where_the_covariance_says() -> None:
         error = result.values[free] - np.array([world.values[name] for name in names])
         distance2 += float(error @ np.linalg.solve(result.covariance[np.ix_(free, free)], error))
         count += len(free)
-    # Chi-square of 40 x 23 degrees of freedom: its mean square is known to sqrt(2 / 920) = 4.7 %. Deviations
+    # Chi-square of 40 x 25 degrees of freedom: its mean square is known to sqrt(2 / 1000) = 4.5 %. Deviations
     # stated 10 % too large or too small would show as 0.83 or 1.23.
     assert distance2 / count == pytest.approx(1.0, abs=3.5 * np.sqrt(2 / count))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_drift_with_a_prior_is_found_where_standoffs_are_shuffled(seed: int) -> None:
+    spread = prior(0.0, 1.0)
+    bench = thesis_rig().bench.model_copy(update={"drift_u_px": spread, "drift_v_px": spread})
+    rig = thesis_rig().model_copy(update={"bench": bench})
+    world = World(rig, seed)
+    shuffled = np.random.default_rng(seed).permutation(STANDOFFS_MM).tolist()
+    result = fit(rig, world.observations(tuple(shuffled)))
+    for name in ("drift_u_px", "drift_v_px"):
+        assert deviation(result, name) < 0.2
+        assert abs(value(result, name) - world.values[name]) < 4 * deviation(result, name)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -22,9 +22,11 @@ def test_sensor_parameters_are_lens_reference_and_rays_in_the_rig_s_order() -> N
     names = [p.name for p in sensor_parameters(thesis_rig())]
     rays = [f"L{i}.{name}" for i in (1, 2, 3, 4) for name in ("x_mm", "y_mm", "tx", "ty")]
     lens = ["f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"]
-    assert names == [*lens, "offset_mm", "ruler_scale", *rays]
+    tilt, drift = ("target_slope_x", "target_slope_y"), ("drift_u_px", "drift_v_px")
+    reference = ["offset_mm", "ruler_scale", *tilt, *drift]
+    assert names == [*lens, *reference, *rays]
     fisheye = [p.name for p in sensor_parameters(fisheye_rig())]
-    assert fisheye[:9] == ["f_px", "cx_px", "cy_px", "k1", "k2", "k3", "k4", "offset_mm", "ruler_scale"]
+    assert fisheye[:13] == ["f_px", "cx_px", "cy_px", "k1", "k2", "k3", "k4", *reference]
 
 
 def test_priors_are_those_of_the_rig_file() -> None:
@@ -34,6 +36,8 @@ def test_priors_are_those_of_the_rig_file() -> None:
     assert by_name["L1.x_mm"] == (-60.0, 0.2)
     assert by_name["offset_mm"] == (0.0, 5.0)
     assert by_name["p1"][1] == 0.0
+    assert by_name["target_slope_y"] == (0.0, radians(0.5))
+    assert by_name["drift_u_px"] == (0.0, 0.0)
 
 
 def test_a_placement_has_an_error_and_two_slopes_and_belongs_to_no_sensor() -> None:
@@ -68,6 +72,6 @@ def test_a_constant_is_not_free() -> None:
     parameters = (*sensor_parameters(rig), *placement_parameters(rig, ["A"]))
     table = ParameterTable(parameters)
     constants = {p.name for i, p in enumerate(parameters) if i not in table.free}
-    assert constants == {"k2", "p1", "p2", "k3", "L3.tx"}
+    assert constants == {"k2", "p1", "p2", "k3", "L3.tx", "drift_u_px", "drift_v_px"}
     assert table.is_sensor.sum() == len(parameters) - 3
     np.testing.assert_array_equal(table.prior_sd[table.free] > 0, True)

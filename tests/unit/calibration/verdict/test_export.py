@@ -232,7 +232,7 @@ def test_lists_of_different_lengths(path: Path) -> None:
     def change(data: dict[str, Any]) -> None:
         data["laser_ranger"]["parameters"]["sd"].pop()
 
-    assert "sd: expected one for each of 26 names, got 25" in edited(path, change)
+    assert "sd: expected one for each of 30 names, got 29" in edited(path, change)
 
 
 def test_pixels_that_are_not_square(path: Path) -> None:

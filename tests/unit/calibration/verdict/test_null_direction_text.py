@@ -7,13 +7,16 @@ from math import hypot
 import pytest
 
 from tests.support.rigs import prior, thesis_rig
+from workbench.calibration.model.parameters import PRINT, REFERENCE
 from workbench.calibration.verdict.null_direction_text import (
     ACROSS,
     APART,
     BASELINE,
+    BOARD,
     LEAST_PART,
     POINTING,
     REMEDIES,
+    SQUARE,
     UNSEEN,
     ParameterChange,
     ParameterGroup,
@@ -42,6 +45,9 @@ def change(name: str, effect: float, step: float = 1.0, value: float = 100.0) ->
         ("ruler_scale", 0.0, 0.0005, "ruler_scale", 0.05, "%"),
         ("cx_px", 320.0, 2.0, "cx_px", 2.0, "px"),
         ("offset_mm", 0.0, 1.5, "offset_mm", 1.5, "mm"),
+        ("target_slope_x", 0.0, 0.01, "target_slope_x", 0.57294, "deg"),
+        ("target_slope_y", 1.0, 0.01, "target_slope_y", 0.28505, "deg"),
+        ("drift_v_px", 0.0, 0.2, "drift_v_px", 0.2, "px"),
         ("k1", 0.0, 0.1, "k1", 0.1, ""),
     ],
 )
@@ -50,7 +56,7 @@ def test_a_change_is_shown_in_the_unit_of_its_kind(
 ) -> None:
     found = parameter_change(RIG, name, value, step, 3.0)
     assert (found.kind, found.unit, found.effect) == (kind, unit, 3.0)
-    assert found.shown == pytest.approx(shown)
+    assert found.shown == pytest.approx(shown, rel=1e-4)
     assert found.laser == name.rpartition(".")[0]
 
 
@@ -101,12 +107,26 @@ def test_all_lasers_are_not_listed_and_some_are() -> None:
 
 def test_a_better_ruler_is_the_remedy_wherever_a_length_s_scale_takes_part() -> None:
     groups = group_by_kind([change("f_px", 3.0), change("ruler_scale", 3.0), change("L1.x_mm", 3.0)])
-    assert remedy(groups) == REMEDIES["ruler_scale"]
+    assert (remedy(groups),) == REMEDIES["ruler_scale"]
 
 
 def test_remedies_are_those_of_the_kinds_each_once() -> None:
     groups = group_by_kind([change("f_px", 3.0), change("k1", 3.0), change("L1.x_mm", 3.0)])
-    assert remedy(groups).split(" or ") == [REMEDIES[BASELINE], REMEDIES["f_px"]]
+    assert remedy(groups).split(" or ") == [*REMEDIES[BASELINE], *REMEDIES["f_px"]]
+
+
+def test_a_common_tilt_is_measured_or_seen_on_the_board_and_each_remedy_stands_once() -> None:
+    with_baselines = group_by_kind([change("target_slope_x", 3.0), change("L1.x_mm", 3.0)])
+    assert set(remedy(with_baselines).split(" or ")) == {SQUARE, BOARD, *REMEDIES[BASELINE]}
+    with_centre = group_by_kind([change("target_slope_x", 3.0), change("cx_px", 3.0), change("L1.tx", 3.0)])
+    assert remedy(with_centre).split(" or ") == [SQUARE, BOARD]
+
+
+@pytest.mark.parametrize("name", [*REFERENCE, *PRINT])
+def test_what_the_bench_adds_is_no_term_of_the_lens(name: str) -> None:
+    words = describe(RIG, group_by_kind([change(name, 3.0)]))
+    assert f"({name})" in words
+    assert "lens" not in words
 
 
 def test_one_kind_has_no_remedy_and_lasers_by_themselves_want_other_standoffs() -> None:
