@@ -20,8 +20,8 @@ from workbench.procedure.engine.limits import capture_limit_prompts, check_captu
 from workbench.procedure.engine.placements import visit_placements
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import Step, StepModel, flat_placement
+from workbench.procedure.engine.visiting_order import RETURN_AT, returned, shuffled
 from workbench.steps.fit import FitStep
-from workbench.steps.visiting_order import RETURN_AT, returned, shuffled
 
 
 @register

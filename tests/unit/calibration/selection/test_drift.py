@@ -11,7 +11,7 @@ from tests.support.rigs import World, thesis_rig
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.selection.drift import drift_is_shown, drift_test, fit_with_drift, fits_drift
-from workbench.steps.visiting_order import shuffled
+from workbench.procedure.engine.visiting_order import shuffled
 
 RIG = thesis_rig(0.05, 0.048)
 

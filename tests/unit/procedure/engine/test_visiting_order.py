@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from workbench.steps.visiting_order import returned, shuffled
+from workbench.procedure.engine.visiting_order import returned, shuffled
 
 GRIDS = (
     (125.0, 160.0, 210.0, 280.0, 400.0, 600.0, 900.0, 1400.0, 2200.0, 3200.0, 4500.0),
