@@ -83,7 +83,7 @@ class BenchScene:
         else:
             self._surfaces = _surfaces(placement.target, z_mm, error, self._spec.surface)
             self._file.add(placement.key, own)
-        self._key = placement.key
+        self._key = _speckle_key(placement)
         self._spots, self._picture = {}, None
         self.moves += 1
         return placement
@@ -137,6 +137,12 @@ class BenchScene:
             for index, (surface, gain) in enumerate(self._surfaces)
         ]
         return [spot for spot in painted if spot is not None]
+
+
+def _speckle_key(placement: Placement) -> str:
+    """Key of the speckle pattern: each placement has its own, and each displacement along the face."""
+    shift_mm: float = getattr(placement.target, "shift_mm", 0.0)
+    return f"{placement.key}/{shift_mm:g}mm" if shift_mm else placement.key
 
 
 def _surfaces(

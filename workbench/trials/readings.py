@@ -41,12 +41,13 @@ def take_readings(
     Raises:
         StoppedError, LaserOffNotConfirmedError: see `Context.capture`.
     """
-    return [_take_reading(context, ranger, name, placement, number) for number in range(count)]
+    return [take_reading(context, ranger, name, placement, number) for number in range(count)]
 
 
-def _take_reading(
+def take_reading(
     context: Context, ranger: Ranger, name: str, placement: Placement, number: int
 ) -> ReadingTaken:
+    """Take reading `number` (from 0) at a placement, journal and return it; see `take_readings`."""
     scene = f"{placement.key}/{number:02d}"
     reading = acquire(ranger, scene, _capture(context, ranger, placement, scene, number))
     stated = placement.standoff_sd_mm
