@@ -32,7 +32,7 @@ def test_statistics_are_those_of_the_errors() -> None:
 
 
 def test_interval_of_the_mean_counts_placements_and_covers_95_percent() -> None:
-    trials, inside = 400, 0
+    trials, inside = 200, 0
     for seed in range(trials):
         found = row(drawn_levels(seed, [400.0], (1, 5, 6), (0.0, 0.5, 0.3)))
         low, high = found["mean_low_mm"], found["mean_high_mm"]
