@@ -61,6 +61,8 @@ class Terminal:
         """Show one record."""
         self._forecast.take(record)
         match record.event:
+            case ev.CalibrationLoaded() as e:
+                self._console.print(Text(e.text))
             case ev.ProcedureStarted() as e:
                 self._length = e.steps
                 self._console.print(Text.assemble((e.title, "bold"), f" ({e.procedure}, {e.length})"))

@@ -287,6 +287,28 @@ class CalibrationExported(FileModel):
     sha256: str
 
 
+class CalibrationLoaded(FileModel):
+    """The session uses an existing calibration, of which it keeps a copy."""
+
+    kind: Literal["calibration_loaded"] = "calibration_loaded"
+    file: str
+    """File named by the user."""
+    path: str
+    """Copy, relative to the session folder."""
+    sha256: str
+    made: str
+    """Time of the calibration, as in its provenance."""
+    age_days: float | None
+    """Age at the start of the session; None if `made` is no time."""
+
+    @property
+    def text(self) -> str:
+        """Summary in one line."""
+        made = f"made {self.made}" if self.made else "of unknown date"
+        age = "age unknown" if self.age_days is None else f"{self.age_days:.1f} days old"
+        return f"calibration {self.file}, {made}, {age}"
+
+
 class SessionFinished(FileModel):
     """Last record of a session that ended, with or without success."""
 
@@ -313,6 +335,7 @@ Event = Annotated[
     | StandoffAdvised
     | FitFinished
     | CalibrationExported
+    | CalibrationLoaded
     | ReadingTaken
     | TrialProgress
     | TrialFinished

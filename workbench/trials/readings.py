@@ -17,11 +17,12 @@ def session_ranger(context: Context, name: str) -> Ranger:
     """Ranger with the session's calibration, for the step `name`.
 
     Raises:
-        BadInputError: no calibration was exported.
+        BadInputError: there is no calibration.
     """
     if context.calibration is None:
         raise BadInputError(
-            f"step {name}: no calibration; run a procedure with an export step before it in the same command"
+            f"step {name}: no calibration; run a procedure with an export step before it in the same command,"
+            " or name an existing calibration by --calibration FILE"
         )
     return Ranger(context.calibration)
 

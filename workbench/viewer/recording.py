@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 
 from workbench.model import event as ev
+from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.model.spot import Spot
@@ -229,6 +230,13 @@ class _OpenRecording:
     @_log.register
     def _(self, event: ev.CalibrationExported, moment: Moment) -> None:
         steps.log_text(self.stream, f"Calibration written to {event.path}")
+
+    @_log.register
+    def _(self, event: ev.CalibrationLoaded, moment: Moment) -> None:
+        calibration = load_calibration(self._session_dir / event.path)
+        self._geometry = self._geometry.calibrated(calibration)
+        scene.log_sensor(self.stream, self._rig.camera, self._geometry, self._colors)
+        steps.log_text(self.stream, event.text)
 
     @_log.register
     def _(self, event: ev.ReadingTaken, moment: Moment) -> None:

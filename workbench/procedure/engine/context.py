@@ -53,7 +53,7 @@ class Context:
     cross_validation: tuple[CrossValidatedPlacement, ...] = ()
     """Cross-validation of the last accepted fit, by placement."""
     calibration: Calibration | None = None
-    """Exported calibration, used by trials."""
+    """Exported or existing calibration, used by trials."""
     pairs: PairSource = field(init=False)
 
     def __post_init__(self) -> None:
