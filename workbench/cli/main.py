@@ -64,7 +64,7 @@ NoInput = Annotated[
 
 ExistingCalibration = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Existing calibration of this rig, in the place of a fit."),
+    typer.Option(metavar="FILE", help="Existing calibration of this rig, instead of a fit."),
 ]
 
 

@@ -1,4 +1,4 @@
-"""Existing calibration that a session uses in the place of a fit of its own."""
+"""Existing calibration that a session uses instead of a fit of its own."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ class Plan:
     procedures: tuple[Procedure, ...]
     procedure_paths: tuple[Path, ...]
     calibration: ExistingCalibration | None = None
-    """Calibration that the session uses in the place of a fit of its own."""
+    """Calibration that the session uses instead of a fit of its own."""
 
     @classmethod
     def load(cls, rig_path: Path, procedure_paths: Sequence[Path], calibration: Path | None = None) -> Plan:
