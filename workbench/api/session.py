@@ -232,8 +232,8 @@ class Session:
         ]
 
     def _reading_row(self, event: ReadingTaken) -> dict[str, object]:
-        error = None if event.range_mm is None else event.range_mm - event.standoff_mm
-        return event.model_dump(exclude={"lasers", "kind"}) | {"error_mm": error}
+        shown = event.model_dump(include=set(READING_COLUMNS))
+        return shown | {"true_mm": event.reference_mm, "error_mm": event.error_mm, "cause": event.cause}
 
 
 def open_session(folder: str | Path) -> Session:

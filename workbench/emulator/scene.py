@@ -70,7 +70,7 @@ class BenchScene:
         Raises:
             BadInputError: a flat target or the board is turned by 90 degrees or more.
         """
-        own = draw_placement_error(self._rig, self._spec, placement.key)
+        own = draw_placement_error(self._rig, self._spec, placement.key, _turn_sds_deg(placement.target))
         error = replace(
             own,
             yaw_deg=own.yaw_deg + self._truth.target_yaw_deg,
@@ -137,6 +137,14 @@ class BenchScene:
             for index, (surface, gain) in enumerate(self._surfaces)
         ]
         return [spot for spot in painted if spot is not None]
+
+
+def _turn_sds_deg(target: TargetShape) -> tuple[float | None, float | None]:
+    """Standard deviations of yaw and pitch that replace those of the rig: of the angle that was measured."""
+    if not isinstance(target, FlatTarget) or target.turn_sd_deg is None:
+        return None, None
+    about_vertical = abs(target.yaw_deg) >= abs(target.pitch_deg)
+    return (target.turn_sd_deg, None) if about_vertical else (None, target.turn_sd_deg)
 
 
 def _surfaces(

@@ -192,6 +192,8 @@ class CaptureTaken(FileModel):
     scene: str | None = None
     laser_id: str
     """`all` if every laser is on; `board` for a frame of the board in room light, all lasers off."""
+    left_off: tuple[str, ...] = ()
+    """Lasers that were left off although the capture is one of all lasers."""
     placement_key: str
     standoff_mm: float
     standoff_sd_mm: float | None = None

@@ -14,6 +14,7 @@ from types import TracebackType
 from workbench.model import event as ev
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError
+from workbench.model.reading_text import reading_remark
 from workbench.model.rig import Rig
 from workbench.model.spot import Spot
 from workbench.model.target import Placement
@@ -248,6 +249,8 @@ class _OpenRecording:
         if event.status != "done":
             text = f"{event.scene}, reading {event.reading} at {event.standoff_mm:g} mm: {event.status}"
             steps.log_text(self.stream, text, steps.WARN)
+        if remark := reading_remark(event):
+            steps.log_text(self.stream, remark, steps.WARN)
 
     @_log.register
     def _(self, event: ev.TrialFinished, moment: Moment) -> None:
