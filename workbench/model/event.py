@@ -30,6 +30,7 @@ from workbench.model.trial_event import LaserRange as LaserRange
 from workbench.model.trial_event import ReadingTaken as ReadingTaken
 from workbench.model.trial_event import TrialFinished as TrialFinished
 from workbench.model.trial_event import TrialProgress as TrialProgress
+from workbench.model.trial_event import TrueValues as TrueValues
 from workbench.model.yamlfile import FileModel
 
 

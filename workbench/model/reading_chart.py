@@ -40,7 +40,7 @@ def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
 
 def _ranges(reading: ReadingTaken) -> list[tuple[str, float, float]]:
     """Name, range and stated standard uncertainty (mm) of every laser and of the sensor itself."""
-    lasers = reading.lasers if reading.true_mm is None else ()
+    lasers = reading.lasers if reading.true is None else ()
     ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in lasers]
     if reading.range_mm is not None and reading.sigma_mm is not None:
         ranges.append((SENSOR, reading.range_mm, reading.sigma_mm))

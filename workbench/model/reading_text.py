@@ -8,13 +8,12 @@ from workbench.model.trial_event import ReadingTaken
 
 def reading_remark(reading: ReadingTaken) -> str:
     """Remark on a reading in one line; empty for one with a range inside its 95 % interval."""
-    where = f"{reading.reference_mm:.6g} mm, reading {reading.reading}"
-    error, half = reading.error_mm, reading.half_interval_mm
+    off = f" ({', '.join(reading.left_off)} off)" if reading.left_off else ""
+    where = f"{reading.reference_mm:.6g} mm, reading {reading.reading}{off}"
+    error, interval = reading.error_mm, reading.interval_mm
     if error is None:
         return f"{where}: no range: {reading.cause}"
-    if half is None or not reading.is_outside:
+    if interval is None or not reading.is_outside:
         return ""
-    return (
-        f"{where}: error {significant(error, half)} mm, outside its 95 % interval of"
-        f" +-{significant(half, half)} mm"
-    )
+    low, high = (significant(end, abs(error)) for end in interval)
+    return f"{where}: error {significant(error, abs(error))} mm, outside its 95 % interval {low} to {high} mm"

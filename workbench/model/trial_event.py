@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import hypot
+from math import hypot, inf
 from typing import Literal
 
 from workbench.model.chart import Chart
@@ -32,6 +32,20 @@ class LaserRange(FileModel):
     """Upper end of the 95 % interval, which is not symmetric; None if it reaches infinity."""
 
 
+class TrueValues(FileModel):
+    """True values of the readings at one placement, with their reference uncertainties (1 sigma)."""
+
+    range_mm: float
+    """Closest range over the front."""
+    range_sd_mm: float
+    angle_deg: float | None = None
+    """None: the target is no incline."""
+    angle_sd_deg: float | None = None
+    radius_mm: float | None = None
+    """None: the target is no cylinder."""
+    radius_sd_mm: float | None = None
+
+
 class ReadingTaken(FileModel):
     """One reading of a trial."""
 
@@ -47,11 +61,15 @@ class ReadingTaken(FileModel):
     """Stated standard uncertainty of `range_mm`."""
     reference_sd_mm: float | None = None
     """Reference uncertainty of the true range; None if unknown."""
-    true_mm: float | None = None
-    """True range, if it is not `standoff_mm`: the target is no flat across the axis."""
+    true: TrueValues | None = None
+    """True values of a reading of the closest range; None: the range is that of a flat at `standoff_mm`."""
     closest_mm: float | None = None
     """Smallest range over the front, which `workbench range` prints."""
     closest_sigma_mm: float | None = None
+    low_mm: float | None = None
+    """Lower end of the sensor's 95 % interval of `range_mm`; None: that of `sigma_mm`."""
+    high_mm: float | None = None
+    """Upper end; None with a lower end: it reaches infinity."""
     shape: str = ""
     """Shape in front of each line of lasers, as `workbench range` names it; empty without a range."""
     angle_deg: float | None = None
@@ -61,6 +79,9 @@ class ReadingTaken(FileModel):
     radius_mm: float | None = None
     """Radius of the cylinder through the lasers' points; None where none is determined."""
     radius_sd_mm: float | None = None
+    cylinder_mm: float | None = None
+    """Closest range over the front by that cylinder."""
+    cylinder_sd_mm: float | None = None
     left_off: tuple[str, ...] = ()
     """Lasers that were left off."""
     notes: tuple[str, ...] = ()
@@ -70,7 +91,7 @@ class ReadingTaken(FileModel):
     @property
     def reference_mm(self) -> float:
         """True value of `range_mm`."""
-        return self.standoff_mm if self.true_mm is None else self.true_mm
+        return self.standoff_mm if self.true is None else self.true.range_mm
 
     @property
     def error_mm(self) -> float | None:
@@ -78,17 +99,25 @@ class ReadingTaken(FileModel):
         return None if self.range_mm is None else self.range_mm - self.reference_mm
 
     @property
-    def half_interval_mm(self) -> float | None:
-        """Half width of the 95 % interval of the error, by sensor and reference; None if one is unknown."""
-        if self.sigma_mm is None or self.reference_sd_mm is None:
+    def interval_mm(self) -> tuple[float, float] | None:
+        """95 % interval of the true range, by sensor and reference; None if either is unknown.
+
+        The upper end may be infinite.
+        """
+        if self.range_mm is None or self.sigma_mm is None or self.reference_sd_mm is None:
             return None
-        return COVERAGE_FACTOR * hypot(self.sigma_mm, self.reference_sd_mm)
+        reference_mm = COVERAGE_FACTOR * self.reference_sd_mm
+        below_mm = above_mm = COVERAGE_FACTOR * self.sigma_mm
+        if self.low_mm is not None:
+            below_mm = self.range_mm - self.low_mm
+            above_mm = inf if self.high_mm is None else self.high_mm - self.range_mm
+        return self.range_mm - hypot(below_mm, reference_mm), self.range_mm + hypot(above_mm, reference_mm)
 
     @property
     def is_outside(self) -> bool:
-        """Whether the error lies outside its 95 % interval; False if that is not known."""
-        error, half = self.error_mm, self.half_interval_mm
-        return error is not None and half is not None and abs(error) > half
+        """Whether the true range lies outside the 95 % interval; False if that is not known."""
+        interval = self.interval_mm
+        return interval is not None and not interval[0] <= self.reference_mm <= interval[1]
 
     @property
     def cause(self) -> str:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, isfinite
 
 from workbench.model.errors import BadInputError
-from workbench.model.event import ReadingTaken
-from workbench.model.rig import ImageAxis
+from workbench.model.event import ReadingTaken, TrueValues
+from workbench.model.rig import ImageAxis, Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.ranging.shape import Shape
+from workbench.sensor.calibrated import CalibratedSensor
 from workbench.spots import Finding
-from workbench.trials.targets import TrueValues
+from workbench.trials.targets import TargetSpec, front_axis, true_values
 
 
 @dataclass(frozen=True)
@@ -23,10 +24,18 @@ class ClosestRange:
     """Readings of the closest range over the front, instead of the range of a flat across the axis."""
 
     true: TrueValues
+    front_mm: tuple[float, float]
+    """Ends of the front."""
     axis: ImageAxis = "u"
     """Line of lasers whose shape gives angle and radius."""
     left_off: tuple[str, ...] = ()
     """Lasers that stay off as if they had failed."""
+
+    @classmethod
+    def of(cls, target: TargetSpec, placed: Placement, sensor: CalibratedSensor, rig: Rig) -> ClosestRange:
+        """Readings of a target at a placement as measured."""
+        axis = front_axis(target)
+        return cls(true_values(target, placed, sensor, rig), sensor.front_mm(axis), axis)
 
 
 def session_ranger(context: Context, name: str) -> Ranger:
@@ -115,11 +124,12 @@ def _closest_reading(taken: ReadingTaken, reading: Reading, closest: ClosestRang
         update={
             "range_mm": reading.closest_mm,
             "sigma_mm": reading.sigma_mm,
-            "true_mm": closest.true.range_mm,
+            **_interval(reading),
+            "true": closest.true,
             "reference_sd_mm": closest.true.range_sd_mm,
             "left_off": closest.left_off,
             **_angle(shape),
-            **_radius(shape),
+            **_cylinder(shape, closest.front_mm),
         }
     )
 
@@ -130,10 +140,23 @@ def _angle(shape: Shape | None) -> dict[str, float]:
     return {"angle_deg": degrees(shape.angle_rad), "angle_sd_deg": degrees(shape.angle_sigma_rad)}
 
 
-def _radius(shape: Shape | None) -> dict[str, float]:
-    if shape is None or shape.cylinder is None:
+def _cylinder(shape: Shape | None, front_mm: tuple[float, float]) -> dict[str, float]:
+    if shape is None or (cylinder := shape.cylinder) is None:
         return {}
-    return {"radius_mm": shape.cylinder.radius_mm, "radius_sd_mm": shape.cylinder.radius_sigma_mm}
+    nearest = cylinder.closest(front_mm)
+    return {
+        "radius_mm": cylinder.radius_mm,
+        "radius_sd_mm": cylinder.radius_sigma_mm,
+        "cylinder_mm": nearest.range_mm,
+        "cylinder_sd_mm": nearest.sigma_mm,
+    }
+
+
+def _interval(reading: Reading) -> dict[str, float | None]:
+    if reading.interval_mm is None:
+        return {}
+    low_mm, high_mm = reading.interval_mm
+    return {"low_mm": low_mm, "high_mm": high_mm if isfinite(high_mm) else None}
 
 
 def _capture(

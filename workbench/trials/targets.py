@@ -1,18 +1,18 @@
 """Targets of trials as in a procedure file, their placements, and the true values of their readings.
 
-The range of a trial is the number that `workbench range` prints: the closest range over the front, between the
-origins of the outer lasers of a line.
+The range of a trial is the number that `workbench range` prints: the closest range over the front, between
+the origins of the outer lasers of a line.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import cos, hypot, radians, sqrt, tan
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
 from workbench.model.errors import BadInputError
+from workbench.model.event import TrueValues
 from workbench.model.rig import LARGEST, ImageAxis, NonNegativeFloat, Rig
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 from workbench.model.yamlfile import FileModel
@@ -70,18 +70,6 @@ class CylinderSpec(FileModel):
 TargetSpec = Annotated[FlatTargetSpec | InclineSpec | CylinderSpec, Field(discriminator="kind")]
 
 
-@dataclass(frozen=True)
-class TrueValues:
-    """True values of the readings at one placement, with their reference uncertainties (1 sigma)."""
-
-    range_mm: float
-    range_sd_mm: float
-    angle_deg: float | None = None
-    angle_sd_deg: float | None = None
-    radius_mm: float | None = None
-    radius_sd_mm: float | None = None
-
-
 def front_axis(spec: TargetSpec) -> ImageAxis:
     """Image axis of the line of lasers that measures the target's angle or radius."""
     return "v" if isinstance(spec, InclineSpec) and spec.axis == "horizontal" else "u"
@@ -120,17 +108,23 @@ def target_placement(spec: TargetSpec, key: str, range_mm: float, rig: Rig) -> P
 
 
 def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, rig: Rig) -> TrueValues:
-    """True values at a placement as measured; the front is that of the calibration."""
-    standoff_sd_mm = rig.bench.placement_sd_mm if placed.standoff_sd_mm is None else placed.standoff_sd_mm
+    """True values at a placement as measured; the front is that of the calibration.
+
+    The closest range of a flat target has the uncertainty of its squareness too: its near end is closer.
+    """
+    bench, stated = rig.bench, placed.standoff_sd_mm
+    standoff_sd_mm = bench.placement_sd_mm if stated is None else stated
     if isinstance(spec, FlatTargetSpec):
-        return TrueValues(placed.standoff_mm, standoff_sd_mm)
+        tilt_sd = radians(hypot(bench.tilt_sd_deg, bench.target_tilt_sd_deg))
+        lead_sd_mm = tilt_sd * _half_front_mm(sensor)
+        return TrueValues(range_mm=placed.standoff_mm, range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm))
     front = sensor.front_mm(front_axis(spec))
     if isinstance(spec, CylinderSpec):
         recess_mm = _cylinder_recess_mm(spec, front)
         radius_sd_mm = spec.diameter_sd_mm / 2
         return TrueValues(
-            placed.standoff_mm + recess_mm,
-            standoff_sd_mm,
+            range_mm=placed.standoff_mm + recess_mm,
+            range_sd_mm=standoff_sd_mm,
             radius_mm=spec.diameter_mm / 2,
             radius_sd_mm=radius_sd_mm,
         )
@@ -138,8 +132,8 @@ def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, r
     arm_mm = lead_mm / tan(radians(abs(spec.angle_deg)))
     lead_sd_mm = arm_mm / cos(radians(spec.angle_deg)) ** 2 * radians(spec.reference_sd_deg)
     return TrueValues(
-        placed.standoff_mm - lead_mm,
-        hypot(standoff_sd_mm, lead_sd_mm),
+        range_mm=placed.standoff_mm - lead_mm,
+        range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm),
         angle_deg=spec.angle_deg,
         angle_sd_deg=spec.reference_sd_deg,
     )
@@ -149,6 +143,12 @@ def _rig_front(spec: TargetSpec, rig: Rig) -> list[float]:
     """Positions of the lasers of the line across the target, mm along x or y, as designed."""
     axis = front_axis(spec)
     return [(laser.x_mm if axis == "u" else laser.y_mm).value for laser in rig.lasers if laser.axis == axis]
+
+
+def _half_front_mm(sensor: CalibratedSensor) -> float:
+    """Largest distance of a laser from the optical axis along its line: the arm of a target's tilt."""
+    axes: tuple[ImageAxis, ...] = ("u", "v")
+    return max(abs(end) for axis in axes if len(sensor.lasers_on(axis)) for end in sensor.front_mm(axis))
 
 
 def _incline_lead_mm(spec: InclineSpec, front_mm: tuple[float, float]) -> float:

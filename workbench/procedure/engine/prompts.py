@@ -11,8 +11,8 @@ from workbench.model.target import BoardTarget, CylinderTarget, FlatTarget, Plac
 SAFETY = "safety"
 """Key of the confirmation before the first emission; asked again when a session is resumed."""
 SPECULAR = (
-    "WARNING: a glossy cylinder reflects the beams sideways like a mirror. Cover it with matt white paper, and"
-    " keep eyes and shiny things out of the plane of the beams."
+    "WARNING: a glossy cylinder reflects the beams sideways like a mirror. Cover it with matt white paper,"
+    " and keep eyes and shiny things out of the plane of the beams."
 )
 """Warning before a beam meets a curved surface, which spreads specular reflections in its plane."""
 MISREAD = 0.1

@@ -22,6 +22,7 @@ class InclineTrialStep(StepModel):
     """Range a flat target turned by set angles; give the errors of range, angle, and angle differences."""
 
     needs: ClassVar[str | None] = "calibration"
+    gives: ClassVar[str | None] = "readings"
     step: Literal["incline_trial"]
     ranges_mm: Standoffs
     """Closest ranges over the front, at which the near end of the target is placed."""

@@ -22,7 +22,6 @@ from workbench.trials.incline.set_up import SetUp
 from workbench.trials.incline.statistics import AngleDifference, InclineRow, angle_differences, incline_row
 from workbench.trials.readings import ClosestRange, session_ranger, take_readings
 from workbench.trials.results import finish_trial
-from workbench.trials.targets import front_axis, true_values
 
 SET_UP = (
     Column(key="angle_deg", name="set", unit="deg"),
@@ -43,8 +42,7 @@ def run_trial(context: Context, name: str, set_ups: Sequence[SetUp], count: int)
 
     def work(placed: Placement) -> tuple[InclineRow, list[ReadingTaken]]:
         set_up = by_key[placed.key]
-        true = true_values(set_up.target, placed, ranger.sensor, context.rig)
-        closest = ClosestRange(true, front_axis(set_up.target))
+        closest = ClosestRange.of(set_up.target, placed, ranger.sensor, context.rig)
         readings = take_readings(context, ranger, name, placed, count, closest)
         return incline_row(set_up.target, set_up.range_mm, readings), readings
 

@@ -21,6 +21,7 @@ class RoundTrialStep(StepModel):
     """Range a cylinder; give tables of the errors of range and radius. The prompts warn of reflections."""
 
     needs: ClassVar[str | None] = "calibration"
+    gives: ClassVar[str | None] = "readings"
     step: Literal["round_trial"]
     ranges_mm: Standoffs
     """Closest ranges over the front: of the cylinder's nearest line, if it faces the front."""

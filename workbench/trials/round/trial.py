@@ -23,7 +23,7 @@ from workbench.trials.errors import (
 )
 from workbench.trials.readings import ClosestRange, session_ranger, take_readings
 from workbench.trials.results import finish_trial
-from workbench.trials.targets import CylinderSpec, true_values
+from workbench.trials.targets import CylinderSpec
 
 CAPTION = "U: expanded uncertainty (k = 2) of the error, by sensor and reference"
 
@@ -40,8 +40,8 @@ def run_trial(
     ranger = session_ranger(context, name)
 
     def work(placed: Placement) -> list[ReadingTaken]:
-        true = true_values(target, placed, ranger.sensor, context.rig)
-        return take_readings(context, ranger, name, placed, count, ClosestRange(true))
+        closest = ClosestRange.of(target, placed, ranger.sensor, context.rig)
+        return take_readings(context, ranger, name, placed, count, closest)
 
     taken = visit_placements(context, placements, work)
     readings = [reading for of in taken for reading in of]
@@ -56,6 +56,15 @@ def run_trial(
     return f"{len(readings)} readings, {radii} with a radius, tables in {name}.csv and {name}-radius.csv"
 
 
+def cylinder_statistics(readings: Sequence[ReadingTaken]) -> ErrorStatistics:
+    """Statistics of the errors of the closest range by the cylinder at one placement, mm."""
+    return error_statistics(
+        [None if r.cylinder_mm is None else r.cylinder_mm - r.reference_mm for r in readings],
+        [r.cylinder_sd_mm for r in readings],
+        readings[0].reference_sd_mm or 0.0,
+    )
+
+
 def radius_statistics(target: CylinderSpec, readings: Sequence[ReadingTaken]) -> ErrorStatistics:
     """Statistics of the radius errors at one placement, mm."""
     true_mm = target.diameter_mm / 2
@@ -67,15 +76,17 @@ def radius_statistics(target: CylinderSpec, readings: Sequence[ReadingTaken]) ->
 
 
 def round_tables(name: str, target: CylinderSpec, taken: Sequence[Sequence[ReadingTaken]]) -> list[Table]:
-    """Tables of the errors of range and radius, one row per placement."""
+    """Tables of the errors of the range as printed, the range by the cylinder, and the radius."""
     columns = (Column(key="true_mm", name="true", unit="mm", format=".1f"), *error_columns("mm", ".2f"))
     true_mm = [readings[0].reference_mm for readings in taken]
     ranges = [error_cells(range_statistics(of), mm) for mm, of in zip(true_mm, taken, strict=True)]
+    by_cylinder = [error_cells(cylinder_statistics(of), mm) for mm, of in zip(true_mm, taken, strict=True)]
     radii = [error_cells(radius_statistics(target, of), target.diameter_mm / 2) for of in taken]
     return [
         Table(name=table, title=title, columns=columns, rows=_rows(true_mm, cells), caption=CAPTION)
         for table, title, cells in (
-            (name, "Cylinder: error of the closest range", ranges),
+            (name, "Cylinder: error of the closest range as `workbench range` prints it", ranges),
+            (f"{name}-cylinder", "Cylinder: error of the closest range by the fitted cylinder", by_cylinder),
             (
                 f"{name}-radius",
                 f"Cylinder: error of the radius, true {target.diameter_mm / 2:g} mm",
