@@ -27,10 +27,11 @@ def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
     """
     points = [(reading, *one) for reading in readings for one in _ranges(reading)]
     names = [*dict.fromkeys(name for _, name, _, _ in points if name != SENSOR), SENSOR]
+    label = "standoff" if all(reading.true is None for reading in readings) else "true range"
     return Chart(
         name=name,
         title="Error of every reading, bars stated u",
-        x=Axis(label="true range", unit="mm", scale="log"),
+        x=Axis(label=label, unit="mm", scale="log"),
         y=Axis(label="error", unit="%"),
         series=tuple(
             _series(name, [(r, mm, sd) for r, of, mm, sd in points if of == name]) for name in names
