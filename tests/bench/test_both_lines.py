@@ -25,7 +25,8 @@ def rig_of(seed: int, axes: str) -> Rig:
     """The rig of both lines on a bench where every target stands exactly as it is put."""
     rig = load_rig(ROOT / "rigs/thesis-both-emulated.yaml")
     lasers = tuple(laser for laser in rig.lasers if laser.axis in axes)
-    exact = rig.bench.model_copy(update={"placement_sd_mm": 0.0, "tilt_sd_deg": 0.0})
+    steady = {"placement_sd_mm": 0.0, "tilt_sd_deg": 0.0, "target_tilt_sd_deg": 0.0}
+    exact = rig.bench.model_copy(update=steady)
     return rig.model_copy(update={"lasers": lasers, "bench": exact, "emulator": {"seed": seed}})
 
 

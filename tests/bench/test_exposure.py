@@ -24,7 +24,7 @@ from workbench.ranging.ranger import Ranger
 from workbench.session.capture_table import write_capture_table
 from workbench.session.journal import read_journal
 
-CAPTURES = PROCEDURE[: PROCEDURE.index("  - step: fit")].replace("[300, 600, 1500]", "[130, 600, 2500]")
+CAPTURES = PROCEDURE[: PROCEDURE.index("  - step: fit")].replace("[300, 600, 1500]", "[140, 600, 2500]")
 
 
 def session(folder: Path, emulator: str = "", stop_after: int | None = None) -> Path:
@@ -51,7 +51,7 @@ def found(session: Path) -> list[ev.SpotsFound]:
 
 
 def test_spots_are_bright_and_whole_at_every_standoff(tmp_path: Path) -> None:
-    """At 2.5 m light is thinner by more than a hundred times than at 130 mm."""
+    """At 2.5 m light is thinner by more than a hundred times than at 140 mm."""
     done = session(tmp_path / "a")
     settings = told(done)
     assert [e.verdict for e in settings] == ["good"] * 3

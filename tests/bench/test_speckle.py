@@ -22,7 +22,8 @@ PLACEMENTS = 60
 def test_spots_scatter_by_speckle_as_the_rig_file_says(tmp_path: Path, name: str, standoff_mm: float) -> None:
     """Two frames of a placement share its speckle; whatever else they share is left out here."""
     rig = load_rig(RIGS / f"{name}.yaml")
-    still = rig.bench.model_copy(update={"placement_sd_mm": 0.0, "tilt_sd_deg": 0.0})
+    steady = {"placement_sd_mm": 0.0, "tilt_sd_deg": 0.0, "target_tilt_sd_deg": 0.0}
+    still = rig.bench.model_copy(update=steady)
     rig = rig.model_copy(update={"bench": still})
     lasers = rig.laser_ids[:4]
     found = []

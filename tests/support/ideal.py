@@ -49,6 +49,7 @@ def ideal_rig(
     for key, value in emulator.items():
         block[key] = {**block.get(key, {}), **value} if isinstance(value, dict) else value
     default = {"width_px": 640, "height_px": 480, "f_px": exact(F), "cx_px": exact(CX), "cy_px": exact(CY)}
+    default |= {"p1": exact(0.0), "p2": exact(0.0)}
     return Rig.model_validate(
         {
             "format": 1,

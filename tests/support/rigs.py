@@ -57,6 +57,8 @@ def thesis_rig(noise_px: float = 0.03, speckle_px: float = 0.04) -> Rig:
             cy_px=prior(239.5, 40.0),
             k1=prior(0.0, 0.3),
             k2=prior(0.0, 0.3),
+            p1=prior(0.0, 0.0),
+            p2=prior(0.0, 0.0),
         ),
         lasers=lasers,
         bench=BenchSpec(

@@ -23,7 +23,16 @@ BOARD = "board"
 REQUIRED = ("laser_id", "standoff_mm", "repeat")
 IMAGES = ("on", "off")
 POSITION = ("u_px", "v_px")
-OPTIONAL = ("scene", "standoff_sd_mm", "u_sd_px", "v_sd_px", "tilt_deg", "exposure", "exposure_unit")
+OPTIONAL = (
+    "scene",
+    "placement",
+    "standoff_sd_mm",
+    "u_sd_px",
+    "v_sd_px",
+    "tilt_deg",
+    "exposure",
+    "exposure_unit",
+)
 LARGEST = 1e6
 """Largest accepted number of millimetres or pixels."""
 NEAREST_MM = 1e-3
@@ -53,6 +62,8 @@ class CaptureRow(FileModel):
     v_px: Pixels = nan
     scene: str = ""
     """Empty if not stated."""
+    placement: str = ""
+    """Name of the placement for a fit; empty: the scene, or else the standoff, is the placement."""
     standoff_sd_mm: Annotated[Millimetres, Field(ge=0)] = nan
     u_sd_px: PixelSd = nan
     v_sd_px: PixelSd = nan

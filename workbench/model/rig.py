@@ -66,6 +66,10 @@ def _slope(angle_deg: float, sd_deg: float) -> Prior:
     return Prior(value=slope, sd=radians(sd_deg) * (1.0 + slope**2))
 
 
+DECENTRED = Prior(value=0.0, sd=0.002)
+"""Tangential distortion of a lens about which nothing is stated: no lens is centred exactly."""
+
+
 class CameraSpec(FileModel):
     """Camera: image format, and the lens according to its data sheet."""
 
@@ -73,14 +77,14 @@ class CameraSpec(FileModel):
     height_px: Annotated[int, Field(gt=0, le=MOST_PX)]
     bits: Annotated[int, Field(ge=8, le=16)] = 8
     lens: LensName = "plumb_bob"
-    """Lens model; it selects the distortion coefficients below. Other coefficients must be 0 exactly."""
+    """Lens model; it selects the distortion coefficients below. Other coefficients are not used."""
     f_px: Prior
     cx_px: Prior
     cy_px: Prior
     k1: Prior = exactly(0.0)
     k2: Prior = exactly(0.0)
-    p1: Prior = exactly(0.0)
-    p2: Prior = exactly(0.0)
+    p1: Prior = DECENTRED
+    p2: Prior = DECENTRED
     k3: Prior = exactly(0.0)
     k4: Prior = exactly(0.0)
 
@@ -88,7 +92,11 @@ class CameraSpec(FileModel):
     @classmethod
     def _is_of_the_lens(cls, prior: Prior, info: ValidationInfo) -> Prior:
         lens: LensName | None = info.data.get("lens")  # None: the lens itself is not valid
-        if lens is not None and info.field_name not in COEFFICIENTS[lens] and prior != exactly(0.0):
+        if (
+            lens is not None
+            and info.field_name not in COEFFICIENTS[lens]
+            and prior not in (exactly(0.0), DECENTRED)
+        ):
             raise ValueError(
                 f"expected coefficients of the lens {lens} ({', '.join(COEFFICIENTS[lens])}), got"
                 f" {info.field_name}; remove it, or name another lens in camera.lens"

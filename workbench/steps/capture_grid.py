@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from workbench.model.event import StandoffAdvised
 from workbench.model.fields import Count, Standoffs, require_different
@@ -20,6 +20,7 @@ from workbench.procedure.engine.limits import capture_limit_prompts, check_captu
 from workbench.procedure.engine.placements import visit_placements
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import Step, StepModel, flat_placement
+from workbench.procedure.engine.visiting_order import RETURN_AT, returned, shuffled
 from workbench.steps.fit import FitStep
 
 
@@ -31,6 +32,10 @@ class CaptureGridStep(StepModel):
     step: Literal["capture_grid"]
     standoffs_mm: Standoffs
     repeats: Count
+    order: Literal["as_listed", "shuffled"] = "as_listed"
+    """`shuffled`: an order, always the same, in which a drift of the image does not follow the standoff."""
+    returns: Annotated[int, Field(ge=0, le=len(RETURN_AT))] = 0
+    """Number of standoffs that are visited again at the end, as another placement, to show a drift."""
     limits: CaptureLimits = CaptureLimits()
 
     @model_validator(mode="after")
@@ -41,15 +46,26 @@ class CaptureGridStep(StepModel):
     @property
     def title(self) -> str:
         """Number of standoffs and of pairs."""
-        return f"Capture at {len(self.standoffs_mm)} standoffs, {self.repeats} pairs per laser"
+        again = f" and {len(self.visits_mm) - len(self.standoffs_mm)} again" if self.returns else ""
+        return f"Capture at {len(self.standoffs_mm)} standoffs{again}, {self.repeats} pairs per laser"
+
+    @property
+    def visits_mm(self) -> tuple[float, ...]:
+        """Standoffs in the order of the placements, with those that are visited again at the end."""
+        order = shuffled(self.standoffs_mm) if self.order == "shuffled" else tuple(self.standoffs_mm)
+        return order + returned(order, self.returns)
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
-        """One placement per standoff."""
-        return [flat_placement(name, standoff_mm) for standoff_mm in self.standoffs_mm]
+        """One placement per standoff, then those that are visited again."""
+        first = len(self.standoffs_mm)
+        return [
+            *(flat_placement(name, standoff_mm) for standoff_mm in self.visits_mm[:first]),
+            *(flat_placement(name, standoff_mm, 2) for standoff_mm in self.visits_mm[first:]),
+        ]
 
     def captures(self, rig: Rig) -> int:
         """Number of pairs of all lasers over all standoffs."""
-        return len(self.standoffs_mm) * self.repeats * len(rig.lasers)
+        return len(self.visits_mm) * self.repeats * len(rig.lasers)
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
         """Prompts of the placements, then those of limits with `on_fail: ask`."""
@@ -90,5 +106,5 @@ def _next_fit(steps: Sequence[Step], index: int) -> tuple[tuple[float, ...], Fit
     for number, step in enumerate(steps[index:], start=index):
         if isinstance(step, FitStep):
             grids = [one for one in steps[:number] if isinstance(one, CaptureGridStep)]
-            return tuple(standoff for grid in grids for standoff in grid.standoffs_mm), step
+            return tuple(standoff for grid in grids for standoff in grid.visits_mm), step
     return None

@@ -81,7 +81,7 @@ def test_one_frame_of_a_pair(refused: Refused, calibration: Path, tmp_path: Path
     frame(tmp_path / "on.png")
     said = refused(table(tmp_path, "all,,0,on.png,off.png"), calibration)
     assert "row 2" in said
-    assert "row 2, column off: expected an image, there is no file" in said
+    assert "row 2, column off: no such file" in said
 
 
 def test_frames_of_another_size(refused: Refused, calibration: Path, tmp_path: Path) -> None:

@@ -54,7 +54,8 @@ def test_not_as_many_spots_as_lasers(coplanar: Ranger, count: int) -> None:
     assert reading.status == ("not_enough_points" if count else "no_points")
     assert reading.closest_mm is None
     assert reading.lasers == ()
-    too_many = ["more spots than lasers: is this the calibration of this sensor?"] if count == 5 else []
+    note = "more spots than lasers: check that this is the calibration of this sensor"
+    too_many = [note] if count == 5 else []
     assert list(reading.notes[1:]) == too_many
 
 

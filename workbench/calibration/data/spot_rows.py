@@ -142,7 +142,7 @@ def _see_board(rig: Rig, key: str, rows: Sequence[CaptureRow]) -> BoardView | Re
 
 
 def _placement(row: CaptureRow) -> str:
-    return row.scene or f"{row.standoff_mm:g} mm"
+    return row.placement or row.scene or f"{row.standoff_mm:g} mm"
 
 
 def _sight_row(rig: Rig, row: CaptureRow) -> Observation | Rejected:

@@ -14,6 +14,7 @@ from workbench.calibration.checks.faults import find_faults, refuses
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.checks.residuals import explain, residual_tests
 from workbench.calibration.estimation.fit import CalibrationFit
+from workbench.calibration.selection.drift import drift_test, fits_drift
 from workbench.calibration.verdict.observability import NullDirection, direction_lines
 from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import FloatArray
@@ -27,6 +28,10 @@ DOUBT_P = 0.005
 """Probability that the priors of a sound fit raise a warning, one by one; the same for all together."""
 WARNED_P = 0.01
 """P value of the placement errors below which their scatter is a warning."""
+NOTICED_SD = 3.4
+"""A drift of this many standard deviations is noticed in half of the sessions (`drift.SHOWN_P`)."""
+LARGEST_HIDDEN_PX = 0.2
+"""Drift that a session must be able to show; otherwise its order of captures is a note."""
 SPECKLE_SCALE = 1.5
 """Noise scale from which a missing speckle_sd_px is named as the cause."""
 DATA_SHARE_DETERMINED = 0.9
@@ -295,6 +300,12 @@ def _warnings(fit: CalibrationFit) -> list[str]:
         warnings.append(
             f"placements scatter {fit.placement_scale:.1f} times more than stated"
             f" (bench.placement_sd_mm {fit.rig.bench.placement_sd_mm:g}); their sd is scaled by this factor."
+        )
+    if not fits_drift(fit.rig) and (hidden := NOTICED_SD * drift_test(fit).sd_px.max()) > LARGEST_HIDDEN_PX:
+        warnings.append(
+            f"a drift of the image of up to {hidden:.2g} px over the session would not be noticed (expected"
+            f" {LARGEST_HIDDEN_PX:g} px at most), because it follows the standoff. Do: visit the standoffs in"
+            " shuffled order (order: shuffled), and return to two of them at the end (returns: 2)."
         )
     if np.any(fit.drift_px):
         warnings.append(

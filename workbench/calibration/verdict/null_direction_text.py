@@ -21,7 +21,7 @@ BASELINE = "baseline"
 ACROSS = "position across the baseline"
 POINTING = {"tx": "pointing along u", "ty": "pointing along v"}
 BOARD = "use the printed board"
-SQUARE = "measure the target's tilt with a square or level"
+SQUARE = "measure the target's tilt with a square"
 REMEDIES: dict[str, tuple[str, ...]] = {
     "ruler_scale": ("check the ruler against a more accurate one",),
     **dict.fromkeys(PRINT, ("check the board's printed ruler against a steel ruler",)),

@@ -201,10 +201,10 @@ def test_more_repeats_at_one_placement_do_not_wash_out_its_error() -> None:
 def test_what_captures_state_of_a_placement_replaces_the_rig_s_prior() -> None:
     rig = thesis_rig()
     observations = World(rig, 1).observations(repeats=1)
-    told = [replace(s, standoff_sd_mm=0.01, yaw_deg=2.0) for s in observations]
+    told = [replace(s, standoff_sd_mm=0.4, yaw_deg=2.0) for s in observations]
     result = fit(rig, told)
     by_name = {p.name: p.prior for p in result.table.parameters}
-    assert by_name["125.error_mm"].sd == 0.01
+    assert by_name["125.error_mm"].sd == 0.4 * result.placement_scale
     slope = np.tan(np.radians(2.0))
     assert by_name["125.slope_x"].value == pytest.approx(slope)
     assert by_name["125.slope_x"].sd == pytest.approx(np.radians(0.5) * (1 + slope**2))

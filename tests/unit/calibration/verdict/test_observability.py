@@ -127,7 +127,7 @@ def test_a_common_tilt_trades_with_image_centre_and_pointing_where_the_lens_bend
     assert tilt.hurts_ranges
     # The nearest ranges, of lasers 60 mm off the axis: the slope over b / z, and what goes with it.
     assert tilt.relative_range_change > 0.2 * tilt.change["target_slope_x"]
-    assert {SQUARE, BOARD} == set(tilt.remedy.split(", or "))
+    assert {SQUARE, BOARD} == set(tilt.remedy.split(" or "))
     assert not found["target_slope_y"].hurts_ranges
 
 

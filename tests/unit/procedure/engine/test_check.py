@@ -77,15 +77,15 @@ def test_an_unknown_kind_of_step_is_answered_with_the_nearest_names_first(tmp_pa
     ("old", "new", "found"),
     [
         ("f_px: {value: 533.3, sd: 26.7} ", "f_px: 533.3 ", [(12, "camera.f_px")]),
-        ("axis: u", "axis: w", [(20, "lasers[0].axis")]),
-        ("id: L2", "id: L1", [(18, "lasers")]),
+        ("axis: u", "axis: w", [(22, "lasers[0].axis")]),
+        ("id: L2", "id: L1", [(20, "lasers")]),
         (
             "seed: 2001",
             "seed: 2001\n  beam: {power_mw: 1 W, colour: red}\n  camera: {gain: 0.2}",
-            [(58, "emulator.beam.power_mw"), (58, "emulator.beam.colour"), (59, "emulator.camera.gain")],
+            [(61, "emulator.beam.power_mw"), (61, "emulator.beam.colour"), (62, "emulator.camera.gain")],
         ),
-        ("seed: 2001", "seed: 2001\n  truth: {lasers: {L9: {x_mm: 3}}}", [(58, "emulator.truth")]),
-        ("seed: 2001", "answers: true", [(56, "emulator.seed")]),
+        ("seed: 2001", "seed: 2001\n  truth: {lasers: {L9: {x_mm: 3}}}", [(61, "emulator.truth")]),
+        ("seed: 2001", "answers: true", [(59, "emulator.seed")]),
         ("emulator:\n  seed: 2001", "", [(1, "emulator.seed")]),
         ("driver: emulated", "driver: robot", [(6, "driver")]),
         (
