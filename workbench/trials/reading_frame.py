@@ -42,15 +42,15 @@ def reading_rows(
     return [
         {
             "standoff_mm": standoff_mm,
-            "true_mm": one.standoff_mm,
+            "true_mm": one.reference_mm,
             "measured_mm": one.range_mm,
-            "error_mm": None if one.range_mm is None else one.range_mm - one.standoff_mm,
+            "error_mm": one.error_mm,
             "stated_u_mm": one.sigma_mm,
             "reference_u_mm": one.reference_sd_mm,
             "placement": placement,
             "repeat": one.reading,
             "session": session,
-            "status": one.status,
+            "status": one.cause or one.status,
         }
         for one in readings
     ]

@@ -19,7 +19,7 @@ def test_rows_have_error_from_the_true_range_and_the_requested_level() -> None:
     assert frame["true_mm"].tolist() == [502.5, 502.5]
     assert frame["error_mm"].tolist() == pytest.approx([0.5, np.nan], nan_ok=True)
     assert frame[["placement", "repeat", "session"]].to_numpy().tolist() == [[3, 0, "1"], [3, 1, "1"]]
-    assert frame["status"].tolist() == ["done", "no_points"]
+    assert frame["status"].tolist() == ["done", readings[1].cause]
 
 
 def test_a_trial_without_readings_has_the_same_columns() -> None:
