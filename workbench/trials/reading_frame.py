@@ -18,13 +18,14 @@ COLUMNS = (
     "measured_mm",
     "error_mm",
     "stated_u_mm",
+    "spot_u_mm",
     "reference_u_mm",
     "placement",
     "repeat",
     "session",
     "status",
 )
-"""Columns of a trial's readings, see docs/trials.md. Statistics need all but `stated_u_mm`, `reference_u_mm`
+"""Columns of a trial's readings, see docs/trials.md. Statistics need all but the uncertainties
 and `status`."""
 
 
@@ -46,6 +47,7 @@ def reading_rows(
             "measured_mm": one.range_mm,
             "error_mm": one.error_mm,
             "stated_u_mm": one.sigma_mm,
+            "spot_u_mm": one.spot_sd_mm,
             "reference_u_mm": one.reference_sd_mm,
             "placement": placement,
             "repeat": one.reading,

@@ -10,6 +10,7 @@ from workbench.procedure.engine.placements import visit_placements
 from workbench.trials.dither import dither
 from workbench.trials.reading_frame import reading_frame, reading_rows
 from workbench.trials.readings import session_ranger, take_reading
+from workbench.trials.repeatability.budget import budget_table
 from workbench.trials.repeatability.step import RepeatabilityTrialStep
 from workbench.trials.repeatability.table import precision_chart, precision_table
 from workbench.trials.results import finish_trial, write_readings
@@ -44,6 +45,7 @@ def run_trial(context: Context, name: str, step: RepeatabilityTrialStep) -> str:
     frame = reading_frame(rows)
     write_readings(context, name, frame)
     table = precision_table(f"{name}-table", frame)
+    budget = budget_table(f"{name}-budget", frame)
     charts = [error_chart(f"{name}-errors", taken), precision_chart(f"{name}-precision", table)]
-    finish_trial(context, name, [table], charts)
+    finish_trial(context, name, [table, budget], charts)
     return f"{frame['measured_mm'].count()} readings in {name}.csv, statistics in {name}-table.csv"
