@@ -10,7 +10,12 @@ import pandas as pd
 from workbench.model.arrays import FloatArray
 from workbench.model.event import ReadingTaken
 from workbench.model.table import Cell, Column, Table
-from workbench.trials.statistics.autocorrelation import Autocorrelation, autocorrelation
+from workbench.trials.statistics.autocorrelation import (
+    INDEPENDENT,
+    SHORTEST_SERIES,
+    Autocorrelation,
+    autocorrelation,
+)
 
 COLUMNS = (
     "standoff_mm",
@@ -77,6 +82,8 @@ def dependence(frame: pd.DataFrame) -> Autocorrelation:
     Each level is scaled by its own standard deviation, so that no level dominates.
     """
     used = frame.dropna(subset=["error_mm"]).sort_values("repeat", kind="stable")
+    if not (used.groupby(["standoff_mm", "session", "placement"]).size() >= SHORTEST_SERIES).any():
+        return INDEPENDENT
     series: list[FloatArray] = []
     for _, level in levels(used):
         cells = level.groupby(["session", "placement"])["error_mm"]
