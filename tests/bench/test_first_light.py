@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 import yaml as pyyaml
 
+from tests.support.virtual_truth import parameter_values
 from tests.viewer.harness import distinct_colors, headless_viewer
 from tests.viewer.readback import Contents
 from workbench.model.calibration import load_calibration
@@ -115,7 +116,7 @@ def test_every_laser_alone_ten_pairs_at_eight_standoffs_or_more(demo: Demo) -> N
     standoffs = {s.standoff_mm for s in calibration}
     assert len(standoffs) >= 8
     assert (min(standoffs), max(standoffs)) == (125.0, 4500.0)
-    assert len(calibration) == len(standoffs) * 4 * 10
+    assert len(calibration) == (len(standoffs) + 2) * 4 * 10  # two standoffs are visited again
     assert {s.laser_id for s in calibration} == {"L1", "L2", "L3", "L4"}
     assert all((demo.folder / f.path).is_file() for s in shots for f in (s.on, s.off) if f is not None)
     assert not standoffs & {s.standoff_mm for s in shots if s.purpose == "trial"}
@@ -138,9 +139,7 @@ def test_held_ranges_are_true_to_one_per_cent_up_to_two_metres(demo: Demo) -> No
 
 def test_the_truth_lies_where_the_calibration_says(demo: Demo) -> None:
     parameters = load_calibration(demo.folder / "calibration.yaml").laser_ranger.parameters
-    truth = {k: v for k, v in demo.truth.items() if isinstance(v, float)}
-    for laser_id, ray in demo.truth["lasers"].items():
-        truth |= {f"{laser_id}.{name}": value for name, value in ray.items()}
+    truth = parameter_values(demo.truth)
     error = np.array(parameters.values) - np.array([truth[name] for name in parameters.names])
     free = np.array(parameters.prior_sd) > 0
     covariance = parameters.covariance_array[np.ix_(free, free)]
@@ -197,7 +196,7 @@ def test_fit_and_range_on_the_session_s_images_give_the_session_s_results(demo: 
 def test_each_placement_tells_how_far_the_captures_have_come(demo: Demo) -> None:
     """From the second on; the last says of the ranges what the fit then does."""
     told = [r.event for r in read_journal(demo.folder) if isinstance(r.event, StandoffAdvised)]
-    assert [one.placements for one in told] == list(range(2, 12))
+    assert [one.placements for one in told] == list(range(2, 14))
     assert told[0].relative_range_sd > told[0].limit == 0.03 > told[-1].relative_range_sd
     stated = load_calibration(demo.folder / "calibration.yaml").laser_ranger.validity.max_relative_range_sd
     assert told[-1].relative_range_sd == pytest.approx(stated, rel=0.05)

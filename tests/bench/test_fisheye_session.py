@@ -12,6 +12,7 @@ import pytest
 import yaml as pyyaml
 
 from tests.crash.short import CALLER, write_files
+from tests.support.virtual_truth import parameter_values
 from workbench.model.calibration import load_calibration
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.run import run
@@ -64,10 +65,8 @@ def test_the_truth_lies_where_the_calibration_says(session: Path) -> None:
     truth: dict[str, Any] = pyyaml.safe_load(session.with_name("s.truth.yaml").read_text())
     assert truth["lens"] == "equidistant"
     parameters = calibration.laser_ranger.parameters
-    true = [
-        truth["lasers"][name.split(".")[0]][name.split(".")[1]] if "." in name else truth[name]
-        for name in parameters.names
-    ]
+    values = parameter_values(truth)
+    true = [values[name] for name in parameters.names]
     error, free = np.array(parameters.values) - true, np.array(parameters.sd) > 0
     covariance = parameters.covariance_array[np.ix_(free, free)]
     distance2, n = error[free] @ np.linalg.solve(covariance, error[free]), int(free.sum())

@@ -144,4 +144,4 @@ def test_sessions_that_cannot_be_kept(tmp_path: Path) -> None:
     process = start(tmp_path)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 2
-    assert "expected a folder for sessions" in " ".join(err.split())
+    assert "the folder of sessions cannot be created" in " ".join(err.split())

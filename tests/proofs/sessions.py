@@ -24,6 +24,7 @@ from tests.proofs import simulate
 from tests.proofs.score import NORMAL_95
 from tests.proofs.study import RANGES_MM
 from tests.proofs.tables import keep
+from tests.support.virtual_truth import parameter_values
 from workbench.calibration.verdict.assessment import PRIOR_UNMOVED
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import load_calibration
@@ -187,16 +188,8 @@ def _ranged(sensor: CalibratedSensor, seen: FloatArray) -> tuple[FloatArray, Flo
 
 def _truth(rig: Rig, path: Path) -> FloatArray:
     """(S,) in the order of `simulate.names`."""
-    told = YAML(typ="safe").load(path)
-    tilt = {
-        f"target_slope_{axis}": np.tan(np.radians(told[f"target_{turn}_deg"]))
-        for axis, turn in (("x", "yaw"), ("y", "pitch"))
-    }
-    steady = dict.fromkeys(("drift_u_px", "drift_v_px"), 0.0)
-    bench = told | tilt | steady
-    common = [float(bench[name]) for name in (*simulate.LENSES[rig.camera.lens], *simulate.BENCH)]
-    rays = [float(told["lasers"][laser][name]) for laser in rig.laser_ids for name in simulate.RAY]
-    return np.array([*common, *rays])
+    values = parameter_values(YAML(typ="safe").load(path))
+    return np.array([values[name] for name in simulate.names(rig)])
 
 
 def main() -> int:

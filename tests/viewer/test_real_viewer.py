@@ -29,7 +29,7 @@ VIEWS_OF_TAB = {
     },
     "Trial": {
         "Results",
-        "Error of the sensor [mm] as the trial went",
+        "Error of the sensor [mm] during the trial",
         "Tables",
     },
     "3D": {"Bench: rays, target, spots"},

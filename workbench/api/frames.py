@@ -49,6 +49,14 @@ READING_COLUMNS = (
     "sigma_mm",
     "error_mm",
     "reference_sd_mm",
+    "true_mm",
+    "closest_mm",
+    "closest_sigma_mm",
+    "angle_deg",
+    "angle_sd_deg",
+    "radius_mm",
+    "radius_sd_mm",
+    "cause",
 )
 SESSION_COLUMNS = ("session", "folder", "state", "procedures", "captures", "reason")
 PARAMETER_COLUMNS = ("unit", "value", "sd", "prior_sd", "data_share", "determined_by")

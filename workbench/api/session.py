@@ -24,6 +24,7 @@ from workbench.model.chart import Chart
 from workbench.model.errors import BadInputError
 from workbench.model.event import (
     CalibrationExported,
+    CalibrationLoaded,
     CaptureTaken,
     FitFinished,
     FrameRef,
@@ -121,14 +122,15 @@ class Session:
 
     @cached_property
     def calibration(self) -> Calibration:
-        """The calibration that the session exported last.
+        """The calibration that the session exported last, or the existing one that it used.
 
         Raises:
-            BadInputError: the session exported none, or its file is damaged.
+            BadInputError: the session has none, or its file is damaged.
         """
-        exported = [event for event in self._events if isinstance(event, CalibrationExported)]
+        kinds = CalibrationExported | CalibrationLoaded
+        exported = [event for event in self._events if isinstance(event, kinds)]
         if not exported:
-            raise BadInputError(f"{self.folder}: expected an exported calibration, the session has none")
+            raise BadInputError(f"{self.folder}: expected a calibration, the session has none")
         return load_calibration(self.folder / exported[-1].path)
 
     def captures_for_fit(self, without: Collection[float] = ()) -> pd.DataFrame:
@@ -230,8 +232,8 @@ class Session:
         ]
 
     def _reading_row(self, event: ReadingTaken) -> dict[str, object]:
-        error = None if event.range_mm is None else event.range_mm - event.standoff_mm
-        return event.model_dump(exclude={"lasers", "kind"}) | {"error_mm": error}
+        shown = event.model_dump(include=set(READING_COLUMNS))
+        return shown | {"true_mm": event.reference_mm, "error_mm": event.error_mm, "cause": event.cause}
 
 
 def open_session(folder: str | Path) -> Session:

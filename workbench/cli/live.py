@@ -10,7 +10,6 @@ from itertools import count
 from pathlib import Path
 
 from workbench.cli.console import print_message
-from workbench.cli.range import usable
 from workbench.cli.reading_json import plain
 from workbench.cli.stopping import StopAfterCapture
 from workbench.devices.protocols import Bench
@@ -18,9 +17,10 @@ from workbench.devices.registry import load_bench_rig, open_bench
 from workbench.devices.watched import watched
 from workbench.model.errors import StoppedError
 from workbench.model.target import Placement
-from workbench.ranging.live import LiveRanger, check_same_sensor, latency_text
+from workbench.ranging.live import LiveRanger, latency_text
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.report.readings import reading_line
+from workbench.sensor.usable import check_same_sensor, load_usable
 
 FIXED_EXPOSURE = (
     "the camera keeps the exposure of the rig file; a reading with a clipped spot has a note; `workbench"
@@ -52,7 +52,7 @@ def range_live(request: LiveRequest, as_json: bool) -> None:
         StoppedError: a signal was received.
         LaserOffNotConfirmedError: a beam may be on.
     """
-    rig, calibration = load_bench_rig(request.rig), usable(request.calibration)
+    rig, calibration = load_bench_rig(request.rig), load_usable(request.calibration)
     check_same_sensor(rig, calibration)
     stopping = StopAfterCapture()
     # A bench may need a session folder for its files; live ranging keeps none.

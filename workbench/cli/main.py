@@ -7,6 +7,7 @@ import gc
 import os
 import traceback
 from contextlib import suppress
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -62,6 +63,12 @@ NoInput = Annotated[
 ]
 
 
+ExistingCalibration = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Existing calibration of this rig, instead of a fit."),
+]
+
+
 @app.command()
 def new(folder: Annotated[Path, typer.Argument(help="New or empty folder.")]) -> None:
     """Lay out a laboratory's own folder: procedures, rigs, firmware."""
@@ -75,13 +82,14 @@ def run(
     procedures: Annotated[list[Path], typer.Argument(help="Procedure files, run in this order.")],
     rig: Annotated[Path, typer.Option(help="Rig file.")],
     sessions: Annotated[Path, typer.Option(help="Folder for the new session.")] = Path("sessions"),
+    calibration: ExistingCalibration = None,
     answers: AnswersFile = None,
     no_input: NoInput = False,
 ) -> None:
     """Run procedures on a rig in one session."""
     from workbench.cli.run import Answers, run_procedures
 
-    run_procedures(procedures, rig, sessions, Answers(answers, no_input))
+    run_procedures(procedures, rig, sessions, Answers(answers, no_input), calibration)
 
 
 Sessions = Annotated[Path, typer.Option(help="Folder of sessions.")]
@@ -136,11 +144,12 @@ def plan(
     procedures: Annotated[list[Path], typer.Argument(help="Procedure files, in the order of `run`.")],
     rig: Annotated[Path, typer.Option(help="Rig file.")],
     sessions: Sessions = Path("sessions"),
+    calibration: ExistingCalibration = None,
 ) -> None:
     """Print the steps of procedures, numbers of captures, laser emission and duration."""
     from workbench.cli.plan import print_plan
 
-    print_plan(procedures, rig, sessions)
+    print_plan(procedures, rig, sessions, calibration)
 
 
 @app.command()
@@ -246,6 +255,30 @@ def range_(
         from workbench.cli.live import LiveRequest, range_live
 
         range_live(LiveRequest(rig, calibration, readings, standoff, stats), json)
+
+
+class TrialKind(StrEnum):
+    """Kinds of statistics of `workbench trial`."""
+
+    ACCURACY = "accuracy"
+    REPEATABILITY = "repeatability"
+    GAUGE_RR = "gauge-rr"
+    LINEARITY = "linearity"
+
+
+@app.command()
+def trial(
+    kind: Annotated[TrialKind, typer.Argument(help="Statistics to compute.")],
+    readings: Annotated[
+        Path,
+        typer.Argument(help="Readings (CSV): true_mm, measured_mm; also placement, repeat, session."),
+    ],
+    json: Json = False,
+) -> None:
+    """Compute the statistics of a trial from readings of any range sensor."""
+    from workbench.cli.trial import analyse_readings
+
+    analyse_readings(kind.value, readings, json)
 
 
 @app.command()

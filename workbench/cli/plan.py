@@ -16,6 +16,7 @@ from workbench.procedure.engine.check import check_file
 from workbench.procedure.engine.durations import StepDurations, learn_durations
 from workbench.procedure.engine.plan import Plan, PlannedStep
 from workbench.report.terminal_table import TerminalTable
+from workbench.session.caller import now
 
 
 def check_files(files: list[Path]) -> None:
@@ -41,18 +42,22 @@ def check_files(files: list[Path]) -> None:
         raise BadInputError("\n".join(mistakes))
 
 
-def print_plan(procedures: list[Path], rig_path: Path, sessions: Path) -> None:
+def print_plan(
+    procedures: list[Path], rig_path: Path, sessions: Path, calibration: Path | None = None
+) -> None:
     """Print every step with its captures, emission and duration.
 
     Raises:
         BadInputError: a file is wrong.
     """
-    plan = Plan.load(rig_path, procedures)
+    plan = Plan.load(rig_path, procedures, calibration)
     if sessions.exists() and not sessions.is_dir():
         raise BadInputError(f"{sessions}: expected a folder of sessions, got a file")
     durations = learn_durations(sessions, plan.rig.rig)
     steps = plan.steps()
     console = Console(stderr=True, markup=False)
+    if plan.calibration is not None:
+        console.print(plan.calibration.loaded(now()).text, highlight=False)
     console.print(TerminalTable(plan_table(steps, durations)))
     total = sum(step.captures for step in steps)
     console.print(

@@ -8,13 +8,12 @@ from pathlib import Path
 from rich.console import Console
 
 from workbench.cli.reading_json import plain
-from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.captures import check_images, errors_name_file, load_captures
 from workbench.model.errors import BadInputError
 from workbench.ranging.captures import read_captures
-from workbench.ranging.live import check_same_sensor
 from workbench.ranging.ranger import Ranger
 from workbench.report.readings import reading_list
+from workbench.sensor.usable import check_same_sensor, load_usable
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE
 from workbench.session.manifest import MANIFEST, load_session_rig
 
@@ -25,7 +24,7 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
     Raises:
         BadInputError: a file is wrong.
     """
-    ranger = Ranger(usable(calibration))
+    ranger = Ranger(load_usable(calibration))
     if (captures / MANIFEST).is_file():
         check_same_sensor(load_session_rig(captures), ranger.calibration)
     readings = []
@@ -53,19 +52,3 @@ def _table(captures: Path) -> Path:
             f" {CALIBRATION_TABLE}, got a folder with neither; name the file itself"
         )
     return found
-
-
-def usable(path: Path) -> Calibration:
-    """Read a calibration that was accepted, by its limits or with a reason.
-
-    Raises:
-        BadInputError: the file is wrong, or the calibration was refused.
-    """
-    calibration = load_calibration(path)
-    summary = calibration.laser_ranger.fit
-    if not summary.usable:
-        raise BadInputError(
-            f"{path}: laser_ranger.fit.verdict: expected an accepted calibration, got one refused because"
-            f" {'; '.join(summary.reasons)}; to use it nevertheless, fit it again with --accept REASON"
-        )
-    return calibration

@@ -56,13 +56,15 @@ class SessionInterface:
     operator: Operator
 
 
-def run_procedures(procedures: list[Path], rig_path: Path, sessions: Path, answers: Answers) -> None:
+def run_procedures(
+    procedures: list[Path], rig_path: Path, sessions: Path, answers: Answers, calibration: Path | None = None
+) -> None:
     """Run procedures in a new session with progress on the terminal.
 
     Raises:
         WorkbenchError: see `workbench.procedure.engine.run.run`.
     """
-    plan = Plan.load(rig_path, procedures)
+    plan = Plan.load(rig_path, procedures, calibration)
     session_dir = plan.new_session(sessions)
     with session_interface(session_dir, plan, answers) as ui:
         run(plan, session_dir, ui.consumers, _caller(), ui.stopping, ui.operator)

@@ -15,6 +15,7 @@ from rich.text import Text
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.model.fit_tables import fit_tables
+from workbench.model.reading_text import reading_remark
 from workbench.model.spot import Spot
 from workbench.procedure.capture.quality import Quality, quality_of
 from workbench.procedure.engine.progress import TimeLeft
@@ -61,6 +62,8 @@ class Terminal:
         """Show one record."""
         self._forecast.take(record)
         match record.event:
+            case ev.CalibrationLoaded() as e:
+                self._console.print(Text(e.text))
             case ev.ProcedureStarted() as e:
                 self._length = e.steps
                 self._console.print(Text.assemble((e.title, "bold"), f" ({e.procedure}, {e.length})"))
@@ -100,6 +103,8 @@ class Terminal:
                     self._print(f"rejected: {line}")
                 for warning in e.warnings:
                     self._print(f"note: {warning}")
+            case ev.ReadingTaken() as e if remark := reading_remark(e):
+                self._print(remark, style="yellow")
             case ev.TrialFinished() as e:
                 for table in e.tables:
                     self._console.print(TerminalTable(table))

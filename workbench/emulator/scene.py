@@ -70,7 +70,7 @@ class BenchScene:
         Raises:
             BadInputError: a flat target or the board is turned by 90 degrees or more.
         """
-        own = draw_placement_error(self._rig, self._spec, placement.key)
+        own = draw_placement_error(self._rig, self._spec, placement.key, _turn_sds_deg(placement.target))
         error = replace(
             own,
             yaw_deg=own.yaw_deg + self._truth.target_yaw_deg,
@@ -83,7 +83,7 @@ class BenchScene:
         else:
             self._surfaces = _surfaces(placement.target, z_mm, error, self._spec.surface)
             self._file.add(placement.key, own)
-        self._key = placement.key
+        self._key = _speckle_key(placement)
         self._spots, self._picture = {}, None
         self.moves += 1
         return placement
@@ -137,6 +137,20 @@ class BenchScene:
             for index, (surface, gain) in enumerate(self._surfaces)
         ]
         return [spot for spot in painted if spot is not None]
+
+
+def _speckle_key(placement: Placement) -> str:
+    """Key of the speckle pattern: each placement has its own, and each displacement along the face."""
+    shift_mm: float = getattr(placement.target, "shift_mm", 0.0)
+    return f"{placement.key}/{shift_mm:g}mm" if shift_mm else placement.key
+
+
+def _turn_sds_deg(target: TargetShape) -> tuple[float | None, float | None]:
+    """Standard deviations of yaw and pitch that replace those of the rig: of the angle that was measured."""
+    if not isinstance(target, FlatTarget) or target.turn_sd_deg is None:
+        return None, None
+    about_vertical = abs(target.yaw_deg) >= abs(target.pitch_deg)
+    return (target.turn_sd_deg, None) if about_vertical else (None, target.turn_sd_deg)
 
 
 def _surfaces(

@@ -131,15 +131,25 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
     )
 
 
-def draw_placement_error(rig: Rig, spec: EmulatorSpec, key: str) -> PlacementError:
-    """Errors of the placement `key` itself, equal whenever the same key is placed again."""
+def draw_placement_error(
+    rig: Rig, spec: EmulatorSpec, key: str, turn_sds_deg: tuple[float | None, float | None] = (None, None)
+) -> PlacementError:
+    """Errors of the placement `key` itself, equal whenever the same key is placed again.
+
+    Args:
+        rig: rig with the tolerances of placements.
+        spec: settings of the bench.
+        key: key of the placement.
+        turn_sds_deg: standard deviations of yaw and pitch; None: the rig's `tilt_sd_deg`.
+    """
     rng = generator(spec.seed, "placement", key)
     error, yaw, pitch = rng.standard_normal(3)
     pins = spec.truth.placements.get(key, PlacementTruth())
+    yaw_sd_deg, pitch_sd_deg = (rig.bench.tilt_sd_deg if sd is None else sd for sd in turn_sds_deg)
     return PlacementError(
         error_mm=_pinned(pins.error_mm, rig.bench.placement_sd_mm * error),
-        yaw_deg=_pinned(pins.yaw_deg, rig.bench.tilt_sd_deg * yaw),
-        pitch_deg=_pinned(pins.pitch_deg, rig.bench.tilt_sd_deg * pitch),
+        yaw_deg=_pinned(pins.yaw_deg, yaw_sd_deg * yaw),
+        pitch_deg=_pinned(pins.pitch_deg, pitch_sd_deg * pitch),
     )
 
 

@@ -30,6 +30,7 @@ from workbench.model.trial_event import LaserRange as LaserRange
 from workbench.model.trial_event import ReadingTaken as ReadingTaken
 from workbench.model.trial_event import TrialFinished as TrialFinished
 from workbench.model.trial_event import TrialProgress as TrialProgress
+from workbench.model.trial_event import TrueValues as TrueValues
 from workbench.model.yamlfile import FileModel
 
 
@@ -192,6 +193,8 @@ class CaptureTaken(FileModel):
     scene: str | None = None
     laser_id: str
     """`all` if every laser is on; `board` for a frame of the board in room light, all lasers off."""
+    left_off: tuple[str, ...] = ()
+    """Lasers that were left off although the capture is one of all lasers."""
     placement_key: str
     standoff_mm: float
     standoff_sd_mm: float | None = None
@@ -287,6 +290,28 @@ class CalibrationExported(FileModel):
     sha256: str
 
 
+class CalibrationLoaded(FileModel):
+    """The session uses an existing calibration, of which it keeps a copy."""
+
+    kind: Literal["calibration_loaded"] = "calibration_loaded"
+    file: str
+    """File named by the user."""
+    path: str
+    """Copy, relative to the session folder."""
+    sha256: str
+    made: str
+    """Time of the calibration, as in its provenance."""
+    age_days: float | None
+    """Age at the start of the session; None if `made` is no time."""
+
+    @property
+    def text(self) -> str:
+        """Summary in one line."""
+        made = f"made {self.made}" if self.made else "of unknown date"
+        age = "age unknown" if self.age_days is None else f"{self.age_days:.1f} days old"
+        return f"calibration {self.file}, {made}, {age}"
+
+
 class SessionFinished(FileModel):
     """Last record of a session that ended, with or without success."""
 
@@ -313,6 +338,7 @@ Event = Annotated[
     | StandoffAdvised
     | FitFinished
     | CalibrationExported
+    | CalibrationLoaded
     | ReadingTaken
     | TrialProgress
     | TrialFinished

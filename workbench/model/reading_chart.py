@@ -16,6 +16,8 @@ PERCENT = 100.0
 def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
     """Chart of errors (measured - true) of readings and of their lasers, in percent of the true range.
 
+    Lasers have no errors where the true range is not the standoff, which differs between the lasers there.
+
     The expected standard deviation of an error combines the stated uncertainty of the range and the reference
     uncertainty of the standoff. No error is an outlier if the latter is unknown.
 
@@ -23,12 +25,13 @@ def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
         name: name of the chart.
         readings: readings in the order in which they were taken.
     """
-    names = [*dict.fromkeys(one.laser_id for reading in readings for one in reading.lasers), SENSOR]
     points = [(reading, *one) for reading in readings for one in _ranges(reading)]
+    names = [*dict.fromkeys(name for _, name, _, _ in points if name != SENSOR), SENSOR]
+    label = "standoff" if all(reading.true is None for reading in readings) else "true range"
     return Chart(
         name=name,
         title="Error of every reading, bars stated u",
-        x=Axis(label="standoff", unit="mm", scale="log"),
+        x=Axis(label=label, unit="mm", scale="log"),
         y=Axis(label="error", unit="%"),
         series=tuple(
             _series(name, [(r, mm, sd) for r, of, mm, sd in points if of == name]) for name in names
@@ -38,22 +41,23 @@ def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
 
 def _ranges(reading: ReadingTaken) -> list[tuple[str, float, float]]:
     """Name, range and stated standard uncertainty (mm) of every laser and of the sensor itself."""
-    ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in reading.lasers]
+    lasers = reading.lasers if reading.true is None else ()
+    ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in lasers]
     if reading.range_mm is not None and reading.sigma_mm is not None:
         ranges.append((SENSOR, reading.range_mm, reading.sigma_mm))
     return ranges
 
 
 def _series(name: str, ranges: Sequence[tuple[ReadingTaken, float, float]]) -> Series:
-    percents = [PERCENT / reading.standoff_mm for reading, _, _ in ranges]
-    errors = [mm - reading.standoff_mm for reading, mm, _ in ranges]
+    percents = [PERCENT / reading.reference_mm for reading, _, _ in ranges]
+    errors = [mm - reading.reference_mm for reading, mm, _ in ranges]
     expected_mm = [
         None if reading.reference_sd_mm is None else hypot(sd, reading.reference_sd_mm)
         for reading, _, sd in ranges
     ]
     return Series(
         name=name,
-        x=tuple(reading.standoff_mm for reading, _, _ in ranges),
+        x=tuple(reading.reference_mm for reading, _, _ in ranges),
         y=tuple(percent * error for percent, error in zip(percents, errors, strict=True)),
         sd=tuple(percent * sd for percent, (_, _, sd) in zip(percents, ranges, strict=True)),
         expected_sd=tuple(

@@ -23,6 +23,8 @@ class FlatTarget(FileModel):
     height_mm: Annotated[float, Field(gt=0)] | None = None
     shift_mm: float = 0.0
     """x of the centre of a target with a stated width; the standoff remains that of the plane at x = 0."""
+    turn_sd_deg: Annotated[float, Field(ge=0)] | None = None
+    """Standard uncertainty of the larger of the two angles, as measured; None: the rig's `tilt_sd_deg`."""
 
 
 class BoardTarget(FileModel):
@@ -43,6 +45,8 @@ class CylinderTarget(FileModel):
     shape: Literal["cylinder"] = "cylinder"
     diameter_mm: Annotated[float, Field(gt=0)]
     shift_mm: float = 0.0
+    diameter_sd_mm: Annotated[float, Field(ge=0)] | None = None
+    """Standard uncertainty of the diameter; None: unknown."""
 
 
 class PolynomialTarget(FileModel):

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from math import hypot, inf
 from typing import Literal
 
 from workbench.model.chart import Chart
 from workbench.model.table import Table
 from workbench.model.yamlfile import FileModel
+
+COVERAGE_FACTOR = 1.959963984540054
+"""Half width of the 95 % interval of a normal error, in standard deviations."""
+STATUS_TEXT = {
+    "done": "no range",
+    "not_enough_points": "too few spots could be assigned to lasers",
+    "no_points": "no spot was seen",
+}
+"""Cause of a missing range without notes, by the status of the reading."""
 
 
 class LaserRange(FileModel):
@@ -22,6 +32,20 @@ class LaserRange(FileModel):
     """Upper end of the 95 % interval, which is not symmetric; None if it reaches infinity."""
 
 
+class TrueValues(FileModel):
+    """True values of the readings at one placement, with their reference uncertainties (1 sigma)."""
+
+    range_mm: float
+    """Closest range over the front."""
+    range_sd_mm: float
+    angle_deg: float | None = None
+    """None: the target is no incline."""
+    angle_sd_deg: float | None = None
+    radius_mm: float | None = None
+    """None: the target is no cylinder."""
+    radius_sd_mm: float | None = None
+
+
 class ReadingTaken(FileModel):
     """One reading of a trial."""
 
@@ -35,9 +59,74 @@ class ReadingTaken(FileModel):
     """Mean of the lasers weighted by their spots' uncertainty: the range of a flat target."""
     sigma_mm: float | None
     """Stated standard uncertainty of `range_mm`."""
+    spot_sd_mm: float | None = None
+    """Part of `sigma_mm` by noise and speckle of the spots, not of the calibration; None: unknown."""
     reference_sd_mm: float | None = None
-    """Reference uncertainty of `standoff_mm`; None if unknown."""
+    """Reference uncertainty of the true range; None if unknown."""
+    true: TrueValues | None = None
+    """True values of a reading of the closest range; None: the range is that of a flat at `standoff_mm`."""
+    closest_mm: float | None = None
+    """Smallest range over the front, which `workbench range` prints."""
+    closest_sigma_mm: float | None = None
+    low_mm: float | None = None
+    """Lower end of the sensor's 95 % interval of `range_mm`; None: that of `sigma_mm`."""
+    high_mm: float | None = None
+    """Upper end; None with a lower end: it reaches infinity."""
+    shape: str = ""
+    """Shape in front of each line of lasers, as `workbench range` names it; empty without a range."""
+    angle_deg: float | None = None
+    """Angle of an incline, positive where it recedes towards greater x (y for a vertical line of lasers)."""
+    angle_sd_deg: float | None = None
+    """Stated standard uncertainty of `angle_deg`."""
+    radius_mm: float | None = None
+    """Radius of the cylinder through the lasers' points; None where none is determined."""
+    radius_sd_mm: float | None = None
+    cylinder_mm: float | None = None
+    """Closest range over the front by that cylinder."""
+    cylinder_sd_mm: float | None = None
+    left_off: tuple[str, ...] = ()
+    """Lasers that were left off."""
+    notes: tuple[str, ...] = ()
+    """Reasons of missing ranges, and remarks on uncertain ones."""
     lasers: tuple[LaserRange, ...]
+
+    @property
+    def reference_mm(self) -> float:
+        """True value of `range_mm`."""
+        return self.standoff_mm if self.true is None else self.true.range_mm
+
+    @property
+    def error_mm(self) -> float | None:
+        """Measured - true range; None without a range."""
+        return None if self.range_mm is None else self.range_mm - self.reference_mm
+
+    @property
+    def interval_mm(self) -> tuple[float, float] | None:
+        """95 % interval of the true range, by sensor and reference; None if either is unknown.
+
+        The upper end may be infinite.
+        """
+        if self.range_mm is None or self.sigma_mm is None or self.reference_sd_mm is None:
+            return None
+        reference_mm = COVERAGE_FACTOR * self.reference_sd_mm
+        below_mm = above_mm = COVERAGE_FACTOR * self.sigma_mm
+        if self.low_mm is not None:
+            below_mm = self.range_mm - self.low_mm
+            above_mm = inf if self.high_mm is None else self.high_mm - self.range_mm
+        return self.range_mm - hypot(below_mm, reference_mm), self.range_mm + hypot(above_mm, reference_mm)
+
+    @property
+    def is_outside(self) -> bool:
+        """Whether the true range lies outside the 95 % interval; False if that is not known."""
+        interval = self.interval_mm
+        return interval is not None and not interval[0] <= self.reference_mm <= interval[1]
+
+    @property
+    def cause(self) -> str:
+        """Cause of a missing range; empty for a reading with a range."""
+        if self.range_mm is not None:
+            return ""
+        return "; ".join(self.notes) or STATUS_TEXT[self.status]
 
 
 class TrialProgress(FileModel):

@@ -10,9 +10,7 @@ import numpy as np
 
 from workbench.devices.protocols import Bench
 from workbench.model.arrays import Image
-from workbench.model.calibration import Calibration
 from workbench.model.errors import BadInputError
-from workbench.model.rig import Rig
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.spots import Finding, Spot, SpotFinder, persistent_spots, position_text, refuse_stuck_beam
@@ -23,30 +21,6 @@ FEWEST_FOR_P99 = 100
 LATENCY_ADVICE = (
     "measure it with `workbench doctor`, and enter it in the rig file as the camera's latency_frames"
 )
-
-
-def check_same_sensor(rig: Rig, calibration: Calibration) -> None:
-    """Refuse a calibration of another sensor than the rig's.
-
-    Raises:
-        BadInputError: image size, lasers, name or serial number differ.
-    """
-    ours, made = calibration.laser_ranger, calibration.laser_ranger.provenance
-    for what, of_rig, of_file in (
-        ("rig", rig.rig, made.rig),
-        ("serial", rig.serial, made.serial),
-        ("image size", (rig.camera.width_px, rig.camera.height_px), _size(calibration)),
-        ("list of lasers", [(s.id, s.axis) for s in rig.lasers], [(s.id, s.axis) for s in ours.lasers]),
-    ):
-        if of_rig != of_file:
-            raise BadInputError(
-                f"calibration: {what}: expected that of this rig, {of_rig}, got {of_file}; calibrate this"
-                " rig, or use its own calibration"
-            )
-
-
-def _size(calibration: Calibration) -> tuple[int, int]:
-    return calibration.image_width, calibration.image_height
 
 
 @dataclass

@@ -50,6 +50,8 @@ class Reading:
     flat_mm: float | None = None
     """Mean range of the lasers, weighted by their spots: the range of a flat target across the axis."""
     flat_sigma_mm: float | None = None
+    flat_spot_sd_mm: float | None = None
+    """Standard deviation of `flat_mm` by noise and speckle of the spots alone."""
     notes: tuple[str, ...] = ()
     """Reasons of missing ranges, and remarks on uncertain ones."""
 
@@ -275,7 +277,7 @@ class Ranger:
         ranges = ranges.only(np.array(good))
         lasers = laser_ranges(ids, position, ranges, self.sensor.offset_mm)
         status: Status = "done" if len(lasers) == fired else "not_enough_points"
-        flat_mm, flat_sigma_mm = flat_range(ranges)
+        flat_mm, flat_sigma_mm, flat_spot_sd_mm = flat_range(ranges)
         lines = self._lines(ids, ranges)
         nearest = min((line.shape for line in lines), key=lambda shape: shape.closest_mm)
         all_notes += [self._no_spot_note(i, flat_mm) for i in without_spot]
@@ -291,6 +293,7 @@ class Ranger:
             lines,
             flat_mm,
             flat_sigma_mm,
+            flat_spot_sd_mm,
             tuple(all_notes),
         )
 

@@ -50,6 +50,13 @@ class RigEntry(FileEntry):
     serial: Name
 
 
+class CalibrationEntry(FileModel):
+    """Existing calibration that a session uses; the session folder has a copy."""
+
+    file: str
+    sha256: str
+
+
 class Manifest(BaseModel):
     """Manifest as read back. Sessions of version 0.1.0 may lack `command`."""
 
@@ -58,6 +65,7 @@ class Manifest(BaseModel):
     command: str = ""
     rig: RigEntry
     procedures: tuple[FileEntry, ...]
+    calibration: CalibrationEntry | None = None
     versions: dict[str, str]
 
 
@@ -70,6 +78,7 @@ def create_session(
     operator: str,
     created: str,
     command: str,
+    calibration: CalibrationEntry | None = None,
 ) -> None:
     """Create the session folder with its manifest.
 
@@ -84,7 +93,7 @@ def create_session(
     caller = {"created": created, "operator": operator, "command": command}
     entry = RigEntry(file=str(rig_path.resolve()), text=_read(rig_path), serial=rig.serial)
     procedures = [FileEntry(file=str(path.resolve()), text=_read(path)) for path in procedure_paths]
-    _write(folder, caller, entry, procedures)
+    _write(folder, caller, entry, procedures, calibration)
 
 
 def replace_manifest(folder: Path, before: Manifest, rig: RigEntry, procedures: Sequence[FileEntry]) -> None:
@@ -92,7 +101,7 @@ def replace_manifest(folder: Path, before: Manifest, rig: RigEntry, procedures: 
     number = next(n for n in count(1) if not (folder / f"session-{n}.yaml").exists())
     write_record(folder / f"session-{number}.yaml", (folder / MANIFEST).read_bytes())
     caller = {"created": before.created, "operator": before.operator, "command": before.command}
-    _write(folder, caller, rig, procedures)
+    _write(folder, caller, rig, procedures, before.calibration)
 
 
 def load_manifest(session_dir: Path) -> Manifest:
@@ -112,7 +121,13 @@ def recorded_versions() -> dict[str, str]:
     return {"python": platform.python_version()} | {n: version(n) for n in RECORDED_VERSIONS}
 
 
-def _write(folder: Path, caller: dict[str, str], rig: RigEntry, procedures: Sequence[FileEntry]) -> None:
+def _write(
+    folder: Path,
+    caller: dict[str, str],
+    rig: RigEntry,
+    procedures: Sequence[FileEntry],
+    calibration: CalibrationEntry | None,
+) -> None:
     manifest: dict[str, Any] = {
         "format": 1,
         "session": folder.name,
@@ -121,6 +136,8 @@ def _write(folder: Path, caller: dict[str, str], rig: RigEntry, procedures: Sequ
         "procedures": [{"file": p.file, "text": LiteralScalarString(p.text)} for p in procedures],
         "versions": recorded_versions(),
     }
+    if calibration is not None:
+        manifest["calibration"] = calibration.model_dump()
     stream = io.StringIO()
     YAML().dump(manifest, stream)
     write_record(folder / MANIFEST, stream.getvalue().encode())

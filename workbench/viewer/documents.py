@@ -25,7 +25,7 @@ def fit_summary(fit: FitFinished) -> str:
 def without_range(readings: Iterable[ReadingTaken]) -> str:
     """List of readings without a range, one line each; empty if all have one."""
     missing = [
-        f"{one.standoff_mm:g} mm, reading {one.reading}: {one.status}"
+        f"{one.standoff_mm:g} mm, reading {one.reading}: {one.cause}"
         for one in readings
         if one.range_mm is None
     ]

@@ -12,6 +12,7 @@ from math import radians, tan
 import numpy as np
 
 from workbench.model.arrays import FloatArray
+from workbench.model.calibration import Calibration
 from workbench.model.event import ParameterRecord
 from workbench.model.lens import LensName
 from workbench.model.rig import Rig
@@ -47,7 +48,13 @@ class Geometry:
 
     def fitted(self, parameters: Iterable[ParameterRecord]) -> Geometry:
         """Geometry with fitted values of the parameters (`f_px`, `offset_mm`, `<laser id>.x_mm`, ...)."""
-        fit = {parameter.name: parameter.value for parameter in parameters}
+        return self._with({parameter.name: parameter.value for parameter in parameters})
+
+    def calibrated(self, calibration: Calibration) -> Geometry:
+        """Geometry of a calibration file."""
+        return self._with(calibration.geometry())
+
+    def _with(self, fit: Mapping[str, float]) -> Geometry:
         rays = {}
         for laser, (x, y, tx, ty) in self.rays.items():
             old = dict(zip(RAY, (x, y, tx, ty), strict=True))

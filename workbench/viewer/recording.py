@@ -12,7 +12,9 @@ from pathlib import Path
 from types import TracebackType
 
 from workbench.model import event as ev
+from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError
+from workbench.model.reading_text import reading_remark
 from workbench.model.rig import Rig
 from workbench.model.spot import Spot
 from workbench.model.target import Placement
@@ -231,6 +233,13 @@ class _OpenRecording:
         steps.log_text(self.stream, f"Calibration written to {event.path}")
 
     @_log.register
+    def _(self, event: ev.CalibrationLoaded, moment: Moment) -> None:
+        calibration = load_calibration(self._session_dir / event.path)
+        self._geometry = self._geometry.calibrated(calibration)
+        scene.log_sensor(self.stream, self._rig.camera, self._geometry, self._colors)
+        steps.log_text(self.stream, event.text)
+
+    @_log.register
     def _(self, event: ev.ReadingTaken, moment: Moment) -> None:
         self.stream.at(self._exposure)
         camera.log_assigned(self.stream, self._spots, event.lasers, self._colors)
@@ -240,6 +249,8 @@ class _OpenRecording:
         if event.status != "done":
             text = f"{event.scene}, reading {event.reading} at {event.standoff_mm:g} mm: {event.status}"
             steps.log_text(self.stream, text, steps.WARN)
+        if remark := reading_remark(event):
+            steps.log_text(self.stream, remark, steps.WARN)
 
     @_log.register
     def _(self, event: ev.TrialFinished, moment: Moment) -> None:

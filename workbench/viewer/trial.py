@@ -88,9 +88,9 @@ class TrialView:
 
 def log_errors(stream: Stream, reading: ReadingTaken, colors: Mapping[str, at.Rgb]) -> None:
     """Log errors (measured - true, mm) of a reading and of its lasers, with their stated 1 sigma."""
-    if reading.range_mm is not None:
-        _log_error(stream, SENSOR, reading.range_mm - reading.standoff_mm, reading.sigma_mm, at.WHITE)
-    for one in reading.lasers:
+    if reading.error_mm is not None:
+        _log_error(stream, SENSOR, reading.error_mm, reading.sigma_mm, at.WHITE)
+    for one in reading.lasers if reading.true is None else ():
         color = colors.get(one.laser_id, at.WHITE)
         _log_error(stream, one.laser_id, one.range_mm - reading.standoff_mm, one.sigma_mm, color)
 

@@ -114,3 +114,13 @@ def test_a_lens_that_folds_is_refused() -> None:
     rig = ideal_rig(truth={"k1": -2.0})
     with pytest.raises(BadInputError, match=r"emulator\.truth: "):
         draw_truth(rig, emulator_spec(rig))
+
+
+def test_an_angle_with_a_stated_uncertainty_has_that_deviation() -> None:
+    spec = emulator_spec(THESIS)
+    own = [draw_placement_error(THESIS, spec, f"P{i}", (0.1, None)) for i in range(400)]
+    usual = [draw_placement_error(THESIS, spec, f"P{i}") for i in range(400)]
+    scale = 0.1 / THESIS.bench.tilt_sd_deg
+    assert [one.yaw_deg for one in own] == pytest.approx([scale * one.yaw_deg for one in usual])
+    assert [one.pitch_deg for one in own] == [one.pitch_deg for one in usual]
+    assert [one.error_mm for one in own] == [one.error_mm for one in usual]

@@ -14,6 +14,7 @@ from workbench.model.rig import load_rig
 from workbench.session.manifest import (
     MANIFEST,
     RECORDED_VERSIONS,
+    CalibrationEntry,
     create_session,
     load_manifest,
     load_session_rig,
@@ -30,8 +31,8 @@ def session(tmp_path: Path) -> Path:
     rig = tmp_path / "rig.yaml"
     rig.write_text(ODD + RIG.read_text(), encoding="utf-8")
     plan = plan_of(tmp_path, rig, a="  - {step: message, text: Hello.}\n")
-    caller = {"operator": "A. T", "created": "now", "command": "run 'a b'"}
-    create_session(tmp_path / "s", plan.rig, rig, plan.procedure_paths, **caller)
+    paths = plan.procedure_paths
+    create_session(tmp_path / "s", plan.rig, rig, paths, operator="A. T", created="now", command="run 'a b'")
     return tmp_path / "s"
 
 
@@ -50,6 +51,16 @@ def test_versions_are_those_of_the_installed_packages(session: Path) -> None:
     assert versions["python"] == platform.python_version()
     assert all(versions[name] == version(name) for name in RECORDED_VERSIONS)
     assert workbench_version() == version("laser-range-workbench")
+
+
+def test_an_existing_calibration_stays_in_a_replaced_manifest(tmp_path: Path) -> None:
+    rig, entry = load_rig(RIG), CalibrationEntry(file="/lab/calibration.yaml", sha256="0" * 64)
+    session = tmp_path / "s"
+    create_session(session, rig, RIG, [], operator="", created="", command="", calibration=entry)
+    first = load_manifest(session)
+    assert first.calibration == entry
+    replace_manifest(session, first, first.rig, first.procedures)
+    assert load_manifest(session).calibration == entry
 
 
 def test_a_session_never_takes_the_place_of_another(session: Path) -> None:

@@ -22,13 +22,13 @@ def test_without_reasons_there_is_no_list_of_them() -> None:
     assert f"{bare.observations}" in blocks[1]
 
 
-def test_readings_without_a_range_are_listed_with_standoff_and_status() -> None:
+def test_readings_without_a_range_are_listed_with_standoff_and_cause() -> None:
     readings = [a_reading(300.0, 301.0), a_reading(4500.0, None, reading=7)]
     _, *rows = without_range(readings).splitlines()
     (row,) = rows
     assert "4500 mm" in row
     assert "7" in row
-    assert "no_points" in row
+    assert "no spot was seen" in row
 
 
 def test_where_all_have_a_range_nothing_is_said() -> None:

@@ -36,8 +36,9 @@ SPECKLE_SCALE = 1.5
 """Noise scale from which a missing speckle_sd_px is named as the cause."""
 DATA_SHARE_DETERMINED = 0.9
 """Information share of the data from which a parameter is determined by them."""
-LEAST_NARROWING = 1e-6
-"""Least decrease of a prior's variance by the data for its pull to be tested."""
+LEAST_NARROWING = 0.1
+"""Least relative decrease of a prior's variance by the data for its pull to be tested: where the data hardly
+constrain a combination, the curvature of the model moves it more than their noise does."""
 PRIOR_UNMOVED = 0.9
 """Ratio of posterior to prior sd above which neither data nor other priors constrain the parameter."""
 
@@ -95,8 +96,8 @@ def assess(
     fit: CalibrationFit,
     limits: Acceptance,
     max_relative_range_sd: float,
+    placements: Sequence[CrossValidatedPlacement],
     directions: Sequence[NullDirection] = (),
-    placements: Sequence[CrossValidatedPlacement] = (),
 ) -> Assessment:
     """Compare a fit with the limits, and run all its checks.
 
@@ -107,8 +108,8 @@ def assess(
         fit: the fit.
         limits: limits of the calibration.
         max_relative_range_sd: as in the calibration's `validity`.
-        directions: null directions, for the warnings.
         placements: cross-validation of the fit.
+        directions: null directions, for the warnings.
     """
     reasons = _too_few_standoffs(fit, limits)
     if not fit.converged:
@@ -229,7 +230,8 @@ def prior_doubts(fit: CalibrationFit) -> list[str]:
     values, vectors = np.linalg.eigh(narrowed)
     seen = values > LEAST_NARROWING
     chi2 = float(((vectors.T @ y)[seen] ** 2 / values[seen]).sum())
-    z = np.abs(y) / np.sqrt(np.maximum(np.diag(narrowed), LEAST_NARROWING))
+    decrease = np.diag(narrowed)
+    z = np.where(decrease > LEAST_NARROWING, np.abs(y) / np.sqrt(np.maximum(decrease, LEAST_NARROWING)), 0.0)
     p = np.minimum(1.0, len(free) * 2.0 * norm_cdf(-z))
     order = np.argsort(-z)
     doubted = [int(free[n]) for n in order if p[n] < DOUBT_P]

@@ -64,9 +64,15 @@ class PairSource:
         return found
 
     def pair(
-        self, key: str, laser_ids: Sequence[str], placement: Placement, repeat: int, scene: str | None
+        self,
+        key: str,
+        laser_ids: Sequence[str],
+        placement: Placement,
+        repeat: int,
+        scene: str | None,
+        left_off: Sequence[str] = (),
     ) -> tuple[Image, Image, ev.CaptureTaken]:
-        """Pair of frames: `laser_ids` on, and all lasers off.
+        """Pair of frames: `laser_ids` without those of `left_off` on, and all lasers off.
 
         Raises:
             BadInputError: a replayed placement lacks this capture, or a frame on disk has changed.
@@ -75,7 +81,7 @@ class PairSource:
         """
         kept = self._kept(key)
         if kept is None or kept.off is None:
-            return self._capture(key, laser_ids, placement, repeat, scene)
+            return self._capture(key, laser_ids, placement, repeat, scene, left_off)
         return self._read(kept.on), self._read(kept.off), kept
 
     def room_light(self, key: str, placement: Placement, repeat: int) -> tuple[Image, ev.CaptureTaken]:
@@ -108,11 +114,17 @@ class PairSource:
             self._search(key, dark, [prior_scanline(self.rig, laser) for laser in self.rig.lasers])
 
     def _capture(
-        self, key: str, laser_ids: Sequence[str], placement: Placement, repeat: int, scene: str | None
+        self,
+        key: str,
+        laser_ids: Sequence[str],
+        placement: Placement,
+        repeat: int,
+        scene: str | None,
+        left_off: Sequence[str],
     ) -> tuple[Image, Image, ev.CaptureTaken]:
         self._refuse_unsafe()
         began = time.monotonic()
-        with self.bench.lasers.lit(laser_ids, for_s=LEASE_S):
+        with self.bench.lasers.lit([i for i in laser_ids if i not in left_off], for_s=LEASE_S):
             on = self.bench.camera.grab()
         lit_s = time.monotonic() - began
         off = self.bench.camera.grab()
@@ -122,6 +134,7 @@ class PairSource:
             purpose="calibration" if scene is None else "trial",
             scene=scene,
             laser_id=laser_ids[0] if len(laser_ids) == 1 else ALL_LASERS,
+            left_off=tuple(left_off),
             placement_key=placement.key,
             standoff_mm=placement.standoff_mm,
             standoff_sd_mm=placement.standoff_sd_mm,

@@ -11,6 +11,7 @@ from workbench.devices.registry import bench_problems, has_bench
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.model.yamlfile import Document, Mistake, kind_of, line_of, read_document
+from workbench.procedure.engine.existing_calibration import GIVES
 from workbench.procedure.engine.procedure_file import Procedure
 from workbench.procedure.engine.registry import step_kinds
 
@@ -72,6 +73,8 @@ def _between_steps(document: Document, steps: list[Any]) -> Iterator[Mistake]:
                 yield Mistake(line, f"{where} needs a step before it that gives {needs}, got one after it")
             else:
                 wanted = f"needs an earlier procedure in the same command that gives {needs}"
+                if needs == GIVES:
+                    wanted += ", or an existing one by --calibration FILE"
                 yield _Note(line, f"{where} {wanted}")
             made.add(needs)
         made.add(kind.gives)

@@ -53,7 +53,9 @@ class Context:
     cross_validation: tuple[CrossValidatedPlacement, ...] = ()
     """Cross-validation of the last accepted fit, by placement."""
     calibration: Calibration | None = None
-    """Exported calibration, used by trials."""
+    """Exported or existing calibration, used by trials."""
+    readings: list[ev.ReadingTaken] = field(default_factory=list)
+    """Readings of all trials so far, for steps that compare trials."""
     pairs: PairSource = field(init=False)
 
     def __post_init__(self) -> None:
@@ -91,17 +93,19 @@ class Context:
         repeat: int,
         scanlines: Sequence[Scanline],
         scene: str | None = None,
+        left_off: Sequence[str] = (),
     ) -> Finding:
         """Take a pair of frames with `laser_ids` on and all lasers off, store it, and find its spots.
 
-        A capture with a scene belongs to a trial, one without a scene to the calibration.
+        A capture with a scene belongs to a trial, one without a scene to the calibration. Lasers in
+        `left_off` stay off as if they had failed.
 
         Raises:
             StoppedError: a stop was requested.
             LaserOffNotConfirmedError: a beam stays on.
         """
         self.begin(key)
-        on, off, taken = self.pairs.pair(key, laser_ids, placement, repeat, scene)
+        on, off, taken = self.pairs.pair(key, laser_ids, placement, repeat, scene, left_off)
         self.emit(taken)
         finding = find_spots(on, off, scanlines=scanlines, expected=len(laser_ids))
         self.emit(spots_found(key, finding, laser_ids))
@@ -180,6 +184,7 @@ class Context:
         """Drop all captures at a placement that is captured again or skipped."""
         self.recorder.forget(key)
         self.boards.pop(key, None)
+        self.readings = [reading for reading in self.readings if not reading.scene.startswith(f"{key}/")]
         for capture in [c for c in self.captures if c.placement_key == key]:
             self.captures.remove(capture)
             self.findings.pop(capture.key, None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from workbench.devices.registry import check_driver, load_bench_rig
 from workbench.model.errors import BadInputError
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
+from workbench.procedure.engine.existing_calibration import GIVES, ExistingCalibration
 from workbench.procedure.engine.procedure_file import Procedure, load_procedure
 from workbench.procedure.engine.prompts import safety_prompt
 
@@ -36,26 +37,35 @@ class Plan:
     rig_path: Path
     procedures: tuple[Procedure, ...]
     procedure_paths: tuple[Path, ...]
+    calibration: ExistingCalibration | None = None
+    """Calibration that the session uses instead of a fit of its own."""
 
     @classmethod
-    def load(cls, rig_path: Path, procedure_paths: Sequence[Path]) -> Plan:
+    def load(cls, rig_path: Path, procedure_paths: Sequence[Path], calibration: Path | None = None) -> Plan:
         """Read and check the files.
 
         Raises:
             BadInputError: a file is wrong.
         """
         procedures = tuple(load_procedure(path) for path in procedure_paths)
-        return cls.of(load_bench_rig(rig_path), rig_path, procedures, procedure_paths)
+        rig = load_bench_rig(rig_path)
+        existing = None if calibration is None else ExistingCalibration.load(calibration, rig)
+        return cls.of(rig, rig_path, procedures, procedure_paths, existing)
 
     @classmethod
     def of(
-        cls, rig: Rig, rig_path: Path, procedures: Sequence[Procedure], procedure_paths: Sequence[Path]
+        cls,
+        rig: Rig,
+        rig_path: Path,
+        procedures: Sequence[Procedure],
+        procedure_paths: Sequence[Path],
+        calibration: ExistingCalibration | None = None,
     ) -> Plan:
         """Check a rig and procedures.
 
         Raises:
-            BadInputError: a step lacks what it needs, two procedures have the same name, or the driver is
-                unknown.
+            BadInputError: a step lacks what it needs or exports a calibration beside an existing one, two
+                procedures have the same name, or the driver is unknown.
         """
         names = [p.procedure for p in procedures]
         for path, name in zip(procedure_paths, names, strict=True):
@@ -64,10 +74,12 @@ class Plan:
                     f"{path}: procedure: expected distinct names of procedures in one command, got {name}"
                     " more than once"
                 )
-        _check_order(procedures, procedure_paths)
+        if calibration is not None:
+            calibration.refuse_export(procedures, procedure_paths)
+        _check_order(procedures, procedure_paths, set() if calibration is None else {GIVES})
         _check_placements(rig, procedures, procedure_paths)
         check_driver(rig)
-        return cls(rig, rig_path, tuple(procedures), tuple(procedure_paths))
+        return cls(rig, rig_path, tuple(procedures), tuple(procedure_paths), calibration)
 
     def new_session(self, sessions: Path) -> Path:
         """Folder of a new session, named by time and first procedure, with a number if it exists."""
@@ -115,14 +127,15 @@ def _check_placements(rig: Rig, procedures: Sequence[Procedure], paths: Sequence
                 )
 
 
-def _check_order(procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:
-    """Refuse a step whose requirement no earlier step of this or an earlier procedure meets."""
-    made: set[str | None] = set()
+def _check_order(procedures: Sequence[Procedure], paths: Sequence[Path], given: Set[str]) -> None:
+    """Refuse a step whose requirement is neither `given` nor met by an earlier step or procedure."""
+    made: set[str | None] = {*given}
     for path, procedure in zip(paths, procedures, strict=True):
         for index, step in enumerate(procedure.steps):
             if step.needs is not None and step.needs not in made:
                 raise BadInputError(
                     f"{path}: steps[{index}]: {step.step} needs a step before it that gives {step.needs};"
                     " add one, or name a procedure with such a step before this one in the command"
+                    + (", or an existing calibration by --calibration FILE" if step.needs == GIVES else "")
                 )
             made.add(step.gives)

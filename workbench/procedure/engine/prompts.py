@@ -6,10 +6,15 @@ from collections.abc import Sequence
 
 from workbench.model.prompt import Action, Prompt, Quantity
 from workbench.model.rig import Rig
-from workbench.model.target import BoardTarget, Placement
+from workbench.model.target import BoardTarget, CylinderTarget, FlatTarget, Placement
 
 SAFETY = "safety"
 """Key of the confirmation before the first emission; asked again when a session is resumed."""
+SPECULAR = (
+    "WARNING: a glossy cylinder reflects the beams sideways like a mirror. Cover it with matt white paper,"
+    " and keep eyes and shiny things out of the plane of the beams."
+)
+"""Warning before a beam meets a curved surface, which spreads specular reflections in its plane."""
 MISREAD = 0.1
 """Largest relative difference of an entered standoff from the requested one; beyond it, it is refused."""
 
@@ -39,8 +44,8 @@ def placement_prompt(placement: Placement, before: Placement | None) -> Prompt:
     place = f"Take the {name} away and place it again" if again else f"Place the {name}"
     return Prompt(
         key=placement.key,
-        do=f"{place} at {at:g} mm{_turn(placement)}.",
-        expect="Its face is square to the ruler unless turned, and every spot lies on it.",
+        do=f"{place} at {at:.6g} mm{_turn(placement)}.{_how(placement)}",
+        expect=_expected_sight(placement),
         otherwise="Place it as near as possible and enter the standoff that the ruler shows.",
         quantity=Quantity("mm", (1 - MISREAD) * at, (1 + MISREAD) * at, at),
         at_bench=True,
@@ -91,7 +96,41 @@ def _protect(laser_class: str) -> str:
 
 
 def _target(placement: Placement) -> str:
-    return "board" if isinstance(placement.target, BoardTarget) else "target"
+    target = placement.target
+    if isinstance(target, CylinderTarget):
+        return f"cylinder of {target.diameter_mm:g} mm diameter"
+    return "board" if isinstance(target, BoardTarget) else "target"
+
+
+def _how(placement: Placement) -> str:
+    """How to place a target that is not flat and square, and how well its reference must be known."""
+    target, standoff_sd = placement.target, placement.standoff_sd_mm
+    ruler = "" if standoff_sd is None else f" Standard uncertainty of the standoff: {standoff_sd:g} mm."
+    if isinstance(target, CylinderTarget):
+        aside = f"at x = {target.shift_mm:g} mm" if target.shift_mm else "on the optical axis"
+        known = "" if target.diameter_sd_mm is None else f", known to {target.diameter_sd_mm:g} mm (1 sigma)"
+        return (
+            f" Its axis is vertical and {aside}; the standoff is that of its nearest line. Diameter"
+            f" {target.diameter_mm:g} mm{known}.{ruler} {SPECULAR}"
+        )
+    if isinstance(target, FlatTarget) and target.turn_sd_deg is not None:
+        return (
+            f" {_nearer(target)} side is nearer; the standoff is that of its face on the optical axis."
+            f" Set the angle to {target.turn_sd_deg:g} deg (1 sigma) by sine bar or digital level.{ruler}"
+        )
+    return ruler
+
+
+def _nearer(target: FlatTarget) -> str:
+    if abs(target.yaw_deg) >= abs(target.pitch_deg):
+        return "Its left" if target.yaw_deg > 0 else "Its right"
+    return "Its upper" if target.pitch_deg > 0 else "Its lower"
+
+
+def _expected_sight(placement: Placement) -> str:
+    if isinstance(placement.target, CylinderTarget):
+        return "Every spot lies on the cylinder, and no beam is reflected towards a person or the camera."
+    return "Its face is square to the ruler unless turned, and every spot lies on it."
 
 
 def _turn(placement: Placement) -> str:

@@ -13,6 +13,7 @@ from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model
+from workbench.procedure.engine.existing_calibration import ExistingCalibration
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.procedure_file import Procedure
 from workbench.procedure.engine.replay import ReplayingJournal
@@ -100,7 +101,11 @@ def files_now(session_dir: Path, began_with: Manifest) -> tuple[Manifest, tuple[
 
 
 def plan_of(session_dir: Path, manifest: Manifest) -> Plan:
-    """Plan from the texts in a manifest."""
+    """Plan from the texts in a manifest, and the copy of an existing calibration.
+
+    Raises:
+        BadInputError: see `Plan.of` and `ExistingCalibration.of_session`.
+    """
     where = session_dir / MANIFEST
     procedures = [
         parse_yaml_model(entry.text, Path(f"{where} ({entry.file})"), Procedure)
@@ -108,7 +113,9 @@ def plan_of(session_dir: Path, manifest: Manifest) -> Plan:
     ]
     rig = parse_yaml_model(manifest.rig.text, Path(f"{where} (rig)"), Rig)
     paths = [Path(entry.file) for entry in manifest.procedures]
-    return Plan.of(rig, Path(manifest.rig.file), procedures, paths)
+    entry = manifest.calibration
+    existing = None if entry is None else ExistingCalibration.of_session(session_dir, entry, rig)
+    return Plan.of(rig, Path(manifest.rig.file), procedures, paths, existing)
 
 
 Entry = TypeVar("Entry", bound=FileEntry)

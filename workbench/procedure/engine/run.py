@@ -72,7 +72,10 @@ def run(
             operator=caller.operator,
             created=caller.created,
             command=caller.command,
+            calibration=None if plan.calibration is None else plan.calibration.entry,
         )
+        if plan.calibration is not None:
+            plan.calibration.write_copy(session_dir)
         journal = stack.enter_context(Journal(session_dir))
         recorder = ReplayingJournal(journal, consumers)
         run_steps(plan, open_context(plan, session_dir, bench, operator, recorder, caller, stopping))
@@ -110,8 +113,16 @@ def open_context(
         operator=caller.operator,
         created=caller.created,
     )
+    existing = plan.calibration
     return Context(
-        session_dir, plan.rig, bench, operator_of_bench(bench, operator), recorder, provenance, stopping
+        session_dir,
+        plan.rig,
+        bench,
+        operator_of_bench(bench, operator),
+        recorder,
+        provenance,
+        stopping,
+        calibration=None if existing is None else existing.calibration,
     )
 
 
@@ -124,6 +135,8 @@ def _ending(error: BaseException) -> ev.SessionFinished:
 def _run_all(plan: Plan, context: Context) -> None:
     names = tuple(p.procedure for p in plan.procedures)
     context.emit(ev.SessionStarted(session=context.session_dir.name, rig=plan.rig.rig, procedures=names))
+    if plan.calibration is not None:
+        context.emit(plan.calibration.loaded(context.provenance.created))
     for procedure in plan.procedures:
         context.emit(
             ev.ProcedureStarted(

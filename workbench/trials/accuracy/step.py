@@ -20,6 +20,7 @@ class AccuracyTrialStep(StepModel):
     """Range a flat target at standoffs that the fit has not used; give a table and a chart of the errors."""
 
     needs: ClassVar[str | None] = "calibration"
+    gives: ClassVar[str | None] = "readings"
     step: Literal["accuracy_trial"]
     standoffs_mm: Standoffs
     readings: Count

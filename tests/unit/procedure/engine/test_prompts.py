@@ -8,8 +8,9 @@ import pytest
 
 from tests.support.running import two_laser_rig
 from workbench.model.prompt import Answer
-from workbench.model.target import BoardTarget, FlatTarget, Placement
+from workbench.model.target import BoardTarget, CylinderTarget, FlatTarget, Placement
 from workbench.procedure.engine.prompts import (
+    SPECULAR,
     captures_prompt,
     placement_prompt,
     placement_prompts,
@@ -87,3 +88,29 @@ def test_the_prompt_of_a_board_states_its_angles(
     text = placement_prompt(Placement(key="a", standoff_mm=700.0, target=board), None).do
     assert re.findall(r"\d+", text) == ["700", *numbers]
     assert "board" in text
+
+
+@pytest.mark.parametrize(
+    ("target", "nearer"),
+    [
+        (FlatTarget(yaw_deg=30.0, turn_sd_deg=0.15), "left"),
+        (FlatTarget(yaw_deg=-30.0, turn_sd_deg=0.15), "right"),
+        (FlatTarget(pitch_deg=30.0, turn_sd_deg=0.15), "upper"),
+        (FlatTarget(pitch_deg=-30.0, turn_sd_deg=0.15), "lower"),
+    ],
+)
+def test_the_prompt_of_an_incline_names_the_nearer_side_and_its_uncertainty(
+    target: FlatTarget, nearer: str
+) -> None:
+    placement = Placement(key="a", standoff_mm=400.0, target=target, standoff_sd_mm=0.35)
+    prompt = placement_prompt(placement, None)
+    assert f"{nearer} side is nearer" in prompt.do
+    assert {"30", "0.15", "0.35"} <= set(prompt.do.split())
+
+
+def test_the_prompt_of_a_cylinder_warns_of_reflections_and_names_its_axis() -> None:
+    target = CylinderTarget(diameter_mm=178.0, shift_mm=20.0, diameter_sd_mm=0.15)
+    prompt = placement_prompt(Placement(key="a", standoff_mm=400.0, target=target), None)
+    assert SPECULAR in prompt.do
+    assert {"178", "20", "0.15"} <= set(prompt.do.split())
+    assert SPECULAR not in placement_prompt(Placement(key="a", standoff_mm=400.0), None).do

@@ -24,7 +24,7 @@ def test_a_trial_that_cannot_be_is_refused(text: str, keys: list[str]) -> None:
 
 def test_it_takes_one_capture_a_reading_with_a_calibration() -> None:
     step, rig = parse_step("step: accuracy_trial, standoffs_mm: [300, 700], readings: 5"), two_laser_rig()
-    assert (step.needs, step.gives) == ("calibration", None)
+    assert (step.needs, step.gives) == ("calibration", "readings")
     assert [(one.key, one.standoff_mm) for one in step.placements("p.1", rig)] == [
         ("p.1/300mm", 300.0),
         ("p.1/700mm", 700.0),

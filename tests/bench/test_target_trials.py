@@ -1,0 +1,115 @@
+"""Trials of targets with an existing calibration: a session, and the same one killed and resumed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.bench.sensors import calibration_of
+from tests.crash.short import ROOT, results
+from workbench.calibration.verdict.export import render
+from workbench.model.event import CalibrationLoaded, ReadingTaken, TrialFinished
+from workbench.model.rig import load_rig
+from workbench.session.journal import read_journal
+
+SCRIPT = Path(sys.executable).with_name("workbench")
+RIG = ROOT / "rigs/thesis-emulated.yaml"
+PROCEDURE = """\
+format: 1
+procedure: targets
+title: Targets
+steps:
+  - step: accuracy_trial
+    standoffs_mm: [400]
+    readings: 1
+  - step: missing_spots_trial
+    ranges_mm: [400]
+    missing: [1, 3]
+    readings: 2
+  - step: incline_trial
+    ranges_mm: [300]
+    targets: [{kind: incline, angle_deg: 30}, {kind: incline, angle_deg: 60}]
+    readings: 2
+  - step: round_trial
+    ranges_mm: [250, 350]
+    target: {kind: cylinder, diameter_mm: 178}
+    readings: 2
+  - step: thesis_comparison
+"""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Procedure and calibration, and the folder of an undisturbed session."""
+
+    folder: Path
+    whole: Path
+
+    def arguments(self, sessions: str) -> list[str]:
+        files = [self.folder / "targets.yaml", "--rig", RIG, "--calibration", self.folder / "c.yaml"]
+        return [str(SCRIPT), "run", *map(str, files), "--sessions", str(self.folder / sessions)]
+
+
+def call(*arguments: str) -> None:
+    done = subprocess.run(
+        arguments, capture_output=True, text=True, env=os.environ | {"COLUMNS": "80"}, cwd=ROOT
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    folder = tmp_path_factory.mktemp("targets")
+    (folder / "targets.yaml").write_text(PROCEDURE)
+    (folder / "c.yaml").write_text(render(calibration_of(load_rig(RIG))))
+    call(*Bench(folder, folder).arguments("whole"))
+    (whole,) = [path for path in (folder / "whole").iterdir() if path.is_dir()]
+    return Bench(folder, whole)
+
+
+def test_every_trial_ends_with_ranges_angles_and_radii(bench: Bench) -> None:
+    events = [record.event for record in read_journal(bench.whole)]
+    assert sum(isinstance(event, CalibrationLoaded) for event in events) == 1
+    readings = [event for event in events if isinstance(event, ReadingTaken)]
+    assert len(readings) == 1 + 3 * 2 + 2 * 2 + 2 * 2
+    assert all(reading.range_mm is not None for reading in readings)
+    for reading in readings:
+        if reading.true is not None and reading.true.angle_deg is not None:
+            # Some five expected deviations: calibration, spots, reference, common tilt of the target.
+            assert reading.angle_deg == pytest.approx(reading.true.angle_deg, abs=5.0)
+        if reading.true is not None and reading.true.radius_mm is not None:
+            assert reading.radius_sd_mm is not None
+            assert reading.radius_mm == pytest.approx(reading.true.radius_mm, abs=5 * reading.radius_sd_mm)
+    trials = [event.trial for event in events if isinstance(event, TrialFinished)]
+    assert trials == [f"targets.{n}" for n in range(1, 6)]
+    assert (bench.whole / "targets.5-figure-41.svg").is_file()
+
+
+@pytest.mark.parametrize("step", ["targets.2", "targets.3", "targets.4"])
+def test_a_trial_that_is_killed_and_resumed_gives_the_same_tables(bench: Bench, step: str) -> None:
+    sessions = f"killed-{step}"
+    process = subprocess.Popen(bench.arguments(sessions), cwd=ROOT, stderr=subprocess.DEVNULL)
+    killed = captured(bench.folder / sessions, step, process)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    call(str(SCRIPT), "resume", str(killed))
+    assert results(killed) == results(bench.whole)
+
+
+def captured(sessions: Path, step: str, process: subprocess.Popen[bytes]) -> Path:
+    """The session's folder, as soon as the step has captured something and has not ended."""
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline:
+        assert process.poll() is None, "it ended before it was killed"
+        for journal in sessions.glob("*/journal.jsonl"):
+            if f'"kind":"capture_taken","key":"{step}/' in journal.read_text(errors="replace"):
+                return journal.parent
+        time.sleep(0.01)
+    raise AssertionError(f"{step} captured nothing")

@@ -1,0 +1,51 @@
+"""Statistics of the incline trial."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.four_lasers import reading
+from workbench.model.event import ReadingTaken, TrueValues
+from workbench.trials.incline.statistics import angle_differences, incline_row
+from workbench.trials.targets import InclineSpec
+
+
+def spec(angle_deg: float, axis: str = "vertical") -> InclineSpec:
+    return InclineSpec.model_validate(
+        {"kind": "incline", "angle_deg": angle_deg, "axis": axis, "reference_sd_deg": 0.1}
+    )
+
+
+def angles(set_deg: float, *measured_deg: float | None, sd_deg: float = 0.2) -> list[ReadingTaken]:
+    true = TrueValues(range_mm=400.0, range_sd_mm=0.3, angle_deg=set_deg, angle_sd_deg=0.1)
+    return [
+        reading(true, range_mm=400.5, angle_deg=one, angle_sd_deg=None if one is None else sd_deg)
+        for one in measured_deg
+    ]
+
+
+def test_a_reading_whose_shape_is_no_incline_has_no_angle() -> None:
+    row = incline_row(spec(30.0), 400.0, angles(30.0, 30.4, None, 30.2))
+    assert (row.range.n, row.angle.n, row.angle.missing) == (3, 2, 1)
+    assert row.angle.mean == pytest.approx(0.3)
+    assert row.angle.expanded == pytest.approx(2 * np.hypot(0.2, 0.1))
+    assert row.range.mean == pytest.approx(0.5)
+
+
+def test_a_tilt_common_to_two_angles_cancels_in_their_difference() -> None:
+    rows = [incline_row(spec(deg), 400.0, angles(deg, deg + 0.7)) for deg in (30.0, 60.0, -10.0)]
+    found = angle_differences(rows)
+    assert [one.angles_deg for one in found] == [(30.0, 60.0), (30.0, -10.0), (60.0, -10.0)]
+    assert [one.error_deg for one in found] == pytest.approx([0.0] * 3, abs=1e-12)
+    assert found[0].expanded_deg == pytest.approx(2 * np.sqrt(2 * 0.2**2 + 2 * 0.1**2))
+
+
+def test_only_angles_at_the_same_range_and_axis_are_compared() -> None:
+    first = incline_row(spec(30.0), 400.0, angles(30.0, 30.0))
+    others = [
+        incline_row(spec(60.0), 500.0, angles(60.0, 60.0)),
+        incline_row(spec(60.0, "horizontal"), 400.0, angles(60.0, 60.0)),
+        incline_row(spec(60.0), 400.0, angles(60.0, None)),
+    ]
+    assert [angle_differences([first, other]) for other in others] == [[], [], []]

@@ -1,0 +1,62 @@
+"""Rows of the comparison with the thesis."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.support.four_lasers import reading
+from workbench.model.event import ReadingTaken, TrueValues
+from workbench.trials.thesis_hardware.comparison import CLAIMS, Row, compare
+
+
+def flats(true_mm: float, *errors_mm: float, left_off: tuple[str, ...] = ()) -> list[ReadingTaken]:
+    true = TrueValues(range_mm=true_mm, range_sd_mm=0.3)
+    return [reading(true, range_mm=true_mm + e, left_off=left_off) for e in errors_mm]
+
+
+def row(rows: list[Row], target: str, quantity: str, to_mm: float | None = None) -> Row:
+    (found,) = [one for one in rows if (one.target, one.quantity, one.to_mm) == (target, quantity, to_mm)]
+    return found
+
+
+def test_a_row_has_the_largest_mean_error_of_its_ranges() -> None:
+    readings = [*flats(400.0, 1.0, -2.0), *flats(1000.0, 3.0), *flats(4000.0, 50.0)]
+    rows = compare(readings)
+    near = row(rows, "flat", "closest range error", 2000)
+    assert near.ours == pytest.approx(1.5 / 400)
+    assert near.at_mm == 400.0
+    assert near.ratio == pytest.approx(1.5 / 400 / 0.025)
+    assert near.is_reached is True
+    far = row(rows, "flat", "closest range error", 4500)
+    assert far.ours == pytest.approx(50 / 4000)
+    assert far.is_reached is False
+
+
+def test_a_standard_deviation_is_in_the_unit_of_its_quantity() -> None:
+    true = TrueValues(range_mm=300.0, range_sd_mm=0.3, angle_deg=30.0, angle_sd_deg=0.1)
+    readings = [reading(true, range_mm=300.0, angle_deg=30.0 + e, angle_sd_deg=0.2) for e in (-1.0, 1.0)]
+    found = row(compare(readings), "inclines", "angle sd")
+    assert found.ours == pytest.approx(2**0.5)
+    assert found.unit == "deg"
+    assert found.ratio == pytest.approx(2**0.5 / 4.0)
+
+
+def test_errors_with_lasers_off_are_relative_to_those_of_all_at_the_same_ranges() -> None:
+    readings = [
+        *flats(400.0, 1.0),
+        *flats(800.0, 2.0),
+        *flats(400.0, 3.0, left_off=("L1",)),
+        *flats(900.0, 90.0, left_off=("L1",)),
+    ]
+    rows = compare(readings)
+    one, three = row(rows, "1 off", "error / that of all"), row(rows, "3 off", "error / that of all")
+    assert one.ours == pytest.approx(3.0)
+    assert one.is_reached is False
+    assert (three.ours, three.is_reached) == (None, False)
+
+
+def test_without_readings_no_goal_is_reached() -> None:
+    rows = compare([])
+    assert len(rows) == len(CLAIMS) + 2
+    assert {one.ours for one in rows} == {None}
+    assert all(one.is_reached is (None if one.goal is None else False) for one in rows)

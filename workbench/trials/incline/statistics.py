@@ -1,0 +1,79 @@
+"""Statistics of the incline trial: errors of range and angle, and of differences of set angles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import hypot, sqrt
+from statistics import fmean
+
+from workbench.model.event import ReadingTaken
+from workbench.trials.errors import EXPANSION, ErrorStatistics, error_statistics, range_statistics
+from workbench.trials.targets import InclineSpec
+
+
+@dataclass(frozen=True)
+class InclineRow:
+    """Statistics of one set-up."""
+
+    target: InclineSpec
+    asked_mm: float
+    """Closest range asked for, common to the set-ups that are compared; the true one is as measured."""
+    true_mm: float
+    range: ErrorStatistics
+    """mm"""
+    angle: ErrorStatistics
+    """deg"""
+    angle_sd_deg: float | None
+    """Stated standard uncertainty of an angle (root mean square); None without an angle."""
+
+
+@dataclass(frozen=True)
+class AngleDifference:
+    """Difference of two measured angles - that of the set ones; a tilt common to both cancels."""
+
+    asked_mm: float
+    angles_deg: tuple[float, float]
+    error_deg: float
+    expanded_deg: float
+    """Expanded uncertainty U (k = 2), with the sensor's errors at both angles taken as independent."""
+
+
+def incline_row(target: InclineSpec, asked_mm: float, readings: Sequence[ReadingTaken]) -> InclineRow:
+    """Statistics of the readings at one set-up, at least one."""
+    errors = [None if r.angle_deg is None else r.angle_deg - target.angle_deg for r in readings]
+    stated = [r.angle_sd_deg for r in readings if r.angle_sd_deg is not None]
+    return InclineRow(
+        target,
+        asked_mm,
+        readings[0].reference_mm,
+        range_statistics(readings),
+        error_statistics(errors, stated, target.reference_sd_deg),
+        sqrt(fmean(sd**2 for sd in stated)) if stated else None,
+    )
+
+
+def angle_differences(rows: Sequence[InclineRow]) -> list[AngleDifference]:
+    """Differences of every two set angles about the same axis at the same closest range."""
+    found = []
+    for first, second in combinations(rows, 2):
+        if (first.asked_mm, first.target.axis) != (second.asked_mm, second.target.axis):
+            continue
+        if first.angle.mean is None or second.angle.mean is None:
+            continue
+        u_deg = hypot(
+            first.angle_sd_deg or 0.0,
+            second.angle_sd_deg or 0.0,
+            first.target.reference_sd_deg,
+            second.target.reference_sd_deg,
+        )
+        found.append(
+            AngleDifference(
+                first.asked_mm,
+                (first.target.angle_deg, second.target.angle_deg),
+                second.angle.mean - first.angle.mean,
+                EXPANSION * u_deg,
+            )
+        )
+    return found

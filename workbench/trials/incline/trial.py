@@ -1,0 +1,119 @@
+"""Execution of the incline trial, with its tables and charts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from workbench.model.chart import Axis, Chart
+from workbench.model.event import ReadingTaken
+from workbench.model.reading_chart import error_chart
+from workbench.model.table import Cell, Column, Table
+from workbench.model.target import Placement
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.placements import visit_placements
+from workbench.trials.errors import (
+    ErrorPoint,
+    error_cells,
+    error_columns,
+    missing_table,
+    quantity_chart,
+)
+from workbench.trials.incline.set_up import SetUp
+from workbench.trials.incline.statistics import AngleDifference, InclineRow, angle_differences, incline_row
+from workbench.trials.readings import ClosestRange, session_ranger, take_readings
+from workbench.trials.results import finish_trial
+
+SET_UP = (
+    Column(key="angle_deg", name="set", unit="deg"),
+    Column(key="true_mm", name="true", unit="mm", format=".1f"),
+)
+U_CAPTION = "U: expanded uncertainty (k = 2) of the error, by sensor and reference"
+
+
+def run_trial(context: Context, name: str, set_ups: Sequence[SetUp], count: int) -> str:
+    """Take `count` readings at each set-up; returns the outcome in one line.
+
+    Raises:
+        BadInputError: there is no calibration.
+        WorkbenchError: see `visit_placements`.
+    """
+    ranger = session_ranger(context, name)
+    by_key = {set_up.placement.key: set_up for set_up in set_ups}
+
+    def work(placed: Placement) -> tuple[InclineRow, list[ReadingTaken]]:
+        set_up = by_key[placed.key]
+        closest = ClosestRange.of(set_up.target, placed, ranger.sensor, context.rig)
+        readings = take_readings(context, ranger, name, placed, count, closest)
+        return incline_row(set_up.target, set_up.range_mm, readings), readings
+
+    taken = visit_placements(context, [set_up.placement for set_up in set_ups], work)
+    rows = [row for row, _ in taken]
+    readings = [reading for _, of in taken for reading in of]
+    tables = [
+        *incline_tables(name, rows, angle_differences(rows)),
+        *missing_table(name, readings),
+        *missing_table(name, readings, "angle", "angle_deg"),
+    ]
+    charts = [error_chart(f"{name}-errors", readings), angle_chart(name, taken)]
+    finish_trial(context, name, tables, charts)
+    angles = sum(row.angle.n for row in rows)
+    return f"{len(readings)} readings, {angles} with an angle, tables in {name}.csv and {name}-angle.csv"
+
+
+def incline_tables(
+    name: str, rows: Sequence[InclineRow], differences: Sequence[AngleDifference]
+) -> list[Table]:
+    """Tables of the errors of range and angle, and of the differences of set angles if there are any."""
+    tables = [
+        _table(name, "Incline: error of the closest range", "mm", [_range_row(row) for row in rows]),
+        _table(f"{name}-angle", "Incline: error of the angle", "deg", [_angle_row(row) for row in rows]),
+    ]
+    if differences:
+        tables.append(difference_table(name, differences))
+    return tables
+
+
+def difference_table(name: str, differences: Sequence[AngleDifference]) -> Table:
+    """Table of the differences of set angles."""
+    return Table(
+        name=f"{name}-difference",
+        title="Incline: difference of two angles, measured - set",
+        columns=(
+            Column(key="asked_mm", name="range", unit="mm", format=".1f"),
+            Column(key="first_deg", name="first", unit="deg"),
+            Column(key="second_deg", name="second", unit="deg"),
+            Column(key="error_deg", name="error", unit="deg", format="+.2f"),
+            Column(key="expanded_deg", name="U", unit="deg", format=".2f"),
+        ),
+        rows=tuple((d.asked_mm, *d.angles_deg, d.error_deg, d.expanded_deg) for d in differences),
+        caption="a tilt common to both angles cancels; U (k = 2) is an upper bound",
+    )
+
+
+def angle_chart(name: str, taken: Sequence[tuple[InclineRow, Sequence[ReadingTaken]]]) -> Chart:
+    """Chart of the angle error of every reading, one series for each set angle."""
+    points: dict[str, list[ErrorPoint]] = {}
+    for row, readings in taken:
+        of = points.setdefault(f"{row.target.angle_deg:g} deg {row.target.axis}", [])
+        of += [
+            ErrorPoint(
+                row.true_mm, r.angle_deg - row.target.angle_deg, r.angle_sd_deg, row.target.reference_sd_deg
+            )
+            for r in readings
+            if r.angle_deg is not None
+        ]
+    y = Axis(label="angle error", unit="deg")
+    return quantity_chart(f"{name}-angles", "Error of every angle, bars stated u", y, points)
+
+
+def _table(name: str, title: str, unit: str, rows: Sequence[tuple[Cell, ...]]) -> Table:
+    columns = (*SET_UP, *error_columns(unit, ".2f"))
+    return Table(name=name, title=title, columns=columns, rows=tuple(rows), caption=U_CAPTION)
+
+
+def _range_row(row: InclineRow) -> tuple[Cell, ...]:
+    return (row.target.angle_deg, row.true_mm, *error_cells(row.range, row.true_mm))
+
+
+def _angle_row(row: InclineRow) -> tuple[Cell, ...]:
+    return (row.target.angle_deg, row.true_mm, *error_cells(row.angle, row.target.angle_deg))

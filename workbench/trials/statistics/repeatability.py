@@ -1,0 +1,158 @@
+"""Repeatability and reproducibility of readings at one level (ISO 5725-2), and its tests for outliers.
+
+The level is a true range. The "laboratory" of the standard is a re-placement of the target, because repeats
+at one placement share its error and its speckle. Placements may be nested in sessions; reproducibility then
+includes the differences between sessions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.stats import f as f_distribution
+from scipy.stats import t
+
+from workbench.model.arrays import FloatArray
+from workbench.trials.statistics.autocorrelation import INDEPENDENT, Autocorrelation
+from workbench.trials.statistics.estimate import Estimate, require, sd_estimate
+from workbench.trials.statistics.mean_squares import combined_sd
+from workbench.trials.statistics.nested import NestedSquares, nested_squares
+
+LIMIT_FACTOR = 2.8
+"""Limit of the difference of two readings in units of their standard deviation, rounded as in ISO 5725-6."""
+
+
+@dataclass(frozen=True)
+class OutlierTest:
+    """Test of the most deviating group."""
+
+    group: object
+    """Label of the group."""
+    statistic: float
+    probability: float
+    """Probability of a more extreme statistic without an outlier (Bonferroni bound)."""
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Precision at one level; standard deviations in the unit of the readings (mm)."""
+
+    repeatability: Estimate
+    """s_r, of readings at one placement."""
+    between_placements: float
+    """s_L, of the placements' own errors; 0 if the estimated variance is negative."""
+    between_sessions: float | None
+    """Of the sessions' own errors; None with one session."""
+    reproducibility: Estimate
+    """s_R, of readings at new placements (and in new sessions, if there are several)."""
+    readings: int
+    placements: int
+    sessions: int
+
+    @property
+    def repeatability_limit(self) -> float:
+        """r: two readings at one placement differ by less with a probability of 95 %."""
+        return LIMIT_FACTOR * self.repeatability.value
+
+    @property
+    def reproducibility_limit(self) -> float:
+        """R: two readings at different placements differ by less with a probability of 95 %."""
+        return LIMIT_FACTOR * self.reproducibility.value
+
+
+def repeatability(readings: pd.DataFrame, dependence: Autocorrelation = INDEPENDENT) -> Repeatability:
+    """Precision of readings at one level, with 95 % intervals.
+
+    The interval of s_r is exact for independent normal readings (chi-square), that of s_R by the modified
+    large-sample method. Autocorrelated repeats lower the effective degrees of freedom and make s_r too small;
+    both are corrected.
+
+    Args:
+        readings: one row a reading with `error_mm`, `placement` and, if there are several, `session`.
+        dependence: autocorrelation of the repeats.
+
+    Raises:
+        TooFewReadingsError: fewer than two placements, or no placement with two readings.
+    """
+    squares = nested_squares(readings)
+    require(squares.placements, 2, "placements")
+    require(squares.within_dof + 1, 2, "readings at one placement")
+    size = squares.placement_size
+    factor = dependence.variance_factor(size)
+    within = squares.within * (size - 1) / (size - factor) if size > factor else squares.within
+    placement_variance = max(0.0, (squares.placement - factor * within) / size)
+    session_variance = _session_variance(squares, factor * within)
+    return Repeatability(
+        repeatability=sd_estimate(within, max(1.0, squares.within_dof * dependence.dof_factor)),
+        between_placements=float(np.sqrt(placement_variance)),
+        between_sessions=None if session_variance is None else float(np.sqrt(session_variance)),
+        reproducibility=_reproducibility(
+            squares, within + placement_variance + (session_variance or 0.0), dependence
+        ),
+        readings=squares.readings,
+        placements=squares.placements,
+        sessions=squares.sessions,
+    )
+
+
+def _session_variance(squares: NestedSquares, mean_variance: float) -> float | None:
+    """Variance between sessions; `mean_variance`: expected mean square of readings alone."""
+    if squares.session is None:
+        return None
+    placement = (squares.placement - mean_variance) / squares.placement_size
+    expected = mean_variance + squares.session_placement_size * placement
+    return max(0.0, (squares.session - expected) / squares.session_size)
+
+
+def _reproducibility(squares: NestedSquares, variance: float, dependence: Autocorrelation) -> Estimate:
+    """s_R with the interval of the sum of mean squares that estimates its variance without truncation."""
+    weights, values, dofs = squares.total_variance()
+    dofs[-1] = max(1.0, dofs[-1] * dependence.dof_factor)
+    interval = combined_sd(weights, values, dofs)
+    value = float(np.sqrt(variance))
+    return Estimate(value, min(value, interval.low), max(value, interval.high), interval.degrees_of_freedom)
+
+
+def cochran(readings: pd.DataFrame) -> OutlierTest:
+    """Cochran's test of the placement with the largest variance, C = max s_i^2 / sum(s_i^2).
+
+    The probability is exact for equal numbers of repeats; otherwise that of their mean number.
+
+    Args:
+        readings: one row a reading with `error_mm` and `placement`.
+
+    Raises:
+        TooFewReadingsError: fewer than two placements with two readings.
+    """
+    groups = readings.groupby("placement")["error_mm"]
+    variances = groups.var(ddof=1).dropna()
+    require(len(variances), 2, "placements with two readings")
+    count, total = len(variances), float(variances.sum())
+    dof = float(groups.count()[variances.index].mean()) - 1
+    largest = float(variances.max()) / total if total > 0 else 1 / count
+    ratio = np.inf if largest >= 1 else largest * (count - 1) / (1 - largest)
+    probability = min(1.0, count * float(f_distribution.sf(ratio, dof, (count - 1) * dof)))
+    return OutlierTest(variances.idxmax(), largest, probability)
+
+
+def grubbs(means: pd.Series[float]) -> OutlierTest:
+    """Grubbs' two-sided test of the mean farthest from the others, G = abs(x - mean) / s.
+
+    Args:
+        means: (p,) mean of each placement, indexed by placement.
+
+    Raises:
+        TooFewReadingsError: fewer than three placements.
+    """
+    require(len(means), 3, "placements")
+    values: FloatArray = np.asarray(means, np.float64)
+    count, sd = len(values), float(values.std(ddof=1))
+    away = np.abs(values - values.mean())
+    farthest = int(away.argmax())
+    statistic = float(away[farthest]) / sd if sd > 0 else 0.0
+    left = (count - 1) ** 2 - count * statistic**2
+    score = np.inf if left <= 0 else statistic * np.sqrt(count * (count - 2) / left)
+    probability = min(1.0, 2 * count * float(t.sf(score, count - 2)))
+    return OutlierTest(means.index[farthest], statistic, probability)

@@ -1,0 +1,180 @@
+"""Targets of trials as in a procedure file, their placements, and the true values of their readings.
+
+The range of a trial is the number that `workbench range` prints: the closest range over the front, between
+the origins of the outer lasers of a line.
+"""
+
+from __future__ import annotations
+
+from math import cos, hypot, radians, sqrt, tan
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from workbench.model.errors import BadInputError
+from workbench.model.event import TrueValues
+from workbench.model.rig import LARGEST, ImageAxis, NonNegativeFloat, Rig
+from workbench.model.target import CylinderTarget, FlatTarget, Placement
+from workbench.model.yamlfile import FileModel
+from workbench.sensor.calibrated import CalibratedSensor
+
+STEEPEST_DEG = 80.0
+"""Largest angle of an incline; beyond it a spot is longer than six times its width."""
+STEEPEST_ON_CYLINDER = 0.95
+"""Largest distance of a beam from the axis of a cylinder, in radii, at which its spot can be measured."""
+FEWEST_ON_CYLINDER = 3
+"""Lasers of one line that must hit a cylinder: a circle has three parameters."""
+
+
+def _is_turned(angle_deg: float) -> float:
+    if angle_deg == 0:
+        raise ValueError("expected an angle other than 0; a target square to the axis is `kind: flat`")
+    return angle_deg
+
+
+class FlatTargetSpec(FileModel):
+    """Flat target square to the optical axis."""
+
+    kind: Literal["flat"] = "flat"
+    reference_sd_mm: NonNegativeFloat | None = None
+    """Standard uncertainty of the standoff; None: the rig's `placement_sd_mm`."""
+
+
+class InclineSpec(FileModel):
+    """Flat target turned about the vertical or the horizontal axis."""
+
+    kind: Literal["incline"]
+    angle_deg: Annotated[float, Field(ge=-STEEPEST_DEG, le=STEEPEST_DEG), AfterValidator(_is_turned)]
+    """Positive: the right (about the horizontal: lower) side is farther away."""
+    axis: Literal["vertical", "horizontal"] = "vertical"
+    """Axis of the turn: vertical for lasers beside the camera, horizontal for lasers above or below it."""
+    reference_sd_deg: NonNegativeFloat = 0.1
+    """Standard uncertainty of the angle: 0.1 deg by a digital level, 0.02 deg by a sine bar."""
+    reference_sd_mm: NonNegativeFloat | None = None
+    """Standard uncertainty of the standoff; None: the rig's `placement_sd_mm`."""
+
+
+class CylinderSpec(FileModel):
+    """Cylinder with a vertical axis."""
+
+    kind: Literal["cylinder"]
+    diameter_mm: Annotated[float, Field(gt=0, le=LARGEST)]
+    shift_mm: Annotated[float, Field(ge=-LARGEST, le=LARGEST)] = 0.0
+    """x of its axis in the camera frame."""
+    diameter_sd_mm: NonNegativeFloat = 0.1
+    """Standard uncertainty of the diameter: 0.1 mm by a calliper."""
+    reference_sd_mm: NonNegativeFloat | None = None
+    """Standard uncertainty of the standoff; None: the rig's `placement_sd_mm`."""
+
+
+TargetSpec = Annotated[FlatTargetSpec | InclineSpec | CylinderSpec, Field(discriminator="kind")]
+
+
+def front_axis(spec: TargetSpec) -> ImageAxis:
+    """Image axis of the line of lasers that measures the target's angle or radius."""
+    return "v" if isinstance(spec, InclineSpec) and spec.axis == "horizontal" else "u"
+
+
+def target_placement(spec: TargetSpec, key: str, range_mm: float, rig: Rig) -> Placement:
+    """Placement at which the closest range over the rig's front is `range_mm`.
+
+    The standoff is that on the optical axis for a flat target, that of the nearest line for a cylinder.
+
+    Raises:
+        BadInputError: the rig's lasers cannot see the target.
+    """
+    front = _rig_front(spec, rig)
+    if isinstance(spec, CylinderSpec):
+        _check_cylinder(spec, front, key)
+        shape = CylinderTarget(
+            diameter_mm=spec.diameter_mm, shift_mm=spec.shift_mm, diameter_sd_mm=spec.diameter_sd_mm
+        )
+        standoff_mm = range_mm - _cylinder_recess_mm(spec, (min(front), max(front)))
+        return Placement(key=key, standoff_mm=standoff_mm, target=shape, standoff_sd_mm=spec.reference_sd_mm)
+    if isinstance(spec, FlatTargetSpec):
+        return Placement(key=key, standoff_mm=range_mm, standoff_sd_mm=spec.reference_sd_mm)
+    if len(front) < 2:
+        raise BadInputError(
+            f"{key}: target: expected 2 lasers or more on a line across the turn about the {spec.axis} axis,"
+            f" got {len(front)}; turn the target about the other axis"
+        )
+    turn = {"yaw_deg" if spec.axis == "vertical" else "pitch_deg": spec.angle_deg}
+    return Placement(
+        key=key,
+        standoff_mm=range_mm + _incline_lead_mm(spec, (min(front), max(front))),
+        target=FlatTarget(turn_sd_deg=spec.reference_sd_deg, **turn),
+        standoff_sd_mm=spec.reference_sd_mm,
+    )
+
+
+def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, rig: Rig) -> TrueValues:
+    """True values at a placement as measured; the front is that of the calibration.
+
+    The closest range of a flat target has the uncertainty of its squareness too: its near end is closer.
+    """
+    bench, stated = rig.bench, placed.standoff_sd_mm
+    standoff_sd_mm = bench.placement_sd_mm if stated is None else stated
+    if isinstance(spec, FlatTargetSpec):
+        tilt_sd = radians(hypot(bench.tilt_sd_deg, bench.target_tilt_sd_deg))
+        lead_sd_mm = tilt_sd * _half_front_mm(sensor)
+        return TrueValues(range_mm=placed.standoff_mm, range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm))
+    front = sensor.front_mm(front_axis(spec))
+    if isinstance(spec, CylinderSpec):
+        recess_mm = _cylinder_recess_mm(spec, front)
+        radius_sd_mm = spec.diameter_sd_mm / 2
+        return TrueValues(
+            range_mm=placed.standoff_mm + recess_mm,
+            range_sd_mm=standoff_sd_mm,
+            radius_mm=spec.diameter_mm / 2,
+            radius_sd_mm=radius_sd_mm,
+        )
+    lead_mm = _incline_lead_mm(spec, front)
+    arm_mm = lead_mm / tan(radians(abs(spec.angle_deg)))
+    lead_sd_mm = arm_mm / cos(radians(spec.angle_deg)) ** 2 * radians(spec.reference_sd_deg)
+    return TrueValues(
+        range_mm=placed.standoff_mm - lead_mm,
+        range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm),
+        angle_deg=spec.angle_deg,
+        angle_sd_deg=spec.reference_sd_deg,
+    )
+
+
+def _rig_front(spec: TargetSpec, rig: Rig) -> list[float]:
+    """Positions of the lasers of the line across the target, mm along x or y, as designed."""
+    axis = front_axis(spec)
+    return [(laser.x_mm if axis == "u" else laser.y_mm).value for laser in rig.lasers if laser.axis == axis]
+
+
+def _half_front_mm(sensor: CalibratedSensor) -> float:
+    """Largest distance of a laser from the optical axis along its line: the arm of a target's tilt."""
+    axes: tuple[ImageAxis, ...] = ("u", "v")
+    return max(abs(end) for axis in axes if len(sensor.lasers_on(axis)) for end in sensor.front_mm(axis))
+
+
+def _incline_lead_mm(spec: InclineSpec, front_mm: tuple[float, float]) -> float:
+    """Distance by which the near end of the front is closer than the optical axis."""
+    slope = tan(radians(spec.angle_deg))
+    return max(-slope * front_mm[0], -slope * front_mm[1])
+
+
+def _cylinder_recess_mm(spec: CylinderSpec, front_mm: tuple[float, float]) -> float:
+    """Distance from the nearest line of the cylinder to its closest point over the front."""
+    radius_mm = spec.diameter_mm / 2
+    aside_mm = spec.shift_mm - min(max(spec.shift_mm, front_mm[0]), front_mm[1])
+    return radius_mm - sqrt(max(radius_mm**2 - aside_mm**2, 0.0))
+
+
+def _check_cylinder(spec: CylinderSpec, front: list[float], key: str) -> None:
+    aside = sorted(abs(x_mm - spec.shift_mm) for x_mm in front)
+    if len(aside) < FEWEST_ON_CYLINDER:
+        raise BadInputError(
+            f"{key}: target: expected {FEWEST_ON_CYLINDER} lasers or more beside the camera to measure a"
+            f" vertical cylinder, got {len(aside)}"
+        )
+    needed_mm = 2 * aside[FEWEST_ON_CYLINDER - 1] / STEEPEST_ON_CYLINDER
+    if spec.diameter_mm < needed_mm:
+        raise BadInputError(
+            f"{key}: target.diameter_mm: expected {needed_mm:.4g} mm or more, so that {FEWEST_ON_CYLINDER}"
+            f" beams hit it at less than {STEEPEST_ON_CYLINDER:g} radii from its axis, got"
+            f" {spec.diameter_mm:g} mm"
+        )

@@ -1,0 +1,173 @@
+"""Rows of the comparison: what the thesis found, what the workbench finds, and the goal.
+
+Source: D. L. Tran, "Obstacle Detection for Robot Navigation Using Structured Light", M.Eng. thesis, MIT,
+2001, section 7.2.2. Errors are relative absolute values, the mean of the readings at a range; a row has the
+largest of its ranges. The thesis's values are stated in its text or read off its figures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import inf
+from statistics import fmean
+from typing import Literal
+
+from workbench.model.event import ReadingTaken
+from workbench.trials.errors import ErrorStatistics
+from workbench.trials.thesis_hardware.quantities import (
+    ANGLE,
+    CLOSEST_RANGE,
+    CYLINDER_RANGE,
+    MEAN_RANGE,
+    RADIUS,
+    Quantity,
+    Select,
+    by_placement,
+    is_incline,
+    is_mean,
+    is_round,
+    is_without,
+)
+
+Measure = Literal["error", "sd"]
+RATIO_GOAL = 1.5
+"""Largest accepted mean error with lasers left off, in units of that with all lasers."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One value of the thesis."""
+
+    figure: str
+    target: str
+    quantity: Quantity
+    select: Select
+    measure: Measure = "error"
+    to_mm: float = inf
+    thesis: float | None = None
+    """Relative error, or standard deviation in the unit of the quantity; None: the thesis states none."""
+    goal: float | None = None
+    """Largest relative error that the workbench aims at."""
+    limit: str = ""
+    """What limits the error besides noise and calibration."""
+
+
+TILT = "the target's squareness: its near end is closer than the ruler shows"
+PARABOLA = "the printed range is that of a parabola, which four lasers cannot distinguish from a circle"
+CLAIMS = (
+    Claim("33", "flat", MEAN_RANGE, is_mean, to_mm=200, thesis=0.025, goal=0.005),
+    Claim("33", "flat", MEAN_RANGE, is_mean, to_mm=2000, thesis=0.025, goal=0.005),
+    Claim("33", "flat", MEAN_RANGE, is_mean, to_mm=4500, thesis=0.035, goal=0.01),
+    Claim("33", "flat", CLOSEST_RANGE, is_without(0), to_mm=2000, thesis=0.025, goal=0.005, limit=TILT),
+    Claim("33", "flat", CLOSEST_RANGE, is_without(0), to_mm=4500, thesis=0.035, goal=0.01, limit=TILT),
+    Claim("34", "flat", MEAN_RANGE, is_mean, "sd", thesis=40.0),
+    Claim("7.2.2", "1 off", CLOSEST_RANGE, is_without(1), thesis=0.06),
+    Claim("7.2.2", "3 off", CLOSEST_RANGE, is_without(3), thesis=0.06),
+    Claim("35", "30 deg", CLOSEST_RANGE, is_incline(30), thesis=0.06),
+    Claim("36", "60 deg", CLOSEST_RANGE, is_incline(60), thesis=0.06),
+    Claim("37", "30 deg", ANGLE, is_incline(30), to_mm=500, thesis=0.25, goal=0.02),
+    Claim("37", "30 deg", ANGLE, is_incline(30), to_mm=1000, thesis=0.25, goal=0.05),
+    Claim("38", "60 deg", ANGLE, is_incline(60), to_mm=500, thesis=0.08, goal=0.02),
+    Claim("38", "60 deg", ANGLE, is_incline(60), to_mm=1000, thesis=0.08, goal=0.05),
+    Claim("39", "inclines", CLOSEST_RANGE, is_incline(30, 60), "sd", thesis=6.0),
+    Claim("40", "inclines", ANGLE, is_incline(30, 60), "sd", thesis=4.0),
+    Claim("41", "cylinder", CLOSEST_RANGE, is_round, thesis=0.05, goal=0.005, limit=PARABOLA),
+    Claim("41", "cylinder", CYLINDER_RANGE, is_round, thesis=0.05, goal=0.005),
+    Claim("42", "cylinder", CLOSEST_RANGE, is_round, "sd"),
+    Claim("", "cylinder", RADIUS, is_round, to_mm=500, goal=0.05),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the comparison."""
+
+    figure: str
+    target: str
+    quantity: str
+    unit: str
+    """`%` of a relative error, else that of the quantity; empty for a ratio."""
+    to_mm: float | None
+    """Farthest range; None: all."""
+    thesis: float | None
+    ours: float | None
+    """None: no reading of this kind has the quantity."""
+    goal: float | None
+    at_mm: float | None = None
+    """Range of the largest value."""
+    expanded: float | None = None
+    """Expanded uncertainty U (k = 2) of the error at that range, relative."""
+    missing: int = 0
+    """Number of readings without the quantity."""
+    limit: str = ""
+    """What limits the error besides noise and calibration."""
+
+    @property
+    def ratio(self) -> float | None:
+        """Ours / thesis."""
+        return None if self.thesis is None or self.ours is None else self.ours / self.thesis
+
+    @property
+    def is_reached(self) -> bool | None:
+        """Whether the goal is reached; None without a goal. A value that is missing reaches none."""
+        return None if self.goal is None else self.ours is not None and self.ours <= self.goal
+
+
+def compare(readings: Sequence[ReadingTaken]) -> list[Row]:
+    """Rows of every claim, and of the errors with lasers left off relative to those of all lasers."""
+    return [*(_row(claim, readings) for claim in CLAIMS), *(_missing_row(n, readings) for n in (1, 3))]
+
+
+def _row(claim: Claim, readings: Sequence[ReadingTaken]) -> Row:
+    groups = by_placement(readings, claim.select, claim.to_mm)
+    rated = [(group, claim.quantity.statistics(group)) for group in groups]
+    value: Callable[[ErrorStatistics, float], float | None] = _sd if claim.measure == "sd" else _mean_error
+    found = [
+        (ours, group[0].reference_mm, statistics.expanded, true)
+        for group, statistics in rated
+        if (true := claim.quantity.true(group[0])) is not None
+        and (ours := value(statistics, true)) is not None
+    ]
+    ours, at_mm, expanded, true = max(found, default=(None, None, None, None), key=lambda one: one[0] or 0.0)
+    return Row(
+        claim.figure,
+        claim.target,
+        f"{claim.quantity.name} {claim.measure}",
+        claim.quantity.unit if claim.measure == "sd" else "%",
+        None if claim.to_mm == inf else claim.to_mm,
+        claim.thesis,
+        ours,
+        claim.goal,
+        at_mm,
+        None if expanded is None or true is None else expanded / abs(true),
+        sum(statistics.missing for _, statistics in rated),
+        claim.limit,
+    )
+
+
+def _missing_row(left_off: int, readings: Sequence[ReadingTaken]) -> Row:
+    """Mean error with lasers left off relative to that of all lasers, over the placements with both."""
+    without = {_place(g): g for g in by_placement(readings, is_without(left_off), inf)}
+    full = {_place(g): g for g in by_placement(readings, is_without(0), inf)}
+    both = [place for place in without if place in full]
+    errors = [[_relative(group) for group in (without[place], full[place])] for place in both]
+    pairs = [(own, whole) for own, whole in errors if own is not None and whole is not None]
+    ours = fmean(own for own, _ in pairs) / fmean(whole for _, whole in pairs) if pairs else None
+    return Row("", f"{left_off} off", "error / that of all", "", None, None, ours, RATIO_GOAL)
+
+
+def _place(group: Sequence[ReadingTaken]) -> tuple[str, float]:
+    return group[0].trial, group[0].reference_mm
+
+
+def _relative(group: Sequence[ReadingTaken]) -> float | None:
+    return _mean_error(CLOSEST_RANGE.statistics(group), group[0].reference_mm)
+
+
+def _mean_error(statistics: ErrorStatistics, true: float) -> float | None:
+    return None if statistics.mean_absolute is None else statistics.mean_absolute / abs(true)
+
+
+def _sd(statistics: ErrorStatistics, true: float) -> float | None:
+    return statistics.sd
