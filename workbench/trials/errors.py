@@ -31,7 +31,7 @@ class ErrorStatistics:
     mean_absolute: float | None = None
     expanded: float | None = None
     """Expanded uncertainty U (k = 2) of the mean error, by the sensor's stated and the reference's standard
-    uncertainty; readings at one placement share calibration, speckle and placement, so that their number does
+    uncertainty. Readings at one placement share calibration, speckle and placement, so that their number does
     not reduce it."""
 
 

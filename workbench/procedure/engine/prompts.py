@@ -103,7 +103,7 @@ def _target(placement: Placement) -> str:
 
 
 def _how(placement: Placement) -> str:
-    """How to place a target that is not flat and square, and how well its reference must be known."""
+    """Instruction for a target that is not flat and square, with the uncertainty of its reference."""
     target, standoff_sd = placement.target, placement.standoff_sd_mm
     ruler = "" if standoff_sd is None else f" Standard uncertainty of the standoff: {standoff_sd:g} mm."
     if isinstance(target, CylinderTarget):
