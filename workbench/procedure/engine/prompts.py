@@ -103,7 +103,7 @@ def _target(placement: Placement) -> str:
 
 
 def _how(placement: Placement) -> str:
-    """How to place a target that is not flat and square, and how well its reference must be known."""
+    """Instructions for a target that is not flat and square, with its reference uncertainties."""
     target, standoff_sd = placement.target, placement.standoff_sd_mm
     ruler = "" if standoff_sd is None else f" Standard uncertainty of the standoff: {standoff_sd:g} mm."
     if standoff_sd is not None and standoff_sd >= placement.standoff_mm:

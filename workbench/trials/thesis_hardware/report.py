@@ -79,7 +79,7 @@ def goal_table(name: str, rows: Sequence[Row]) -> list[Table]:
 
 
 def reason(row: Row) -> str:
-    """Reason why a goal is not reached, from the stated uncertainty at that range."""
+    """Reason why a goal is not reached, from the stated uncertainty there."""
     if row.ours is None:
         return "no reading has this quantity"
     if row.expanded is None:

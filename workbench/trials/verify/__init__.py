@@ -1,4 +1,4 @@
-"""Verification of a sensor in service: is its calibration still valid?"""
+"""Verification of the calibration of a sensor in service."""
 
 from workbench.trials.verify.step import VerifyTrialStep
 
