@@ -45,7 +45,7 @@ PRIOR_UNMOVED = 0.9
 
 @dataclass(frozen=True)
 class Derived:
-    """Quantities of a laser that the data determine whatever the priors are. 1 sigma."""
+    """Quantities of a laser that the data determine under any priors. 1 sigma."""
 
     laser_id: str
     f_b_px_mm: float
@@ -77,7 +77,7 @@ def determined_by(fit: CalibrationFit) -> tuple[DeterminedBy, ...]:
 
 
 def basis(data_share: float, sd: float, prior_sd: float) -> DeterminedBy:
-    """What determines a parameter.
+    """Source of the information on a parameter.
 
     `data`: the data alone. `prior`: its own prior, hardly narrowed. `joint`: the data together with the
     priors of other parameters.
@@ -99,9 +99,9 @@ def assess(
     placements: Sequence[CrossValidatedPlacement],
     directions: Sequence[NullDirection] = (),
 ) -> Assessment:
-    """Compare a fit with the limits, and run all checks of it.
+    """Compare a fit with the limits, and run all its checks.
 
-    Where a fault refuses the fit, consequences of it (contradicted priors, alarms, missed limits) are not
+    Where a fault refuses the fit, its consequences (contradicted priors, alarms, missed limits) are not
     listed.
 
     Args:
@@ -312,7 +312,8 @@ def _warnings(fit: CalibrationFit) -> list[str]:
     if np.any(fit.drift_px):
         warnings.append(
             f"the image drifted by {_drift_text(fit)} from the first capture to the last; the fit allows for"
-            " it, and the sd of the image centre includes half of it. Do: warm up longer, or fix the camera."
+            " it, and the sd of the image centre includes half the drift. Do: warm up longer, or fix the"
+            " camera."
         )
     if fit.noise_scale > 1:
         warnings.append(
