@@ -37,7 +37,7 @@ SPECKLE_SCALE = 1.5
 DATA_SHARE_DETERMINED = 0.9
 """Information share of the data from which a parameter is determined by them."""
 LEAST_NARROWING = 0.1
-"""Least relative decrease of a prior's variance by the data for its pull to be tested: where the data hardly
+"""Least relative decrease of a prior's variance by the data for its pull to be tested. Where the data hardly
 constrain a combination, the curvature of the model moves it more than their noise does."""
 PRIOR_UNMOVED = 0.9
 """Ratio of posterior to prior sd above which neither data nor other priors constrain the parameter."""
