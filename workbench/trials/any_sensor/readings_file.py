@@ -30,10 +30,10 @@ class ReadingRow(FileModel):
     true_mm: Millimetres
     measured_mm: Millimetres = nan
     """NaN: the sensor gave no range."""
-    placement: Annotated[str, Field(min_length=1)] = "1"
+    placement: str = "1"
     repeat: Annotated[int, Field(ge=0)] | None = None
     """Order in time within the placement; None: the order of the rows."""
-    session: Annotated[str, Field(min_length=1)] = "1"
+    session: str = "1"
     standoff_mm: Millimetres | None = None
     """Level to which the reading belongs; None: its true range."""
 

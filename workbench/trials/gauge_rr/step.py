@@ -16,8 +16,6 @@ from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel, flat_placement
 
-Operator = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^\S(.*\S)?$")]
-
 
 @dataclass(frozen=True)
 class Round:
@@ -37,7 +35,7 @@ class GaugeTrialStep(StepModel):
     needs: ClassVar[str | None] = "calibration"
     step: Literal["gauge_rr_trial"]
     standoffs_mm: Annotated[tuple[Standoff, ...], Field(min_length=2)]
-    operators: Annotated[tuple[Operator, ...], Field(min_length=2, max_length=100)]
+    operators: Annotated[tuple[str, ...], Field(min_length=2, max_length=100)]
     trials: Annotated[int, Field(ge=2, le=100)] = 3
     """Placements of each standoff by each operator."""
     readings: Count = 1
@@ -46,8 +44,9 @@ class GaugeTrialStep(StepModel):
     @model_validator(mode="after")
     def _parts_and_operators_differ(self) -> GaugeTrialStep:
         require_different(self.standoffs_mm, "trials")
-        if len(set(self.operators)) != len(self.operators):
-            raise ValueError(f"operators: expected each name once, got {', '.join(self.operators)}")
+        names = [name.strip() for name in self.operators]
+        if "" in names or len(set(names)) != len(names):
+            raise ValueError(f"operators: expected each name once, and none blank, got {', '.join(names)}")
         return self
 
     @property

@@ -82,6 +82,7 @@ def _rows(study: GaugeStudy) -> list[dict[str, Cell]]:
         {"component": "TV", "sd_mm": study.total},
     ]
     for row in rows:
+        row.setdefault("note", "")
         sd = row["sd_mm"]
         if isinstance(sd, float) and study.total > 0:
             row["study_variation"] = sd / study.total

@@ -41,3 +41,11 @@ def test_autocorrelation_and_missing_readings_are_reported() -> None:
     found = analyse("repeatability", frame.assign(error_mm=series, measured_mm=300 + series))
     assert found.missing == 3
     assert 0.3 < found.autocorrelation.lag1 < 0.7
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_file_of_clipped_readings_alone_has_no_statistics(kind: str) -> None:
+    frame = drawn_levels(1, [500.0, 600.0]).assign(measured_mm=400.0)
+    found = analyse(kind, frame.assign(error_mm=400.0 - frame["true_mm"]))
+    assert [level.clipped for level in found.clipped] == [24, 24]
+    assert not any(isinstance(row.get("sd_mm"), float) for row in found.table.records())
