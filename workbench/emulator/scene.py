@@ -123,7 +123,7 @@ class BenchScene:
         return Print(self._rig.board, self._spec.surface.ink_albedo / self._spec.surface.albedo)
 
     def _put_board(self, target: BoardTarget, z_mm: float, error: PlacementError, key: str) -> BoardError:
-        """Where a hand has put the board on its plane."""
+        """Place the board on its plane, with the error of an operator."""
         _check_turn("board", target.yaw_deg + error.yaw_deg, target.pitch_deg + error.pitch_deg)
         aside = draw_board_error(self._truth, self._spec, key, z_mm)
         board = stand(target, z_mm, error, aside, self._truth, self._print, self._spec.surface)

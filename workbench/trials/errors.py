@@ -30,9 +30,10 @@ class ErrorStatistics:
     """Standard deviation over the readings: what differs between them, without common errors."""
     mean_absolute: float | None = None
     expanded: float | None = None
-    """Expanded uncertainty U (k = 2) of the mean error, by the sensor's stated and the reference's standard
-    uncertainty; readings at one placement share calibration, speckle and placement, so that their number does
-    not reduce it."""
+    """Expanded uncertainty U (k = 2) of the mean error, by the sensor and the reference.
+
+    Readings at one placement share calibration, speckle and placement: their number does not reduce it.
+    """
 
 
 def error_statistics(

@@ -20,7 +20,7 @@ from workbench.session.manifest import CalibrationEntry
 COPY = "calibration.yaml"
 """Name of the copy in the session folder, under which an export step writes too."""
 GIVES = "calibration"
-"""What the steps of a session need not give if there is an existing calibration."""
+"""Requirement of steps that an existing calibration meets."""
 SECONDS_PER_DAY = 86400.0
 
 

@@ -24,6 +24,7 @@ from workbench.trials.readings import ClosestRange, session_ranger, take_reading
 from workbench.trials.results import finish_trial
 
 SET_UP = (
+    Column(key="axis", name="axis"),
     Column(key="angle_deg", name="set", unit="deg"),
     Column(key="true_mm", name="true", unit="mm", format=".1f"),
 )
@@ -112,8 +113,8 @@ def _table(name: str, title: str, unit: str, rows: Sequence[tuple[Cell, ...]]) -
 
 
 def _range_row(row: InclineRow) -> tuple[Cell, ...]:
-    return (row.target.angle_deg, row.true_mm, *error_cells(row.range, row.true_mm))
+    return (row.target.axis, row.target.angle_deg, row.true_mm, *error_cells(row.range, row.true_mm))
 
 
 def _angle_row(row: InclineRow) -> tuple[Cell, ...]:
-    return (row.target.angle_deg, row.true_mm, *error_cells(row.angle, row.target.angle_deg))
+    return (row.target.axis, row.target.angle_deg, row.true_mm, *error_cells(row.angle, row.target.angle_deg))

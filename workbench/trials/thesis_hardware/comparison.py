@@ -50,7 +50,7 @@ class Claim:
     goal: float | None = None
     """Largest relative error that the workbench aims at."""
     limit: str = ""
-    """What limits the error besides noise and calibration."""
+    """Limit of the error besides noise and calibration; empty: none is known."""
 
 
 TILT = "the target's squareness: its near end is closer than the ruler shows"
@@ -97,11 +97,11 @@ class Row:
     at_mm: float | None = None
     """Range of the largest value."""
     expanded: float | None = None
-    """Expanded uncertainty U (k = 2) of the error at that range, relative."""
+    """Expanded uncertainty U (k = 2) of the error at `at_mm`, relative."""
     missing: int = 0
     """Number of readings without the quantity."""
     limit: str = ""
-    """What limits the error besides noise and calibration."""
+    """Limit of the error besides noise and calibration; empty: none is known."""
 
     @property
     def ratio(self) -> float | None:

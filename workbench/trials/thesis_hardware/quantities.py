@@ -89,7 +89,7 @@ def is_mean(reading: ReadingTaken) -> bool:
 
 
 def is_without(left_off: int) -> Select:
-    """Whether the closest range is that of a flat and square target with so many lasers left off."""
+    """Whether the closest range is that of a flat and square target with this number of lasers left off."""
     return lambda reading: len(reading.left_off) == left_off and _is_square(reading)
 
 

@@ -35,7 +35,7 @@ def side_by_side(name: str, rows: Sequence[Row]) -> Table:
             Column(key="quantity", name="quantity"),
             Column(key="to_mm", name="to", unit="mm"),
             Column(key="thesis", name="thesis", format=".3g"),
-            Column(key="ours", name="ours", format=".2g"),
+            Column(key="ours", name="ours", format=".3g"),
             Column(key="ratio", name="ratio", format=".2g"),
             Column(key="goal", name="goal", format=".3g"),
             Column(key="reached", name="met"),
@@ -54,7 +54,7 @@ def goal_table(name: str, rows: Sequence[Row]) -> list[Table]:
         Column(key="figure", name="fig."),
         Column(key="target", name="target"),
         Column(key="quantity", name="quantity"),
-        Column(key="ours", name="ours", format=".2g"),
+        Column(key="ours", name="ours", format=".3g"),
         Column(key="goal", name="goal", format=".3g"),
         Column(key="at_mm", name="at", unit="mm", format=".0f"),
         Column(key="expanded", name="U there", format=".2g"),
@@ -79,7 +79,7 @@ def goal_table(name: str, rows: Sequence[Row]) -> list[Table]:
 
 
 def reason(row: Row) -> str:
-    """Reason why a goal is not reached, from the stated uncertainty at that range."""
+    """Reason why a goal is not reached, from the stated uncertainty there."""
     if row.ours is None:
         return "no reading has this quantity"
     if row.expanded is None:
