@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from tests.support.exact import calibration_of
-from tests.support.running import Scripted, running, two_laser_rig
+from tests.support.running import Scripted, running, two_laser_rig, with_emulator
 from tests.support.steps import parse_step
 from workbench.model.errors import BadInputError
 from workbench.model.event import TrialFinished
@@ -61,6 +61,21 @@ def test_dither_is_asked_between_repeats(tmp_path: Path) -> None:
     asked = [key for key in operator.keys if key.startswith("p.1")]
     assert sorted(asked) == sorted(prompts)
     assert asked.index("p.1/01-400mm/dither-01") < asked.index("p.1/02-400mm")
+
+
+def test_dither_adds_speckle_to_the_scatter_of_repeats(tmp_path: Path) -> None:
+    rig = with_emulator(two_laser_rig(), beam={"speckle_contrast": 1.0})
+    sds_mm = []
+    for text in ("", ", dither_mm: 2"):
+        folder = tmp_path / (text.strip(", :") or "still")
+        folder.mkdir()
+        step = parse_step(f"step: repeatability_trial, standoffs_mm: [600], placements: 4, repeats: 4{text}")
+        with running(folder, rig) as session:
+            session.context.calibration = calibration_of(rig)
+            step.run(session.context, "p.1")
+            table = pd.read_csv(session.context.session_dir / "p.1-table.csv")
+        sds_mm.append(table["repeatability_sd_mm"][0])
+    assert sds_mm[1] > 3 * sds_mm[0]
 
 
 def test_without_a_calibration_nothing_is_captured(tmp_path: Path) -> None:
