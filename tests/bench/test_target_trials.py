@@ -42,6 +42,9 @@ steps:
     target: {kind: cylinder, diameter_mm: 178}
     readings: 2
   - step: thesis_comparison
+  - step: verify_trial
+    standoffs_mm: [300, 700]
+    readings: 1
 """
 
 
@@ -78,7 +81,7 @@ def test_every_trial_ends_with_ranges_angles_and_radii(bench: Bench) -> None:
     events = [record.event for record in read_journal(bench.whole)]
     assert sum(isinstance(event, CalibrationLoaded) for event in events) == 1
     readings = [event for event in events if isinstance(event, ReadingTaken)]
-    assert len(readings) == 1 + 3 * 2 + 2 * 2 + 2 * 2
+    assert len(readings) == 1 + 3 * 2 + 2 * 2 + 2 * 2 + 3
     assert all(reading.range_mm is not None for reading in readings)
     for reading in readings:
         if reading.true is not None and reading.true.angle_deg is not None:
@@ -88,11 +91,11 @@ def test_every_trial_ends_with_ranges_angles_and_radii(bench: Bench) -> None:
             assert reading.radius_sd_mm is not None
             assert reading.radius_mm == pytest.approx(reading.true.radius_mm, abs=5 * reading.radius_sd_mm)
     trials = [event.trial for event in events if isinstance(event, TrialFinished)]
-    assert trials == [f"targets.{n}" for n in range(1, 6)]
+    assert trials == [f"targets.{n}" for n in range(1, 7)]
     assert (bench.whole / "targets.5-figure-41.svg").is_file()
 
 
-@pytest.mark.parametrize("step", ["targets.2", "targets.3", "targets.4"])
+@pytest.mark.parametrize("step", ["targets.2", "targets.3", "targets.4", "targets.6"])
 def test_a_trial_that_is_killed_and_resumed_gives_the_same_tables(bench: Bench, step: str) -> None:
     sessions = f"killed-{step}"
     process = subprocess.Popen(bench.arguments(sessions), cwd=ROOT, stderr=subprocess.DEVNULL)

@@ -24,7 +24,7 @@ def parameter_table(parameters: Sequence[ParameterRecord]) -> Table:
             Column(key="sd", name="sd", format="sd"),
             Column(key="unit", name="unit"),
             Column(key="prior_value", name="prior", format="g"),
-            Column(key="prior_sd", name="prior sd", format="g"),
+            Column(key="prior_sd", name="prior sd", format=".3g"),
             Column(key="data_share", name="information share", unit="%", scale=100, format=".0f"),
             Column(key="determined_by", name="determined by"),
         ),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.crash.short import write_files
 from tests.support.command_line import Run, refused
 
 ROOT = Path(__file__).parents[3]
@@ -68,3 +69,16 @@ def test_a_number_that_no_computation_holds_is_refused(workbench: Run, tmp_path:
     rig = tmp_path / "rig.yaml"
     rig.write_text(WEBCAM_RIG.read_text() + "board: {columns: 1" + 400 * "0" + "}\n")
     refused(workbench("check", rig), 2, "board.columns: ")
+
+
+def test_plan_states_the_age_of_an_existing_calibration(workbench: Run, tmp_path: Path) -> None:
+    rig, procedure = write_files(
+        tmp_path, f"{SHORT}  - {{step: accuracy_trial, standoffs_mm: [300], readings: 2}}\n"
+    )
+    calibration = ROOT / "data/session-0.1.0/calibration.yaml"
+    refused(workbench("plan", procedure, "--rig", rig), 2, "--calibration")
+    outcome = workbench("plan", procedure, "--rig", rig, "--calibration", calibration)
+    assert outcome.code == 0
+    assert "days old" in " ".join(outcome.err.split())
+    rig.write_text(rig.read_text().replace("serial: emulated-1", "serial: emulated-9"))
+    refused(workbench("plan", procedure, "--rig", rig, "--calibration", calibration), 2, "emulated-9")

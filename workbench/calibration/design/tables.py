@@ -19,7 +19,7 @@ def parameter_forecast_table(parameters: Sequence[ParameterForecast]) -> Table:
         title="Parameters, predicted (sd: 1 sigma)",
         columns=(
             Column(key="name", name="parameter"),
-            Column(key="prior_sd", name="prior sd", format="g"),
+            Column(key="prior_sd", name="prior sd", format=".3g"),
             Column(key="sd", name="sd", format="sd"),
             Column(key="unit", name="unit"),
             Column(key="data_share", name="information share", unit="%", scale=100, format=".0f"),

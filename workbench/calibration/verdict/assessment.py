@@ -265,6 +265,12 @@ def _alarm(one: CrossValidatedPlacement) -> str:
     )
 
 
+def _hidden_drift_px(fit: CalibrationFit) -> float:
+    """Drift that would not be noticed, along the axes that the data constrain; 0 without any."""
+    sd_px = drift_test(fit).sd_px
+    return NOTICED_SD * float(sd_px[np.isfinite(sd_px)].max(initial=0.0))
+
+
 def _drift_text(fit: CalibrationFit) -> str:
     u, v = fit.drift_px
     return f"{u:+.2f} px in u and {v:+.2f} px in v"
@@ -303,7 +309,8 @@ def _warnings(fit: CalibrationFit) -> list[str]:
             f"placements scatter {fit.placement_scale:.1f} times more than stated"
             f" (bench.placement_sd_mm {fit.rig.bench.placement_sd_mm:g}); their sd is scaled by this factor."
         )
-    if not fits_drift(fit.rig) and (hidden := NOTICED_SD * drift_test(fit).sd_px.max()) > LARGEST_HIDDEN_PX:
+    hidden = 0.0 if fits_drift(fit.rig) else _hidden_drift_px(fit)
+    if hidden > LARGEST_HIDDEN_PX:
         warnings.append(
             f"a drift of the image of up to {hidden:.2g} px over the session would not be noticed (expected"
             f" {LARGEST_HIDDEN_PX:g} px at most), because it follows the standoff. Do: visit the standoffs in"
