@@ -48,6 +48,8 @@ SLOW = {
     "tests/unit/sensor/test_calibrated.py",
     "tests/unit/sensor/test_curves.py",
     "tests/unit/spots/test_persistence.py",
+    "tests/unit/trials/statistics/test_gauge_rr.py",
+    "tests/unit/trials/statistics/test_repeatability.py",
     "tests/unit/trials/thesis/test_thesis_chain.py",
     "tests/unit/viewer/test_window.py",
 }

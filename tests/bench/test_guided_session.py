@@ -298,7 +298,7 @@ def test_a_laser_out_of_the_picture_is_asked_about_once_and_in_words(tmp_path: P
     assert asked.do.startswith(
         "no spot of L4 was found in 2 captures at 125 mm (missing: expected at most 0.5). "
     )
-    assert "outside the picture of 640 x 480" in asked.expect
+    assert "outside the image of 640 x 480" in asked.expect
     assert asked.yes
     assert asked.may == {"redo": "125 mm again", "skip": "leave 125 mm out"}
     failed = [e for e in events(done, ev.LimitChecked) if isinstance(e, ev.LimitChecked)]

@@ -11,7 +11,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ import pandas as pd
 import pytest
 
 from tests.crash.short import ROOT, results, write_files
+from tests.support.killed_session import wait_for_capture
 from tests.viewer.readback import Contents
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.event import TrialFinished
@@ -263,16 +263,3 @@ def without_provenance(files: dict[str, bytes]) -> dict[str, bytes]:
     text = files["calibration.yaml"].decode()
     lines = [line for line in text.splitlines() if not line.lstrip().startswith(PROVENANCE)]
     return files | {"calibration.yaml": "\n".join(lines).encode()}
-
-
-def wait_for_capture(sessions: Path, step: str, process: subprocess.Popen[bytes]) -> Path:
-    """The session's folder, as soon as the step has captured something and has not ended."""
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline:
-        assert process.poll() is None, "it ended before it was killed"
-        for folder in sessions.glob("*/journal.jsonl"):
-            text = folder.read_text(errors="replace")
-            if f'"key":"{step}/' in text and '"capture_taken"' in text.split(f'"key":"{step}/', 1)[1]:
-                return folder.parent
-        time.sleep(0.01)
-    raise AssertionError(f"{step} captured nothing")

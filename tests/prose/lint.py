@@ -54,6 +54,19 @@ class Avoid:
 
 
 @dataclass(frozen=True)
+class Allowed:
+    """Accepted exception: findings of some words in one file, for a reason."""
+
+    path: str
+    words: str
+    reason: str
+
+    def covers(self, finding: Finding) -> bool:
+        """Whether a finding is this exception."""
+        return finding.path.as_posix().endswith(self.path) and finding.words == self.words
+
+
+@dataclass(frozen=True)
 class Rules:
     """Contents of `rules.toml`."""
 
@@ -63,10 +76,15 @@ class Rules:
     sentence_kinds: Sequence[str]
     openings: frozenset[str] = field(default_factory=frozenset)
     paths: Sequence[str] = ()
-    not_clean: Sequence[str] = ()
+    allow: Sequence[Allowed] = ()
 
     def findings(self, block: Block) -> Iterator[Finding]:
-        """All findings in one block."""
+        """Findings in one block, without accepted exceptions."""
+        for finding in self._all_findings(block):
+            if not any(allowed.covers(finding) for allowed in self.allow):
+                yield finding
+
+    def _all_findings(self, block: Block) -> Iterator[Finding]:
         for rule in self.avoid:
             yield from rule.findings(block)
         if block.kind in self.sentence_kinds:
@@ -100,7 +118,7 @@ def load_rules(path: Path = RULES) -> Rules:
         sentence_kinds=content["sentence_kinds"],
         openings=frozenset(content["docstring_openings"]),
         paths=content["paths"],
-        not_clean=content["not_clean"],
+        allow=[Allowed(**exception) for exception in content["allow"]],
     )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
+import numpy as np
+
 from tests.support.rigs import World
 from workbench.calibration.data.observations import Observation
 
@@ -51,5 +53,17 @@ def moved(
             if seen > after:
                 du, dv = world.pixel(s.laser_id, z0 + step_mm) - world.pixel(s.laser_id, z0)
                 s = replace(s, u_px=s.u_px + float(du), v_px=s.v_px + float(dv))
+        found.append(s)
+    return found
+
+
+def turned_at(world: World, standoff_mm: float, turn_deg: float) -> list[Observation]:
+    """A whole calibration with the target turned about the vertical at one placement."""
+    z0 = standoff_mm + world.values["offset_mm"]
+    found = []
+    for s in world.observations():
+        if s.standoff_mm == standoff_mm:
+            du, dv = world.pixel(s.laser_id, z0, np.radians(turn_deg)) - world.pixel(s.laser_id, z0)
+            s = replace(s, u_px=s.u_px + float(du), v_px=s.v_px + float(dv))
         found.append(s)
     return found

@@ -44,15 +44,15 @@ def fitted_spot(
     v_px: float,
     width_px: float = 1.3,
     flux_dn: float = 5000.0,
-    clarity: float = 100.0,
+    flux_snr: float = 100.0,
     scene: PairSignal | None = None,
 ) -> FittedSpot:
     """A round spot as if it had been fitted."""
-    sd_px, ln_width = width_px / clarity, np.log(width_px)
+    sd_px, ln_width = width_px / flux_snr, np.log(width_px)
     peak_dn = flux_dn / (2.0 * np.pi * width_px**2)
     spot = Spot(u_px, v_px, sd_px, sd_px, flux_dn, width_px, peak_dn)
     params = np.array([0.0, flux_dn, u_px, v_px, ln_width, ln_width])
-    return FittedSpot(spot, params, 0.1, width_px, clarity, scene or BLACK)
+    return FittedSpot(spot, params, 0.1, width_px, flux_snr, scene or BLACK)
 
 
 BLACK = scene_of(np.zeros((60, 120), np.uint16))

@@ -14,11 +14,12 @@ PAGES = sorted(
         *(page for folder in ("docs", "examples", "rigs", "data") for page in ROOT.glob(f"{folder}/**/*.md")),
     ]
 )
+README = ROOT / "README.md"
 LONGEST_README = 150
 
 
 def test_readme_is_short() -> None:
-    assert len((ROOT / "README.md").read_text().splitlines()) <= LONGEST_README
+    assert len(README.read_text().splitlines()) <= LONGEST_README
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -42,3 +43,13 @@ def _anchors(page: Path) -> set[str]:
     """Anchors of the headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(), flags=re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_headline_figures_of_the_readme_are_those_of_the_whole_table() -> None:
+    row = r"^\| (?:flat|angle|cylinder)[^|]*\| (\d+) \| ([\d.]+) \| ([\d.]+) \|$"
+    rows = re.findall(row, README.read_text(), re.MULTILINE)
+    table = (ROOT / "docs/target-trials.md").read_text()
+    assert len(rows) == 5
+    for to_mm, thesis, ours in rows:
+        reach = "-" if to_mm == "1000" else to_mm
+        assert re.search(rf" {reach} +{thesis} +{ours} ", table), (to_mm, thesis, ours)

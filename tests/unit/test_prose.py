@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -111,9 +112,15 @@ def test_a_missing_path_is_an_error() -> None:
         lint([Path("no/such/folder")], RULES)
 
 
-def test_packages_listed_as_not_clean_exist() -> None:
-    root = Path(__file__).parents[2]
-    assert all((root / package).exists() for package in RULES.not_clean)
+def test_each_exception_is_found_without_it_and_passes_in_its_file_only(tmp_path: Path) -> None:
+    strict = replace(RULES, allow=())
+    for allowed in RULES.allow:
+        path = Path(__file__).parents[2] / allowed.path
+        assert allowed.words in [item.words for item in lint([path], strict)]
+        assert allowed.words not in [item.words for item in lint([path], RULES)]
+        copy = tmp_path / path.name
+        copy.write_text(path.read_text())
+        assert allowed.words in [item.words for item in lint([copy], RULES)]
 
 
 def _in_markdown(folder: Path, text: str) -> list[Finding]:

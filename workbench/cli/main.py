@@ -7,6 +7,7 @@ import gc
 import os
 import traceback
 from contextlib import suppress
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -254,6 +255,30 @@ def range_(
         from workbench.cli.live import LiveRequest, range_live
 
         range_live(LiveRequest(rig, calibration, readings, standoff, stats), json)
+
+
+class TrialKind(StrEnum):
+    """Kinds of statistics of `workbench trial`."""
+
+    ACCURACY = "accuracy"
+    REPEATABILITY = "repeatability"
+    GAUGE_RR = "gauge-rr"
+    LINEARITY = "linearity"
+
+
+@app.command()
+def trial(
+    kind: Annotated[TrialKind, typer.Argument(help="Statistics to compute.")],
+    readings: Annotated[
+        Path,
+        typer.Argument(help="Readings (CSV): true_mm, measured_mm; also placement, repeat, session."),
+    ],
+    json: Json = False,
+) -> None:
+    """Compute the statistics of a trial from readings of any range sensor."""
+    from workbench.cli.trial import analyse_readings
+
+    analyse_readings(kind.value, readings, json)
 
 
 @app.command()

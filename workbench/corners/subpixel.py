@@ -5,8 +5,8 @@ The model of a corner is two straight edges that cross, each blurred to an error
     I(x) = a + b erf(d1 / (sqrt(2) w)) erf(d2 / (sqrt(2) w)),    d = distance from an edge through the corner
 
 It has seven unknowns: the corner (u, v), the direction of each edge, the blur w, and the tones a, b. The true
-image of two edges that are not at right angles differs from the product, but is point-symmetric like it, so
-that the position of the corner is not biased.
+image of two edges that are not at right angles differs from the product. It is point-symmetric like the
+product, so that the position of the corner is not biased.
 """
 
 from __future__ import annotations

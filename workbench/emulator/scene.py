@@ -83,7 +83,7 @@ class BenchScene:
         else:
             self._surfaces = _surfaces(placement.target, z_mm, error, self._spec.surface)
             self._file.add(placement.key, own)
-        self._key = placement.key
+        self._key = _speckle_key(placement)
         self._spots, self._picture = {}, None
         self.moves += 1
         return placement
@@ -123,7 +123,7 @@ class BenchScene:
         return Print(self._rig.board, self._spec.surface.ink_albedo / self._spec.surface.albedo)
 
     def _put_board(self, target: BoardTarget, z_mm: float, error: PlacementError, key: str) -> BoardError:
-        """Where a hand has put the board on its plane."""
+        """Place the board on its plane, with the error of an operator."""
         _check_turn("board", target.yaw_deg + error.yaw_deg, target.pitch_deg + error.pitch_deg)
         aside = draw_board_error(self._truth, self._spec, key, z_mm)
         board = stand(target, z_mm, error, aside, self._truth, self._print, self._spec.surface)
@@ -137,6 +137,12 @@ class BenchScene:
             for index, (surface, gain) in enumerate(self._surfaces)
         ]
         return [spot for spot in painted if spot is not None]
+
+
+def _speckle_key(placement: Placement) -> str:
+    """Key of the speckle pattern: each placement has its own, and each displacement along the face."""
+    shift_mm: float = getattr(placement.target, "shift_mm", 0.0)
+    return f"{placement.key}/{shift_mm:g}mm" if shift_mm else placement.key
 
 
 def _turn_sds_deg(target: TargetShape) -> tuple[float | None, float | None]:

@@ -13,8 +13,9 @@ from typing import Annotated, Any
 from pydantic import Field, ValidationError, model_validator
 
 from workbench.model.contents import not_text
+from workbench.model.csv_header import check_header
 from workbench.model.errors import BadInputError
-from workbench.model.problems import one_of, problems, short
+from workbench.model.problems import problems
 from workbench.model.yamlfile import FileModel
 
 ALL_LASERS = "all"
@@ -38,8 +39,6 @@ LARGEST = 1e6
 NEAREST_MM = 1e-3
 SMALLEST_SD_PX = 1e-6
 MOST_REPEATS = 99_999_999
-SEPARATORS = {";": "semicolons (;)", "\t": "tabs", "|": "bars (|)"}
-"""Column separators of other table formats, with their names for messages."""
 COLUMNS = (*REQUIRED, *IMAGES, *POSITION, *OPTIONAL)
 
 
@@ -173,35 +172,18 @@ def errors_name_file(path: Path) -> Iterator[None]:
 
 
 def _check_header(path: Path, names: object) -> None:
-    present = list(names) if isinstance(names, list) else []
-    where = f"{path}: row 1"
-    if not present:
-        raise BadInputError(
-            f"{path}: the file is empty; expected a header with {', '.join(REQUIRED)} and more"
-        )
-    if len(present) == 1 and (others := [name for mark, name in SEPARATORS.items() if mark in present[0]]):
-        raise BadInputError(
-            f"{where}: expected columns separated by commas, got {others[0]}; save the table as CSV with"
-            " commas as separators and decimal points in numbers"
-        )
+    present = list(map(str, names)) if isinstance(names, list) else []
     if len(present) == 1 and (
         present[0].startswith("%YAML") or present[0].rstrip().endswith(":") or ": " in present[0]
     ):
         raise BadInputError(
             f"{path}: expected a captures file (CSV) with the columns {', '.join(COLUMNS)}; got YAML"
         )
-    if missing := [name for name in REQUIRED if name not in present]:
-        needed, got = ", ".join(REQUIRED), ", ".join(map(str, present))
-        raise BadInputError(
-            f"{where}: expected the columns {needed}; missing: {', '.join(missing)}; got {short(got)}"
-        )
-    if unknown := [str(name) for name in present if name not in COLUMNS]:
-        found = "; ".join(f"no such column: {name}; {one_of(name, COLUMNS)}" for name in unknown)
-        raise BadInputError(f"{where}: {found}")
-    if len(set(present)) != len(present):
-        raise BadInputError(f"{where}: expected every column once, got {', '.join(present)}")
+    check_header(path, present, REQUIRED, COLUMNS)
     if "on" not in present and not set(POSITION) & set(present):
-        raise BadInputError(f"{where}: expected either the column on (images) or u_px and v_px (positions)")
+        raise BadInputError(
+            f"{path}: row 1: expected either the column on (images) or u_px and v_px (positions)"
+        )
 
 
 def _row(path: Path, number: int, cells: dict[str | None, Any]) -> CaptureRow:

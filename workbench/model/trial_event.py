@@ -59,6 +59,8 @@ class ReadingTaken(FileModel):
     """Mean of the lasers weighted by their spots' uncertainty: the range of a flat target."""
     sigma_mm: float | None
     """Stated standard uncertainty of `range_mm`."""
+    spot_sd_mm: float | None = None
+    """Part of `sigma_mm` by noise and speckle of the spots, not of the calibration; None: unknown."""
     reference_sd_mm: float | None = None
     """Reference uncertainty of the true range; None if unknown."""
     true: TrueValues | None = None

@@ -28,7 +28,7 @@ class LensModel:
     """Lens model; there is one object of each.
 
     A lens is a vector in the order of `parameters`: f, cx, cy in pixels (square pixels), then the distortion
-    coefficients, which have no unit and are all 0 for the undistorted lens.
+    coefficients. These have no unit, and are all 0 for the undistorted lens.
     """
 
     name: LensName

@@ -16,8 +16,8 @@ from workbench.optics.lens import LensModel, Numbers
 from workbench.optics.rays import Ray, spot_at_inverse_depth
 
 ITERATIONS = 20
-"""Gauss-Newton steps. Each is exact except for distortion: six reach rounding for a usual lens, ten for a
-fisheye at 80 degrees; the others are for lenses close to their fold, at negligible cost."""
+"""Number of Gauss-Newton steps. Each is exact except for distortion: six reach rounding for a usual lens, ten
+for a fisheye at 80 degrees. The others are for lenses close to their fold, at negligible cost."""
 
 
 class MeasuredSpot(NamedTuple):

@@ -95,8 +95,8 @@ class _Control:
         position, sd = spot_arrays(spots)
         self._notes += flag_notes(ids, spots)
         fired = len(self._ranger.sensor.ids)
-        unseen = [i for i in self._ranger.sensor.ids if i not in ids and i not in self._ambiguous]
-        reading = self._ranger.read_known(self._scene, fired, ids, position, sd, self._notes, unseen)
+        without_spot = [i for i in self._ranger.sensor.ids if i not in ids and i not in self._ambiguous]
+        reading = self._ranger.read_known(self._scene, fired, ids, position, sd, self._notes, without_spot)
         # This state follows only a normal capture with spots.
         self.reading = replace(reading, status="not_enough_points") if not reading.lasers else reading
         return Seen.ASSIGNED if ids else Seen.NOTHING

@@ -64,11 +64,11 @@ def assign(pairs: LaserSpotPairs, lasers: IndexArray) -> tuple[IndexArray, Index
     Spots off the lines of all lasers are other light. Every injective assignment of the other spots is
     enumerated. Assignments with improbable distances from the lasers' lines are rejected; this is often
     sufficient, because the lines of real lasers are never quite coplanar. Of the rest, the assignment with
-    the smallest relative spread of inverse depths is taken, if the second best is clearly worse: on a
-    surface without jumps all lasers have nearly the same inverse depth, and exchanging two of them changes
-    it by half and more, the ratio of neighbouring baselines. Where spots are missing, the spread must also be
-    small. Undecided, or wrong, is a target with a jump in depth as large as an exchange would cause, seen by
-    lasers with coincident lines.
+    the smallest relative spread of inverse depths is taken, if the second best is clearly worse. On a
+    surface without jumps all lasers have nearly the same inverse depth; exchanging two of them changes it
+    by half and more, the ratio of neighbouring baselines. Where spots are missing, the spread must also be
+    small. For lasers with coincident lines, a jump in depth as large as an exchange would cause gives an
+    undecided or wrong result.
 
     Args:
         pairs: of all lasers with all spots.

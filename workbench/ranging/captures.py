@@ -69,8 +69,8 @@ def _read_alone(ranger: Ranger, scene: str, rows: Sequence[CaptureRow]) -> Readi
     seen = {i: mean for i, mean in means.items() if mean is not None}
     position = np.array([mean[0] for mean in seen.values()]).reshape(-1, 2)
     sd = np.array([mean[1] for mean in seen.values()]).reshape(-1, 2)
-    unseen = [i for i in fired if i not in seen]
-    return ranger.read_known(scene, len(fired), list(seen), position, sd, unseen=unseen)
+    without_spot = [i for i in fired if i not in seen]
+    return ranger.read_known(scene, len(fired), list(seen), position, sd, without_spot=without_spot)
 
 
 def _mean_position(ranger: Ranger, rows: Sequence[CaptureRow]) -> tuple[FloatArray, FloatArray] | None:

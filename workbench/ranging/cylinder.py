@@ -55,7 +55,7 @@ class CylinderFit:
 def fit_cylinder(points: Points) -> CylinderFit | None:
     """Maximum-likelihood circle, convex towards the sensor; None where the spots determine none.
 
-    None too where a spot lies at grazing incidence, or the radius is uncertain by more than half: a circle
+    Also None where a spot lies at grazing incidence, or the radius is uncertain by more than half. A circle
     has as many parameters as a parabola, and is reported only where it differs from one.
     """
     from workbench.ranging.shape_kernels import circle  # loads the compiler

@@ -42,7 +42,7 @@ def fit_line(
 ) -> LineShape:
     """Fit the shape in front of one line.
 
-    A spot lies where its beam meets the surface, not at the origin of the beam; errors of this position and
+    A spot lies where its beam meets the surface, not at the origin of the beam. Errors of this position and
     of the range are correlated, because both come from the calibration. The front reaches from the first to
     the last laser of the line, with or without a spot.
 

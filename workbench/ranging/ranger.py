@@ -50,6 +50,8 @@ class Reading:
     flat_mm: float | None = None
     """Mean range of the lasers, weighted by their spots: the range of a flat target across the axis."""
     flat_sigma_mm: float | None = None
+    flat_spot_sd_mm: float | None = None
+    """Standard deviation of `flat_mm` by noise and speckle of the spots alone."""
     notes: tuple[str, ...] = ()
     """Reasons of missing ranges, and remarks on uncertain ones."""
 
@@ -130,7 +132,7 @@ class Ranger:
         position_px: FloatArray,
         sd_px: FloatArray,
         notes: Sequence[str] = (),
-        unseen: Sequence[str] = (),
+        without_spot: Sequence[str] = (),
     ) -> Reading:
         """Range spots whose lasers are known, because each was on alone.
 
@@ -141,10 +143,10 @@ class Ranger:
             position_px: (n, 2), NaN where a coordinate was not measured.
             sd_px: (n, 2) 1 sigma, NaN where not known.
             notes: notes on the captures.
-            unseen: lasers captured without a spot.
+            without_spot: lasers captured without a spot.
         """
         ranges = self.sensor.ranges(laser_ids, position_px, sd_px)
-        return self._answer(scene, fired, laser_ids, position_px, ranges, notes, unseen)
+        return self._answer(scene, fired, laser_ids, position_px, ranges, notes, without_spot)
 
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
         """Range the spots of a frame with all lasers on.
@@ -161,8 +163,10 @@ class Ranger:
         assigned = [spots[i] for i in assignment.spots.tolist()]
         position, _ = spot_arrays(assigned)
         notes = (*assignment.notes, *flag_notes(ids, assigned))
-        unseen = [i for i in self.sensor.ids if i not in ids and i not in assignment.ambiguous]
-        reading = self._answer(scene, len(self.sensor.ids), ids, position, assignment.ranges, notes, unseen)
+        without_spot = [i for i in self.sensor.ids if i not in ids and i not in assignment.ambiguous]
+        reading = self._answer(
+            scene, len(self.sensor.ids), ids, position, assignment.ranges, notes, without_spot
+        )
         if assignment.ambiguous and reading.status == "no_points":
             return Reading(scene, "not_enough_points", notes=reading.notes)
         return reading
@@ -258,7 +262,7 @@ class Ranger:
         position_px: FloatArray,
         ranges: RangeEstimates,
         notes: Sequence[str],
-        unseen: Sequence[str],
+        without_spot: Sequence[str],
     ) -> Reading:
         failed = failed_checks(position_px, ranges, self.size_px)
         all_notes = [
@@ -273,10 +277,10 @@ class Ranger:
         ranges = ranges.only(np.array(good))
         lasers = laser_ranges(ids, position, ranges, self.sensor.offset_mm)
         status: Status = "done" if len(lasers) == fired else "not_enough_points"
-        flat_mm, flat_sigma_mm = flat_range(ranges)
+        flat_mm, flat_sigma_mm, flat_spot_sd_mm = flat_range(ranges)
         lines = self._lines(ids, ranges)
         nearest = min((line.shape for line in lines), key=lambda shape: shape.closest_mm)
-        all_notes += [self._unseen_note(i, flat_mm) for i in unseen]
+        all_notes += [self._no_spot_note(i, flat_mm) for i in without_spot]
         all_notes += outside_validity(lasers, self.calibration.laser_ranger.validity, self._calibrated_px)
         return Reading(
             scene,
@@ -289,10 +293,11 @@ class Ranger:
             lines,
             flat_mm,
             flat_sigma_mm,
+            flat_spot_sd_mm,
             tuple(all_notes),
         )
 
-    def _unseen_note(self, laser_id: str, range_mm: float) -> str:
+    def _no_spot_note(self, laser_id: str, range_mm: float) -> str:
         if self.sensor.in_frame(laser_id, np.array([range_mm]))[0]:
             return f"{laser_id}: no spot was seen"
         return f"{laser_id}: at {range_mm:.0f} mm its spot lies outside the image"

@@ -56,12 +56,13 @@ def laser_ranges(
     return tuple(records)
 
 
-def flat_range(ranges: RangeEstimates) -> tuple[float, float]:
-    """Mean range weighted by the spots' variances, and its sigma by the full covariance, mm.
+def flat_range(ranges: RangeEstimates) -> tuple[float, float, float]:
+    """Mean range weighted by the spots' variances, its sigma by all sources, and by the spots alone, mm.
 
     The calibration's error is nearly common to all lasers: weights by the full covariance would depend on
     small differences of its entries, for no measurable gain.
     """
-    weight = 1.0 / ranges.spot_sd_mm**2
-    weight = weight / weight.sum()
-    return float(weight @ ranges.range_mm), float(np.sqrt(weight @ ranges.covariance_mm2 @ weight))
+    information = 1.0 / ranges.spot_sd_mm**2
+    weight = information / information.sum()
+    sigma_mm = float(np.sqrt(weight @ ranges.covariance_mm2 @ weight))
+    return float(weight @ ranges.range_mm), sigma_mm, float(information.sum() ** -0.5)

@@ -1,4 +1,4 @@
-"""From a pair of frames to laser spots with their uncertainty."""
+"""Laser spots of a pair of frames, with their covariance."""
 
 from workbench.model.arrays import Image
 from workbench.model.spot import Failure, Spot

@@ -13,7 +13,7 @@ from workbench.model.stats import norm_cdf
 from workbench.spots.kernels.columns import FLUX
 from workbench.spots.psf import derivatives
 
-# Above this many electrons a Poisson count is Gaussian to 1e-3 of its information.
+# Electrons above which a Poisson count is Gaussian to 1e-3 of its information.
 _MANY_ELECTRONS = 400.0
 _REACH_WIDTHS = 7.0
 
@@ -34,10 +34,10 @@ def pixel_information(electrons: float, camera: CameraNoise) -> float:
     between two numbers; above 400 electrons the inverse of the variance.
     """
     read = camera.read_sd_electrons
-    least = 1.0 / _variance(electrons, camera)
+    gaussian = 1.0 / _variance(electrons, camera)
     if electrons > _MANY_ELECTRONS:
-        return least
-    # Rounding finer than the read noise or than single electrons takes nothing away.
+        return gaussian
+    # Rounding finer than the read noise or than single electrons loses no information.
     step = max(camera.electrons_per_dn, 0.25 * read, 0.25)
     count = np.arange(0, int(electrons + 10.0 * np.sqrt(electrons) + 20.0))
     mass = np.exp(xlogy(count, electrons) - electrons - gammaln(count + 1.0))
@@ -49,8 +49,8 @@ def pixel_information(electrons: float, camera: CameraNoise) -> float:
         edges = (np.append(numbers, numbers[-1] + 1.0) - 0.5) * step
         share = np.diff(norm_cdf((edges[:, None] - count) / read), axis=0)
         chance = share @ mass
-        seen = chance > 1e-12
-        information.append(float((((share @ by_mean)[seen]) ** 2 / chance[seen]).sum()))
+        possible = chance > 1e-12
+        information.append(float((((share @ by_mean)[possible]) ** 2 / chance[possible]).sum()))
     return float(np.mean(information))
 
 
@@ -73,10 +73,10 @@ def fisher_matrix(
     """(6, 6) information about background, flux, u, v, ln width along u and along v of a round spot.
 
     Args:
-        electrons: Of the whole spot.
+        electrons: Flux of the spot.
         width_px: Standard deviation of its profile.
-        phase_px: Its centre from the centre of a pixel.
-        camera: Noise.
+        phase_px: Centre of the spot relative to the centre of a pixel.
+        camera: Noise of the camera.
     """
     half = int(np.ceil(_REACH_WIDTHS * width_px)) + 2
     params = np.array([[0.0, electrons, half + phase_px[0], half + phase_px[1], *[np.log(width_px)] * 2]])

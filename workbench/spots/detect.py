@@ -1,4 +1,4 @@
-"""Where spots may be: peaks that stand out of the noise of the smoothed signal."""
+"""Detection: significant local maxima of the smoothed signal."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from workbench.model.arrays import Float32Array, FloatArray
 from workbench.spots.kernels.strip_pixels import peaks_of
 from workbench.spots.strip import Strip
 
-# White noise passes 5.5 sd once in 5e7 looks.
+# Detection threshold; white noise exceeds 5.5 sd at one position in 5e7.
 PEAK_SD: Final = 5.5
-# Widths that the two searches are matched to: sharp spots, and spots so wide that no pixel stands out.
+# Widths of the matched filters of the two searches: sharp spots, and spots without a significant pixel.
 FINE_PX, COARSE_PX = 1.0, 3.0
 _NO_MASK: Final = np.zeros((0, 0), bool)
 
@@ -36,7 +36,7 @@ def smoothed_sd(variance: float, scale_px: float) -> float:
 
 @lru_cache(maxsize=8)
 def _taps(scale_px: float) -> Float32Array:
-    """(n,) weights of a Gaussian."""
+    """(n,) weights of a sampled Gaussian."""
     size = 2 * round(2.5 * scale_px) + 1
     return np.asarray(cv2.getGaussianKernel(size, scale_px), np.float32).ravel()
 
@@ -51,11 +51,11 @@ def find_peaks(
     """Peaks of a strip's signal, in pixels of the image.
 
     Args:
-        signal: The strip's signal without its level, DN.
-        strip: Where it lies, and which of its pixels count.
-        variance: Of a pixel's noise, DN^2.
-        scale_px: Width of the smoothing.
-        threshold_sd: In standard deviations of the smoothed noise.
+        signal: (height, width) signal of the strip without its level, DN.
+        strip: Position of the strip, and which of its pixels count.
+        variance: Noise variance of a pixel, DN^2.
+        scale_px: Width of the smoothing Gaussian.
+        threshold_sd: Least height, in standard deviations of the smoothed noise.
     """
     sd = smoothed_sd(variance, scale_px)
     mask = _NO_MASK if strip.mask is None else strip.mask

@@ -1,4 +1,4 @@
-"""From a pair of frames to spots: the door to the search."""
+"""Public interface of the spot search: `SpotFinder` and `find_spots`."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from workbench.spots.types import Finding, Scanline
 
 
 class SpotFinder:
-    """Finds spots in frames of one size; keeps what can be prepared once.
+    """Spot search in frames of one size; prepares the strips of the scanlines once.
 
     Args:
         shape: Height and width of the frames.
-        scanlines: Where spots may lie; none means anywhere. Only their bands are read.
-        expected: Number of lasers lit.
+        scanlines: Image lines that spots may lie on; none: the whole frame. Only their bands are read.
+        expected: Number of lasers that are on.
         saturation_dn: Value of a clipped pixel; None means the full scale of the depth (255; for uint16 the
             10, 12 or 14 bit full scale if the brightest pixel has exactly that value, else 65535).
-        reasons: Whether fewer spots than expected start a search for the reason, over the whole frame.
+        reasons: Whether missing spots start a search for the reason, over the whole frame.
 
     Raises:
         BadInputError: a scanline without direction or width.
@@ -37,9 +37,8 @@ class SpotFinder:
         saturation_dn: int | None = None,
         reasons: bool = True,
     ) -> None:
-        from workbench.spots.search import (
-            Search,
-        )  # loads the compiler: half a second that only a search needs
+        # Imported here, because numba takes half a second to load.
+        from workbench.spots.search import Search
 
         for line in scanlines:
             check_line(line)
@@ -72,13 +71,13 @@ def find_spots(
 ) -> Finding:
     """Find laser spots in a frame with the lasers on, or in its difference to one with the lasers off.
 
-    For many frames of one size make a `SpotFinder` (which see for the arguments) and call `find`.
+    For many frames of one size make one `SpotFinder` and call `find`. Arguments: see `SpotFinder`.
 
     Raises:
         BadInputError: a frame is no grey uint8 or uint16 image, or the two differ in size or depth; a
             scanline without direction or width.
     """
-    shape: tuple[int, ...] = getattr(on, "shape", ())  # `find` says what is wrong with it
+    shape: tuple[int, ...] = getattr(on, "shape", ())  # `find` reports a bad frame
     finder = SpotFinder(
         (shape[0], shape[1]) if len(shape) == 2 else (1, 1),
         scanlines,
@@ -89,5 +88,5 @@ def find_spots(
 
 
 def is_compiled(folder: Path = Path(__file__).parent / "kernels") -> bool:
-    """Whether the loops of this package are kept as machine code, or elsewhere, where it cannot be told."""
+    """Whether the compiled loops are cached beside their sources; true where that folder is not writable."""
     return not os.access(folder, os.W_OK) or any((folder / "__pycache__").glob("*.nbi"))

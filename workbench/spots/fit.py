@@ -8,20 +8,20 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray
-from workbench.spots.kernels.columns import ACCEPTANCE_COLUMNS
-from workbench.spots.kernels.single import score
+from workbench.spots.kernels.columns import STATISTIC_COLUMNS
+from workbench.spots.kernels.single import fisher_scoring
 from workbench.spots.noise import PixelNoise
 
 
 class Windows(NamedTuple):
-    """Equal windows of the signal, one spot each, all arrays (n, height, width)."""
+    """Windows of equal size, one spot each; all arrays (n, height, width)."""
 
     data: FloatArray
     """DN."""
     usable: BoolArray
     """False where a pixel is clipped, hot or outside the image."""
     clip_dn: FloatArray
-    """Value at which the pixel clips; infinite where nothing is near to it."""
+    """Signal at which the pixel clips, DN; infinite where no pixel of the windows is clipped."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -31,7 +31,7 @@ class Windows(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SpotFit:
-    """Result for n windows. `cov` is that of background, flux, and flux times each further parameter."""
+    """Fits of n windows. `cov` is that of background, flux, and flux times each further parameter."""
 
     params: FloatArray
     """(n, k)."""
@@ -47,17 +47,17 @@ class SpotFit:
     """(n,)."""
     slope_dn: FloatArray
     """(n,) measured photon-transfer slope."""
-    judged: FloatArray
-    """(n, ACCEPTANCE_COLUMNS) what a window is accepted by; see `kernels.columns`."""
+    statistics: FloatArray
+    """(n, STATISTIC_COLUMNS) statistics for acceptance; see `kernels.columns`."""
 
 
 def fit_spots(win: Windows, start: FloatArray, noise: PixelNoise) -> SpotFit:
-    """Fit one spot per window; the photon-transfer slope is measured from the residuals on the way.
+    """Fit one spot per window, and measure the photon-transfer slope from the residuals.
 
     Args:
         win: The windows.
-        start: (n, k) first guesses in the order of `gaussian`; k is 6 for upright ellipses, 7 for any.
-        noise: Floor (trusted) and slope (a first guess).
+        start: (n, k) first guesses as in `kernels.columns`; k is 6 for upright ellipses, 7 for tilted ones.
+        noise: Floor (fixed) and slope (a first guess).
     """
     n, k = start.shape
     shape = win.data.shape
@@ -69,9 +69,9 @@ def fit_spots(win: Windows, start: FloatArray, noise: PixelNoise) -> SpotFit:
         np.empty(shape),
         np.empty(n, bool),
         np.empty(n),
-        np.empty((n, ACCEPTANCE_COLUMNS)),
+        np.empty((n, STATISTIC_COLUMNS)),
     )
-    score(
+    fisher_scoring(
         win.data,
         win.usable,
         win.clip_dn,
@@ -84,6 +84,6 @@ def fit_spots(win: Windows, start: FloatArray, noise: PixelNoise) -> SpotFit:
         fit.weight,
         fit.converged,
         fit.slope_dn,
-        fit.judged,
+        fit.statistics,
     )
     return fit

@@ -1,4 +1,4 @@
-"""Checks of the frames at the door, so that nothing behind it meets an image it was not made for."""
+"""Input checks of frames: shape, type and size; full scale of their depth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def check_frame(frame: object, name: str) -> Image:
     """`frame` itself if it is a grey image of uint8 or uint16 with at least one pixel.
 
     Raises:
-        BadInputError: it is not; says what was expected, what came and what to do.
+        BadInputError: it is not.
     """
     if isinstance(frame, np.ndarray) and frame.ndim == 2 and frame.dtype in _DTYPES and frame.size:
         return cast(Image, frame)
@@ -33,7 +33,7 @@ def check_frame(frame: object, name: str) -> Image:
 
 
 def check_pair(on: object, off: object | None) -> tuple[Image, Image | None]:
-    """Both frames checked, and that they fit each other.
+    """Both frames, checked for equal size and depth.
 
     Raises:
         BadInputError: a frame is no grey uint8 or uint16 image, or the two differ in size or depth.
@@ -54,8 +54,7 @@ def check_pair(on: object, off: object | None) -> tuple[Image, Image | None]:
 def default_saturation_dn(on: Image) -> int:
     """Value at which a pixel counts as clipped: the full scale of the depth.
 
-    A camera of 10, 12 or 14 bits delivers uint16; the smallest full scale that holds the brightest pixel is
-    taken.
+    A camera of 10, 12 or 14 bits delivers uint16: the smallest full scale not below the brightest pixel.
     """
     if on.dtype == np.uint8:
         return 255

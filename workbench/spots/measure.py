@@ -1,4 +1,4 @@
-"""From peaks to measured spots: windows cut, fitted together, cut anew where a spot asks for another."""
+"""Measurement of the spots at detected peaks: windows, fits, larger windows where a spot needs one."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from workbench.spots.detect import FINE_PX, Peaks
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.acceptance import COLUMNS, NEXT_HALF, U_SD, fit_group
 from workbench.spots.kernels.columns import FLUX, LN_SU, U, V
-from workbench.spots.kernels.windows import HALVES_PX, flag_codes, guess, halves_for
+from workbench.spots.kernels.windows import HALVES_PX, flag_codes, halves_for, moment_guess
 from workbench.spots.pair import PairSignal
 
-# First guesses of the width scatter upwards; a window too small is cut anew.
-_GUESSED: Final = 0.7
+# Factor on guessed widths, which are biased upwards; a window that is too small is replaced by a larger one.
+_GUESS_SCALE: Final = 0.7
 _SMALLEST: Final = HALVES_PX[0]
 _MAX_CUTS: Final = 3
-# Electrons that fill a pixel: only the first guess of the photon-transfer slope, which is then measured.
+# Full well for the first guess of the photon-transfer slope, which is then measured.
 _FULL_WELL_ELECTRONS: Final = 1e4
-# By the codes of `flag_codes`.
+# Flags by the codes of `flag_codes`.
 _FLAGS: Final = (
     NO_FLAGS,
     frozenset({Failure.AT_EDGE}),
@@ -32,29 +32,29 @@ _FLAGS: Final = (
 
 
 class FittedSpot(NamedTuple):
-    """A measured spot with what telling neighbours apart needs."""
+    """Measured spot, with the values that deblending needs."""
 
     spot: Spot
     params: FloatArray
-    """(6,) or (7,) as in `gaussian`, u and v in pixels of the image."""
+    """(6,) or (7,) as in `kernels.columns`, u and v in pixels of the image."""
     slope_dn: float
     reach_px: float
     """The larger of both widths."""
-    clarity: float
+    flux_snr: float
     """Flux over its standard deviation."""
     scene: PairSignal
     """The strip that it was found in."""
 
 
 def spot_flags(scene: PairSignal, params: FloatArray) -> list[frozenset[Failure]]:
-    """What the places of n spots (n, 6 or more) in the image tell: cut by its border, clipped."""
+    """Flags of n spots (n, 6 or more), in pixels of the image: at its border, clipped."""
     codes = np.empty(len(params), np.intp)
     flag_codes(scene.pair.on, scene.pair.clip_dn, params, codes)
     return [_FLAGS[code] for code in codes.tolist()]
 
 
 def measure(scene: PairSignal, peaks: Peaks) -> list[FittedSpot]:
-    """Fit every peak and keep those that are spots."""
+    """Fit every peak; return the accepted spots."""
     n = peaks.rows.size
     if n == 0:
         return []
@@ -66,7 +66,7 @@ def measure(scene: PairSignal, peaks: Peaks) -> list[FittedSpot]:
     halves = sizes.tolist()
     slope_dn, shape = scene.pair.clip_dn / _FULL_WELL_ELECTRONS, scene.pair.on.shape
     for turn in range(_MAX_CUTS):
-        # Small windows first: a spot that outgrows its window is fitted again with those of its new size.
+        # Small windows first: a spot that outgrows its window joins the group of the next size.
         for half in HALVES_PX:
             if half not in halves:
                 continue
@@ -79,32 +79,32 @@ def measure(scene: PairSignal, peaks: Peaks) -> list[FittedSpot]:
                 halves[k] = int(wanted)
         if not any(halves):
             break
-    return _traces(scene, found)
+    return _fitted_spots(scene, found)
 
 
 def first_guess(win: Windows, peaks: Peaks) -> tuple[FloatArray, float]:
-    """Start (n, 6) in pixels of the image, and by how much its widths tend to be too large.
+    """First guesses (n, 6) in pixels of the image, and the factor on their widths for the size of the window.
 
-    From the shape of a sharp peak, from what the search was matched to for a wide one.
+    For sharp peaks from the moments of the window, for wide ones from the matched filter of the search.
     """
     start = np.zeros((peaks.rows.size, 6))
     if peaks.scale_px == FINE_PX:
-        guess(win.data, win.usable, peaks.rows, peaks.cols, start)
-        return start, _GUESSED
+        moment_guess(win.data, win.usable, peaks.rows, peaks.cols, start)
+        return start, _GUESS_SCALE
     start[:, U], start[:, V] = peaks.cols, peaks.rows
     start[:, FLUX] = peaks.height_dn * (4.0 * np.pi * peaks.scale_px**2)
     start[:, LN_SU:] = np.log(peaks.scale_px)
     return start, 1.0
 
 
-def _traces(scene: PairSignal, found: FloatArray) -> list[FittedSpot]:
-    """What the table of fits says is a spot."""
+def _fitted_spots(scene: PairSignal, found: FloatArray) -> list[FittedSpot]:
+    """Accepted spots of the table of fits."""
     flags = spot_flags(scene, found)
-    traces = []
+    fits = []
     for params, row, its_flags in zip(found, found.tolist(), flags, strict=True):
         _, flux, u, v, ln_su, ln_sv, _, u_sd, v_sd, flux_sd, peak, slope, is_spot, _ = row
         if is_spot:
             spot = Spot(u, v, u_sd, v_sd, flux, math.exp(0.5 * (ln_su + ln_sv)), peak, its_flags)
             reach = math.exp(max(ln_su, ln_sv))
-            traces.append(FittedSpot(spot, params[:U_SD], slope, reach, flux / flux_sd, scene))
-    return traces
+            fits.append(FittedSpot(spot, params[:U_SD], slope, reach, flux / flux_sd, scene))
+    return fits

@@ -1,4 +1,4 @@
-"""Noise measured from the frame itself: its floor from the background, its slope from the fit's residuals."""
+"""Pixel noise measured from the frame: floor from the background, slope from the residuals of the fits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from workbench.spots.kernels.strip_pixels import level_of
 
 _SAMPLES = 1200
 _CLIP_SD = 4.0
-# Variance that rounding to whole numbers alone leaves in a frame.
+# Variance of rounding to whole numbers.
 ROUNDING_DN2 = 1.0 / 12.0
 
 
@@ -19,16 +19,16 @@ class PixelNoise:
     """Variance of a pixel as a straight line over its expected signal (photon transfer)."""
 
     floor_dn2: FloatArray
-    """(n,), one for each window: variance without signal, DN^2."""
+    """(n,) variance without signal, DN^2, for each window."""
     slope_dn: FloatArray
-    """(n,): variance per signal, DN^2 / DN."""
+    """(n,) variance per signal, DN^2 / DN."""
 
 
 def level_and_variance(values: Float32Array) -> tuple[float, float]:
-    """Robust mean and variance of pixels among which a few are spots.
+    """Robust mean and variance of pixels, a few of which belong to spots.
 
-    Quantiles first, then mean and variance of what lies within 4 sd of them: the former resist the spots, the
-    latter are efficient and free of the rounding to whole numbers.
+    Quantiles first, which are robust against the spots; then mean and variance of the pixels within 4 sd,
+    which are efficient and unaffected by rounding.
     """
     return level_of(values, _SAMPLES, _CLIP_SD, ROUNDING_DN2)
 
@@ -38,18 +38,17 @@ def photon_transfer_slope(
 ) -> FloatArray:
     """(n,) variance per signal (DN) measured from the residuals of all spots of a frame.
 
-    On average a squared residual is its variance less the share that the fit has absorbed (its leverage), so
-    what exceeds the floor is slope times signal. Weighted moments give the slope; the logarithm of the slope
-    assumed so far weighs in like a quarter of a pixel. Where only n pixels tell the slope, its inverse
-    scatters upwards and a deviation stated with it would be too small on average (Student's distribution,
-    factor n / (n - 2)); as the assumed slope keeps the measured one from vanishing, n / (n - 2) at n + 4 is
-    enough.
+    The expected squared residual is V (1 - h), with V = floor + slope * signal and h the leverage. Weighted
+    moments give the slope. It is averaged, in the logarithm, with the assumed one, which has the weight of
+    a quarter of a pixel. The inverse of a slope from n pixels is biased upwards, and standard deviations
+    would be too small on average (Student, factor n / (n - 2)). As the assumed slope bounds the measured
+    one, the factor at n + 4 suffices.
 
     Args:
         signal: (n, height, width) expected signal, DN.
         residual: (n, height, width), DN.
         weight: (n, height, width) inverse variance, 0 where unused.
         leverage: (n, height, width) variance of the fitted value, DN^2.
-        noise: Floor, and the slope assumed so far.
+        noise: Floor, and the assumed slope.
     """
     return transfer_slope(signal, residual, weight, leverage, noise.floor_dn2, noise.slope_dn)

@@ -1,4 +1,4 @@
-"""A pair of frames as one signal: the difference, freed from a change of the ambient light."""
+"""Signal of a pair of frames: their difference, corrected for a change of the ambient light."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import numpy as np
 
 from workbench.model.arrays import Float32Array, FloatArray, Image, IndexArray
 from workbench.spots.fit import Windows
-from workbench.spots.kernels.windows import cut
+from workbench.spots.kernels.windows import cut_windows
 from workbench.spots.noise import level_and_variance
 from workbench.spots.strip import Strip
 
-# A change of the level below one DN or a quarter of the noise moves no spot: the fit has a background of its
-# own.
+# A change of the level below 1 DN or a quarter of the noise is left to the background of the fit.
 _LEVEL_CHANGE_DN = 1.0
 _LEVEL_CHANGE_SD = 0.25
 _MIN_OFF_SPREAD_DN = 2.0
@@ -31,7 +30,7 @@ class Pair(NamedTuple):
     level_dn: float = 0.0
 
     def signal(self, strip: Strip) -> Float32Array:
-        """The signal in a strip, DN."""
+        """(height, width) signal of a strip, DN."""
         on = self.on[strip.at]
         if self.off is None:
             return on.astype(np.float32) - np.float32(self.level_dn)
@@ -41,34 +40,34 @@ class Pair(NamedTuple):
         return np.asarray(out, np.float32)
 
     def cut(self, rows: FloatArray, cols: FloatArray, group: IndexArray, half: int) -> Windows:
-        """Square windows of 2 half + 1 pixels around the peaks `group` (n,) of all, at `rows` and `cols`.
+        """Square windows of 2 half + 1 pixels around those of the peaks that `group` (n,) indexes.
 
-        No pixel outside the image is usable, and none that lies nearer to another peak.
+        Pixels outside the image, and pixels closer to another peak, are not usable.
         """
         off, share = (self.on, 0.0) if self.off is None else (self.off, self.off_share)
         shape = (group.size, 2 * half + 1, 2 * half + 1)
         win = Windows(np.empty(shape), np.empty(shape, bool), np.empty(shape))
-        cut(self.on, off, share, self.level_dn, self.clip_dn, rows, cols, group, *win)
+        cut_windows(self.on, off, share, self.level_dn, self.clip_dn, rows, cols, group, *win)
         return win
 
 
 class PairSignal(NamedTuple):
-    """A strip of a pair, with its level taken off and its noise measured."""
+    """Signal of a strip of a pair, without its level, and the noise of its pixels."""
 
     pair: Pair
     strip: Strip
     signal: Float32Array
-    """The strip's signal, DN; zero where no spot is."""
+    """(height, width) signal of the strip, DN; its mean is zero outside spots."""
     variance: float
-    """Of a pixel without a spot, DN^2."""
+    """Variance of a pixel without light of a spot, DN^2."""
     ambient_changed: bool
 
 
 def measure_signal(pair: Pair, strip: Strip) -> PairSignal:
     """Measure level and noise of a strip.
 
-    When the ambient light changed, the off-frame is scaled to the on-frame by a straight line through the
-    pixels of the strip, so that bright and dark parts of the scene vanish alike.
+    Where the ambient light changed, the off frame is scaled to the on frame by linear regression over the
+    pixels of the strip. Bright and dark parts of the scene then cancel alike.
     """
     signal = pair.signal(strip)
     level, variance = level_and_variance(signal)
@@ -84,13 +83,13 @@ def measure_signal(pair: Pair, strip: Strip) -> PairSignal:
 
 
 def _share_of_off(on: FloatArray, off: FloatArray) -> float:
-    """Slope of on over off, spots left out as outliers; 1 where the off-frame is too even to tell."""
+    """Slope of on over off, spots rejected as outliers; 1 where the off frame is too even for a slope."""
     share = 1.0
     for _ in range(3):
         rest = on - share * off
-        middle = float(np.median(rest))
-        spread = 1.4826 * float(np.median(np.abs(rest - middle))) + 0.5
-        kept = np.abs(rest - middle) < 4.0 * spread
+        median = float(np.median(rest))
+        spread = 1.4826 * float(np.median(np.abs(rest - median))) + 0.5
+        kept = np.abs(rest - median) < 4.0 * spread
         centred = off[kept] - off[kept].mean()
         total = float(centred @ centred)
         if total < _MIN_OFF_SPREAD_DN**2 * kept.sum():

@@ -1,4 +1,7 @@
-"""Lights in a frame that should be dark: told from what noise makes of a frame once in some hundred."""
+"""Confirmation of spots in a frame with all lasers off.
+
+In one of some hundred such frames, a noise peak passes for a spot.
+"""
 
 from __future__ import annotations
 
@@ -7,37 +10,34 @@ from math import hypot
 
 from workbench.model.spot import Spot
 
-CLEAR = 10.0
-"""Width of a light over the deviation of its place, which is its brightness over that one's deviation. Noise
-reached 7.3 in 1600 whole frames."""
-SAME_LIGHT_PX = 3.0
-SAME_LIGHT_SD = 4.0
-"""Lights of two frames that lie so near to each other are the same."""
+SIGNIFICANT = 10.0
+"""Significance above which a spot needs no second frame. Noise reached 7.3 in 1600 whole frames."""
+SAME_SPOT_PX = 3.0
+SAME_SPOT_SD = 4.0
+"""Largest distance of one spot in two frames: a margin in px, plus a multiple of its standard deviation."""
 
 
-def is_same_spot(light: Spot, other: Spot) -> bool:
-    """Whether the lights of two frames are one."""
-    sd = hypot(light.u_sd_px, light.v_sd_px, other.u_sd_px, other.v_sd_px)
-    away = hypot(light.u_px - other.u_px, light.v_px - other.v_px)
-    return away < SAME_LIGHT_PX + SAME_LIGHT_SD * sd
+def is_same_spot(spot: Spot, other: Spot) -> bool:
+    """Whether spots of two frames are the same one."""
+    sd = hypot(spot.u_sd_px, spot.v_sd_px, other.u_sd_px, other.v_sd_px)
+    distance = hypot(spot.u_px - other.u_px, spot.v_px - other.v_px)
+    return distance < SAME_SPOT_PX + SAME_SPOT_SD * sd
 
 
-def clearness(light: Spot) -> float:
-    """How many of its standard deviations a light is bright, see `CLEAR`."""
-    return light.width_px / min(light.u_sd_px, light.v_sd_px)
+def significance(spot: Spot) -> float:
+    """Width over the standard deviation of the position, which is about the flux over that of the flux."""
+    return spot.width_px / min(spot.u_sd_px, spot.v_sd_px)
 
 
-def persistent_spots(lights: Sequence[Spot], look_again: Callable[[], Sequence[Spot]]) -> list[Spot]:
-    """The lights that are no noise: clear, or there in another frame as well.
+def persistent_spots(spots: Sequence[Spot], find_again: Callable[[], Sequence[Spot]]) -> list[Spot]:
+    """Spots that are not noise: significant, or present in a second frame.
 
     Args:
-        lights: what was found in a frame that should be dark.
-        look_again: what is found in another such frame; called where a light is faint.
+        spots: Spots of a frame with all lasers off.
+        find_again: Finds the spots of another such frame; called only where a spot is faint.
     """
-    faint = [light for light in lights if clearness(light) <= CLEAR]
+    faint = [spot for spot in spots if significance(spot) <= SIGNIFICANT]
     if not faint:
-        return list(lights)
-    again = look_again()
-    return [
-        light for light in lights if light not in faint or any(is_same_spot(light, other) for other in again)
-    ]
+        return list(spots)
+    again = find_again()
+    return [spot for spot in spots if spot not in faint or any(is_same_spot(spot, other) for other in again)]

@@ -1,7 +1,7 @@
-"""Models of a spot: Gaussians integrated over square pixels, with their derivatives, many windows at once.
+"""PSF of a spot: a Gaussian integrated over square pixels, and its derivatives, for many windows.
 
-Pixels count from the centre of the window's first pixel. Derivatives by position and width are still to be
-multiplied by the flux, so that nothing degenerates when the flux vanishes. Derivation: docs/spots.md.
+The origin is the centre of the window's first pixel. Derivatives by position and width are per unit flux,
+so that the information matrix stays regular at zero flux. Derivation: docs/spots.md.
 """
 
 from __future__ import annotations
@@ -14,16 +14,14 @@ from workbench.model.arrays import FloatArray
 from workbench.spots.kernels.columns import LN_SU, LN_SV, SHEAR
 from workbench.spots.kernels.profiles import sheared_rows, upright_rows
 
-"""Order of a spot's parameters: DN per pixel, DN, pixels, pixels, ln(pixels) twice, pixels per pixel."""
-
 
 def derivatives(params: FloatArray, shape: tuple[int, int]) -> FloatArray:
     """(n, k, height, width) derivatives of the pixels of n windows; `[:, FLUX]` is the spot for a flux of 1.
 
     Args:
-        params: (n, 6) in the order BACKGROUND .. LN_SV for ellipses whose axes lie along rows and columns;
-            (n, 7) BACKGROUND .. SHEAR for those at any angle: any ellipse is an upright one sheared along u,
-            its centre moves by SHEAR pixels per row and LN_SU is the width along u at a fixed row.
+        params: (n, 6) BACKGROUND to LN_SV for ellipses with axes along rows and columns, or (n, 7)
+            BACKGROUND to SHEAR for any angle. Any ellipse is an upright one sheared along u: its centre
+            moves by SHEAR pixels per row. LN_SU is then the width along u at a fixed row.
         shape: Height and width of the window.
     """
     rows = np.empty((*params.shape, *shape))
@@ -34,12 +32,12 @@ def derivatives(params: FloatArray, shape: tuple[int, int]) -> FloatArray:
 
 
 def principal_axes(params: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Short and long width in pixels (2,), their directions as columns (2, 2), of one spot (6,) or (7,)."""
+    """Short and long width (2,) in px, and their directions as columns (2, 2), of one spot (6,) or (7,)."""
     var_u, var_v = math.exp(2.0 * params[LN_SU]), math.exp(2.0 * params[LN_SV])
     shear = float(params[SHEAR]) if params.size > SHEAR else 0.0
     mixed, var_u = shear * var_v, var_u + shear**2 * var_v
-    apart = math.hypot(0.5 * (var_u - var_v), mixed)
-    squares = 0.5 * (var_u + var_v) + np.array([-apart, apart])
+    half_difference = math.hypot(0.5 * (var_u - var_v), mixed)
+    variances = 0.5 * (var_u + var_v) + np.array([-half_difference, half_difference])
     angle = 0.5 * math.atan2(2.0 * mixed, var_u - var_v)
     cos, sin = math.cos(angle), math.sin(angle)
-    return np.sqrt(np.maximum(squares, 1e-6)), np.array([[-sin, cos], [cos, sin]])
+    return np.sqrt(np.maximum(variances, 1e-6)), np.array([[-sin, cos], [cos, sin]])

@@ -1,4 +1,4 @@
-"""The search behind `SpotFinder`: peaks, fits, overlaps, and what went wrong."""
+"""Search of `SpotFinder`: detection, fits, deblending, failures."""
 
 from __future__ import annotations
 
@@ -8,23 +8,28 @@ import numpy as np
 
 from workbench.model.arrays import Image
 from workbench.model.spot import NO_FLAGS, Failure, Spot
-from workbench.spots.deblending.blend import fit_blends, grown, split
-from workbench.spots.deblending.clusters import CLEAR_SD, are_apart, clearest, clusters, without_duplicates
+from workbench.spots.deblending.blend import fit_blends, split_elongated, with_hidden_spots
+from workbench.spots.deblending.clusters import (
+    CLEAR_SNR,
+    are_separate,
+    clusters,
+    without_duplicates,
+    without_rivals,
+)
 from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
 from workbench.spots.measure import FittedSpot, measure
 from workbench.spots.pair import Pair, PairSignal, measure_signal
 from workbench.spots.strip import Strip, is_on, strip_of
 from workbench.spots.types import Finding, Scanline
 
-# A peak of the smoothed signal between this and the threshold is named: too dim to be told from noise.
+# Lowest height of a peak that is reported as too dim, in sd of the smoothed noise.
 _DIM_SD: Final = 4.2
-# A spot whose peak is this many sd of a pixel is clear; one that is not has to give way when there are too
-# many.
+# Peak of a spot, in sd of a pixel, below which it is dropped where there are more spots than lasers.
 _CLEAR_PEAK_SD: Final = 5.0
 
 
 class Search:
-    """A search of frames of one size; see `SpotFinder` for the arguments."""
+    """Search in frames of one size; arguments as in `SpotFinder`."""
 
     def __init__(
         self, shape: tuple[int, int], scanlines: tuple[Scanline, ...], expected: int | None, reasons: bool
@@ -37,12 +42,12 @@ class Search:
         self._strips = tuple(s for s in strips if s.rows.stop > s.rows.start and s.cols.stop > s.cols.start)
 
     def find(self, on: Image, off: Image | None, clip_dn: float) -> Finding:
-        """Spots of a pair of frames that were checked."""
+        """Spots and failures of a checked pair of frames."""
         pair = Pair(on, off, clip_dn)
         scenes = [measure_signal(pair, strip) for strip in self._strips]
-        traces = self._search(scenes)
-        spots = self._in_order([t.spot for t in traces if self._on_a_line(t.spot)])
-        return Finding(tuple(spots), self._failures(pair, scenes, traces, spots))
+        fits = self._search(scenes)
+        spots = self._in_order([t.spot for t in fits if self._on_a_line(t.spot)])
+        return Finding(tuple(spots), self._failures(pair, scenes, fits, spots))
 
     def _search(self, scenes: list[PairSignal]) -> list[FittedSpot]:
         """Spots of all strips, by the cheapest search that explains the frame.
@@ -53,42 +58,43 @@ class Search:
         ones are tried as two; while spots are still missing, they are searched in the residuals of the joint
         fits. Each addition must pass the F test of `deblending.blend`.
         """
-        traces: list[FittedSpot] = []
+        fits: list[FittedSpot] = []
         for scale in (FINE_PX, COARSE_PX):
             for scene in scenes:
                 peaks = find_peaks(scene.signal, scene.strip, scene.variance, scale)
-                clear = [t for t in traces if t.clarity >= CLEAR_SD]
-                traces = clearest(traces, measure(scene, _new_ones(peaks, clear)))
-            if self._is_complete(traces) and are_apart(traces):
-                return traces
-            traces = without_duplicates(traces)
-            if self._is_complete(traces):
+                clear = [t for t in fits if t.flux_snr >= CLEAR_SNR]
+                fits = without_rivals(fits, measure(scene, _unexplained(peaks, clear)))
+            if self._is_complete(fits) and are_separate(fits):
+                return fits
+            fits = without_duplicates(fits)
+            if self._is_complete(fits):
                 break
-        if not traces or (len(traces) == self._expected and are_apart(traces)):
-            return traces
-        more = self._wants_more(traces)
+        if not fits or (len(fits) == self._expected and are_separate(fits)):
+            return fits
+        more = self._wants_more(fits)
         if more:
-            traces = [s for t in traces for s in split(scenes, t, _without(traces, [t]))]
-        groups = [fit_blends(scenes, g, _without(traces, g), more) for g in clusters(traces)]
-        traces = without_duplicates([trace for group in groups for trace in group])
-        if self._wants_more(traces):
-            found = [t for g in clusters(traces) for t in grown(scenes, g, _without(traces, g))]
-            traces = without_duplicates(found)
-        return self._as_many_as_lasers(traces, scenes)
+            fits = [s for t in fits for s in split_elongated(scenes, t, _without(fits, [t]))]
+        groups = [fit_blends(scenes, g, _without(fits, g), more) for g in clusters(fits)]
+        fits = without_duplicates([fit for group in groups for fit in group])
+        if self._wants_more(fits):
+            found = [t for g in clusters(fits) for t in with_hidden_spots(scenes, g, _without(fits, g))]
+            fits = without_duplicates(found)
+        return self._without_dim_extras(fits, scenes)
 
-    def _wants_more(self, traces: list[FittedSpot]) -> bool:
-        return self._expected is None or len(traces) < self._expected
+    def _wants_more(self, fits: list[FittedSpot]) -> bool:
+        """Whether more spots may be found: the number of lasers is unknown, or not reached."""
+        return self._expected is None or len(fits) < self._expected
 
-    def _is_complete(self, traces: list[FittedSpot]) -> bool:
-        """Whether every laser has a spot that is no spike of noise."""
-        return len(traces) == self._expected and all(t.clarity >= CLEAR_SD for t in traces)
+    def _is_complete(self, fits: list[FittedSpot]) -> bool:
+        """Whether every laser has a significant spot."""
+        return len(fits) == self._expected and all(t.flux_snr >= CLEAR_SNR for t in fits)
 
-    def _as_many_as_lasers(self, traces: list[FittedSpot], scenes: list[PairSignal]) -> list[FittedSpot]:
-        """The traces without the dim ones that are more than there are lasers."""
-        if self._expected is None or len(traces) <= self._expected:
-            return traces
+    def _without_dim_extras(self, fits: list[FittedSpot], scenes: list[PairSignal]) -> list[FittedSpot]:
+        """Fits without dim ones in excess of the number of lasers."""
+        if self._expected is None or len(fits) <= self._expected:
+            return fits
         clear = _CLEAR_PEAK_SD * min(scene.variance for scene in scenes) ** 0.5
-        ranked = sorted(traces, key=lambda t: -t.spot.peak_dn)
+        ranked = sorted(fits, key=lambda t: -t.spot.peak_dn)
         return [t for i, t in enumerate(ranked) if i < self._expected or t.spot.peak_dn > clear]
 
     def _on_a_line(self, spot: Spot) -> bool:
@@ -102,10 +108,10 @@ class Search:
         return sorted(spots, key=lambda s: (s.u_px * du + s.v_px * dv, s.v_px))
 
     def _failures(
-        self, pair: Pair, scenes: list[PairSignal], traces: list[FittedSpot], spots: list[Spot]
+        self, pair: Pair, scenes: list[PairSignal], fits: list[FittedSpot], spots: list[Spot]
     ) -> tuple[Failure, ...]:
         failures = [Failure.AMBIENT_CHANGED] if any(s.ambient_changed for s in scenes) else []
-        if len(spots) < len(traces):
+        if len(spots) < len(fits):
             failures.append(Failure.OFF_SCANLINE)
         if not spots or (self._expected is not None and len(spots) < self._expected):
             failures.append(Failure.TOO_FEW if spots else Failure.NO_SPOT)
@@ -117,7 +123,7 @@ class Search:
         return tuple(dict.fromkeys(failures))
 
     def _reasons(self, pair: Pair, scenes: list[PairSignal], spots: list[Spot]) -> list[Failure]:
-        """Why spots are missing: too dim, or outside the band (then the whole frame is read)."""
+        """Reasons for missing spots: too dim, or outside the band (for which the whole frame is searched)."""
         reasons = []
         for scene in scenes:
             dim = find_peaks(scene.signal, scene.strip, scene.variance, threshold_sd=_DIM_SD)
@@ -138,19 +144,19 @@ class Search:
         return reasons
 
 
-def _without(traces: list[FittedSpot], group: list[FittedSpot]) -> list[FittedSpot]:
-    """The traces that are not in a group."""
-    mine = {id(t) for t in group}
-    return [t for t in traces if id(t) not in mine]
+def _without(fits: list[FittedSpot], group: list[FittedSpot]) -> list[FittedSpot]:
+    """Fits that are not in a group."""
+    members = {id(t) for t in group}
+    return [t for t in fits if id(t) not in members]
 
 
-def _new_ones(peaks: Peaks, traces: list[FittedSpot]) -> Peaks:
-    """Peaks that no measured spot explains."""
-    if not traces or peaks.rows.size == 0:
+def _unexplained(peaks: Peaks, fits: list[FittedSpot]) -> Peaks:
+    """Peaks outside the reach of all measured spots."""
+    if not fits or peaks.rows.size == 0:
         return peaks
-    u = np.array([t.spot.u_px for t in traces])
-    v = np.array([t.spot.v_px for t in traces])
-    reach = np.array([3.0 * t.reach_px + 2.0 * peaks.scale_px for t in traces])
-    apart = np.hypot(peaks.cols[:, None] - u, peaks.rows[:, None] - v)
-    new = (apart > reach).all(axis=1)
+    u = np.array([t.spot.u_px for t in fits])
+    v = np.array([t.spot.v_px for t in fits])
+    reach = np.array([3.0 * t.reach_px + 2.0 * peaks.scale_px for t in fits])
+    distance_px = np.hypot(peaks.cols[:, None] - u, peaks.rows[:, None] - v)
+    new = (distance_px > reach).all(axis=1)
     return Peaks(peaks.rows[new], peaks.cols[new], peaks.height_dn[new], peaks.scale_px)

@@ -1,4 +1,4 @@
-"""The part of an image that a scanline allows."""
+"""Strip of an image around a scanline."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.errors import BadInputError
 from workbench.spots.types import Scanline
 
-# Smoothing at the strip's rim needs some rows beyond it.
+# Rows beyond the band, for the smoothing at its rim.
 _RIM_PX = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """A rectangle of the image, and which of its pixels lie within the scanline's half-width."""
+    """Rectangle of the image, and the mask of its pixels within the scanline's half-width."""
 
     rows: slice
     cols: slice
     mask: BoolArray | None
-    """None where every pixel may hold a spot."""
+    """None: spots are allowed in every pixel."""
 
     @property
     def at(self) -> tuple[slice, slice]:
@@ -31,7 +31,7 @@ class Strip:
 
 
 def distance_px(line: Scanline, u_px: FloatArray, v_px: FloatArray) -> FloatArray:
-    """Distance of points from the line."""
+    """(n,) distances of points from the line."""
     across = (u_px - line.u0_px) * line.dv - (v_px - line.v0_px) * line.du
     distance: FloatArray = np.abs(across) / np.hypot(line.du, line.dv)
     return distance
@@ -44,24 +44,23 @@ def is_on(line: Scanline, u_px: float, v_px: float) -> bool:
 
 
 def check_line(line: Scanline) -> None:
-    """Refuse a line without direction or with a value that is no number.
+    """Refuse a line without direction or width, or with a value that is not finite.
 
     Raises:
-        BadInputError: says what was expected, what came and what to do.
+        BadInputError: the line is refused.
     """
     values = (line.u0_px, line.v0_px, line.du, line.dv, line.half_width_px)
     if not np.isfinite(values).all() or line.half_width_px <= 0 or (line.du == 0 and line.dv == 0):
         raise BadInputError(
-            f"scanline: expected finite numbers, a direction other than (0, 0) and a half-width above "
-            f"0, got {line}; "
-            "give for example Scanline(0, 240, 1, 0, 3) for row 240"
+            f"scanline: expected finite numbers, a direction other than (0, 0) and a half-width above 0, "
+            f"got {line}; use for example Scanline(0, 240, 1, 0, 3) for row 240"
         )
 
 
 def strip_of(line: Scanline, shape: tuple[int, int]) -> Strip:
-    """Smallest rectangle of an image of `shape` that holds the scanline's band and a rim.
+    """Smallest rectangle of an image of `shape` around the scanline's band and a rim.
 
-    A band that misses the image leaves an empty strip.
+    The strip of a band outside the image is empty.
     """
     height, width = shape
     reach = line.half_width_px + _RIM_PX

@@ -1,7 +1,7 @@
-"""The chain of the thesis that this workbench grew from, kept for comparison: threshold, scanline, centroid.
+"""Spot detection of the thesis behind this workbench, for comparison: threshold, scanline, centroid.
 
 Deborah L. Tran, "Obstacle Detection for Robot Navigation Using Structured Light", MIT 2001, sections 3.4 and
-5.2.3. Its centre is biased wherever the threshold cuts a spot off, and it knows no standard deviation.
+5.2.3. Its centre is biased where the threshold truncates a spot, and it has no standard deviation.
 """
 
 from __future__ import annotations
@@ -33,11 +33,12 @@ def thesis_centres(
 
     Args:
         on: Frame with the lasers on.
-        off: Frame with the lasers off; None where a filter keeps the ambient light out.
-        scanlines: Pixels further than the half-width from all of them are dropped; none keeps all.
-        expected: Number of lasers: the threshold is halved while nothing is seen, raised while too much is.
-        ambiguous_px: Pixels nearer than this to more than one scanline are dropped: nobody can say whose they
-            are.
+        off: Frame with the lasers off; None where a filter blocks the ambient light.
+        scanlines: Pixels farther than the half-width from all of them are dropped; none: all are kept.
+        expected: Number of lasers: the threshold is halved while there are fewer spots, raised while there
+            are more.
+        ambiguous_px: Pixels closer than this to more than one scanline are dropped, as their laser is
+            ambiguous.
 
     Raises:
         BadInputError: as `find_spots`.
@@ -59,7 +60,7 @@ def thesis_centres(
 
 
 def _allowed(shape: tuple[int, ...], scanlines: Sequence[Scanline], ambiguous_px: float) -> BoolArray:
-    """Pixels on a scanline, and not near to two."""
+    """(height, width): pixels on a scanline, and not close to two."""
     if not scanlines:
         return np.ones(shape, bool)
     v, u = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
@@ -71,7 +72,7 @@ def _allowed(shape: tuple[int, ...], scanlines: Sequence[Scanline], ambiguous_px
 
 
 def _centroids(diff: FloatArray, threshold: float) -> FloatArray:
-    """Centres of mass of the connected pixels above the threshold, by falling mass."""
+    """(k, 2) centres of mass of the connected pixels above the threshold, by decreasing mass."""
     above = (diff > threshold).astype(np.uint8)
     count, labels = cv2.connectedComponents(above)
     kept = diff * above

@@ -1,4 +1,4 @@
-"""The line that spots may lie on, and what was found in a capture."""
+"""Scanline that spots may lie on, and result of a search."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from workbench.model.spot import Failure, Spot
 
 @dataclass(frozen=True, slots=True)
 class Scanline:
-    """Where spots may lie: the image line through (u0, v0) with direction (du, dv), and a half-width."""
+    """Image line that spots may lie on: through (u0, v0) with direction (du, dv), and a half-width."""
 
     u0_px: float
     v0_px: float
@@ -20,7 +20,7 @@ class Scanline:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Spots of one capture, in order along the first scanline (else by u, then v), and what went wrong."""
+    """Spots of one capture, in order along the first scanline (else by u, then v), and its failures."""
 
     spots: tuple[Spot, ...]
     failures: tuple[Failure, ...] = ()

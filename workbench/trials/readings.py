@@ -109,6 +109,7 @@ def _flat_reading(
         status=reading.status,
         range_mm=reading.flat_mm,
         sigma_mm=reading.flat_sigma_mm,
+        spot_sd_mm=reading.flat_spot_sd_mm,
         reference_sd_mm=context.rig.bench.placement_sd_mm if stated is None else stated,
         closest_mm=reading.closest_mm,
         closest_sigma_mm=reading.sigma_mm,
@@ -124,6 +125,7 @@ def _closest_reading(taken: ReadingTaken, reading: Reading, closest: ClosestRang
         update={
             "range_mm": reading.closest_mm,
             "sigma_mm": reading.sigma_mm,
+            "spot_sd_mm": None,
             **_interval(reading),
             "true": closest.true,
             "reference_sd_mm": closest.true.range_sd_mm,

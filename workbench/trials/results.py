@@ -4,12 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import pandas as pd
+
 from workbench.model.chart import Chart
 from workbench.model.event import TrialFinished
 from workbench.model.table import Table
 from workbench.procedure.engine.context import Context
 from workbench.session.capture_table import TRIAL_TABLE, write_capture_table
 from workbench.session.files import write_record
+
+
+def write_readings(context: Context, name: str, readings: pd.DataFrame) -> None:
+    """Write the readings of a trial, one row each, to `<name>.csv` in the session folder (docs/trials.md).
+
+    Raises:
+        StoppedError: the disk is full or cannot be written.
+    """
+    content = readings.to_csv(index=False, lineterminator="\n").encode()
+    write_record(context.session_dir / f"{name}.csv", content)
 
 
 def finish_trial(context: Context, name: str, tables: Sequence[Table], charts: Sequence[Chart] = ()) -> None:

@@ -27,6 +27,19 @@ def test_speckle_stands_still_until_the_target_moves(tmp_path: Path) -> None:
     assert not np.array_equal(patterns[0], patterns[1])
 
 
+def test_a_move_along_the_face_changes_speckle_alone(tmp_path: Path) -> None:
+    for contrast in (0.0, 1.0):
+        scene = scene_of(ideal_rig(beam={"speckle_contrast": contrast}), tmp_path)
+        patterns = []
+        for shift_mm in (0.0, 2.0, 4.0, 2.0):
+            target = FlatTarget(shift_mm=shift_mm)
+            scene.place(Placement(key="A", standoff_mm=500.0, target=target))
+            patterns.append(scene.spots("L1")[0].rate)
+        assert np.array_equal(patterns[1], patterns[3])
+        for changed in (patterns[0], patterns[2]):
+            assert np.array_equal(patterns[1], changed) == (contrast == 0)
+
+
 def test_nothing_is_seen_of_what_is_not_there(tmp_path: Path) -> None:
     scene = scene_of(ideal_rig(laser("L", 60.0)), tmp_path)
     cases: list[tuple[float, Any]] = [

@@ -67,6 +67,7 @@ def test_a_record_lacks_what_was_not_measured_and_an_end_that_is_infinite() -> N
 
 
 def test_the_range_of_a_flat_is_weighted_by_the_spots_and_keeps_the_common_error() -> None:
-    mean, sigma = flat_range(estimates([500.0, 506.0], [1.0, 2.0], 0.7))
+    mean, sigma, spot_sd = flat_range(estimates([500.0, 506.0], [1.0, 2.0], 0.7))
     assert mean == pytest.approx((500.0 / 1 + 506.0 / 4) / (1 + 1 / 4))
     assert sigma == pytest.approx(np.sqrt(1 / (1 + 1 / 4) + 0.7**2))
+    assert spot_sd == pytest.approx(np.sqrt(1 / (1 + 1 / 4)))

@@ -1,4 +1,4 @@
-"""Whatever the image, a Finding comes back, and every number in it is finite."""
+"""For any image, a Finding is returned, and every number in it is finite."""
 
 from __future__ import annotations
 

@@ -12,10 +12,10 @@ FINE = CameraNoise(electrons_per_dn=0.5, read_sd_electrons=5.0, background_elect
 
 @pytest.mark.parametrize("electrons", [0.5, 10.0, 100.0, 399.0])
 def test_information_of_a_pixel_is_at_least_the_inverse_variance(electrons: float) -> None:
-    # Of all distributions with this mean and variance, the Gaussian tells least about the mean.
+    # Of all distributions with this mean and variance, the Gaussian has the least information about the mean.
     least = 1.0 / (electrons + 25.0 + 0.25 / 12.0)
-    told = pixel_information(electrons, FINE)
-    assert least * (1 - 1e-3) <= told < 1.06 * least
+    information = pixel_information(electrons, FINE)
+    assert least * (1 - 1e-3) <= information < 1.06 * least
 
 
 def test_information_of_a_pixel_agrees_with_the_score_of_simulated_numbers() -> None:
@@ -31,10 +31,10 @@ def test_information_of_a_pixel_agrees_with_the_score_of_simulated_numbers() -> 
 
     middle, up, down = numbers(20.0), numbers(20.0 + step), numbers(20.0 - step)
     seen = middle > 2e-4
-    told = float(((up - down)[seen] ** 2 / (4 * step**2) / middle[seen]).sum())
+    information = float(((up - down)[seen] ** 2 / (4 * step**2) / middle[seen]).sum())
     # Noise of the histograms adds about (number of bins) / (2 step^2 trials) to the sum.
     bias = seen.sum() / (2 * step**2 * trials)
-    assert told - bias == pytest.approx(pixel_information(20.0, camera), rel=0.03)
+    assert information - bias == pytest.approx(pixel_information(20.0, camera), rel=0.03)
 
 
 def test_bright_wide_spot_reaches_the_shot_noise_limit() -> None:

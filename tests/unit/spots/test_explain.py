@@ -21,7 +21,7 @@ def test_every_failure_is_explained_with_cause_and_remedy() -> None:
         assert "Do: " in words
 
 
-def test_a_reflection_on_the_scanline_is_told_as_one_too_many_and_in_words() -> None:
+def test_a_reflection_on_the_scanline_is_reported_and_explained_as_too_many_spots() -> None:
     lasers, reflection = [Drawn(30, 30), Drawn(60, 30)], Drawn(90, 29.5, 8e3, 1.6, 1.6)
     finding = find_spots(draw([*lasers, reflection], rng(8)), scanlines=ROW, expected=2)
     assert finding.failures == (Failure.TOO_MANY,)

@@ -25,7 +25,7 @@ def test_a_finder_refuses_another_size() -> None:
 
 
 def test_it_is_known_whether_the_loops_are_compiled(tmp_path: Path) -> None:
-    """A technician is told what the first capture waits for."""
+    """The technician sees the reason for the wait before the first capture."""
     assert not is_compiled(tmp_path)
     find_spots(draw([Drawn(60, 30)], rng()))
     assert is_compiled()

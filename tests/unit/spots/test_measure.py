@@ -26,9 +26,9 @@ def test_a_spot_has_the_values_that_it_was_drawn_with(width_px: float, seed: int
     assert spot.u_px == pytest.approx(true.u, abs=4.5 * spot.u_sd_px)
     assert spot.v_px == pytest.approx(true.v, abs=4.5 * spot.v_sd_px)
     flux_dn = true.electrons / SENSOR.electrons_per_dn
-    assert spot.flux_dn == pytest.approx(flux_dn, abs=4.5 * spot.flux_dn / trace.clarity)
+    assert spot.flux_dn == pytest.approx(flux_dn, abs=4.5 * spot.flux_dn / trace.flux_snr)
     # The logarithm of a width is as uncertain as the flux relative to itself.
-    assert np.log(spot.width_px / width_px) == pytest.approx(0.0, abs=4.5 / trace.clarity)
+    assert np.log(spot.width_px / width_px) == pytest.approx(0.0, abs=4.5 / trace.flux_snr)
     assert trace.reach_px == pytest.approx(spot.width_px, rel=0.05)
     np.testing.assert_array_equal(trace.params[[1, 2, 3]], [spot.flux_dn, spot.u_px, spot.v_px])
 

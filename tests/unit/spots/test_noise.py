@@ -47,7 +47,9 @@ def noise(windows: int, assumed: float) -> PixelNoise:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("slope", "assumed"), [(0.4, 0.4), (0.4, 1.5), (2.0, 0.5)])
-def test_the_slope_is_that_of_the_noise_whatever_was_assumed(slope: float, assumed: float, seed: int) -> None:
+def test_the_slope_is_that_of_the_noise_for_any_assumed_slope(
+    slope: float, assumed: float, seed: int
+) -> None:
     signal, residual, weight = drawn(slope, seed)
     found = photon_transfer_slope(signal, residual, weight, np.zeros_like(signal), noise(6, assumed))
     # The variance of n pixels is known to sqrt(2 / n) of itself; the floor's share is small.

@@ -18,7 +18,7 @@ def rng(seed: int = 0) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-def test_a_change_of_ambient_light_is_told_and_compensated() -> None:
+def test_a_change_of_ambient_light_is_reported_and_compensated() -> None:
     scene = np.where(np.arange(120) % 40 < 20, 300.0, 1500.0) * np.ones((60, 1))
     true = [Drawn(20.3, 30.2), Drawn(62, 30.2), Drawn(101.4, 29.8)]
     on, off = draw(true, rng(1), ambient=1.4 * scene), draw([], rng(2), ambient=scene)

@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.draw import Drawn, Sensor, draw
 from workbench.spots import Scanline, Spot, find_spots, is_same_spot, persistent_spots
-from workbench.spots.persistence import CLEAR, clearness
+from workbench.spots.persistence import SIGNIFICANT, significance
 
 SENSOR = Sensor(electrons_per_dn=156.0, read_sd=225.0, bits=8)
 EVERYWHERE = [Scanline(0.0, 239.5, 1.0, 0.0, 240.0)]
@@ -24,10 +24,10 @@ def test_noise_is_taken_for_a_spot_now_and_then_and_never_for_a_light() -> None:
     for _ in range(FRAMES):
         found = find_spots(dark(rng, []), scanlines=EVERYWHERE).spots
         spots += bool(found)
-        assert all(clearness(spot) < CLEAR for spot in found)
+        assert all(significance(spot) < SIGNIFICANT for spot in found)
         lights += bool(persistent_spots(found, lambda: find_spots(dark(rng, []), scanlines=EVERYWHERE).spots))
     print(f"spots in {spots} of {FRAMES} dark frames")
-    assert spots > 0, "otherwise there is nothing to tell apart"
+    assert spots > 0, "otherwise nothing is tested"
     assert lights == 0
 
 
@@ -37,13 +37,13 @@ def test_a_beam_is_a_light_be_it_faint(electrons: float, looks: int) -> None:
     rng = np.random.default_rng(2)
     beam, seen, looked = Drawn(200.3, 300.4, electrons), 0, 0
 
-    def look_again() -> tuple[Spot, ...]:
+    def find_again() -> tuple[Spot, ...]:
         nonlocal looked
         looked += 1
         return find_spots(dark(rng, [beam]), scanlines=EVERYWHERE).spots
 
     for _ in range(50):
-        lights = persistent_spots(find_spots(dark(rng, [beam]), scanlines=EVERYWHERE).spots, look_again)
+        lights = persistent_spots(find_spots(dark(rng, [beam]), scanlines=EVERYWHERE).spots, find_again)
         seen += any(abs(light.u_px - beam.u) < 2 and abs(light.v_px - beam.v) < 2 for light in lights)
     assert seen >= 49
     assert looked / 50 == pytest.approx(looks, abs=0.1)
@@ -64,7 +64,7 @@ def test_a_faint_one_beside_a_clear_one_is_a_light_as_well() -> None:
     rng = np.random.default_rng(4)
     lamps = [Drawn(100.0, 100.0, 1e5), Drawn(400.0, 300.0, 1.0e4)]
     found, again = (find_spots(dark(rng, lamps), scanlines=EVERYWHERE).spots for _ in range(2))
-    clear, faint = sorted(found, key=clearness, reverse=True)
-    assert clearness(faint) < CLEAR < clearness(clear)
+    clear, faint = sorted(found, key=significance, reverse=True)
+    assert significance(faint) < SIGNIFICANT < significance(clear)
     assert persistent_spots(found, lambda: again) == list(found)
     assert persistent_spots(found, list) == [clear]

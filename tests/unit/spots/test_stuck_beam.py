@@ -6,17 +6,17 @@ import pytest
 
 from workbench.model.errors import LaserOffNotConfirmedError
 from workbench.spots import Spot, position_text, refuse_stuck_beam
-from workbench.spots.persistence import CLEAR
+from workbench.spots.persistence import SIGNIFICANT
 
 
-def light(u_px: float, clearness: float = 3 * CLEAR) -> Spot:
-    """A spot that is so many of its standard deviations bright."""
-    sd = 1.5 / clearness
+def light(u_px: float, significance: float = 3 * SIGNIFICANT) -> Spot:
+    """A spot of a given significance."""
+    sd = 1.5 / significance
     return Spot(u_px, 50.0, sd, sd, 1000.0, 1.5, 100.0)
 
 
 ADVICE = "measure it"
-BEAM, FAINT = light(100.0), light(100.0, clearness=0.6 * CLEAR)
+BEAM, FAINT = light(100.0), light(100.0, significance=0.6 * SIGNIFICANT)
 
 
 def nothing() -> list[Spot]:
@@ -38,7 +38,7 @@ def test_a_faint_light_is_a_beam_if_it_is_there_again() -> None:
     with pytest.raises(LaserOffNotConfirmedError):
         refuse_stuck_beam("k", [FAINT], lambda: [FAINT], ADVICE)
     assert refuse_stuck_beam("k", [FAINT], nothing, ADVICE) == []
-    assert refuse_stuck_beam("k", [FAINT], lambda: [light(140.0, 0.6 * CLEAR)], ADVICE) == []
+    assert refuse_stuck_beam("k", [FAINT], lambda: [light(140.0, 0.6 * SIGNIFICANT)], ADVICE) == []
 
 
 def test_a_dark_frame_passes() -> None:

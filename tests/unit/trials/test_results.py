@@ -14,7 +14,7 @@ from workbench.model.event import TrialFinished
 from workbench.model.table import Column, Table
 from workbench.procedure.engine.lasers import capture_lasers
 from workbench.procedure.engine.step import flat_placement
-from workbench.trials.results import finish_trial
+from workbench.trials.results import finish_trial, write_readings
 
 TABLE = Table(
     name="p.1-errors",
@@ -58,3 +58,12 @@ def test_a_table_that_cannot_be_written_stops_the_session(tmp_path: Path) -> Non
             finish_trial(session.context, "p.1", [TABLE])
         assert session.events == []
     assert caught.value.exit_code == 5
+
+
+def test_readings_are_a_file_with_every_digit(tmp_path: Path) -> None:
+    frame = pd.DataFrame({"measured_mm": [0.1 + 0.2, None], "session": ["Ann, B", "C"]})
+    with running(tmp_path) as session:
+        write_readings(session.context, "p.1", frame)
+        path = session.context.session_dir / "p.1.csv"
+        assert pd.read_csv(path).equals(frame)
+        assert b"\r" not in path.read_bytes()

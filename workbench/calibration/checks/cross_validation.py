@@ -1,11 +1,11 @@
 """Cross-validation: each placement is ranged by the fit without it.
 
 Each placement is left out in turn and the fit repeated without it. The reduced fit predicts the spots of the
-placement with a covariance: that of the parameters, of the placement's own error and tilts (at their priors),
-of spot noise and speckle. Spots too far from their prediction raise an alarm.
+placement. The covariance of the prediction includes the parameters, the placement's own error and tilts (at
+their priors), spot noise and speckle. Spots too far from their prediction raise an alarm.
 
-With d the residuals of n spot coordinates in standard deviations of their noise, J their derivatives by the
-parameters and C the covariance of the fit without them, d has the covariance V = 1 + J C J^T. A wrong
+Let d be the residuals of n spot coordinates in standard deviations of their noise, J their derivatives by the
+parameters, C the covariance of the fit without them. Then d has the covariance V = 1 + J C J^T. A wrong
 standoff moves the residuals in the direction w. The generalised least-squares estimate of that shift,
 w V^-1 d / (w V^-1 w), is the range error of all spots together; its variance is 1 / (w V^-1 w). The test of
 all coordinates is d V^-1 d, chi-square with n degrees of freedom (C. E. Rasmussen, C. K. I. Williams,

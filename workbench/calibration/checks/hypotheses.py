@@ -2,14 +2,14 @@
 
 A hypothesis is the fit's problem with other data of the same shapes: two lasers exchanged, the image
 mirrored, a standoff free, a spot left out. Its score is twice the logarithm of its Bayes factor against the
-current explanation: the decrease of the cost (chi-square of data and priors, in units of the remaining noise)
-minus the Occam factor, twice the logarithm of the prior range of its free quantity over the width to which
-the data determine it (Laplace's approximation; D. J. C. MacKay, Information Theory, Inference, and Learning
-Algorithms, 2003, chapter 28).
+current explanation: the decrease of the cost minus the Occam factor. The cost is chi-square of data and
+priors, in units of the remaining noise. The Occam factor is twice the logarithm of the prior range of the
+free quantity over the width to which the data determine it. This is Laplace's approximation (D. J. C.
+MacKay, Information Theory, Inference, and Learning Algorithms, 2003, chapter 28).
 
 The search is greedy: the best hypothesis is adopted while it is decisive, and the next are compared with it
-adopted. An early choice can be wrong once a later one is adopted, so at the end each is removed in turn and
-kept only where the rest without it is decisively worse.
+adopted. An early choice can be wrong once a later one is adopted. At the end each is therefore removed in
+turn, and kept only where the rest without it is decisively worse.
 """
 
 from __future__ import annotations
@@ -200,9 +200,9 @@ def _from_priors(problem: LeastSquaresProblem, used: BoolArray) -> Refit:
 def _wrong_standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
     """Standoffs of single placements free, the most strained first, until one explains everything.
 
-    A placement is tried only where leaving it out gains more than the Occam factor of a free standoff. A
-    board has so many corners that their noise alone gains as much; there the strain of its placement error
-    is compared instead.
+    A placement is tried only where leaving it out gains more than the Occam factor of a free standoff. The
+    noise of the many corners of a board alone gains as much; there the strain of its placement error is
+    compared instead.
     """
     cost = STANDOFF_COST + 2 * log(len(fit.cells.placements))
     boards = {view.placement.key for view in fit.boards}

@@ -1,19 +1,19 @@
 """Tests of the residuals for trends, autocorrelation, and unequal variances.
 
 Fitted residuals are neither independent nor of equal variance: parameters, placement errors and tilts absorb
-part of them. In standard deviations and under the rig file's priors, the residuals r of a fit have the
-covariance R = 1 - J C J^T, with J their derivatives by the parameters and C the posterior covariance. (The
+part of them. Let r be the residuals in standard deviations, J their derivatives by the parameters, C the
+posterior covariance. Under the rig file's priors, r has the covariance R = 1 - J C J^T. (The
 covariance of the measurements is 1 + J J^T, and R is its inverse.)
 
-A trend W (n x k) that the model lacks has the score W^T r with the covariance W^T R W. The square of the
-whitened score is chi-square, with as many degrees of freedom as W has directions that the parameters do not
-absorb (C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50).
+A trend W (n x k) that the model lacks has the score `W^T r` with the covariance `W^T R W`. The square of the
+whitened score is chi-square. Its degrees of freedom are the number of directions of W that the parameters
+do not absorb (C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50).
 
-A quadratic form r^T B r (lag, variance) has the mean tr(B R), the variance 2 tr(B R B R) and the third
-central moment 8 tr(B R B R B R). It is approximated by the gamma distribution with these three moments
+A quadratic form r^T B r (lag, variance) has the mean `tr(B R)`, the variance `2 tr(B R B R)` and the third
+central moment `8 tr(B R B R B R)`. It is approximated by the gamma distribution with these three moments
 (Pearson's type III). B is centred so that its mean vanishes at any noise level, and the form is divided by
-the noise level that the residuals show: a wrong stated noise is tested elsewhere, and must not appear as lag
-or as a difference of variances.
+the noise level of the residuals. A wrong stated noise is tested elsewhere; it must not appear as lag or as a
+difference of variances.
 
 Repeats of a spot share everything but their own noise: their deviations from their mean are tested
 separately.
@@ -144,7 +144,7 @@ class _Spots:
         )
 
     def trend_p(self, pixels: FloatArray) -> float:
-        """P value of the score test of a trend (n, k), px; NaN where the parameters absorb all of it."""
+        """P value of the score test of a trend (n, k), px; NaN where the parameters absorb it completely."""
         trend = pixels / self.sd_px[:, None]
         trend = trend[:, (trend**2).sum(axis=0) > 0]
         trend = trend / np.sqrt((trend**2).sum(axis=0))

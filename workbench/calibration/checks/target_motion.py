@@ -106,8 +106,8 @@ class _Captures:
 def _repeat_scale(fit: CalibrationFit, cell: int) -> float:
     """Factor on the stated deviations of a cell's repeats.
 
-    For an inconsistent cell the scatter about two means is used, before and after the split that leaves the
-    least of it: a step among the repeats must not count as noise, nor noise as a step.
+    For an inconsistent cell the scatter about two means is used, before and after the split with the least
+    scatter. A step among the repeats must not count as noise, nor noise as a step.
     """
     usual, members = fit.cells.repeat_scale, fit.cells.members[cell]
     if cell not in fit.cells.inconsistent:
@@ -126,8 +126,8 @@ def _repeat_scale(fit: CalibrationFit, cell: int) -> float:
 def _best_step(fit: CalibrationFit, captures: _Captures, reduced: Refit, index: int) -> TargetMotion | None:
     """The step with the highest score, if it is decisive.
 
-    With the captures whitened to z and a step of 1 mm after capture m to a_m, the step is a_m z / (a_m a_m)
-    and the decrease of chi-square (a_m z)^2 / (a_m a_m).
+    Let z be the whitened captures, and a_m a whitened step of 1 mm after capture m. The estimated step is
+    `a_m z / (a_m a_m)`, the decrease of chi-square `(a_m z)^2 / (a_m a_m)`.
     """
     mean, slope, variance = _prediction(fit, captures, reduced, index)
     distance = captures.position_px - mean

@@ -14,8 +14,8 @@ from workbench.model.stats import chi2_isf, chi2_sf
 
 OUTLIER_SD = 6.0
 """Distance from the median at which one of 10 or more repeats is rejected. Of Gaussian repeats with the
-stated deviation 1 in 5e8 lies so far out; where the stated deviation is far too small, 1 in 250 of ten,
-because their own median absolute deviation is then used, and it is a rough estimate."""
+stated deviation, 1 in 5e8 is rejected. Where the stated deviation is far too small, the median absolute
+deviation of the repeats replaces it, a rough estimate: of ten repeats, 1 in 250 is rejected."""
 FEWEST_FOR_MEDIAN = 10
 OUTLIER_SD_OF_FEW = 8.0
 """The same for 3 to 9 repeats, in deviations confirmed by the repeats of other spots: 1 in 1e9 of three."""

@@ -108,7 +108,8 @@ def with_placements(cells: MeanObservations, boards: Sequence[BoardView]) -> Mea
     """The mean observations, with the placements of the boards added to theirs.
 
     Raises:
-        BadInputError: two boards at one placement, or a board and a spot with different settings of it.
+        BadInputError: two boards at one placement, or a board and a spot with different settings of one
+            placement.
     """
     known = {p.key: p for p in cells.placements}
     seen: set[str] = set()

@@ -48,8 +48,8 @@ class Expectation:
     def spot_rows(self, standoff_mm: FloatArray, sd_px: float) -> FloatArray:
         """(N, J, 2 L, S) whitened derivatives of spots on a target at standoffs (J,); 0 outside the image.
 
-        The error of a placement and its tilts are noise that its spots share: with V = 1 + E E^T = L L^T the
-        covariance of the spots, the rows are A = L^-1 J, and A^T A is the placement's information.
+        The error of a placement and its tilts are noise that its spots share. Their covariance is
+        V = 1 + E E^T = L L^T. The rows are A = L^-1 J; A^T A is the placement's information.
 
         Args:
             standoff_mm: by the ruler.

@@ -97,8 +97,8 @@ class Candidates:
     def with_one_more(self, covariance: FloatArray) -> FloatArray:
         """(N, C, K) relative variance of ranges after one more placement at each candidate.
 
-        A rank-M update of the covariance P (N, F, F) (Sherman, Morrison, Woodbury), evaluated for the range
-        gradients g only: g P' g = g P g - |L^-1 A P g|^2 with A P A^T + 1 = L L^T.
+        A rank-M update of the covariance P (N, F, F) (Sherman, Morrison, Woodbury), for the range gradients g
+        only: `g P' g = g P g - |L^-1 A P g|^2` with `A P A^T + 1 = L L^T`.
         """
         projected = self.rows @ covariance[:, None]
         noise = projected @ np.swapaxes(self.rows, 2, 3) + np.eye(self.rows.shape[2])

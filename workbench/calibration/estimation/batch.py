@@ -6,11 +6,11 @@ where a step would increase the cost. With y = (sensor s, placements p) the equa
     [H_ss  H_sp] [ds]     [g_s]
     [H_ps  H_pp] [dp] = - [g_p]
 
-H_pp is block diagonal, because error and tilts of a placement affect its own spots only: 3 x 3 blocks are
-inverted, and ds solves the Schur complement (H_ss - H_sp H_pp^-1 H_ps) ds = H_sp H_pp^-1 g_p - g_s, which has
-the size of the sensor alone; then dp = -H_pp^-1 (g_p + H_ps ds) (F. Zhang, "The Schur Complement and Its
-Applications", 2005). The first steps renew the equations; near the optimum only the gradient is renewed, a
-quasi-Newton iteration that converges linearly and whose steps cost a small part (`_close_in`).
+H_pp is block diagonal with 3 x 3 blocks, because error and tilts of a placement affect its own spots only.
+First the Schur complement `(H_ss - H_sp H_pp^-1 H_ps) ds = H_sp H_pp^-1 g_p - g_s` is solved for ds; it has
+the size of the sensor alone. Then `dp = -H_pp^-1 (g_p + H_ps ds)` (F. Zhang, "The Schur Complement and Its
+Applications", 2005). The first steps renew the equations. Near the optimum only the gradient is renewed: a
+quasi-Newton iteration with linear convergence and much cheaper steps (`_close_in`).
 """
 
 from __future__ import annotations

@@ -134,10 +134,10 @@ def fit(
 ) -> CalibrationFit:
     """Fit the rig's parameters to observations of a flat target, and to views of the printed board.
 
-    The estimate maximises the posterior, with Gaussian noise and the rig's Gaussian priors. Errors and tilts
-    of the placements are parameters with priors, so that repeats at one placement share them. Where the
-    residuals are significantly larger than the stated noise, the noise is scaled to them (by the degrees of
-    freedom, with the effective number of parameters subtracted) and the fit repeated.
+    The estimate maximises the posterior, with Gaussian noise and the rig's Gaussian priors. Errors and
+    tilts of the placements are parameters with priors, so that repeats at one placement share them. Where
+    the residuals are significantly larger than the stated noise, the noise is scaled to them and the fit
+    repeated. The degrees of freedom are the coordinates less the effective number of parameters.
 
     Args:
         rig: priors and noise.

@@ -1,6 +1,6 @@
 """Gauss-Newton iteration for small least-squares problems outside hot loops.
 
-`problem` solves the fit with optimistix; `refit` and `batch` have damped solvers of their own for speed; the
+`problem` solves the fit with optimistix. `refit` and `batch` have damped solvers of their own for speed. The
 loops in `sensor`, `optics`, `corners` and `ranging` solve many problems at once or are compiled.
 """
 

@@ -26,26 +26,26 @@ from workbench.model.arrays import FloatArray
 from workbench.model.stats import chi2_sf
 
 LEAST_INFORMATION = 1e-3
-"""Information on a combination of placement errors, in units of its prior's, below which it tells nothing."""
+"""Information on a combination of placement errors, in units of its prior's, below which it is ignored."""
 LARGEST_SCALE = 100.0
 SCALED_P = 0.1
 """P value below which the deviations are scaled: a scale that was not needed costs less than one that was."""
 OUTLIER_SD = 30.0
-"""Prior deviation of a placement that stands elsewhere, in stated deviations."""
+"""Prior deviation of a placement at a wrong standoff, in stated deviations."""
 MOST_OUTLIERS = 2
 FEWEST = 3
 """Placements from whose errors a scale is estimated."""
 
 
 class PlacementScatter(NamedTuple):
-    """What the placement errors of one fit show."""
+    """Scatter of the placement errors of one fit, and their outliers."""
 
     scale: float
     """Factor on the stated deviations; 1 where the errors agree with them."""
     p_value: float
     """Chance of errors as large, of all but the outliers; 1 where the data show none."""
     outliers: tuple[int, ...]
-    """Placements (by their place among the J) that stand elsewhere."""
+    """Indices, among the J placements, of those at a wrong standoff."""
 
 
 def placement_scatter(errors: FloatArray, covariance: FloatArray) -> PlacementScatter:

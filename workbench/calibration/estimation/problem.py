@@ -147,7 +147,7 @@ def _corner_data(cells: MeanObservations, boards: Sequence[BoardView], board: Bo
 
 
 def _board_time(cells: MeanObservations, placement: int) -> float:
-    """When the spots beside the board were captured, as `SpotData.time`; 0 where there are none."""
+    """Mean time of the spots captured with a board, as in `SpotData.time`; 0 where there are none."""
     beside = cells.time[cells.placement == placement]
     return float(beside.mean()) if len(beside) else 0.0
 

@@ -82,7 +82,7 @@ def unit_of(name: str) -> str:
 class ParameterTable:
     """All P parameters of one fit. A parameter with prior sd 0 is a constant.
 
-    The fit solves for y = (value - prior mean) / prior sd: the prior of y is the unit Gaussian, and the
+    The fit solves for `y = (value - prior mean) / prior sd`. The prior of y is the unit Gaussian, and the
     problem is well scaled if the rig file's priors are realistic.
     """
 

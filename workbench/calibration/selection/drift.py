@@ -2,10 +2,10 @@
 
 A mount that creeps or a camera that warms up shifts the image. Where standoffs are visited from near to far
 the shift follows the standoff and is taken for baselines and pointing: residuals hardly show it. The test
-is that of a missing trend (C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50). With residuals r of the fit in
-standard deviations, their covariance R = 1 - J C J^T, and the shift W (one column for u, one for v) that is
-linear in the order of capture, the score W^T r has the covariance S = W^T R W; S^-1 W^T r is the drift that
-the data show beside everything else.
+is that of a missing trend (C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50). Let r be the residuals in
+standard deviations, and R = 1 - J C J^T their covariance. A shift that is linear in the order of capture is
+W, one column for u and one for v. The score `W^T r` has the covariance S = W^T R W. The estimated drift is
+`S^-1 W^T r`, with all other parameters free.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SHOWN_P = 0.003
 PRIOR_SD_PX = 0.5
 """Prior deviation of a drift that the data show, px over the session."""
 LEAST_INFORMATION = 1e-6
-"""Information on a drift, 1/px^2, below which the order of the captures tells nothing of it."""
+"""Information on a drift, 1/px^2, below which the drift is not estimated."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class DriftTest:
     """Drift that the data show, from the first capture to the last."""
 
     shift_px: FloatArray
-    """(2,) in u and v; 0 where nothing is known."""
+    """(2,) in u and v; 0 where it is not estimated."""
     sd_px: FloatArray
     """(2,) standard deviation; infinite where nothing is known."""
     p_value: float

@@ -1,10 +1,10 @@
 """Evidence for the terms of the model, each compared with its absence; no term is dropped.
 
-A term is compared with its absence by the Bayes factor of the two nested models: the ratio of posterior to
-prior density at the value that means absence, both Gaussian (Savage and Dickey's ratio; J. M. Dickey and B.
-P. Lientz, Ann. Math. Statist. 41 (1970) 214), and by a chi-square test of the data alone. Dropping terms has
-no benefit: ranges change by at most 0.03 of their standard deviation, and coverage does not improve
-(docs/decisions/0005).
+A term is compared with its absence by a chi-square test of the data alone, and by the Bayes factor of the
+two nested models. The latter is the Savage-Dickey ratio: posterior over prior density, both Gaussian, at
+the value that means absence (J. M. Dickey and B. P. Lientz, Ann. Math. Statist. 41 (1970) 214). Dropping
+terms has no benefit: ranges change by at most 0.03 of their standard deviation, and coverage does not
+improve (docs/decisions/0005).
 """
 
 from __future__ import annotations
@@ -132,8 +132,8 @@ def _indices(fitted: CalibrationFit, name: str) -> IndexArray:
 def _compare(fitted: CalibrationFit, index: IndexArray) -> _Comparison:
     """Compare a fit with its restriction to zero offset of the parameters `index`, to first order.
 
-    With y the offsets in prior deviations and C their posterior covariance, the log Bayes factor is
-    (y C^-1 y + ln det C) / 2; the data alone have the information C^-1 - 1 and the score C^-1 y.
+    Let y be the offsets in prior deviations and C their posterior covariance. The log Bayes factor is
+    `(y C^-1 y + ln det C) / 2`. The data alone have the information `C^-1 - 1` and the score `C^-1 y`.
     """
     prior_sd = fitted.table.prior_sd[index]
     offset = fitted.values[index] - fitted.table.prior_mean[index]
@@ -192,8 +192,8 @@ def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
 def _called_for(fitted: CalibrationFit) -> list[TermSummary]:
     """Constant lens terms that the data call for, by a score test at the fit.
 
-    With j the derivatives of the residuals by the term, J those by the free parameters and C their posterior
-    covariance, the information on the term is j j - j^T J C J^T j and the score -j r.
+    Let j be the derivatives of the residuals r by the term, J those by the free parameters, C their posterior
+    covariance. The information on the term is `j j - j^T J C J^T j`, the score `-j r`.
     """
     rig = fitted.rig
     tried = [name for name in fitted.layout.model.trial_sd if rig.camera.lens_priors[name].sd == 0]

@@ -28,9 +28,9 @@ def fit_without_outliers(
 def without_outliers(found: CalibrationFit, rejected: Sequence[Rejected]) -> CalibrationFit:
     """The fit repeated without its outliers, if there are any.
 
-    A spot (the mean of its repeats, which share its error) is rejected where its distance from the
-    prediction by all others is significant at a rate of 1 in 1000 fits, and where no other hypothesis (lasers
-    exchanged, a wrong standoff, target motion) explains it better.
+    A spot is the mean of its repeats, which share its error. It is rejected where its distance from the
+    prediction by all others is significant at a rate of 1 in 1000 fits. No other hypothesis (lasers
+    exchanged, a wrong standoff, target motion) may explain it better.
 
     Args:
         found: a fit of all observations.

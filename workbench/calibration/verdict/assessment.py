@@ -36,15 +36,16 @@ SPECKLE_SCALE = 1.5
 """Noise scale from which a missing speckle_sd_px is named as the cause."""
 DATA_SHARE_DETERMINED = 0.9
 """Information share of the data from which a parameter is determined by them."""
-LEAST_NARROWING = 1e-6
-"""Least decrease of a prior's variance by the data for its pull to be tested."""
+LEAST_NARROWING = 0.1
+"""Least relative decrease of a prior's variance by the data for its pull to be tested. Where the data hardly
+constrain a combination, the curvature of the model moves it more than their noise does."""
 PRIOR_UNMOVED = 0.9
 """Ratio of posterior to prior sd above which neither data nor other priors constrain the parameter."""
 
 
 @dataclass(frozen=True)
 class Derived:
-    """Quantities of a laser that the data determine whatever the priors are. 1 sigma."""
+    """Quantities of a laser that the data determine under any priors. 1 sigma."""
 
     laser_id: str
     f_b_px_mm: float
@@ -76,7 +77,7 @@ def determined_by(fit: CalibrationFit) -> tuple[DeterminedBy, ...]:
 
 
 def basis(data_share: float, sd: float, prior_sd: float) -> DeterminedBy:
-    """What determines a parameter.
+    """Source of the information on a parameter.
 
     `data`: the data alone. `prior`: its own prior, hardly narrowed. `joint`: the data together with the
     priors of other parameters.
@@ -95,20 +96,20 @@ def assess(
     fit: CalibrationFit,
     limits: Acceptance,
     max_relative_range_sd: float,
+    placements: Sequence[CrossValidatedPlacement],
     directions: Sequence[NullDirection] = (),
-    placements: Sequence[CrossValidatedPlacement] = (),
 ) -> Assessment:
-    """Compare a fit with the limits, and run all checks of it.
+    """Compare a fit with the limits, and run all its checks.
 
-    Where a fault refuses the fit, consequences of it (contradicted priors, alarms, missed limits) are not
+    Where a fault refuses the fit, its consequences (contradicted priors, alarms, missed limits) are not
     listed.
 
     Args:
         fit: the fit.
         limits: limits of the calibration.
         max_relative_range_sd: as in the calibration's `validity`.
-        directions: null directions, for the warnings.
         placements: cross-validation of the fit.
+        directions: null directions, for the warnings.
     """
     reasons = _too_few_standoffs(fit, limits)
     if not fit.converged:
@@ -229,7 +230,8 @@ def prior_doubts(fit: CalibrationFit) -> list[str]:
     values, vectors = np.linalg.eigh(narrowed)
     seen = values > LEAST_NARROWING
     chi2 = float(((vectors.T @ y)[seen] ** 2 / values[seen]).sum())
-    z = np.abs(y) / np.sqrt(np.maximum(np.diag(narrowed), LEAST_NARROWING))
+    decrease = np.diag(narrowed)
+    z = np.where(decrease > LEAST_NARROWING, np.abs(y) / np.sqrt(np.maximum(decrease, LEAST_NARROWING)), 0.0)
     p = np.minimum(1.0, len(free) * 2.0 * norm_cdf(-z))
     order = np.argsort(-z)
     doubted = [int(free[n]) for n in order if p[n] < DOUBT_P]
@@ -310,7 +312,8 @@ def _warnings(fit: CalibrationFit) -> list[str]:
     if np.any(fit.drift_px):
         warnings.append(
             f"the image drifted by {_drift_text(fit)} from the first capture to the last; the fit allows for"
-            " it, and the sd of the image centre includes half of it. Do: warm up longer, or fix the camera."
+            " it, and the sd of the image centre includes half the drift. Do: warm up longer, or fix the"
+            " camera."
         )
     if fit.noise_scale > 1:
         warnings.append(

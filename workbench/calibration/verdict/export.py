@@ -58,7 +58,7 @@ def calibrate(
         fit.covariance[sensor, sensor],
         ranges,
     )
-    assessment = assess(fit, limits, worst, directions, placements)
+    assessment = assess(fit, limits, worst, placements, directions)
     return _calibration(fit, values, provenance, assessment, worst), assessment
 
 

@@ -46,11 +46,11 @@ SHARED = {
     ),
     **dict(zip(DRIFT, ("the drift of the image along u", "the drift of the image along v"), strict=True)),
 }
-"""What all lasers share, in words; the other terms are the lens's."""
+"""Names of the parameters that all lasers share, except those of the lens."""
 LENGTHS = ("ruler_scale", *PRINT)
 """Scales of all lengths. Where one takes part, only a more accurate ruler separates the parameters."""
 APART = "place the target at standoffs farther apart"
-UNSEEN = "none: no spot depends on it"
+NO_EFFECT = "none: no spot depends on it"
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def describe(rig: Rig, groups: Sequence[ParameterGroup], each: Sequence[str] = (
 def remedy(groups: Sequence[ParameterGroup], each: Sequence[str] = ()) -> str:
     """Measurement that would separate the parameters."""
     if len(groups) == 1:
-        return UNSEEN
+        return NO_EFFECT
     if each:
         return APART
     kinds = {group.kind for group in groups}
@@ -160,7 +160,7 @@ def remedy(groups: Sequence[ParameterGroup], each: Sequence[str] = ()) -> str:
 
 def advice(remedy: str) -> str:
     """Sentence with a remedy; empty where none is needed."""
-    return "" if remedy == UNSEEN else f"To separate them, {remedy}."
+    return "" if remedy == NO_EFFECT else f"To separate them, {remedy}."
 
 
 def own_laser(rig: Rig, groups: Sequence[ParameterGroup]) -> str:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # imported for annotations alone: commands start faster
 
 
 def derived_table(derived: Sequence[Derived]) -> Table:
-    """Quantities of each laser that the data determine whatever the priors are."""
+    """Quantities of each laser that the data determine under any priors."""
     return Table(
         name="derived",
         title="Determined by the data (sd: 1 sigma)",

@@ -1,12 +1,12 @@
 """The YAML text of a calibration, in the subset that OpenCV, ROS, yaml-cpp and PyYAML read alike.
 
-General YAML writers produce more than this subset. OpenCV refuses a plain string that begins with a digit, a
-plain string over several lines, an empty value, and a list of mappings that is not indented under its key.
-PyYAML reads 1e-05 as a string. So strings are quoted, floats have a decimal point, None is written as `null`
-(OpenCV reads it as a node without a value), and a list of numbers or words is one line.
+General YAML writers produce more than this subset. OpenCV refuses plain strings that begin with a digit or
+span several lines, and empty values. A list of mappings must be indented under its key. PyYAML reads 1e-05
+as a string. Therefore strings are quoted, floats have a decimal point, and a list of numbers or words is
+one line. None is written as `null`, which OpenCV reads as a node without a value.
 
-Text that some reader cannot read in any form is changed: a control character becomes a space, and a string
-longer than OpenCV's limit, beyond which it reads nothing of the file, ends with an ellipsis.
+Text that some reader cannot read in any form is changed. A control character becomes a space. A string beyond
+OpenCV's limit, with which it could not read the file, ends with an ellipsis.
 """
 
 from __future__ import annotations

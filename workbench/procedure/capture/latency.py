@@ -49,7 +49,7 @@ def count_latency(lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_fra
             return max([frames, *(more for more in later if more is not None)])
     raise RigNotReadyError(
         f"camera: expected laser {first.id} within {most_frames} frames after switching it on, got no spot;"
-        " check that its beam hits the target and that the spot lies in the picture"
+        " check that its beam hits the target and that the spot lies in the image"
     )
 
 

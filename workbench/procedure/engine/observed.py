@@ -51,11 +51,11 @@ def expected_position_text(context: Context, laser_id: str, placement: Placement
 
 def expected_spot_text(rig: Rig, laser_id: str, where: ExpectedSpot) -> str:
     """Text of an expected position, with advice for the person at the bench."""
-    picture = f"the picture of {rig.camera.width_px} x {rig.camera.height_px} pixels"
+    image = f"the image of {rig.camera.width_px} x {rig.camera.height_px} pixels"
     advice = {
-        "outside": f"outside {picture}: {laser_id} cannot be seen at this standoff.",
-        "at the edge": f"at the edge of {picture}: {laser_id} may not be visible at this standoff.",
-        "inside": f"inside {picture}: check that {laser_id} is on and that its beam hits the target.",
+        "outside": f"outside {image}: {laser_id} cannot be seen at this standoff.",
+        "at the edge": f"at the edge of {image}: {laser_id} may not be visible at this standoff.",
+        "inside": f"inside {image}: check that {laser_id} is on and that its beam hits the target.",
     }
     return (
         f"Its spot is expected at u = {where.u_px:.0f} +- {where.u_sd_px:.0f},"

@@ -26,7 +26,7 @@ class Step(Protocol):
     """
 
     needs: ClassVar[str | None]
-    """What an earlier step must give: `target`, `captures`, `fit`, `calibration` or `readings`."""
+    """Result that an earlier step must give: `target`, `captures`, `fit`, `calibration` or `readings`."""
     gives: ClassVar[str | None]
     """Result for later steps."""
 

@@ -1,1 +1,1 @@
-"""Spots whose images overlap: which belong together, and their joint fit."""
+"""Deblending: clusters of spots whose images overlap, and their joint fit."""

@@ -1,4 +1,4 @@
-"""Several spots in one window, fitted together: overlapping neighbours, and a blob that is really two."""
+"""Joint maximum-likelihood fit of several spots in one window, with common background and widths."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ import numpy as np
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U, V
-from workbench.spots.kernels.joint import score_together
+from workbench.spots.kernels.joint import joint_fisher_scoring
 from workbench.spots.kernels.joint_sums import OWN, SHARED
 from workbench.spots.noise import PixelNoise, photon_transfer_slope
 from workbench.spots.psf import principal_axes
 
 _HIDDEN_SD = 5.0
-_AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
-# As in `judging`; less, for the widths are known from all spots together (docs/spots.md).
+_NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
+# As in `kernels.acceptance`; smaller, because all spots together determine the widths (docs/spots.md).
 _SECOND_ORDER = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class JointFit:
-    """Spots of one window that share their widths: lasers of one kind on one target."""
+    """Result of a joint fit: spots of one window with common widths (lasers of one kind on one target)."""
 
     params: FloatArray
-    """(k, 6) in the order of `gaussian`; background and widths are the same in all rows."""
+    """(k, 6) in the order of `kernels.columns`; background and widths are the same in all rows."""
     sd: FloatArray
     """(k, 3): of flux, u, v."""
     chi2: float
-    """Sum of squared residuals over the variance of the fit that the evidence is asked of."""
+    """Sum of squared residuals times their weights."""
     signal: FloatArray
     """(height, width) expected value above the background, DN."""
     residual: FloatArray
@@ -38,7 +38,7 @@ class JointFit:
     weight: FloatArray
     """(height, width) inverse variance, 0 where unused."""
     noise: PixelNoise
-    """With the photon-transfer slope that the residuals tell, unless the weights were fixed."""
+    """With the photon-transfer slope measured from the residuals, unless the weights were fixed."""
     converged: bool
 
 
@@ -57,7 +57,7 @@ def fit_joint(
     cov, used = np.empty((m, m)), np.empty(win.shape) if weight is None else weight
     signal, residual, leverage = np.empty(win.shape), np.empty(win.shape), np.empty(win.shape)
     floor, slope = float(noise.floor_dn2[0]), float(noise.slope_dn[0])
-    converged = score_together(
+    converged = joint_fisher_scoring(
         win.data[0],
         win.usable[0],
         floor,
@@ -79,44 +79,45 @@ def fit_joint(
 
 
 def _with_second_order(sd_px: FloatArray, width_px: FloatArray) -> FloatArray:
-    """(k, 2) deviations of u and v, with the next term of their series in 1 / A, as in `judging`.
+    """(k, 2) standard deviations of u and v with the second term of their series in 1 / A.
 
-    The variance of a spot alone in white noise is 2 width^2 / A; so A is taken from it, for a neighbour that
-    overlaps takes a part of what tells away.
+    A is the information on the amplitude as in `kernels.acceptance`. It is taken from the variance of each
+    coordinate, which is 2 width^2 / A for an isolated spot in white noise; an overlapping neighbour lowers
+    it.
     """
     widened: FloatArray = sd_px * np.sqrt(1.0 + 0.5 * _SECOND_ORDER * (sd_px / width_px) ** 2)
     return widened
 
 
-def halves(params: FloatArray) -> FloatArray:
-    """(2, 6) first guess for two spots from the fit (6,) or (7,) of their sum: apart along its long axis."""
+def pair_guess(params: FloatArray) -> FloatArray:
+    """(2, 6) first guess of two spots, separated along the long axis of the fit (6,) or (7,) of their sum."""
     widths, axes = principal_axes(params)
-    apart = max(np.sqrt(widths[1] ** 2 - widths[0] ** 2), 0.4 * widths[1])
+    offset = max(np.sqrt(widths[1] ** 2 - widths[0] ** 2), 0.4 * widths[1])
     start = np.stack([params[:SHEAR], params[:SHEAR]])
     start[:, FLUX] *= 0.5
     start[:, LN_SU:] = np.log(widths[0])
-    start[0, U:LN_SU] -= apart * axes[:, 1]
-    start[1, U:LN_SU] += apart * axes[:, 1]
+    start[0, U:LN_SU] -= offset * axes[:, 1]
+    start[1, U:LN_SU] += offset * axes[:, 1]
     return start
 
 
-def evidence(one: float, two: float, pixels: int, parameters: int) -> float:
+def f_statistic(one: float, two: float, pixels: int, parameters: int) -> float:
     """F statistic for three more parameters (a second spot) that lower chi2 from `one` to `two`.
 
-    Dividing by what the larger model leaves unexplained keeps speckle from passing as a second spot.
+    The denominator is the misfit of the larger model, so that speckle does not count as a second spot.
     """
     left = two / max(pixels - parameters, 1)
     return (one - two) / 3.0 / max(left, 1e-12)
 
 
 def hidden_spot(joint: JointFit, win: Windows, allowed: BoolArray) -> FloatArray | None:
-    """(6,) first guess of a spot of the same widths that stands out of the residuals; None without one."""
+    """(6,) first guess of a further spot by a matched filter of the residuals; None below 5 sd."""
     su, sv = np.exp(joint.params[0, LN_SU:SHEAR])
     weight, residual = joint.weight, joint.residual
-    # A pixel that towers over all its neighbours is hot: it counts no more than the highest of them.
-    excess = weight * np.minimum(residual, cv2.dilate(residual, _AROUND))
+    # A pixel far above all its neighbours is hot: it is limited to the highest of them.
+    excess = weight * np.minimum(residual, cv2.dilate(residual, _NEIGHBOURS))
     matched = cv2.GaussianBlur(excess, (0, 0), sigmaX=su, sigmaY=sv, borderType=cv2.BORDER_CONSTANT)
-    # The square of a Gaussian is a Gaussian narrower by sqrt(2), of the sum 1 / (4 pi su sv).
+    # The square of a Gaussian is a Gaussian narrower by sqrt(2), with the sum 1 / (4 pi su sv).
     information = cv2.GaussianBlur(
         weight, (0, 0), sigmaX=su / 2**0.5, sigmaY=sv / 2**0.5, borderType=cv2.BORDER_CONSTANT
     )

@@ -1,4 +1,13 @@
-"""From windows to measured spots in one compiled call: fit, fit again where residuals ask for it, judge."""
+"""Fit windows, refit without outliers and with the rim's noise, and accept those that hold a spot (compiled).
+
+A fit is a spot if `A = sum w m^2 > 36 max(q, 1)` and `F > 3 sd(F)`. Here w are the weights, m is the fitted
+signal, F its flux, q the noise of the rim over the predicted noise. The signal-to-noise ratio of a matched
+filter (position, widths and background known) is sqrt(A). White noise exceeds 6 at one position in 1e9, and
+a frame has some 1e6 independent ones. The second condition, with sd(F) from the full covariance, excludes a
+swelling of the background: its A is large, but its flux and background are not determined separately.
+Squared residuals, and the squared score of a shear, are chi-squared over their variances, with one degree of
+freedom. Above 36 (2e-9) a pixel is an outlier; above 25 (6e-7) a tilted ellipse is fitted.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +18,6 @@ import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.spots.kernels.columns import (
-    ACCEPTANCE_COLUMNS,
     FLUX,
     FLUX_DEVIATION,
     INFORMATION,
@@ -20,6 +28,7 @@ from workbench.spots.kernels.columns import (
     RIM_PIXELS,
     SHEAR,
     SHEAR_SCORE,
+    STATISTIC_COLUMNS,
     U_DEVIATION,
     V_DEVIATION,
     WORST_EXCESS,
@@ -27,27 +36,27 @@ from workbench.spots.kernels.columns import (
     V,
 )
 from workbench.spots.kernels.compiled import compiled
-from workbench.spots.kernels.single import score
+from workbench.spots.kernels.single import fisher_scoring
 from workbench.spots.kernels.windows import half_for
 from workbench.spots.noise import ROUNDING_DN2
 
-# Columns of a table of spots, one row each. The first seven are the parameters as in `gaussian`, in pixels of
-# the image; the next half-width is 0 for a spot whose window fits.
+# Columns of a table of spots, one row each. The first seven are the parameters as in `columns`, in pixels of
+# the image; the next half-width is 0 where the window suits the spot.
 U_SD, V_SD, FLUX_SD, PEAK, SLOPE, IS_SPOT, NEXT_HALF = range(7, 14)
 COLUMNS: Final = 14
-# Narrower than any lens makes a spot: a hot pixel. (A pixel integrates; 0 is possible, 0.6 the least
-# specified.)
+# Below the narrowest spot of a lens (0.6 px is the least specified): a hot pixel.
 _MIN_WIDTH_PX: Final = 0.5
 _MAX_WIDTH_PX: Final = 7.0
-_MIN_FLUX_SD: Final = 6.0
-_MIN_TOLD_SD: Final = 3.0
-# A window is cut anew only for a spot that outgrows it by this factor: the loss up to there is below 1 %.
+# Flux over its standard deviation: other parameters known, and all parameters free. Derivation above.
+_MIN_MATCHED_SNR: Final = 6.0
+_MIN_FLUX_SNR: Final = 3.0
+# A larger window is cut where the width times this factor needs one; the loss up to there is below 1 %.
 _OUTGROWN: Final = 0.9
-# Its width counts with 2 sd on top: where noise made a faint spot look narrow, the window must not follow.
-# (The logarithm of a width is as uncertain as the flux relative to itself.)
+# Standard deviations added to the width for this test, so that noise that makes a faint spot look narrow
+# does not keep its window small. (sd of ln width = relative sd of the flux.)
 _WIDTH_SD: Final = 2.0
-# The inverse Fisher matrix is the first term of a series in 1 / told: this is the next one's factor for a
-# position, and for the scatter of its stated variance (docs/spots.md).
+# The inverse Fisher matrix is the first term of a series in 1 / A: factor of the next term for a position,
+# with the scatter of its stated variance (docs/spots.md).
 _SECOND_ORDER: Final = 13.0
 _OFF_CENTRE_PX: Final = 1.5
 _OUTLIER_SD: Final = 6.0
@@ -58,15 +67,16 @@ _RIM_SD: Final = 5.0
 
 @compiled
 def without_outliers(
-    usable: BoolArray, signal: FloatArray, residual: FloatArray, weight: FloatArray, judged: FloatArray
+    usable: BoolArray, signal: FloatArray, residual: FloatArray, weight: FloatArray, statistics: FloatArray
 ) -> tuple[BoolArray, bool]:
-    """Usable pixels of n windows without the few that no spot explains, and whether there are any.
+    """Usable pixels of n windows without outliers (hot pixels), and whether there are any.
 
-    These are hot pixels. The arguments are as in `Windows` and `Fit`.
+    A window with more than three outliers keeps them: they are no hot pixels, but a misfit. The arguments
+    are as in `Windows` and `SpotFit`.
     """
     kept, changed = usable, False
     for i in range(len(usable)):
-        if judged[i, WORST_EXCESS] <= _OUTLIER_SD**2:
+        if statistics[i, WORST_EXCESS] <= _OUTLIER_SD**2:
             continue
         far = residual[i] * residual[i] * weight[i] > _OUTLIER_SD**2
         if far.sum() <= _MAX_OUTLIERS:
@@ -79,34 +89,40 @@ def without_outliers(
 
 
 @compiled
-def _follow_rim(floor: FloatArray, judged: FloatArray) -> bool:
-    """Take the floor (n,) of windows from their rim where it is not as noisy as predicted; whether any is.
+def _take_floor_from_rim(floor: FloatArray, statistics: FloatArray) -> bool:
+    """Scale the floor (n,) of windows whose rim is significantly more or less noisy than predicted.
 
-    Clutter and bright surroundings make it noisier, a dark patch of a bright scene quieter. The threshold is
-    5 sd of the estimate from those of the rim's pixels that are used, so that an even scene keeps the strip's
-    floor, which is known better.
+    Clutter and bright surroundings raise the noise, a dark patch of a bright scene lowers it. The threshold
+    is 5 sd of the mean squared residual, sqrt(2 / n) for n used pixels. An even scene therefore keeps the
+    floor of the strip, which is more certain.
+
+    Returns:
+        Whether any floor changed.
     """
     changed = False
     for i in range(len(floor)):
-        n = max(judged[i, RIM_PIXELS], 1.0)
-        # The mean of n squares is far from Gaussian below 1: its cube root is not (Wilson and Hilferty).
+        n = max(statistics[i, RIM_PIXELS], 1.0)
+        # The lower tail of chi-squared is far from Gaussian; that of its cube root is not (Wilson, Hilferty).
         least = max(1.0 - 2.0 / (9.0 * n) - _RIM_SD * math.sqrt(2.0 / (9.0 * n)), 0.0) ** 3
-        if judged[i, RIM_NOISE] > 1.0 + _RIM_SD * math.sqrt(2.0 / n) or 0.0 < judged[i, RIM_NOISE] < least:
-            floor[i] = max(floor[i] * judged[i, RIM_NOISE], ROUNDING_DN2)
+        if (
+            statistics[i, RIM_NOISE] > 1.0 + _RIM_SD * math.sqrt(2.0 / n)
+            or 0.0 < statistics[i, RIM_NOISE] < least
+        ):
+            floor[i] = max(floor[i] * statistics[i, RIM_NOISE], ROUNDING_DN2)
             changed = True
     return changed
 
 
 @compiled
-def _is_spot(params: FloatArray, judged: FloatArray, shape: tuple[int, int]) -> bool:
-    """Whether a fit that converged is a spot in the image; see `Fit` for `judged`."""
+def _is_spot(params: FloatArray, statistics: FloatArray, shape: tuple[int, int]) -> bool:
+    """Whether a converged fit is a spot inside the image; `statistics` as in `columns`."""
     mean_width = math.exp(0.5 * (params[LN_SU] + params[LN_SV]))
     return (
         params[FLUX] > 0.0
-        # Were place and shape known: whether anything is there is not a question of its width.
-        and judged[INFORMATION] > _MIN_FLUX_SD**2 * max(judged[RIM_NOISE], 1.0)
-        # ... but a swelling of the background is not one: there flux and background cannot be told apart.
-        and params[FLUX] > _MIN_TOLD_SD * judged[FLUX_DEVIATION]
+        # Detection does not depend on how well the width is determined.
+        and statistics[INFORMATION] > _MIN_MATCHED_SNR**2 * max(statistics[RIM_NOISE], 1.0)
+        # Excludes a swelling of the background, whose flux and background are correlated.
+        and params[FLUX] > _MIN_FLUX_SNR * statistics[FLUX_DEVIATION]
         and _MIN_WIDTH_PX <= mean_width <= _MAX_WIDTH_PX
         and -0.5 <= params[U] <= shape[1] - 0.5
         and -0.5 <= params[V] <= shape[0] - 0.5
@@ -123,37 +139,40 @@ def _fit_tilted(
     start: FloatArray,
     tilted: FloatArray,
 ) -> tuple[bool, FloatArray, float]:
-    """Fit one window by an ellipse at any angle: whether that converged, `Fit.judged`, slope.
+    """Fit an ellipse at any angle to one window, from the upright fit `start` (6,); fill `tilted` (1, 7).
 
-    `start` (6,) is that of an upright one, `tilted` (1, 7) is filled.
+    Returns:
+        Whether it converged, the statistics (STATISTIC_COLUMNS,), the photon-transfer slope.
     """
     tilted[0, :6], tilted[0, SHEAR] = start, 0.0
-    cov, judged, slope = np.empty((1, 7, 7)), np.empty((1, ACCEPTANCE_COLUMNS)), np.empty(1)
+    cov, statistics, slope = np.empty((1, 7, 7)), np.empty((1, STATISTIC_COLUMNS)), np.empty(1)
     signal, residual, weight = np.empty_like(data), np.empty_like(data), np.empty_like(data)
     converged = np.empty(1, np.bool_)
-    score(data, usable, clip, floor, guess, tilted, cov, signal, residual, weight, converged, slope, judged)
-    return converged[0], judged[0], slope[0]
+    fisher_scoring(
+        data, usable, clip, floor, guess, tilted, cov, signal, residual, weight, converged, slope, statistics
+    )
+    return converged[0], statistics[0], slope[0]
 
 
 @compiled
-def _note(params: FloatArray, judged: FloatArray, slope: float, row: FloatArray) -> None:
-    """Fill a spot's row of the table, all but the next window."""
+def _fill_row(params: FloatArray, statistics: FloatArray, slope: float, row: FloatArray) -> None:
+    """Fill a spot's row of the table, except `NEXT_HALF`."""
     row[SHEAR] = 0.0
     row[: params.size] = params
-    curved = math.sqrt(1.0 + _SECOND_ORDER / judged[INFORMATION])
+    inflation = math.sqrt(1.0 + _SECOND_ORDER / statistics[INFORMATION])
     row[U_SD], row[V_SD], row[FLUX_SD] = (
-        judged[U_DEVIATION] * curved,
-        judged[V_DEVIATION] * curved,
-        judged[FLUX_DEVIATION],
+        statistics[U_DEVIATION] * inflation,
+        statistics[V_DEVIATION] * inflation,
+        statistics[FLUX_DEVIATION],
     )
-    row[PEAK], row[SLOPE], row[IS_SPOT] = judged[PEAK_DN], slope, 1.0
+    row[PEAK], row[SLOPE], row[IS_SPOT] = statistics[PEAK_DN], slope, 1.0
 
 
 @compiled
-def _ask_for_another_window(
+def _request_window(
     params: FloatArray, half: int, rows: FloatArray, cols: FloatArray, k: int, found: FloatArray
 ) -> None:
-    """Note that spot k needs another window, and where, if it outgrows its own or lies off its middle."""
+    """Fill size and centre of the next window of spot k, if it outgrows its own or is off its centre."""
     margin = _WIDTH_SD * found[k, FLUX_SD] / params[FLUX]
     wanted = half_for(_OUTGROWN * math.exp(max(params[LN_SU], params[LN_SV]) + margin))
     if wanted > half or max(abs(params[U] - cols[k]), abs(params[V] - rows[k])) > _OFF_CENTRE_PX:
@@ -175,16 +194,16 @@ def fit_group(
     shape: tuple[int, int],
     found: FloatArray,
 ) -> None:
-    """Fit windows of one size that belong to the peaks `group` of all; fill the rows of those that are spots.
+    """Fit windows of one size around the peaks `group`; fill the rows of those that are spots.
 
     Args:
         data: (n, side, side) DN, one window each.
         usable: (n, side, side).
         clip: (n, side, side) as in `Windows`.
-        group: (n,) numbers of the peaks.
-        rows: (peaks,) middles of the windows; where a window should be cut anew, moved to the spot.
-        cols: (peaks,).
-        start: (peaks, 6) first guesses in pixels of the image; the fits of upright ellipses afterwards.
+        group: (n,) indices of the peaks.
+        rows: (peaks,) rows of the window centres; moved to the spot where another window is needed.
+        cols: (peaks,) columns, likewise.
+        start: (peaks, 6) first guesses in pixels of the image; replaced by the fits of upright ellipses.
         variance: Of a pixel without signal, DN^2.
         slope_dn: First guess of the photon-transfer slope.
         shape: Height and width of the image.
@@ -195,13 +214,13 @@ def fit_group(
     for i in range(n):
         origin[i, U], origin[i, V] = cols[group[i]] - half, rows[group[i]] - half
         params[i] = start[group[i]] - origin[i, :6]
-    cov, judged, slope = np.empty((n, 6, 6)), np.empty((n, ACCEPTANCE_COLUMNS)), np.empty(n)
+    cov, statistics, slope = np.empty((n, 6, 6)), np.empty((n, STATISTIC_COLUMNS)), np.empty(n)
     signal, residual, weight = np.empty_like(data), np.empty_like(data), np.empty_like(data)
     floor, guess, converged = np.full(n, variance), np.full(n, slope_dn), np.empty(n, np.bool_)
-    asked = True
+    refit = True
     for turn in range(3):
-        if asked:
-            score(
+        if refit:
+            fisher_scoring(
                 data,
                 usable,
                 clip,
@@ -214,19 +233,19 @@ def fit_group(
                 weight,
                 converged,
                 slope,
-                judged,
+                statistics,
             )
         if turn == 0:
-            usable, asked = without_outliers(usable, signal, residual, weight, judged)
+            usable, refit = without_outliers(usable, signal, residual, weight, statistics)
         elif turn == 1:
-            asked = _follow_rim(floor, judged)
+            refit = _take_floor_from_rim(floor, statistics)
     for i in range(n):
         k = group[i]
         start[k] = params[i] + origin[i, :6]
         found[k, NEXT_HALF] = 0.0
-        final, its_judged, its_slope, is_there = start[k], judged[i], slope[i], converged[i]
-        if judged[i, SHEAR_SCORE] > _SHEAR_SD**2:
-            fitted, tilted_judged, tilted_slope = _fit_tilted(
+        final, final_statistics, final_slope, is_fitted = start[k], statistics[i], slope[i], converged[i]
+        if statistics[i, SHEAR_SCORE] > _SHEAR_SD**2:
+            fitted, tilted_statistics, tilted_slope = _fit_tilted(
                 data[i : i + 1],
                 usable[i : i + 1],
                 clip[i : i + 1],
@@ -236,12 +255,12 @@ def fit_group(
                 tilted,
             )
             if fitted:
-                final, its_judged, its_slope, is_there = (
+                final, final_statistics, final_slope, is_fitted = (
                     tilted[0] + origin[i],
-                    tilted_judged,
+                    tilted_statistics,
                     tilted_slope,
                     True,
                 )
-        if is_there and _is_spot(final, its_judged, shape):
-            _note(final, its_judged, its_slope, found[k])
-            _ask_for_another_window(start[k], half, rows, cols, k, found)
+        if is_fitted and _is_spot(final, final_statistics, shape):
+            _fill_row(final, final_statistics, final_slope, found[k])
+            _request_window(start[k], half, rows, cols, k, found)

@@ -1,11 +1,11 @@
-"""Names of the columns of the tables that the compiled loops share. Numba takes them for constants."""
+"""Columns of the tables that the compiled loops share. Numba compiles them as constants."""
 
 from __future__ import annotations
 
 from typing import Final
 
 BACKGROUND, FLUX, U, V, LN_SU, LN_SV, SHEAR = range(7)
-"""Parameters of a spot: DN, DN, px, px, logarithms of the widths in px, px a row."""
+"""Parameters of a spot: DN per pixel, DN, px, px, ln of the widths in px, px per row."""
 
 (
     WORST_EXCESS,
@@ -18,7 +18,9 @@ BACKGROUND, FLUX, U, V, LN_SU, LN_SV, SHEAR = range(7)
     SHEAR_SCORE,
     RIM_PIXELS,
 ) = range(9)
-"""What a fitted window is accepted by: largest squared residual over its variance; mean of that at the rim;
-highest pixel of the model; Fisher information of the flux, times the flux squared; standard deviations of
-flux (DN), u and v (px); squared score of a shear over its variance; pixels used at the rim."""
-ACCEPTANCE_COLUMNS: Final = 9
+"""Statistics that a fitted window is accepted by. WORST_EXCESS: largest squared residual over its variance.
+RIM_NOISE: mean squared residual over its variance at the rim. PEAK_DN: highest pixel of the model.
+INFORMATION: Fisher information of the flux times the flux squared. Deviations: standard deviations of flux
+(DN), u, v (px). SHEAR_SCORE: squared score of a shear over its variance. RIM_PIXELS: number of pixels used
+at the rim."""
+STATISTIC_COLUMNS: Final = 9

@@ -1,4 +1,4 @@
-"""How loops over pixels are compiled. Import it only where a fit runs: numba takes half a second to load."""
+"""Compilation of loops over pixels. Import it only where a fit runs: numba takes half a second to load."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numba
 
 F = TypeVar("F", bound=Callable[..., object])
 
-# Sums may be taken in any order, which is what lets them use the whole width of a register; nan and infinity
-# keep their meaning, for they tell a fit that has failed.
+# Sums may be reordered, which allows vector instructions. NaN and infinity keep their meaning, because they
+# reveal a failed fit.
 _FAST: Final = {"reassoc", "contract", "arcp", "nsz"}
 
 
 def compiled(function: F) -> F:
     """`function` as machine code, kept beside its source between runs.
 
-    It is renewed when that source changes, but not when another file does that it calls: whoever changes one
-    of these files removes `__pycache__`.
+    Numba compiles it again when that source changes, but not when the source of a function that it calls
+    changes. After such a change remove `__pycache__` of this folder.
     """
     return cast(F, numba.njit(function, cache=True, fastmath=_FAST, error_model="numpy"))

@@ -1,6 +1,6 @@
-"""Fisher scoring of several spots in one window that share their widths, compiled. Derivation: docs/spots.md.
+"""Fisher scoring of several spots in one window with common widths, compiled. Derivation: docs/spots.md.
 
-Order of the parameters as in `shared_sums`.
+Order of the parameters of a fit as in `joint_sums`.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ def _signal(
 
 
 @compiled
-def _weigh(usable: BoolArray, signal: FloatArray, floor: float, slope: float, out: FloatArray) -> None:
-    """Inverse of the variance that the model predicts, 0 where a pixel is not to be used."""
+def _fill_weights(usable: BoolArray, signal: FloatArray, floor: float, slope: float, out: FloatArray) -> None:
+    """Fill the inverse of the variance that the model predicts; 0 for a pixel that is not used."""
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
             out[y, x] = usable[y, x] / (floor + slope * max(signal[y, x], 0.0))
 
 
 @compiled
-def _moved(params: FloatArray, delta: FloatArray) -> None:
-    """A step, kept from jumping; after it all spots have one background and shape. `params` is changed."""
+def _apply_step(params: FloatArray, delta: FloatArray) -> None:
+    """Apply a limited step to `params` (k, 6); afterwards all spots have the same background and widths."""
     params[:, BACKGROUND] = params[0, BACKGROUND] + delta[0]
     for j in range(2):
         stretched = params[0, LN_SU + j] + min(max(delta[1 + j], -_MAX_STRETCH), _MAX_STRETCH)
@@ -59,7 +59,7 @@ def _moved(params: FloatArray, delta: FloatArray) -> None:
 
 
 @compiled
-def score_together(
+def joint_fisher_scoring(
     data: FloatArray,
     usable: BoolArray,
     floor: float,
@@ -72,7 +72,7 @@ def score_together(
     weight: FloatArray,
     leverage: FloatArray,
 ) -> bool:
-    """Fit k spots to a window (height, width), starting at `params`; whether that converged.
+    """Fit k spots to a window (height, width), starting at `params`; return whether the fit converged.
 
     Args:
         data: (height, width), DN.
@@ -80,15 +80,15 @@ def score_together(
         floor: Variance without signal, DN^2.
         slope: Photon-transfer slope, DN.
         fixed: Whether `weight` is given; it is filled otherwise.
-        params: (k, 6) in the order of `gaussian`, changed; background and widths are in the end those of
-            all spots, and are counted on from the first one's.
+        params: (k, 6) in the order of `columns`, changed. Background and widths start from the first spot's,
+            and are the same for all spots in the end.
         cov: (m, m) filled: covariance of the m = 3 + 3 k parameters of the fit.
-        signal: (height, width) filled: expected value above the background, DN; this and what follows where
-            the last step began.
+        signal: (height, width) filled: expected value above the background, DN; like the arrays below, before
+            the last step.
         residual: (height, width) filled, DN.
         weight: (height, width) inverse variance, 0 where unused.
-        leverage: (height, width) filled: variance of the fitted pixel values, DN^2; left alone where
-            the weights are fixed.
+        leverage: (height, width) filled: variance of the fitted pixel values, DN^2; unchanged where the
+            weights are fixed.
     """
     k, m = len(params), len(cov)
     along_u, along_v = np.empty((k, 4, data.shape[1])), np.empty((k, 4, data.shape[0]))
@@ -101,7 +101,7 @@ def score_together(
         _signal(params, along_u, along_v, box, signal)
         residual[:] = data - signal - params[0, BACKGROUND]
         if not fixed:
-            _weigh(usable, signal, floor, slope, weight)
+            _fill_weights(usable, signal, floor, slope, weight)
         sums_alone(params, along_u, along_v, box, weight, residual, information, gradient)
         add_pairs(params, along_u, along_v, box, weight, information)
         invert(information, cov)
@@ -112,7 +112,7 @@ def score_together(
                 delta[a] += cov[a, b] * gradient[b]
             if not abs(delta[a]) <= _TOLERANCE_SD * math.sqrt(max(cov[a, a], 0.0)):
                 converged = False
-        _moved(params, delta)
+        _apply_step(params, delta)
         if converged:
             break
     if not fixed:

@@ -1,4 +1,4 @@
-"""Sums over a window's pixels that a step of a joint fit needs, compiled.
+"""Sums over a window's pixels for a step of a joint fit, compiled.
 
 The parameters of such a fit, in order: background, ln of both widths, then flux, u and v of each spot.
 """
@@ -19,15 +19,15 @@ SHARED: Final = 3
 """Parameters before those of the single spots: background and both widths."""
 OWN: Final = 3
 """Parameters of each spot: flux, u, v."""
-# Beyond so many widths along an axis a spot has a millionth of its light.
+# Reach along an axis, in widths; a millionth of a spot's light lies beyond.
 _REACH_WIDTHS: Final = 5.0
 
 
 @compiled
 def profiles(params: FloatArray, along_u: FloatArray, along_v: FloatArray, box: IndexArray) -> None:
-    """Fill (k, 4, width) and (k, 4, height), see `shapes.profile`, and the boxes (k, 4) of the spots' light.
+    """Fill the profiles (k, 4, width) and (k, 4, height), and the boxes (k, 4) of the spots' light.
 
-    A box has the first column, the one after the last, the first row and the one after the last.
+    A box holds the first column, the end of the columns, the first row, the end of the rows.
     """
     for i in range(len(params)):
         profile(params[i, U], params[i, LN_SU], along_u[i])
@@ -39,14 +39,14 @@ def profiles(params: FloatArray, along_u: FloatArray, along_v: FloatArray, box: 
 
 
 @compiled
-def _place(i: int, p: int) -> int:
-    """Where parameter p of spot i, FLUX to LN_SV in the order of `gaussian`, is among those of the fit."""
+def _fit_index(i: int, p: int) -> int:
+    """Index among the parameters of the fit of parameter p (FLUX to LN_SV in `columns`) of spot i."""
     return SHARED + OWN * i + p - 1 if p <= OWN else p - OWN
 
 
 @compiled
 def _overlap(box: IndexArray, i: int, j: int) -> tuple[int, int, int, int]:
-    """Columns and rows where light of both spots comes, as in `profiles`."""
+    """Intersection of the boxes of two spots: first column, end, first row, end."""
     return (
         max(box[i, 0], box[j, 0]),
         min(box[i, 1], box[j, 1]),
@@ -70,24 +70,24 @@ def sums_alone(
     weighted = weight * residual
     information[:], gradient[:] = 0.0, 0.0
     information[0, 0], gradient[0] = weight.sum(), weighted.sum()
-    told, pulled = np.empty((3, weight.shape[1])), np.empty((3, weight.shape[1]))
+    weight_sums, residual_sums = np.empty((3, weight.shape[1])), np.empty((3, weight.shape[1]))
     for i in range(len(params)):
         first, end = box[i, 0], box[i, 1]
-        told[:], pulled[:] = 0.0, 0.0
+        weight_sums[:], residual_sums[:] = 0.0, 0.0
         for y in range(box[i, 2], box[i, 3]):
             for a in range(3):
                 factor = along_v[i, a, y]
                 for x in range(first, end):
-                    told[a, x] += factor * weight[y, x]
-                    pulled[a, x] += factor * weighted[y, x]
+                    weight_sums[a, x] += factor * weight[y, x]
+                    residual_sums[a, x] += factor * weighted[y, x]
         for p in range(1, 6):
             of_u, scale = along_u[i, ALONG_U[p]], 1.0 if p == 1 else params[i, FLUX]
-            one = other = 0.0
+            information_sum = gradient_sum = 0.0
             for x in range(first, end):
-                one += of_u[x] * told[ALONG_V[p], x]
-                other += of_u[x] * pulled[ALONG_V[p], x]
-            information[0, _place(i, p)] += scale * one
-            gradient[_place(i, p)] += scale * other
+                information_sum += of_u[x] * weight_sums[ALONG_V[p], x]
+                gradient_sum += of_u[x] * residual_sums[ALONG_V[p], x]
+            information[0, _fit_index(i, p)] += scale * information_sum
+            gradient[_fit_index(i, p)] += scale * gradient_sum
     information[1:, 0] = information[0, 1:]
 
 
@@ -100,34 +100,34 @@ def add_pairs(
     weight: FloatArray,
     information: FloatArray,
 ) -> None:
-    """Add what every spot and every two that overlap tell to the information (m, m).
+    """Add the terms of every spot and of every two overlapping spots to the information (m, m).
 
-    Sums are taken along v first, as in `sums.separable_sums`.
+    Sums are taken along v first, as in `single_sums.separable_sums`.
     """
-    both = np.empty((3, 3, weight.shape[1]))
+    products = np.empty((3, 3, weight.shape[1]))
     for i in range(len(params)):
         for j in range(i + 1):
             first, end, top, bottom = _overlap(box, i, j)
             if first >= end or top >= bottom:
                 continue
-            both[:] = 0.0
+            products[:] = 0.0
             for y in range(top, bottom):
                 for a in range(3):
                     for b in range(3):
-                        factor, sums = along_v[i, a, y] * along_v[j, b, y], both[a, b]
+                        factor, sums = along_v[i, a, y] * along_v[j, b, y], products[a, b]
                         for x in range(first, end):
                             sums[x] += factor * weight[y, x]
             for p in range(1, 6):
                 for q in range(1, 6):
                     of_i, of_j = along_u[i, ALONG_U[p]], along_u[j, ALONG_U[q]]
-                    sums = both[ALONG_V[p], ALONG_V[q]]
-                    told = 0.0
+                    sums = products[ALONG_V[p], ALONG_V[q]]
+                    total = 0.0
                     for x in range(first, end):
-                        told += of_i[x] * of_j[x] * sums[x]
-                    told *= (1.0 if p == 1 else params[i, FLUX]) * (1.0 if q == 1 else params[j, 1])
-                    information[_place(i, p), _place(j, q)] += told
+                        total += of_i[x] * of_j[x] * sums[x]
+                    total *= (1.0 if p == 1 else params[i, FLUX]) * (1.0 if q == 1 else params[j, 1])
+                    information[_fit_index(i, p), _fit_index(j, q)] += total
                     if i != j:
-                        information[_place(j, q), _place(i, p)] += told
+                        information[_fit_index(j, q), _fit_index(i, p)] += total
 
 
 @compiled
@@ -145,7 +145,7 @@ def leverages(
     for i in range(len(params)):
         for y in range(box[i, 2], box[i, 3]):
             for p in range(1, 6):
-                factor = 2.0 * cov[0, _place(i, p)] * (1.0 if p == 1 else params[i, FLUX])
+                factor = 2.0 * cov[0, _fit_index(i, p)] * (1.0 if p == 1 else params[i, FLUX])
                 factor *= along_v[i, ALONG_V[p], y]
                 for x in range(box[i, 0], box[i, 1]):
                     out[y, x] += factor * along_u[i, ALONG_U[p], x]
@@ -157,7 +157,7 @@ def leverages(
                     for q in range(1, 6):
                         factor = (1.0 if p == 1 else params[i, FLUX]) * (1.0 if q == 1 else params[j, 1])
                         factor *= along_v[i, ALONG_V[p], y] * along_v[j, ALONG_V[q], y]
-                        mixed[ALONG_U[p], ALONG_U[q]] += factor * cov[_place(i, p), _place(j, q)]
+                        mixed[ALONG_U[p], ALONG_U[q]] += factor * cov[_fit_index(i, p), _fit_index(j, q)]
                 if i != j:
                     mixed *= 2.0
                 for a in range(3):

@@ -1,6 +1,6 @@
-"""Model of a spot as compiled loops: profiles along an axis, derivatives of an ellipse's pixels.
+"""PSF as compiled loops: profiles along an axis, derivatives of an ellipse's pixels.
 
-Order of the parameters as in `gaussian`. Derivation: docs/spots.md.
+Order of the parameters as in `columns`. Derivation: docs/spots.md.
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ from workbench.spots.kernels.compiled import compiled
 
 _INV_SQRT_2: Final = 1.0 / math.sqrt(2.0)
 _INV_SQRT_2PI: Final = 1.0 / math.sqrt(2.0 * math.pi)
-# Three nodes of Gauss and Legendre integrate a pixel of the narrowest spot to 1e-4 of its peak.
+# Three Gauss-Legendre nodes integrate a pixel of the narrowest spot to 1e-4 of its peak.
 _NODES: Final = 0.5 * np.polynomial.legendre.leggauss(3)[0]
 _NODE_WEIGHTS: Final = 0.5 * np.polynomial.legendre.leggauss(3)[1]
 
-# Which factor each parameter's derivative has along v and along u: 0 share, 1 by centre, 2 by width, 3
-# constant.
+# Factor of each parameter's derivative along v and along u: 0 share, 1 by centre, 2 by ln width, 3 constant.
 ALONG_V: Final = np.array([3, 0, 0, 1, 0, 2])
 ALONG_U: Final = np.array([3, 0, 1, 0, 2, 0])
 

@@ -1,4 +1,4 @@
-"""Fisher scoring over all windows as one compiled program. Derivation: docs/spots.md."""
+"""Fisher scoring of one spot per window, all windows in one compiled call. Derivation: docs/spots.md."""
 
 from __future__ import annotations
 
@@ -32,24 +32,25 @@ from workbench.spots.kernels.single_sums import dense_sums, fill_leverage, inver
 
 _MAX_STEPS: Final = 20
 _MAX_STEP: Final = np.array([math.inf, math.inf, 1.0, 1.0, 0.4, 0.4, 0.4])
-# Of both logarithms of the width, and of the shear.
+# Limits of ln width along u and v, and of the shear.
 _LOWEST: Final = np.array([math.log(0.15), math.log(0.15), -3.0])
 _HIGHEST: Final = np.array([math.log(12.0), math.log(12.0), 3.0])
-# Where the steps stop. Near the end a step squares the error: one of 1 sd that is small against the spot too,
-# or of 0.1 sd, leaves some hundredths of an sd once it is taken.
+# Convergence: a last step of 0.1 sd, or of 1 sd if it is below 5 % of the spot, too. Convergence is
+# quadratic: after that step the error is some hundredths of an sd.
 _TOLERANCE_SD: Final = 0.1
-_SMALL: Final = 0.05
-# One window that never converges must not keep the noise of the others from being measured.
+_SMALL_STEP: Final = 0.05
+# Step after which the noise is measured even if a window has not converged.
 _STEPS_TO_MEASURE: Final = 8
-# After so many steps it is settled which pixels clip: a set that changes with every step never converges.
+# Step after which the set of clipped pixels is fixed: a set that changes with every step prevents
+# convergence.
 _STEPS_TO_SETTLE: Final = 6
-# A pixel whose expected value is this near to clipping is left out whatever it reads, else noise would
-# choose.
+# Margin between a pixel's expected value and clipping. Closer pixels are excluded, clipped or not: a choice
+# by the data would be a choice by noise.
 _CLIP_MARGIN_SD: Final = 2.0
 
 
 @compiled
-def _weigh(
+def _fill_weights(
     usable: BoolArray,
     clip: FloatArray,
     signal: FloatArray,
@@ -58,20 +59,20 @@ def _weigh(
     slope: float,
     out: FloatArray,
 ) -> None:
-    """Inverse of the variance that the model predicts, 0 where a pixel is not to be used."""
+    """Fill the inverse of the variance that the model predicts; 0 for a pixel that is not used."""
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
             variance = floor + slope * max(signal[y, x], 0.0)
             out[y, x] = usable[y, x] / variance
             if clip[y, x] < math.inf:
-                room = clip[y, x] - signal[y, x] - background
-                if not room > _CLIP_MARGIN_SD * math.sqrt(variance):
+                margin = clip[y, x] - signal[y, x] - background
+                if not margin > _CLIP_MARGIN_SD * math.sqrt(variance):
                     out[y, x] = 0.0
 
 
 @compiled
-def _moved(params: FloatArray, delta: FloatArray) -> None:
-    """Step of one window, kept from jumping out of it; `params` is changed."""
+def _apply_step(params: FloatArray, delta: FloatArray) -> None:
+    """Apply a limited step to the parameters of one window."""
     flux = max(abs(params[FLUX]), 1e-9)
     for j in range(params.size):
         step = delta[j] / flux if j > 1 else delta[j]
@@ -82,7 +83,7 @@ def _moved(params: FloatArray, delta: FloatArray) -> None:
 
 @compiled
 def _within(delta: FloatArray, cov: FloatArray, small: float) -> bool:
-    """Whether a step is within 0.1 sd; or within 1 sd if that is small, too, DN."""
+    """Whether a step is within 0.1 sd, or within 1 sd and `small` (DN)."""
     for j in range(delta.size):
         variance = cov[j, j]
         limit = variance if small > 0.0 else 0.0
@@ -103,7 +104,7 @@ def _evaluate(
     signal: FloatArray,
     residual: FloatArray,
 ) -> None:
-    """Fill profiles or derivatives of one window, its signal and residual, at `params`."""
+    """Fill profiles (or derivatives of a tilted ellipse), signal and residual of one window at `params`."""
     if params.size == 7:
         sheared_rows(params, rows)
         signal[:] = params[FLUX] * rows[1]
@@ -156,19 +157,19 @@ def _leverages(params: FloatArray, cov: FloatArray, data: FloatArray) -> FloatAr
 
 
 @compiled
-def _tilt(along_u: FloatArray, along_v: FloatArray, weight: FloatArray, residual: FloatArray) -> float:
-    """Square of the score by the shear over its variance, of an upright window."""
-    score = told = 0.0
+def _shear_score(along_u: FloatArray, along_v: FloatArray, weight: FloatArray, residual: FloatArray) -> float:
+    """Squared score of the shear over its variance, for an upright fit."""
+    score = information = 0.0
     for y in range(weight.shape[0]):
         for x in range(weight.shape[1]):
             by_shear = along_v[1, y] * along_u[1, x]
             score += by_shear * weight[y, x] * residual[y, x]
-            told += by_shear * by_shear * weight[y, x]
-    return score * score / max(told, 1e-300)
+            information += by_shear * by_shear * weight[y, x]
+    return score * score / max(information, 1e-300)
 
 
 @compiled
-def _judge(
+def _fill_statistics(
     signal: FloatArray,
     residual: FloatArray,
     weight: FloatArray,
@@ -176,20 +177,20 @@ def _judge(
     flux: float,
     out: FloatArray,
 ) -> None:
-    """Fill a window's `Fit.judged`, all but the score by a shear."""
+    """Fill a window's statistics (STATISTIC_COLUMNS,), except SHEAR_SCORE."""
     height, width = signal.shape
-    worst = at_rim = told = 0.0
+    worst = at_rim = information = 0.0
     peak, in_rim = -math.inf, 0
     for y in range(height):
         for x in range(width):
             excess = residual[y, x] * residual[y, x] * weight[y, x]
             worst = max(worst, excess)
             peak = max(peak, signal[y, x])
-            told += weight[y, x] * signal[y, x] * signal[y, x]
+            information += weight[y, x] * signal[y, x] * signal[y, x]
             if y == 0 or y == height - 1 or x == 0 or x == width - 1:
                 at_rim += excess
                 in_rim += weight[y, x] > 0.0
-    out[WORST_EXCESS], out[PEAK_DN], out[INFORMATION] = worst, peak, told
+    out[WORST_EXCESS], out[PEAK_DN], out[INFORMATION] = worst, peak, information
     out[RIM_NOISE], out[RIM_PIXELS] = at_rim / max(in_rim, 1), in_rim
     out[FLUX_DEVIATION] = math.sqrt(max(cov[FLUX, FLUX], 0.0))
     out[U_DEVIATION] = math.sqrt(max(cov[U, U], 0.0)) / max(flux, 1e-12)
@@ -197,7 +198,7 @@ def _judge(
 
 
 @compiled
-def score(
+def fisher_scoring(
     data: FloatArray,
     usable: BoolArray,
     clip: FloatArray,
@@ -208,13 +209,13 @@ def score(
     signal: FloatArray,
     residual: FloatArray,
     weight: FloatArray,
-    last: BoolArray,
+    converged: BoolArray,
     slope: FloatArray,
-    judged: FloatArray,
+    statistics: FloatArray,
 ) -> None:
-    """Fit one spot per window, starting at `params`; from there on the arguments are filled: see `Fit`.
+    """Fit one spot per window, starting at `params`; it and all arguments after it are filled, see `SpotFit`.
 
-    Handing out an array that was made here would cost more than a step of one window.
+    The caller allocates them, since returning a new array takes longer than a step of one window.
     """
     n, k = params.shape
     delta = np.empty((n, k))
@@ -227,12 +228,14 @@ def score(
             _evaluate(params[i], data[i], along_u[i], along_v[i], rows[i], signal[i], residual[i])
         again = True
         while again:
-            there = True
+            within = True
             for i in range(n):
-                _weigh(usable[i], clip[i], signal[i], params[i, BACKGROUND], floor[i], slope[i], weight[i])
+                _fill_weights(
+                    usable[i], clip[i], signal[i], params[i, BACKGROUND], floor[i], slope[i], weight[i]
+                )
                 _solve(along_u[i], along_v[i], rows[i], weight[i], residual[i], cov[i], delta[i])
-                there = there and _within(delta[i], cov[i], 0.0)
-            again = not measured and (there or step == _STEPS_TO_MEASURE)
+                within = within and _within(delta[i], cov[i], 0.0)
+            again = not measured and (within or step == _STEPS_TO_MEASURE)
             if again:
                 leverage = _leverages(params, cov, data)
                 slope[:] = transfer_slope(signal, residual, weight, leverage, floor, guess)
@@ -241,10 +244,12 @@ def score(
             usable = weight > 0.0
             clip = np.full_like(clip, math.inf)
         for i in range(n):
-            last[i] = _within(delta[i], cov[i], max(_SMALL * abs(params[i, FLUX]), 1e-300))
-            _moved(params[i], delta[i])
-        if measured and last.all():
+            converged[i] = _within(delta[i], cov[i], max(_SMALL_STEP * abs(params[i, FLUX]), 1e-300))
+            _apply_step(params[i], delta[i])
+        if measured and converged.all():
             break
     for i in range(n):
-        _judge(signal[i], residual[i], weight[i], cov[i], params[i, FLUX], judged[i])
-        judged[i, SHEAR_SCORE] = 0.0 if k == 7 else _tilt(along_u[i], along_v[i], weight[i], residual[i])
+        _fill_statistics(signal[i], residual[i], weight[i], cov[i], params[i, FLUX], statistics[i])
+        statistics[i, SHEAR_SCORE] = (
+            0.0 if k == 7 else _shear_score(along_u[i], along_v[i], weight[i], residual[i])
+        )

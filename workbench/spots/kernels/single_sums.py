@@ -1,4 +1,4 @@
-"""Sums over a window's pixels that a step of the fit needs, and the inverse of its matrix, compiled."""
+"""Sums over a window's pixels for a step of the fit, and the inverse of the information matrix, compiled."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _PAIRS: Final = 10
 
 @compiled
 def invert(matrix: FloatArray, out: FloatArray) -> None:
-    """Inverse of an information matrix (k, k), by elimination with pivots; `matrix` is used up.
+    """Inverse of an information matrix (k, k) by Gauss-Jordan elimination with pivots; overwrites `matrix`.
 
-    A ridge that only a singular one feels keeps the result finite.
+    A ridge of 1e-10 keeps the inverse of a singular matrix finite.
     """
     k = matrix.shape[0]
     out[:] = 0.0
@@ -51,7 +51,7 @@ def invert(matrix: FloatArray, out: FloatArray) -> None:
 def _summed_along_v(
     along_v: FloatArray, weight: FloatArray, residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Columns' sums of weight times products of profiles (10, width), of weighted residuals (4, width)."""
+    """Sums along v: weights times products of two profiles (10, width), weighted residuals (4, width)."""
     height, width = weight.shape
     squares, weighted = np.zeros((_PAIRS, width)), np.zeros((4, width))
     row = np.empty(width)
@@ -81,7 +81,7 @@ def separable_sums(
     """Sums over the pixels of an upright window: information (6, 6) and gradient (6,).
 
     Every derivative is a product of a profile along v and one along u. Sums are therefore taken along v first
-    and along u then, and the derivatives themselves are never written out: a tenth of the work.
+    and along u then, without the full derivatives: a tenth of the work.
     """
     squares, weighted = _summed_along_v(along_v, weight, residual)
     for i in range(6):
@@ -102,7 +102,7 @@ def separable_sums(
 def dense_sums(
     rows: FloatArray, weight: FloatArray, residual: FloatArray, information: FloatArray, gradient: FloatArray
 ) -> None:
-    """The same sums from derivatives (k, height, width) that are written out."""
+    """The same sums from full derivatives (k, height, width)."""
     for i in range(rows.shape[0]):
         weighted = rows[i] * weight
         gradient[i] = (weighted * residual).sum()

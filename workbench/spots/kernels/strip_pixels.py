@@ -1,4 +1,4 @@
-"""Compiled loops over a strip of the image: its level and noise, and the peaks of its smoothed signal."""
+"""Compiled loops over a strip of the image: level, noise, and peaks of the smoothed signal."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from workbench.model.arrays import BoolArray, Float32Array, FloatArray, IndexArr
 from workbench.spots.kernels.compiled import compiled
 
 _MAX_PEAKS: Final = 64
-# Peaks nearer than this are one unless a valley lies between them, this deep in sd and as a share of the
-# lower.
+# Peaks closer than this are one, unless the valley between them is this deep: in sd, and as a share of the
+# lower peak.
 _NEAR_PX: Final = 16
 _VALLEY_SD: Final = 3.0
 _VALLEY_SHARE: Final = 0.08
@@ -31,7 +31,7 @@ def _is_top(image: Float32Array, row: int, col: int) -> bool:
 
 @compiled
 def _lowest_between(image: Float32Array, row: int, col: int, dv: int, du: int) -> float:
-    """Lowest pixel on the way from (row, col) to (row + dv, col + du)."""
+    """Lowest pixel on the straight line from (row, col) to (row + dv, col + du)."""
     steps = 2 * max(abs(du), abs(dv))
     lowest = math.inf
     for step in range(steps + 1):
@@ -43,7 +43,7 @@ def _lowest_between(image: Float32Array, row: int, col: int, dv: int, du: int) -
 
 @compiled
 def _is_ripple(image: Float32Array, top: IndexArray, tops: IndexArray, sd: float) -> bool:
-    """Whether no valley parts a peak (2,) from one of the higher `tops` (n, 2): noise, a clipped plateau."""
+    """Whether a peak (2,) has no valley towards a higher one of `tops` (n, 2): noise, a clipped plateau."""
     row, col = top[0], top[1]
     height = np.float64(image[row, col])
     depth = max(_VALLEY_SD * sd, _VALLEY_SHARE * height)
@@ -57,7 +57,7 @@ def _is_ripple(image: Float32Array, top: IndexArray, tops: IndexArray, sd: float
 
 @compiled
 def _tops_of(image: Float32Array, mask: BoolArray, threshold: np.float32, sd: float) -> IndexArray:
-    """(n, 2) rows and columns of local maxima above `threshold`, highest first, ripples left out."""
+    """(n, 2) rows and columns of local maxima above `threshold`, highest first, without ripples."""
     everywhere = mask.shape != image.shape
     rows, cols, heights = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
     for y in range(image.shape[0]):
@@ -83,7 +83,7 @@ def _tops_of(image: Float32Array, mask: BoolArray, threshold: np.float32, sd: fl
 
 @compiled
 def _quantiles(sample: Float32Array, shares: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Quantiles, to half a bin: 1 DN, which is exact for whole numbers, or a 2000th of the range."""
+    """Quantiles from a histogram with bins of 1 DN (exact for whole numbers) or a 2000th of the range."""
     n, first, last = sample.size, np.float64(sample.min()), np.float64(sample.max())
     width = max(1.0, (last - first) / _BINS)
     counts = np.zeros(int((last - first) / width) + 2, np.intp)
@@ -102,7 +102,7 @@ def _quantiles(sample: Float32Array, shares: tuple[float, float, float]) -> tupl
 
 @compiled
 def _stride(width: int, wanted: int) -> int:
-    """The smallest from `wanted` on that has no divisor in common with the width: it visits every column."""
+    """Smallest stride from `wanted` on that is coprime to the width: the samples cover every column."""
     while math.gcd(width, wanted) > 1:
         wanted += 1
     return wanted
@@ -114,26 +114,26 @@ def level_of(
 ) -> tuple[float, float]:
     """Robust mean and variance: see `noise.level_and_variance`."""
     sample = values.ravel()[:: _stride(values.shape[1], max(1, values.size // samples))].copy()
-    low, middle, high = _quantiles(sample, (0.1587, 0.5, 0.8413))
+    low, median, high = _quantiles(sample, (0.1587, 0.5, 0.8413))
     # Half the distance between the quantiles of +-1 sd; the lower half alone when spots fill the upper one.
-    reach = clip_sd * max(min(middle - low, 0.5 * (high - low)), 0.5)
+    reach = clip_sd * max(min(median - low, 0.5 * (high - low)), 0.5)
     total = square = 0.0
     count = 0
     for i in range(sample.size):
-        d = np.float64(sample[i]) - middle
+        d = np.float64(sample[i]) - median
         inside = 1.0 if abs(d) <= reach else 0.0
         count += int(inside)
         total += d * inside
         square += d * d * inside
     if count == 0:
-        return middle, least_variance
+        return median, least_variance
     mean = total / count
-    return middle + mean, max(square / count - mean**2, least_variance)
+    return median + mean, max(square / count - mean**2, least_variance)
 
 
 @compiled
 def _smoothed(signal: Float32Array, taps: Float32Array) -> Float32Array:
-    """A strip after a separable filter with an odd number of taps; beyond the rim its last pixels repeat."""
+    """Strip filtered by a separable filter with an odd number of taps; edge pixels are repeated outwards."""
     height, width = signal.shape
     half = taps.size // 2
     out, row = np.empty_like(signal), np.empty(width + 2 * half, np.float32)
@@ -164,14 +164,14 @@ def peaks_of(
     row0: int,
     col0: int,
 ) -> FloatArray:
-    """(n, 3) row, column and smoothed height (DN) of local maxima, highest first, ripples left out.
+    """(n, 3) row, column and smoothed height (DN) of local maxima, highest first, without ripples.
 
     Args:
-        signal: A strip, DN.
-        taps: Of the separable filter that smooths it.
-        mask: (height, width) where maxima count; of any other shape: everywhere.
-        threshold: Of the smoothed signal, DN.
-        sd: Of the smoothed noise, DN.
+        signal: (height, width) signal of the strip, DN.
+        taps: (n,) weights of the smoothing filter.
+        mask: (height, width) pixels where maxima count; of any other shape: all.
+        threshold: Least height of the smoothed signal, DN.
+        sd: Standard deviation of the smoothed noise, DN.
         row0: The strip's first row.
         col0: The strip's first column.
     """

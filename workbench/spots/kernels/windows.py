@@ -1,4 +1,4 @@
-"""Compiled loops around a fit: windows cut out of the frames, first guesses, what a spot's place tells."""
+"""Compiled loops before and after a fit: windows of the frames, first guesses, flags, masks."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from workbench.spots.kernels.compiled import compiled
 
 _PER_HALF_HEIGHT: Final = 1.0 / (2.0 * math.pi * math.log(2.0))
 _EDGE_WIDTHS: Final = 2.5
-# Half-widths of windows; each holds spots whose width is up to (half - 0.5) / 3: what lies beyond 3 widths
-# tells next to nothing about the position.
+# Half-widths of windows; each suits spots of widths up to (half - 0.5) / 3: pixels beyond 3 widths have
+# almost no information about the position.
 HALVES_PX: Final = (5, 8, 13, 19)
 _REACH_WIDTHS: Final = 3.0
 
 
 @compiled
 def half_for(width_px: float) -> int:
-    """Half-width of the window for a spot."""
+    """Half-width of the window for a spot of this width, px."""
     for half in HALVES_PX:
         if half >= _REACH_WIDTHS * width_px + 0.5:
             return half
@@ -29,8 +29,10 @@ def half_for(width_px: float) -> int:
 
 
 @compiled
-def _part(usable: BoolArray, rows: FloatArray, cols: FloatArray, group: IndexArray) -> None:
-    """Make the pixels unusable that lie nearer to another peak than to the window's own."""
+def _exclude_nearer_to_others(
+    usable: BoolArray, rows: FloatArray, cols: FloatArray, group: IndexArray
+) -> None:
+    """Mark pixels that are closer to another peak than to the window's own as unusable."""
     half = usable.shape[1] // 2
     for i in range(len(group)):
         for k in range(len(rows)):
@@ -45,7 +47,7 @@ def _part(usable: BoolArray, rows: FloatArray, cols: FloatArray, group: IndexArr
 
 
 @compiled
-def cut(
+def cut_windows(
     on: Image,
     off: Image,
     share: float,
@@ -58,7 +60,7 @@ def cut(
     usable: BoolArray,
     clip: FloatArray,
 ) -> None:
-    """Fill data, usable pixels and clipping values (see `Windows`) around the peaks `group` (n,) of all."""
+    """Fill data, usable pixels and clipping values, as in `Windows`, around the peaks `group` (n,)."""
     n, side = len(group), data.shape[1]
     clip[:] = math.inf
     clipped = False
@@ -80,14 +82,17 @@ def cut(
                 for x in range(side):
                     col = min(max(col0 + x, 0), on.shape[1] - 1)
                     clip[i, y, x] = data[i, y, x] + (clip_dn - float(on[row, col]))
-    _part(usable, rows, cols, group)
+    _exclude_nearer_to_others(usable, rows, cols, group)
 
 
 @compiled
-def guess(data: FloatArray, usable: BoolArray, rows: FloatArray, cols: FloatArray, start: FloatArray) -> None:
-    """Fill a start (n, 6) in pixels of the image, from windows around pixels (n,).
+def moment_guess(
+    data: FloatArray, usable: BoolArray, rows: FloatArray, cols: FloatArray, start: FloatArray
+) -> None:
+    """Fill first guesses (n, 6), in pixels of the image, from windows centred on pixels (n,).
 
-    The width is that of a spot with as many pixels above half the peak (2 pi ln 2 widths squared).
+    The centre is that of mass above half the peak; the width follows from the number of pixels above it,
+    which is 2 pi ln 2 width^2.
     """
     half = data.shape[1] // 2
     for i in range(len(data)):
@@ -112,7 +117,7 @@ def guess(data: FloatArray, usable: BoolArray, rows: FloatArray, cols: FloatArra
 
 @compiled
 def is_near_edge(params: FloatArray, height: int, width: int) -> bool:
-    """Whether the border of the image cuts a spot (6 or more, in pixels of the image)."""
+    """Whether the image border is within 2.5 widths of a spot (6 or more, in pixels of the image)."""
     along_u, along_v = min(params[U], width - 1 - params[U]), min(params[V], height - 1 - params[V])
     cut_off: bool = along_u < _EDGE_WIDTHS * math.exp(params[LN_SU]) or along_v < _EDGE_WIDTHS * math.exp(
         params[LN_SV]
@@ -135,7 +140,7 @@ def is_clipped(on: Image, clip_dn: float, params: FloatArray) -> bool:
 
 @compiled
 def flag_codes(on: Image, clip_dn: float, params: FloatArray, codes: IndexArray) -> None:
-    """Fill (n,) codes: 1 for a spot (n, 6 or more) that the border cuts, plus 2 for one that is clipped."""
+    """Fill (n,) codes of spots (n, 6 or more): 1 at the border, plus 2 if clipped."""
     for i in range(len(params)):
         cut_off = is_near_edge(params[i], on.shape[0], on.shape[1])
         codes[i] = int(cut_off) + 2 * int(is_clipped(on, clip_dn, params[i]))
@@ -143,19 +148,19 @@ def flag_codes(on: Image, clip_dn: float, params: FloatArray, codes: IndexArray)
 
 @compiled
 def halves_for(params: FloatArray, scale: float, halves: IndexArray) -> None:
-    """Fill (n,) half-widths of windows for spots (n, 6) whose widths are to be multiplied by `scale`."""
+    """Fill (n,) half-widths of windows for spots (n, 6), their widths multiplied by `scale`."""
     for i in range(len(params)):
         halves[i] = half_for(scale * math.exp(params[i, LN_SU]))
 
 
 @compiled
-def mark_light(row0: int, col0: int, lights: FloatArray, out: BoolArray) -> None:
+def mark_discs(row0: int, col0: int, discs: FloatArray, out: BoolArray) -> None:
     """Mark pixels of a window (height, width) that lie within discs (n, 3): u, v and radius in the image.
 
     `row0` and `col0` are the window's first pixel in the image.
     """
-    for n in range(len(lights)):
-        u, v, radius = lights[n, 0] - col0, lights[n, 1] - row0, lights[n, 2]
+    for n in range(len(discs)):
+        u, v, radius = discs[n, 0] - col0, discs[n, 1] - row0, discs[n, 2]
         for y in range(max(math.floor(v - radius), 0), min(math.ceil(v + radius) + 1, out.shape[0])):
             for x in range(max(math.floor(u - radius), 0), min(math.ceil(u + radius) + 1, out.shape[1])):
                 if (x - u) ** 2 + (y - v) ** 2 < radius * radius:
@@ -168,8 +173,7 @@ def mark_strip(
 ) -> None:
     """Mark pixels of a window (height, width) that lie in a strip of the image.
 
-    The strip has rows and columns from the first to the one after its last; `mask` says which of its pixels
-    count, all if it is empty.
+    `rows` and `cols` are half-open ranges; `mask` has the pixels of the strip that count, all if it is empty.
     """
     for y in range(max(rows[0] - row0, 0), min(rows[1] - row0, out.shape[0])):
         for x in range(max(cols[0] - col0, 0), min(cols[1] - col0, out.shape[1])):

@@ -59,6 +59,7 @@ def nested_squares(readings: pd.DataFrame) -> NestedSquares:
     Raises:
         TooFewReadingsError: fewer than two placements in one session, or one reading at each.
     """
+    require(len(readings), 2, "readings")
     cells, session_of_cell = _numbered(readings)
     error = readings["error_mm"].to_numpy(np.float64)
     sizes, means = _sizes_and_means(cells, error)

@@ -19,9 +19,8 @@ from workbench.trials.statistics.bias import bias_test
 LASERS_ALARM = 0.02
 SCALE_ALARM = 0.02
 RANGES_ALARM = 0.01
-"""Probabilities that a valid calibration is refused, 5 % together.
-
-The tests are the lasers against each other (all placements), the scale of the ranges, and any other error."""
+"""Probabilities that a valid calibration is refused, 5 % together. The tests are the lasers against each
+other (all placements), the scale of the ranges, and any other error of the ranges."""
 MEASURE_AGAIN = "measure the target's standoffs again; if they are right, calibrate again"
 PLANES = frozenset({"degree 0", "degree 1"})
 """Shapes of a flat target, square or turned."""

@@ -83,7 +83,7 @@ def test_ten_millimetres_are_found_up_to_900(seed: int, standoff_mm: float) -> N
 def test_an_alarm_refuses_and_says_what_to_do() -> None:
     """12 mm at 1400: seen, though not so clearly that it could have no other name."""
     fitted = fit(RIG, told_as(World(RIG, 5).observations(), 1400.0, 1412.0))
-    assessment = assess(fitted, Acceptance(), 0.01, placements=leave_each_out(fitted))
+    assessment = assess(fitted, Acceptance(), 0.01, leave_each_out(fitted))
     assert (assessment.verdict, assessment.faults) == ("refused", ())
     (reason,) = assessment.reasons
     (alarm,) = alarms(assessment.cross_validation)

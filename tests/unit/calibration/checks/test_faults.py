@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support.board_world import PLACINGS, BoardWorld
-from tests.support.corrupted_data import exchanged, mirrored, moved, shifted, told_as
+from tests.support.corrupted_data import exchanged, mirrored, moved, shifted, told_as, turned_at
 from tests.support.message_text import laser_ids, numbers
 from tests.support.rigs import World, board_rig, prior, thesis_rig
 from workbench.calibration.checks.cross_validation import leave_each_out
@@ -33,7 +33,8 @@ def named(observations: list[Observation], rejected: Sequence[Rejected] = (), ri
 
 
 def judged(observations: list[Observation]) -> Assessment:
-    return assess(fit_without_outliers(RIG, observations), Acceptance(), 0.01)
+    fit = fit_without_outliers(RIG, observations)
+    return assess(fit, Acceptance(), 0.01, leave_each_out(fit))
 
 
 def the(faults: list[Fault], name: str) -> str:
@@ -51,6 +52,17 @@ class TestFaults:
     def test_a_mirrored_picture(self, seed: int) -> None:
         world = World(RIG, seed)
         the(named(mirrored(world, world.observations())), "mirrored")
+
+    @pytest.mark.parametrize("turn_deg", [6.0, -8.0])
+    def test_a_target_turned_at_one_placement_is_named_with_its_angle(
+        self, seed: int, turn_deg: float
+    ) -> None:
+        world = World(RIG, seed)
+        message = the(named(turned_at(world, 280.0, turn_deg)), "tilted")
+        standoff_mm, angle_deg, *_ = numbers(message)
+        assert standoff_mm == 280.0
+        assert angle_deg == pytest.approx(turn_deg, abs=2.0)
+        assert "vertical" in message
 
     @pytest.mark.parametrize(
         ("standoff_mm", "told_mm", "slip"),
@@ -265,7 +277,8 @@ def test_sound_data_of_any_shape_are_judged_without_a_fault(
     seed: int, told: Rig, true: Rig, seen: Callable[[World], list[Observation]]
 ) -> None:
     observations = seen(World(true, seed))
-    assessment = assess(fit_without_outliers(told, observations), Acceptance(), 0.001)
+    fitted = fit_without_outliers(told, observations)
+    assessment = assess(fitted, Acceptance(), 0.001, leave_each_out(fitted))
     assert assessment.faults == ()
     few = len({s.standoff_mm for s in observations}) < Acceptance().min_standoffs
     assert (assessment.verdict == "refused") == few

@@ -9,8 +9,16 @@ import pytest
 
 from tests.support.message_text import laser_ids, numbers
 from tests.support.rigs import World, prior, thesis_rig
+from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.estimation.fit import CalibrationFit, fit
-from workbench.calibration.verdict.assessment import CONTRADICTION_SD, Assessment, assess, basis, derive
+from workbench.calibration.verdict.assessment import (
+    CONTRADICTION_SD,
+    Assessment,
+    assess,
+    basis,
+    derive,
+    prior_doubts,
+)
 from workbench.model.acceptance import Acceptance
 
 
@@ -20,7 +28,7 @@ def fitted() -> CalibrationFit:
 
 
 def judged(fitted: CalibrationFit, worst: float = 0.01, **limits: float) -> Assessment:
-    return assess(fitted, Acceptance.model_validate(limits), worst)
+    return assess(fitted, Acceptance.model_validate(limits), worst, leave_each_out(fitted))
 
 
 def test_limits_that_fail_are_named(fitted: CalibrationFit) -> None:
@@ -99,3 +107,40 @@ def test_a_solver_that_did_not_converge_is_a_reason() -> None:
     found = judged(replace(result, converged=False))
     assert found.verdict == "refused"
     assert len(found.reasons) == 1
+
+
+def test_priors_that_hold_are_not_doubted() -> None:
+    """40 sound sensors: none (expected 0.4, by 0.5 % of each of two tests)."""
+    rig = thesis_rig()
+    fits = (fit(rig, World(rig, seed).observations()) for seed in range(40))
+    assert [line for fitted in fits for line in prior_doubts(fitted)] == []
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_prior_that_the_data_contradict_is_named(seed: int) -> None:
+    """An offset of 22 mm where the rig file says 0 +- 5; a flat determines it to less than a millimetre."""
+    rig = thesis_rig()
+    world = World(rig, seed)
+    world.values["offset_mm"] = 22.0
+    (line,) = prior_doubts(fit(rig, world.observations()))
+    assert line.startswith("offset_mm = ")
+    assert numbers(line)[1] == pytest.approx(22.0 / 5.0, abs=0.2)
+
+
+def test_placements_that_scatter_more_than_stated_are_a_warning_and_a_limit() -> None:
+    rig = thesis_rig()
+    loose = rig.model_copy(update={"bench": rig.bench.model_copy(update={"placement_sd_mm": 1.5})})
+    found = fit(rig, World(loose, 3).observations())
+    assert found.placement_scale > 2
+    (line,) = [text for text in judged(found).warnings if "placements scatter" in text]
+    assert numbers(line)[0] == pytest.approx(found.placement_scale, abs=0.06)
+    assert judged(found, max_placement_scale=1.5).verdict == "refused"
+
+
+def test_a_missing_speckle_is_named_where_the_residuals_call_for_it() -> None:
+    rig = thesis_rig(0.02, 0.06)
+    silent = rig.model_copy(update={"noise": rig.noise.model_copy(update={"speckle_sd_px": 0.0})})
+    missing = judged(fit(silent, World(rig, 1).observations(repeats=10)))
+    assert any("noise.speckle_sd_px" in text for text in missing.warnings)
+    stated = judged(fit(rig, World(rig, 1).observations(repeats=10)))
+    assert not any("noise.speckle_sd_px" in text for text in stated.warnings)

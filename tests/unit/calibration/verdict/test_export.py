@@ -16,7 +16,9 @@ import pytest
 import yaml as pyyaml
 
 from tests.support.rigs import FISHEYE_STANDOFFS_MM, PROVENANCE, World, fisheye_rig, opencv_pixels, thesis_rig
+from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.calibration.selection.drift import with_drift
 from workbench.calibration.verdict.assessment import assess
 from workbench.calibration.verdict.export import calibrate, render, write_calibration
 from workbench.model.acceptance import Acceptance
@@ -275,7 +277,7 @@ def test_rendering_is_reproducible(calibration: Calibration) -> None:
 
 
 def test_a_good_fit_is_accepted(fitted: CalibrationFit, calibration: Calibration) -> None:
-    found = assess(fitted, Acceptance(), 0.01)
+    found = assess(fitted, Acceptance(), 0.01, leave_each_out(fitted))
     assert (found.verdict, found.reasons) == ("accepted", ())
     assert calibration.laser_ranger.validity.standoff_mm == (125.0, 4500.0)
     assert 0.001 < calibration.laser_ranger.validity.max_relative_range_sd < 0.03
@@ -307,3 +309,22 @@ def test_a_fit_that_puts_every_spot_outside_the_picture_is_refused(fitted: Calib
     values[1] += 5000.0
     with pytest.raises(LimitFailedError):
         calibrate(replace(fitted, values=values), Acceptance(), PROVENANCE)
+
+
+def test_few_placements_state_what_their_cross_validation_supports() -> None:
+    few = fit(thesis_rig(), World(thesis_rig(), 1).observations((125.0, 600.0, 2200.0)))
+    calibration, assessment = calibrate(few, Acceptance(), PROVENANCE)
+    predicted = max(one.sd_mm / one.standoff_mm for one in assessment.cross_validation)
+    assert calibration.laser_ranger.validity.max_relative_range_sd == predicted > 0.03
+
+
+def test_half_of_a_drift_is_added_to_the_image_centre() -> None:
+    rig = with_drift(thesis_rig())
+    drifting = [
+        replace(s, u_px=s.u_px + 0.4 * n / 219) for n, s in enumerate(World(thesis_rig(), 1).observations())
+    ]
+    found = fit(rig, drifting)
+    parameters = calibrate(found, Acceptance(), PROVENANCE)[0].laser_ranger.parameters
+    index = parameters.names.index("cx_px")
+    assert parameters.sd[index] == pytest.approx(np.hypot(found.sd[index], found.drift_px[0] / 2))
+    assert parameters.covariance_array[index, index] == pytest.approx(parameters.sd[index] ** 2)

@@ -14,10 +14,10 @@ from workbench.calibration.verdict.null_direction_text import (
     BASELINE,
     BOARD,
     LEAST_PART,
+    NO_EFFECT,
     POINTING,
     REMEDIES,
     SQUARE,
-    UNSEEN,
     ParameterChange,
     ParameterGroup,
     describe,
@@ -132,7 +132,7 @@ def test_what_the_bench_adds_is_no_term_of_the_lens(name: str) -> None:
 def test_one_kind_has_no_remedy_and_lasers_by_themselves_want_other_standoffs() -> None:
     alone = group_by_kind([change("k3", 1.0)])
     pair = group_by_kind([change("L1.tx", 1.0), change("L1.x_mm", 1.0)])
-    assert remedy(alone) == UNSEEN
+    assert remedy(alone) == NO_EFFECT
     assert remedy(pair, ("L1", "L2")) == APART
 
 

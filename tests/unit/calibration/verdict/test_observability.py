@@ -13,7 +13,14 @@ from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.prediction import SpotData, predict_spots
 from workbench.calibration.verdict.export import calibrate
-from workbench.calibration.verdict.null_direction_text import APART, BASELINE, BOARD, REMEDIES, SQUARE, UNSEEN
+from workbench.calibration.verdict.null_direction_text import (
+    APART,
+    BASELINE,
+    BOARD,
+    NO_EFFECT,
+    REMEDIES,
+    SQUARE,
+)
 from workbench.calibration.verdict.observability import (
     NullDirection,
     direction_lines,
@@ -176,7 +183,7 @@ def test_what_no_spot_shows_stands_alone() -> None:
     )
     found = by_first(directions_of(fit(rig, World(rig, 1).observations((1000.0, 2000.0, 4000.0)))))
     assert found["k3"].change.keys() == {"k3"}
-    assert found["k3"].remedy == UNSEEN
+    assert found["k3"].remedy == NO_EFFECT
     assert not any("k3" in line for line in direction_lines(tuple(found.values())))
 
 

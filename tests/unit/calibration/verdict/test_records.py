@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.rigs import World, thesis_rig
+from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.data.observations import RejectedObservation
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.verdict.assessment import Assessment, assess, determined_by
@@ -30,7 +31,7 @@ def fitted() -> CalibrationFit:
 
 @pytest.fixture(scope="module")
 def assessment(fitted: CalibrationFit) -> Assessment:
-    return assess(fitted, Acceptance(), 0.01)
+    return assess(fitted, Acceptance(), 0.01, leave_each_out(fitted))
 
 
 def test_parameters_are_those_of_the_sensor_with_constants(fitted: CalibrationFit) -> None:

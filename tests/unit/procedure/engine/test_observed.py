@@ -14,7 +14,7 @@ RIG = load_rig(Path(__file__).parents[4] / "rigs/thesis-emulated.yaml")
 def test_the_text_of_an_expected_spot_has_its_position_and_place() -> None:
     outside = expected_spot_text(RIG, "L4", ExpectedSpot(662.3, 248.4, 6.6, 3.6, "outside"))
     assert "u = 662 +- 7, v = 248 +- 4 px (1 sigma)" in outside
-    assert "outside the picture of 640 x 480" in outside
+    assert "outside the image of 640 x 480" in outside
     inside = expected_spot_text(RIG, "L4", ExpectedSpot(600.0, 248.4, 6.6, 3.5, "inside"))
     assert "inside" in inside
     edge = expected_spot_text(RIG, "L4", ExpectedSpot(640.0, 248.4, 6.6, 3.5, "at the edge"))

@@ -1,4 +1,4 @@
-"""Spots whose light mixes are separated, and clear neighbours are kept."""
+"""Overlapping spots are separated, and isolated neighbours are kept."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from tests.support.draw import Drawn, Sensor, draw, profile
 from tests.support.spot_models import fitted_spot, scene_of
 from workbench.spots import Failure, Scanline, find_spots
-from workbench.spots.deblending.blend import Blend, fit_blends, grown, split
+from workbench.spots.deblending.blend import Blend, fit_blends, split_elongated, with_hidden_spots
 from workbench.spots.deblending.joint_fit import fit_joint
 from workbench.spots.measure import FittedSpot
 from workbench.spots.pair import PairSignal
@@ -30,22 +30,22 @@ def test_overlapping_spots_are_separated(apart: float) -> None:
     assert (Failure.MERGED in finding.failures) == (apart < 4 * 1.3)
 
 
-CROWDS = {
+CLUSTERS = {
     "three side by side": [(13.8, 20.0), (13.9, 24.1), (8.8, 22.7), (21.3, 23.7)],
     "a merged pair and two more": [(13.8, 16.7), (14.4, 24.5), (24.6, 22.9), (27.6, 22.2)],
     "two merged pairs": [(13.4, 20.6), (16.7, 20.6), (23.3, 20.6), (26.6, 20.6)],
 }
-"""Places of four lasers' spots on a target far away, u and v."""
+"""Centres (u, v) of the spots of four lasers on a distant target."""
 
 
 SPECKLE = 0.2
 
 
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("crowd", CROWDS)
-def test_a_crowd_of_spots_is_told_apart(crowd: str, seed: int) -> None:
+@pytest.mark.parametrize("cluster", CLUSTERS)
+def test_a_cluster_of_spots_is_separated(cluster: str, seed: int) -> None:
     """In speckle, whose noise hides the neighbours of a spot from a model that lacks them."""
-    places, random = sorted(CROWDS[crowd]), rng(seed)
+    places, random = sorted(CLUSTERS[cluster]), rng(seed)
     light = np.sum([profile((40, 40), Drawn(u, v, 5000.0, 0.75, 0.75)) for u, v in places], axis=0)
     grains = random.gamma(SPECKLE**-2, SPECKLE**2, light.shape)
     frame = Sensor(10.0, 6.0, 8).expose(20.0 + light * grains, random)
@@ -96,12 +96,14 @@ def test_a_blend_is_fitted_in_pixels_of_its_window_and_comes_back_in_those_of_th
     true = [Drawn(60.2, 30.1, 4e4), Drawn(64.4, 31.8, 3e4)]
     scene, group = scene_with(*true, seed=seed)
     blend = Blend([scene], group, [])
-    assert blend.fits
+    assert blend.is_within_limit
     start = blend.start_of(group)
     np.testing.assert_allclose(start[:, 2] + blend.col0, [60.2, 64.4])
     np.testing.assert_allclose(start[:, 3] + blend.row0, [30.1, 31.8])
     assert blend.win.data[0, 3, 4] == pytest.approx(scene.signal[blend.row0 + 3, blend.col0 + 4])
-    for trace, drawn in zip(blend.as_traces(fit_joint(blend.win, start, blend.noise)), true, strict=True):
+    for trace, drawn in zip(
+        blend.as_fitted_spots(fit_joint(blend.win, start, blend.noise)), true, strict=True
+    ):
         assert trace.spot.u_px == pytest.approx(drawn.u, abs=4.5 * trace.spot.u_sd_px)
         assert trace.spot.v_px == pytest.approx(drawn.v, abs=4.5 * trace.spot.v_sd_px)
         # Nearer than four widths.
@@ -112,17 +114,17 @@ def test_light_of_others_is_not_used() -> None:
     scene, (one, other) = scene_with(Drawn(60.0, 30.0), Drawn(67.0, 30.0), seed=1)
     blend = Blend([scene], [one], [other])
     v, u = np.mgrid[: blend.win.shape[0], : blend.win.shape[1]]
-    lit = np.hypot(u + blend.col0 - 67.0, v + blend.row0 - 30.0) < 2.5 * 1.3
-    assert lit.any()
-    assert not blend.win.usable[0][lit].any()
-    assert not blend.allowed[lit].any()
-    assert blend.allowed[~lit].all()
+    other_light = np.hypot(u + blend.col0 - 67.0, v + blend.row0 - 30.0) < 2.5 * 1.3
+    assert other_light.any()
+    assert not blend.win.usable[0][other_light].any()
+    assert not blend.allowed[other_light].any()
+    assert blend.allowed[~other_light].all()
 
 
 def test_spots_too_far_from_each_other_do_not_fit_into_one_window() -> None:
     scene = scene_of(np.zeros((20, 400), np.uint16))
     ends = [fitted_spot(u, 10.0, scene=scene) for u in (10.0, 300.0)]
-    assert not Blend([scene], ends, []).fits
+    assert not Blend([scene], ends, []).is_within_limit
     assert fit_blends([scene], ends, [], wants_more=False) == ends
 
 
@@ -132,20 +134,20 @@ def test_an_elongated_spot_is_two_and_a_round_one_stays(seed: int) -> None:
     random = rng(seed)
     scene = scene_of(draw(true, random), draw([], random))
     whole = fitted_spot(61.5, 30.0, 2.2, 7e4 / 8.0, scene=scene)
-    two = sorted(split([scene], whole, []), key=lambda t: t.spot.u_px)
+    two = sorted(split_elongated([scene], whole, []), key=lambda t: t.spot.u_px)
     assert len(two) == 2
     for trace, drawn in zip(two, true, strict=True):
         assert trace.spot.u_px == pytest.approx(drawn.u, abs=4.5 * trace.spot.u_sd_px)
     scene, (single,) = scene_with(Drawn(60.0, 30.0, 4e4), seed=seed)
-    assert split([scene], single, []) == [single]
+    assert split_elongated([scene], single, []) == [single]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_member_that_is_not_there_is_dropped_and_a_hidden_one_is_found(seed: int) -> None:
     true = [Drawn(60.0, 30.0, 4e4), Drawn(65.0, 30.0, 2e4)]
     scene, group = scene_with(*true, seed=seed)
-    false = fitted_spot(62.0, 34.0, 1.3, 300.0, clarity=4.0, scene=scene)
+    false = fitted_spot(62.0, 34.0, 1.3, 300.0, flux_snr=4.0, scene=scene)
     kept = fit_blends([scene], [*group, false], [], wants_more=False)
     assert sorted(round(t.spot.u_px) for t in kept) == [60, 65]
-    more = grown([scene], group[:1], [])
+    more = with_hidden_spots([scene], group[:1], [])
     assert sorted(round(t.spot.u_px) for t in more) == [60, 65]

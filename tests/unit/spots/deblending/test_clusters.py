@@ -9,15 +9,15 @@ from tests.support.draw import Drawn, Sensor, draw
 from tests.support.spot_models import fitted_spot
 from workbench.spots import find_spots
 from workbench.spots.deblending.clusters import (
-    CLEAR_SD,
+    CLEAR_SNR,
     TAIL_WIDTHS,
-    apart_px,
-    are_apart,
-    clearest,
+    are_separate,
     clusters,
-    mixes,
-    stands_alone,
+    is_isolated,
+    overlap,
+    separation_px,
     without_duplicates,
+    without_rivals,
 )
 from workbench.spots.kernels.windows import half_for
 
@@ -72,12 +72,12 @@ DISTURBED_PX = half_for(WIDTH) + TAIL_WIDTHS * WIDTH
 
 
 def test_spots_are_apart_where_no_light_falls_into_another_window() -> None:
-    assert are_apart([])
-    assert are_apart([fitted_spot(10.0, 10.0)])
+    assert are_separate([])
+    assert are_separate([fitted_spot(10.0, 10.0)])
     for distance, apart in ((DISTURBED_PX + 0.01, True), (DISTURBED_PX - 0.01, False)):
         pair = [fitted_spot(10.0, 10.0, WIDTH), fitted_spot(10.0, 10.0 + distance, WIDTH)]
-        assert apart_px(*pair) == pytest.approx(distance)
-        assert are_apart(pair) == apart
+        assert separation_px(*pair) == pytest.approx(distance)
+        assert are_separate(pair) == apart
         assert len(clusters(pair)) == 1 + apart
 
 
@@ -97,22 +97,22 @@ def test_of_fits_that_ended_on_one_spot_the_brightest_is_kept() -> None:
 
 
 def test_of_a_faint_spot_and_its_rival_the_clearer_is_kept() -> None:
-    faint = fitted_spot(10.0, 10.0, 1.0, clarity=0.9 * CLEAR_SD)
-    clear = fitted_spot(30.0, 10.0, 1.0, clarity=1.1 * CLEAR_SD)
-    better, worse = fitted_spot(13.0, 10.0, 4.0, clarity=20.0), fitted_spot(13.0, 10.0, 4.0, clarity=1.0)
-    assert clearest([faint, clear], [better]) == [clear, better]
-    assert clearest([faint, clear], [worse]) == [faint, clear]
+    faint = fitted_spot(10.0, 10.0, 1.0, flux_snr=0.9 * CLEAR_SNR)
+    clear = fitted_spot(30.0, 10.0, 1.0, flux_snr=1.1 * CLEAR_SNR)
+    better, worse = fitted_spot(13.0, 10.0, 4.0, flux_snr=20.0), fitted_spot(13.0, 10.0, 4.0, flux_snr=1.0)
+    assert without_rivals([faint, clear], [better]) == [clear, better]
+    assert without_rivals([faint, clear], [worse]) == [faint, clear]
     # A clear one gives way to nothing.
-    assert clearest([clear], [fitted_spot(31.0, 10.0, 4.0, clarity=90.0)])[0] is clear
-    assert clearest([], [worse]) == [worse]
+    assert without_rivals([clear], [fitted_spot(31.0, 10.0, 4.0, flux_snr=90.0)])[0] is clear
+    assert without_rivals([], [worse]) == [worse]
 
 
 def test_light_mixes_within_the_tails_of_both_spots() -> None:
     one = fitted_spot(10.0, 10.0, 1.0)
     reach = TAIL_WIDTHS * (1.0 + 2.0)
     near, far = fitted_spot(10.0 + 0.99 * reach, 10.0, 2.0), fitted_spot(10.0 + 1.01 * reach, 10.0, 2.0)
-    assert mixes(one, near)
-    assert not mixes(one, far)
-    assert not stands_alone(one, [far, near])
-    assert stands_alone(one, [far])
-    assert not stands_alone(fitted_spot(10.0, 10.0, 1.0, clarity=0.9 * CLEAR_SD), [far])
+    assert overlap(one, near)
+    assert not overlap(one, far)
+    assert not is_isolated(one, [far, near])
+    assert is_isolated(one, [far])
+    assert not is_isolated(fitted_spot(10.0, 10.0, 1.0, flux_snr=0.9 * CLEAR_SNR), [far])

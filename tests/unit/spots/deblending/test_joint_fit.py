@@ -12,7 +12,7 @@ from workbench.spots.fit import Windows
 from workbench.spots.kernels.columns import FLUX, LN_SU, LN_SV, U, V
 from workbench.spots.noise import PixelNoise
 
-WIDTH, HALF, APART, TOLD = 2.5, 12, 3.0, 400.0
+WIDTH, HALF, APART, INFORMATION = 2.5, 12, 3.0, 400.0
 
 
 SHAPE = (2 * HALF + 1, 2 * HALF + 1)
@@ -24,7 +24,7 @@ PAIRS = 500
 def two_spots(rng: np.random.Generator) -> np.ndarray:
     """(2, 6) true parameters, three widths apart, in noise of 1 DN."""
     true = np.zeros((2, 6))
-    true[:, FLUX], true[:, LN_SU:] = np.sqrt(TOLD * 4.0 * np.pi) * WIDTH, np.log(WIDTH)
+    true[:, FLUX], true[:, LN_SU:] = np.sqrt(INFORMATION * 4.0 * np.pi) * WIDTH, np.log(WIDTH)
     true[:, U] = HALF + rng.uniform(-0.5, 0.5) + np.array([-0.5, 0.5]) * APART * WIDTH
     true[:, U + 1] = HALF + rng.uniform(-0.5, 0.5)
     return true
@@ -99,5 +99,5 @@ def test_the_deviations_of_spots_fitted_together_are_right_to_second_order() -> 
     excess = np.array(terms).reshape(PAIRS, 2, 2, 2).mean(axis=1).mean(axis=(1, 2))
     sampling = 4.0 * excess.std() / np.sqrt(PAIRS)
     # Left out, the term is some 10 / 400.
-    assert sampling < 0.4 * 10.0 / TOLD
+    assert sampling < 0.4 * 10.0 / INFORMATION
     assert excess.mean() == pytest.approx(0.0, abs=sampling)

@@ -1,4 +1,4 @@
-"""The noise at a window's rim, told from those of its pixels that are used."""
+"""Noise at the rim of a window, outlying pixels, and the table of accepted spots."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from workbench.spots.kernels.acceptance import (
     PEAK,
     U_SD,
     V_SD,
-    _follow_rim,
+    _take_floor_from_rim,
     fit_group,
     without_outliers,
 )
@@ -44,18 +44,18 @@ def windows(used: str, seed: int, sd: float = 1.0) -> Windows:
 def test_the_noise_at_the_rim_does_not_depend_on_how_much_of_it_is_used(used: str, count: int) -> None:
     win = windows(used, 1)
     start = np.tile([0.0, 4000.0, HALF, HALF, 0.3, 0.3], (WINDOWS, 1))
-    judged = fit_spots(win, start, PixelNoise(np.ones(WINDOWS), np.full(WINDOWS, 1e-3))).judged
-    assert (judged[:, 8] == count).all()
+    statistics = fit_spots(win, start, PixelNoise(np.ones(WINDOWS), np.full(WINDOWS, 1e-3))).statistics
+    assert (statistics[:, 8] == count).all()
     # The mean of `count` squared normal numbers has sd sqrt(2 / count); the fit takes the leverage of six
     # parameters, of which the background's share of the rim is the larger part: 4 % at most.
-    assert judged[:, 1].mean() == pytest.approx(1.0, abs=0.06 + 4 * np.sqrt(2 / count / WINDOWS))
+    assert statistics[:, 1].mean() == pytest.approx(1.0, abs=0.06 + 4 * np.sqrt(2 / count / WINDOWS))
 
 
 @pytest.mark.parametrize(("count", "reads", "raised"), [(40, 1.9, False), (40, 2.2, True), (20, 2.2, False)])
 def test_a_rim_of_fewer_pixels_must_be_noisier_to_count(count: int, reads: float, raised: bool) -> None:
-    judged, floor = np.zeros((1, 9)), np.ones(1)
-    judged[0, 1], judged[0, 8] = reads, count
-    assert _follow_rim(floor, judged) == raised
+    statistics, floor = np.zeros((1, 9)), np.ones(1)
+    statistics[0, 1], statistics[0, 8] = reads, count
+    assert _take_floor_from_rim(floor, statistics) == raised
     assert floor[0] == (reads if raised else 1.0)
 
 
@@ -64,9 +64,9 @@ def test_a_rim_of_fewer_pixels_must_be_noisier_to_count(count: int, reads: float
 )
 def test_a_rim_must_be_much_quieter_to_count(count: int, reads: float, lowered: bool) -> None:
     """As rare as 5 sd of a Gaussian on one side: 2.9e-7."""
-    judged, floor = np.zeros((1, 9)), np.ones(1)
-    judged[0, 1], judged[0, 8] = reads, count
-    assert _follow_rim(floor, judged) == lowered
+    statistics, floor = np.zeros((1, 9)), np.ones(1)
+    statistics[0, 1], statistics[0, 8] = reads, count
+    assert _take_floor_from_rim(floor, statistics) == lowered
     assert floor[0] == (reads if lowered else 1.0)
     assert (chi2(count).cdf(reads * count) < 2.9e-7) == lowered
 
@@ -85,9 +85,9 @@ def test_in_a_dark_patch_of_a_bright_scene_the_deviation_is_that_of_the_patch(se
     assert 0.88 < np.std(z) < 1.12  # 300 values: 3 sd of their standard deviation are 0.12
 
 
-def test_a_rim_that_no_pixel_tells_of_leaves_the_floor_alone() -> None:
+def test_a_rim_without_used_pixels_leaves_the_floor_unchanged() -> None:
     floor = np.ones(1)
-    assert not _follow_rim(floor, np.zeros((1, 9)))
+    assert not _take_floor_from_rim(floor, np.zeros((1, 9)))
     assert floor[0] == 1.0
 
 
@@ -111,7 +111,7 @@ def test_the_row_of_a_spot_has_its_values_in_pixels_of_the_image() -> None:
     assert found[PEAK] == pytest.approx(4e3 / (2 * np.pi * (1.3**2 + 1 / 12)), rel=0.05)
 
 
-def test_a_spot_that_outgrows_its_window_asks_for_the_next_one() -> None:
+def test_a_spot_that_outgrows_its_window_requests_the_next_one() -> None:
     found, _, _ = table_of(
         profile((11, 11), Drawn(5.0, 5.0, 4e4, 2.2, 2.2)), [0.0, 3e4, 50.0, 40.0, 0.6, 0.6]
     )
@@ -138,9 +138,9 @@ def test_a_few_pixels_that_no_spot_explains_are_left_out(outliers: int, dropped:
     residual, weight = np.zeros((2, 11, 11)), np.ones((2, 11, 11))
     residual[1, 3, :outliers] = 6.1
     residual[1, 5, 5] = 5.9
-    judged = np.zeros((2, 9))
-    judged[:, WORST_EXCESS] = (weight * residual**2).max(axis=(1, 2))
-    kept, changed = without_outliers(usable, signal, residual, weight, judged)
+    statistics = np.zeros((2, 9))
+    statistics[:, WORST_EXCESS] = (weight * residual**2).max(axis=(1, 2))
+    kept, changed = without_outliers(usable, signal, residual, weight, statistics)
     assert changed == bool(dropped)
     assert (~kept).sum() == dropped
     assert usable.all()

@@ -12,7 +12,7 @@ from tests.support.spot_models import jacobian_of
 from workbench.model.arrays import FloatArray
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.columns import BACKGROUND, FLUX, LN_SU, LN_SV, U, V
-from workbench.spots.kernels.joint import score_together
+from workbench.spots.kernels.joint import joint_fisher_scoring
 from workbench.spots.noise import PixelNoise
 
 SHAPE = (21, 27)
@@ -35,7 +35,7 @@ def scored(data: FloatArray, start: FloatArray, weight: FloatArray | None = None
     signal, residual, leverage = np.empty(SHAPE), np.empty(SHAPE), np.empty(SHAPE)
     used = np.empty(SHAPE) if weight is None else weight.copy()
     usable, fixed = np.ones(SHAPE, bool), weight is not None
-    converged = score_together(
+    converged = joint_fisher_scoring(
         data, usable, FLOOR, SLOPE, fixed, params, cov, signal, residual, used, leverage
     )
     return Scored(converged, params, cov, signal, residual, used, leverage)

@@ -1,4 +1,4 @@
-"""The photon-transfer slope that residuals tell."""
+"""Photon-transfer slope measured from residuals."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_the_slope_of_the_light_s_variance_is_measured(tilted: bool) -> None:
 
 
 def slope_of(residual_scale: float, absorbed: float, assumed: float) -> float:
-    """Slope told by one window of noise with a floor of 4 DN^2 and a slope of 0.5 DN, scaled."""
+    """Slope measured in one window of noise with a floor of 4 DN^2 and a slope of 0.5 DN, scaled."""
     rng = np.random.default_rng(3)
     signal = rng.uniform(20.0, 400.0, (1, 60, 60))
     variance = 4.0 + 0.5 * signal

@@ -12,7 +12,7 @@ from workbench.spots.psf import derivatives
 
 WIDTH, HALF, NOISE_SD = 4.0, 19, 1.0
 SHAPE = (2 * HALF + 1, 2 * HALF + 1)
-PAIRS, TOLD, STEPS = 1200, 400.0, 8
+PAIRS, INFORMATION, STEPS = 1200, 400.0, 8
 
 
 def linearised(params: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -35,7 +35,7 @@ def fitted(data: FloatArray, start: FloatArray) -> FloatArray:
 
 def test_the_second_order_of_the_deviation_is_that_of_simulated_fits() -> None:
     rng = np.random.default_rng(1)
-    flux = np.sqrt(TOLD * 4.0 * np.pi) * WIDTH * NOISE_SD
+    flux = np.sqrt(INFORMATION * 4.0 * np.pi) * WIDTH * NOISE_SD
     terms = []
     for _ in range(PAIRS // 100):
         true = np.zeros((100, 6))
@@ -48,7 +48,7 @@ def test_the_second_order_of_the_deviation_is_that_of_simulated_fits() -> None:
         for sign in (1.0, -1.0):
             params = fitted(signal + sign * noise, true)
             z = (params - true)[:, U:4] ** 2 / linearised(params)[2][:, [2, 3], [2, 3]]
-            terms.append(TOLD * (z - first))
+            terms.append(INFORMATION * (z - first))
     pairs = np.array(terms).reshape(-1, 2, 100, 2).mean(axis=1)
     sampling = 4.0 * pairs.std() / np.sqrt(pairs.size)
     assert sampling < 0.3 * _SECOND_ORDER

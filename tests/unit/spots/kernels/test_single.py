@@ -67,14 +67,14 @@ def test_a_window_is_accepted_by_numbers_that_numpy_finds_as_well() -> None:
         FLUX_DEVIATION: np.sqrt(fit.cov[:, FLUX, FLUX]),
     }
     for column, values in expected.items():
-        np.testing.assert_allclose(fit.judged[:, column], values, rtol=1e-9)
+        np.testing.assert_allclose(fit.statistics[:, column], values, rtol=1e-9)
     for column, parameter in ((U_DEVIATION, U), (V_DEVIATION, V)):
         deviation = np.sqrt(fit.cov[:, parameter, parameter]) / flux
         # The flux of the last step: its own deviation away at most.
-        np.testing.assert_allclose(fit.judged[:, column], deviation, rtol=1e-2)
+        np.testing.assert_allclose(fit.statistics[:, column], deviation, rtol=1e-2)
 
 
-def test_a_pixel_that_may_be_clipped_is_left_out_whatever_it_reads() -> None:
+def test_a_pixel_that_may_be_clipped_is_excluded_at_any_value() -> None:
     """Those expected within 2 sd of clipping, not those that read so."""
     params = ROUND.copy()
     params[:, FLUX] = 4e4
@@ -90,13 +90,13 @@ def test_a_pixel_that_may_be_clipped_is_left_out_whatever_it_reads() -> None:
     assert fit.params[0, [U, V]] == pytest.approx(params[0, [U, V]], abs=0.05)
 
 
-def test_a_tilted_ellipse_is_told_by_the_score_of_its_shear() -> None:
+def test_the_score_of_the_shear_detects_a_tilted_ellipse() -> None:
     upright = ROUND.copy()
     upright[:, FLUX] = 4e4
     tilted = np.append(upright, [[0.3]], axis=1)
     noise = PixelNoise(np.full(1, 4.0), np.ones(1))
     scores = [
-        fit_spots(drawn_windows(p, (15, 15)), upright, noise).judged[0, SHEAR_SCORE]
+        fit_spots(drawn_windows(p, (15, 15)), upright, noise).statistics[0, SHEAR_SCORE]
         for p in (upright, tilted)
     ]
     assert scores[0] < 5.0**2 < scores[1]

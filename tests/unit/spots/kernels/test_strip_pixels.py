@@ -58,9 +58,9 @@ def test_peaks_are_the_local_maxima_of_the_filtered_strip(seed: int) -> None:
             assert smooth[row, col] < heights[0]
 
 
-@pytest.mark.parametrize(("apart_px", "count"), [(2.0, 1), (4.0, 2), (30.0, 2)])
-def test_a_valley_parts_two_peaks(apart_px: float, count: int) -> None:
-    lights = [Drawn(20.0, 12.0, 5e3, 1.0, 1.0), Drawn(20.0 + apart_px, 12.0, 4e3, 1.0, 1.0)]
+@pytest.mark.parametrize(("separation_px", "count"), [(2.0, 1), (4.0, 2), (30.0, 2)])
+def test_a_valley_parts_two_peaks(separation_px: float, count: int) -> None:
+    lights = [Drawn(20.0, 12.0, 5e3, 1.0, 1.0), Drawn(20.0 + separation_px, 12.0, 4e3, 1.0, 1.0)]
     signal = sum((profile((25, 60), light) for light in lights), np.zeros((25, 60))).astype(np.float32)
     assert len(peaks_of(signal, TAPS, EVERYWHERE, 10.0, 1.0, 0, 0)) == count
 

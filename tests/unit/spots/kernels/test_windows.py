@@ -9,15 +9,15 @@ from tests.support.draw import Drawn, profile
 from workbench.spots.kernels.columns import FLUX, LN_SU, LN_SV, U, V
 from workbench.spots.kernels.windows import (
     HALVES_PX,
-    cut,
+    cut_windows,
     flag_codes,
-    guess,
     half_for,
     halves_for,
     is_clipped,
     is_near_edge,
-    mark_light,
+    mark_discs,
     mark_strip,
+    moment_guess,
 )
 
 
@@ -41,7 +41,7 @@ def test_cut_windows_are_those_of_numpy(seed: int) -> None:
     rows, cols, group = np.array([2.0, 20.0, 20.0]), np.array([37.0, 10.0, 16.0]), np.array([0, 1])
     data, clip = np.empty((2, 11, 11)), np.empty((2, 11, 11))
     usable = np.empty((2, 11, 11), bool)
-    cut(on, off, 0.7, 2.5, 240.0, rows, cols, group, data, usable, clip)
+    cut_windows(on, off, 0.7, 2.5, 240.0, rows, cols, group, data, usable, clip)
     for i in range(2):
         y, x = np.mgrid[-5:6, -5:6]
         row, col = (rows[i] + y).astype(int), (cols[i] + x).astype(int)
@@ -58,7 +58,7 @@ def test_a_window_without_a_clipped_pixel_cannot_clip() -> None:
     on = np.full((20, 20), 100, np.uint8)
     data, usable, clip = np.empty((1, 11, 11)), np.empty((1, 11, 11), bool), np.empty((1, 11, 11))
     at = np.array([10.0])
-    cut(on, on, 0.0, 0.0, 255.0, at, at, np.array([0]), data, usable, clip)
+    cut_windows(on, on, 0.0, 0.0, 255.0, at, at, np.array([0]), data, usable, clip)
     assert np.isinf(clip).all()
 
 
@@ -70,7 +70,7 @@ def test_the_first_guess_is_near_the_spot(width_px: float, tolerance: float, off
     usable = np.ones((1, 17, 17), bool)
     light[2, 2], usable[0, 2, 2] = 1e6, False
     start = np.empty((1, 6))
-    guess(light[None], usable, np.array([38.0]), np.array([58.0]), start)
+    moment_guess(light[None], usable, np.array([38.0]), np.array([58.0]), start)
     assert start[0, [U, V]] == pytest.approx([58.0 + offset_px, 38.0 - offset_px], abs=0.1)
     assert start[0, FLUX] == pytest.approx(1e4, rel=tolerance)
     assert np.exp(start[0, [LN_SU, LN_SV]]) == pytest.approx([width_px, width_px], rel=tolerance)
@@ -103,7 +103,7 @@ def test_a_clipped_pixel_within_two_widths_counts(row: int, col: int, seen: bool
 def test_marks_of_discs_are_those_of_numpy() -> None:
     lights = np.array([[103.2, 55.1, 4.3], [96.0, 48.0, 2.0], [125.0, 60.0, 7.5], [300.0, 0.0, 5.0]])
     marked = np.zeros((20, 30), bool)
-    mark_light(45, 95, lights, marked)
+    mark_discs(45, 95, lights, marked)
     v, u = np.mgrid[45:65, 95:125]
     expected = np.any([np.hypot(u - a, v - b) < r for a, b, r in lights], axis=0)
     np.testing.assert_array_equal(marked, expected)

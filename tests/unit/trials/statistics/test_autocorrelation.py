@@ -7,16 +7,9 @@ import pytest
 from statsmodels.tsa.stattools import acf
 
 from tests.support.statistics import spread
+from tests.support.trial_readings import autoregressive
 from workbench.model.arrays import FloatArray
 from workbench.trials.statistics.autocorrelation import Autocorrelation, autocorrelation, standard_error
-
-
-def chains(random: np.random.Generator, rho: float, shape: tuple[int, int]) -> FloatArray:
-    """Autoregressive series (series, readings) of unit variance."""
-    noise = random.normal(0, 1, shape)
-    for k in range(1, shape[1]):
-        noise[:, k] = rho * noise[:, k - 1] + np.sqrt(1 - rho**2) * noise[:, k]
-    return noise
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.3, 0.6])
@@ -25,18 +18,20 @@ def test_bias_of_the_estimate_falls_with_the_square_of_the_length(
     rho: float, series: int, length: int
 ) -> None:
     random = np.random.default_rng(6)
-    found = [autocorrelation(list(chains(random, rho, (series, length)))).estimated for _ in range(400)]
+    found = [
+        autocorrelation(list(autoregressive(random, rho, (series, length)))).estimated for _ in range(400)
+    ]
     assert np.mean(found) == pytest.approx(rho, abs=15 / length**2 + 4 * float(np.std(found)) / 20)
 
 
 def test_a_long_series_agrees_with_statsmodels() -> None:
-    (series,) = chains(np.random.default_rng(1), 0.5, (1, 4000))
+    (series,) = autoregressive(np.random.default_rng(1), 0.5, (1, 4000))
     assert autocorrelation([series]).estimated == pytest.approx(acf(series, nlags=1)[1], abs=2e-3)
 
 
 def test_independent_readings_are_rarely_widened() -> None:
     random, trials = np.random.default_rng(3), 2000
-    found = [autocorrelation(list(chains(random, 0.0, (4, 20)))).lag1 > 0 for _ in range(trials)]
+    found = [autocorrelation(list(autoregressive(random, 0.0, (4, 20)))).lag1 > 0 for _ in range(trials)]
     assert np.mean(found) < 0.05 + spread(0.05, trials)
 
 
@@ -54,7 +49,7 @@ def test_variance_factor_is_that_of_the_sum_of_correlations(rho: float) -> None:
 
 
 def test_widened_standard_error_is_that_of_simulated_means() -> None:
-    series = chains(np.random.default_rng(9), 0.5, (4000, 20))
+    series = autoregressive(np.random.default_rng(9), 0.5, (4000, 20))
     stated = [standard_error(one, Autocorrelation(lag1=0.5)) ** 2 for one in series]
     assert np.mean(stated) == pytest.approx(series.mean(axis=1).var(), rel=0.1)
 

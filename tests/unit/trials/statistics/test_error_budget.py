@@ -29,7 +29,7 @@ def test_a_source_alone_is_the_budget(name: str) -> None:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_alarm_rates(seed: int) -> None:
     """Eleven standoffs of 8 placements (77 degrees of freedom); the missing source equals the rest."""
-    random, trials = np.random.default_rng(seed), 2000
+    random, trials = np.random.default_rng(seed), 1000
     draws = 0.29 * random.chisquare(7, (trials, 11)) / 7
     complete, incomplete = (
         [budget_test([ErrorBudget(scale * one, 7, SOURCES) for one in row]).alarm for row in draws]

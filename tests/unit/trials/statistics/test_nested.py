@@ -41,7 +41,7 @@ def test_components_of_balanced_readings_agree_with_restricted_likelihood() -> N
 def test_total_variance_is_unbiased_for_unequal_numbers() -> None:
     random, totals = np.random.default_rng(3), []
     kept = np.random.default_rng(5).random(60) < 0.6
-    for _ in range(2000):
+    for _ in range(800):
         weights, squares, _ = nested_squares(
             drawn_readings(random, (3, 4, 5), (0.8, 0.5, 0.3))[kept]
         ).total_variance()

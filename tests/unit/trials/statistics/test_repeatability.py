@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.support.statistics import spread
-from tests.support.trial_readings import drawn_readings
+from tests.support.trial_readings import autoregressive, drawn_readings
 from workbench.model.arrays import FloatArray
 from workbench.trials.statistics.autocorrelation import Autocorrelation
 from workbench.trials.statistics.estimate import TooFewReadingsError
@@ -57,7 +57,7 @@ def test_analysis_of_variance_of_gum_h5() -> None:
 
 @pytest.mark.parametrize(("placement_sd", "session_sd"), [(0.0, 0.0), (0.5, 0.0), (2.0, 0.0), (0.5, 0.8)])
 def test_intervals_cover_93_to_97_percent(placement_sd: float, session_sd: float) -> None:
-    shape, trials = ((8, 4, 3) if session_sd else (1, 8, 3)), 1500
+    shape, trials = ((8, 4, 3) if session_sd else (1, 8, 3)), 1000
     random = np.random.default_rng(15)
     within = between = 0
     total = np.sqrt(0.3**2 + placement_sd**2 + session_sd**2)
@@ -73,11 +73,7 @@ def test_autocorrelated_repeats_are_corrected() -> None:
     random, rho, trials = np.random.default_rng(4), 0.6, 400
     within, between = [], []
     for _ in range(trials):
-        noise = np.empty((8, 20))
-        noise[:, 0] = random.normal(0, 1, 8)
-        for k in range(1, 20):
-            noise[:, k] = rho * noise[:, k - 1] + random.normal(0, np.sqrt(1 - rho**2), 8)
-        found = repeatability(frame(noise), Autocorrelation(lag1=rho))
+        found = repeatability(frame(autoregressive(random, rho, (8, 20))), Autocorrelation(lag1=rho))
         within.append(found.repeatability.value**2)
         between.append(found.repeatability.low <= 1 <= found.repeatability.high)
     assert np.mean(within) == pytest.approx(1, abs=4 * np.std(within) / np.sqrt(trials))
@@ -123,7 +119,7 @@ def test_grubbs_critical_values_of_iso_5725_2(critical: float, level: float) -> 
 
 
 def test_outlier_tests_alarm_at_their_level_without_outliers() -> None:
-    random, trials = np.random.default_rng(8), 1500
+    random, trials = np.random.default_rng(8), 800
     alarms = np.zeros(2)
     for _ in range(trials):
         readings = drawn_readings(random, (1, 8, 3), (0, 0.5, 0.3))

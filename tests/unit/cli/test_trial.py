@@ -1,0 +1,66 @@
+"""`workbench trial`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.support.command_line import Run, refused
+from tests.support.trial_readings import drawn_levels
+from workbench.cli.main import TrialKind
+from workbench.trials.any_sensor.analysis import KINDS, analyse
+from workbench.trials.any_sensor.readings_file import load_readings
+
+USED = ["true_mm", "measured_mm", "placement", "repeat", "session"]
+
+
+@pytest.fixture
+def readings(tmp_path: Path) -> Path:
+    path = tmp_path / "readings.csv"
+    drawn_levels(1, shape=(2, 4, 3), sds=(0.4, 0.3, 0.2))[USED].to_csv(path, index=False)
+    return path
+
+
+def test_the_command_knows_every_kind() -> None:
+    assert [kind.value for kind in TrialKind] == list(KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_json_has_the_rows_of_the_table(workbench: Run, readings: Path, kind: str) -> None:
+    outcome = workbench("trial", kind, readings, "--json")
+    result = json.loads(outcome.out)
+    assert outcome.code == 0
+    assert result["rows"] == analyse(kind, load_readings(readings)).table.records()
+    assert (result["kind"], result["readings"], result["missing"], result["clipped"]) == (kind, 72, 0, [])
+    assert result["autocorrelation"]["lag1"] == 0
+
+
+def test_the_table_goes_to_the_terminal(workbench: Run, readings: Path) -> None:
+    outcome = workbench("trial", "repeatability", readings)
+    assert (outcome.code, outcome.out) == (0, "")
+    assert all(word in outcome.err for word in ("s_r", "s_R", "1000"))
+
+
+def test_clipped_and_missing_readings_are_noted(workbench: Run, tmp_path: Path) -> None:
+    path = tmp_path / "clipped.csv"
+    frame = drawn_levels(1)
+    frame = frame.assign(measured_mm=frame["measured_mm"].clip(upper=999.5))
+    frame.loc[0, "measured_mm"] = None
+    frame[USED].to_csv(path, index=False)
+    outcome = workbench("trial", "accuracy", path, "--json")
+    (level,) = json.loads(outcome.out)["clipped"]
+    assert (level["standoff_mm"], level["limit_mm"]) == (1000, 999.5)
+    assert json.loads(outcome.out)["missing"] == 1
+    assert "999.5 mm" in outcome.err
+
+
+def test_wrong_values_end_with_2_row_and_column(workbench: Run, tmp_path: Path) -> None:
+    path = tmp_path / "wrong.csv"
+    path.write_text("true_mm,measured_mm\n500,501\n500,far\n")
+    refused(workbench("trial", "accuracy", path), 2, "wrong.csv", "row 3", "column measured_mm")
+
+
+def test_an_unknown_kind_ends_with_2(workbench: Run, readings: Path) -> None:
+    assert workbench("trial", "precision", readings).code == 2

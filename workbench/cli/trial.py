@@ -1,0 +1,60 @@
+"""`workbench trial`: statistics of readings of any range sensor."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+
+from workbench.model.table import Cell
+from workbench.report.terminal_table import TerminalTable
+from workbench.trials.any_sensor.analysis import Analysis, analyse
+from workbench.trials.any_sensor.readings_file import load_readings
+
+
+def analyse_readings(kind: str, path: Path, as_json: bool) -> None:
+    """Analyse a file of readings: JSON on standard output, table and notes on standard error.
+
+    Raises:
+        BadInputError: the file is wrong.
+    """
+    result = analyse(kind, load_readings(path))
+    if as_json:
+        print(json.dumps(_plain(result)))
+    console = Console(stderr=True, markup=False)
+    console.print(TerminalTable(result.table))
+    for note in _notes(result):
+        console.print(f"note: {note}", highlight=False)
+
+
+def _plain(result: Analysis) -> dict[str, object]:
+    """Analysis as plain numbers and texts; `rows` has the keys of the table's columns."""
+    rows: list[dict[str, Cell]] = result.table.records()
+    return {
+        "kind": result.kind,
+        "readings": result.readings,
+        "missing": result.missing,
+        "autocorrelation": asdict(result.autocorrelation),
+        "clipped": [asdict(level) for level in result.clipped],
+        "rows": rows,
+        "caption": result.table.caption,
+    }
+
+
+def _notes(result: Analysis) -> list[str]:
+    """Reservations about the table."""
+    notes = [
+        f"{level.clipped} of {level.readings} readings at {level.standoff_mm:g} mm are clipped at"
+        f" {level.limit_mm:g} mm, the end of the sensor's scale; this true range is left out"
+        for level in result.clipped
+    ]
+    if result.missing:
+        notes.append(f"{result.missing} of {result.readings + result.missing} readings have no range")
+    if result.autocorrelation.lag1 > 0:
+        notes.append(
+            f"successive readings are autocorrelated (lag 1: {result.autocorrelation.lag1:.2f}); intervals"
+            " of repeats are widened"
+        )
+    return notes

@@ -1,0 +1,1 @@
+"""Statistics of readings of any range sensor, from a CSV file."""

@@ -1,0 +1,100 @@
+"""Step `gauge_rr_trial`: every operator places the target at every standoff several times."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from workbench.model.fields import Count, Standoff, require_different
+from workbench.model.prompt import Prompt
+from workbench.model.rig import Rig
+from workbench.model.target import Placement
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.step import StepModel, flat_placement
+
+
+@dataclass(frozen=True)
+class Round:
+    """One operator's pass over all standoffs."""
+
+    operator: str
+    trial: int
+    """Number of the operator's trial, from 1."""
+    prompt: Prompt
+    placements: Sequence[Placement]
+
+
+@register
+class GaugeTrialStep(StepModel):
+    """Separate operators from repeatability: each places the target at every standoff several times."""
+
+    needs: ClassVar[str | None] = "calibration"
+    step: Literal["gauge_rr_trial"]
+    standoffs_mm: Annotated[tuple[Standoff, ...], Field(min_length=2)]
+    operators: Annotated[tuple[str, ...], Field(min_length=2, max_length=100)]
+    trials: Annotated[int, Field(ge=2, le=100)] = 3
+    """Placements of each standoff by each operator."""
+    readings: Count = 1
+    """Readings at one placement, of which the mean counts."""
+
+    @model_validator(mode="after")
+    def _parts_and_operators_differ(self) -> GaugeTrialStep:
+        require_different(self.standoffs_mm, "trials")
+        names = [name.strip() for name in self.operators]
+        if "" in names or len(set(names)) != len(names):
+            raise ValueError(f"operators: expected each name once, and none blank, got {', '.join(names)}")
+        return self
+
+    @property
+    def title(self) -> str:
+        """Design, and the components of variance that it separates."""
+        return (
+            f"Gauge R&R, {len(self.standoffs_mm)} standoffs x {len(self.operators)} operators x {self.trials}"
+            " placements: separates re-placements, operators and their interaction with standoffs"
+        )
+
+    def rounds(self, name: str) -> Iterator[Round]:
+        """Passes in order: every operator once, then every operator again."""
+        number = 0
+        for trial in range(1, self.trials + 1):
+            for operator in self.operators:
+                number += 1
+                placements = [flat_placement(name, standoff_mm, number) for standoff_mm in self.standoffs_mm]
+                yield Round(operator, trial, _round_prompt(name, number, operator, trial), placements)
+
+    def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
+        """Placements of all passes."""
+        return [placement for each in self.rounds(name) for placement in each.placements]
+
+    def captures(self, rig: Rig) -> int:
+        """One capture per reading; ambiguous readings take further captures of single lasers."""
+        return len(self.standoffs_mm) * len(self.operators) * self.trials * self.readings
+
+    def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
+        """Prompts of the placements and of the changes of operator."""
+        return [*super().prompts(name, rig), *(each.prompt for each in self.rounds(name))]
+
+    def run(self, context: Context, name: str) -> str:
+        """Take the readings of every pass and write their statistics.
+
+        Raises:
+            BadInputError: there is no calibration.
+            WorkbenchError: see `visit_placements`.
+        """
+        # Imported here: checking a file must not import the ranger.
+        from workbench.trials.gauge_rr.trial import run_trial
+
+        return run_trial(context, name, self)
+
+
+def _round_prompt(name: str, number: int, operator: str, trial: int) -> Prompt:
+    return Prompt(
+        key=f"{name}/operator-{number:02d}",
+        do=f"Operator {operator}, trial {trial}: place the target at the next standoffs yourself.",
+        expect="The operator does not see earlier readings.",
+        at_bench=True,
+    )

@@ -1,0 +1,113 @@
+"""Table and chart of a gauge R&R study, for readings of any origin."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+import pandas as pd
+
+from workbench.model.chart import Axis, Chart, Series
+from workbench.model.errors import BadInputError
+from workbench.model.table import Cell, Column, Table
+from workbench.trials.reading_frame import table_of
+from workbench.trials.statistics.gauge_rr import GaugeStudy, gauge_rr
+
+COLUMNS = (
+    Column(key="component", name="component"),
+    Column(key="sd_mm", name="sd", unit="mm", format="sd"),
+    Column(key="low_mm", name="low", unit="mm", format="sd"),
+    Column(key="high_mm", name="high", unit="mm", format="sd"),
+    Column(key="study_variation", name="study variation", unit="%", scale=100, format=".1f"),
+    Column(key="distinct_categories", name="ndc", format=".1f"),
+    Column(key="note", name="note"),
+)
+TITLE = "Gauge R&R (AIAG): part = standoff, trial = placement"
+
+
+def gauge_table(name: str, frame: pd.DataFrame) -> Table:
+    """Table of the components of variance, one row each.
+
+    A part is a requested standoff, an operator the column `session`, a trial a placement, with the mean of
+    its readings. A target beside its standoff counts by its error from the true range.
+
+    Args:
+        name: name of the table.
+        frame: readings, see `reading_frame.COLUMNS`; those without a range are left out.
+    """
+    used = frame.dropna(subset=["error_mm"])
+    keys = ["standoff_mm", "session", "placement"]
+    trials = used.groupby(keys, as_index=False)["error_mm"].mean()
+    trials = trials.assign(
+        part=trials["standoff_mm"],
+        operator=trials["session"].astype(str),
+        measured_mm=trials["standoff_mm"] + trials["error_mm"],
+    )
+    try:
+        study = gauge_rr(trials)
+    except BadInputError as error:
+        row: dict[str, Cell] = {"component": "GRR", "note": f"no statistics: {error}"}
+        return table_of(name, TITLE, COLUMNS, [row], "")
+    caption = (
+        f"{study.parts} standoffs, {study.operators} operators, {study.trials} trials of each;"
+        f" {len(used) / len(trials):.3g} readings a trial; low, high: 95 % interval; ndc: distinct categories"
+    )
+    return table_of(name, TITLE, COLUMNS, _rows(study), caption)
+
+
+def _rows(study: GaugeStudy) -> list[dict[str, Cell]]:
+    categories = study.distinct_categories
+    pooled = f"pooled with EV (p = {study.interaction_probability:.2g})"
+    rows: list[dict[str, Cell]] = [
+        {
+            "component": "EV (repeatability)",
+            "sd_mm": study.equipment.value,
+            "low_mm": study.equipment.low,
+            "high_mm": study.equipment.high,
+        },
+        {"component": "AV (operators)", "sd_mm": study.appraiser},
+        {
+            "component": "interaction",
+            "sd_mm": study.interaction,
+            "note": pooled if study.interaction is None else f"p = {study.interaction_probability:.2g}",
+        },
+        {
+            "component": "GRR",
+            "sd_mm": study.gauge.value,
+            "low_mm": study.gauge.low,
+            "high_mm": study.gauge.high,
+            "distinct_categories": categories if isfinite(categories) else None,
+        },
+        {"component": "PV (standoffs)", "sd_mm": study.part},
+        {"component": "TV", "sd_mm": study.total},
+    ]
+    for row in rows:
+        row.setdefault("note", "")
+        sd = row["sd_mm"]
+        if isinstance(sd, float) and study.total > 0:
+            row["study_variation"] = sd / study.total
+    return rows
+
+
+def gauge_chart(name: str, frame: pd.DataFrame) -> Chart:
+    """Chart of the errors over the standoff, one series for each operator.
+
+    Args:
+        name: name of the chart.
+        frame: readings, see `reading_frame.COLUMNS`.
+    """
+    used = frame.dropna(subset=["error_mm"])
+    return Chart(
+        name=name,
+        title="Errors by operator",
+        x=Axis(label="standoff", unit="mm", scale="log"),
+        y=Axis(label="error", unit="mm"),
+        series=tuple(
+            Series(
+                name=str(operator),
+                x=tuple(readings["standoff_mm"].to_numpy(np.float64).tolist()),
+                y=tuple(readings["error_mm"].to_numpy(np.float64).tolist()),
+            )
+            for operator, readings in used.groupby("session", sort=False)
+        ),
+    )

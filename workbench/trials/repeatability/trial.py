@@ -1,0 +1,51 @@
+"""Execution of the repeatability trial: readings, their file, tables and charts."""
+
+from __future__ import annotations
+
+from workbench.model.event import ReadingTaken
+from workbench.model.reading_chart import error_chart
+from workbench.model.target import Placement
+from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.placements import visit_placements
+from workbench.trials.dither import dither
+from workbench.trials.reading_frame import reading_frame, reading_rows
+from workbench.trials.readings import session_ranger, take_reading
+from workbench.trials.repeatability.budget import budget_table
+from workbench.trials.repeatability.step import RepeatabilityTrialStep
+from workbench.trials.repeatability.table import precision_chart, precision_table
+from workbench.trials.results import finish_trial, write_readings
+
+
+def run_trial(context: Context, name: str, step: RepeatabilityTrialStep) -> str:
+    """Take the repeats at each placement; returns the outcome in one line.
+
+    Raises:
+        BadInputError: there is no calibration.
+        WorkbenchError: see `visit_placements`.
+    """
+    ranger = session_ranger(context, name)
+    placements = step.placements(name, context.rig)
+    standoffs_mm = {placement.key: placement.standoff_mm for placement in placements}
+
+    def work(placement: Placement) -> tuple[str, list[ReadingTaken]]:
+        readings = []
+        for number in range(step.repeats):
+            dither(context, placement, number, step.dither_mm)
+            readings.append(take_reading(context, ranger, name, placement, number))
+        return placement.key, readings
+
+    rows: list[dict[str, object]] = []
+    taken: list[ReadingTaken] = []
+    visited: dict[float, int] = {}
+    for key, readings in visit_placements(context, placements, work):
+        standoff_mm = standoffs_mm[key]
+        visited[standoff_mm] = visited.get(standoff_mm, 0) + 1
+        rows += reading_rows(readings, standoff_mm, visited[standoff_mm])
+        taken += readings
+    frame = reading_frame(rows)
+    write_readings(context, name, frame)
+    table = precision_table(f"{name}-table", frame)
+    budget = budget_table(f"{name}-budget", frame)
+    charts = [error_chart(f"{name}-errors", taken), precision_chart(f"{name}-precision", table)]
+    finish_trial(context, name, [table, budget], charts)
+    return f"{frame['measured_mm'].count()} readings in {name}.csv, statistics in {name}-table.csv"
