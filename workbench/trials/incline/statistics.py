@@ -27,6 +27,8 @@ class InclineRow:
     """deg"""
     angle_sd_deg: float | None
     """Stated standard uncertainty of an angle (root mean square); None without an angle."""
+    reference_sd_deg: float
+    """Reference uncertainty of the set angle, with the tilt common to all placements."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +51,16 @@ def incline_row(target: InclineSpec, asked_mm: float, readings: Sequence[Reading
         asked_mm,
         readings[0].reference_mm,
         range_statistics(readings),
-        error_statistics(errors, stated, target.reference_sd_deg),
+        error_statistics(errors, stated, _reference_sd_deg(target, readings[0])),
         sqrt(fmean(sd**2 for sd in stated)) if stated else None,
+        _reference_sd_deg(target, readings[0]),
     )
+
+
+def _reference_sd_deg(target: InclineSpec, reading: ReadingTaken) -> float:
+    """Reference uncertainty of a set angle, with the tilt common to all placements."""
+    stated = None if reading.true is None else reading.true.angle_sd_deg
+    return target.reference_sd_deg if stated is None else stated
 
 
 def angle_differences(rows: Sequence[InclineRow]) -> list[AngleDifference]:

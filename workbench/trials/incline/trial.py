@@ -97,9 +97,7 @@ def angle_chart(name: str, taken: Sequence[tuple[InclineRow, Sequence[ReadingTak
     for row, readings in taken:
         of = points.setdefault(f"{row.target.angle_deg:g} deg {row.target.axis}", [])
         of += [
-            ErrorPoint(
-                row.true_mm, r.angle_deg - row.target.angle_deg, r.angle_sd_deg, row.target.reference_sd_deg
-            )
+            ErrorPoint(row.true_mm, r.angle_deg - row.target.angle_deg, r.angle_sd_deg, row.reference_sd_deg)
             for r in readings
             if r.angle_deg is not None
         ]
