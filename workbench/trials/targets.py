@@ -110,7 +110,8 @@ def target_placement(spec: TargetSpec, key: str, range_mm: float, rig: Rig) -> P
 def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, rig: Rig) -> TrueValues:
     """True values at a placement as measured; the front is that of the calibration.
 
-    The closest range of a flat target has the uncertainty of its squareness too: its near end is closer.
+    The closest range of a flat target has the uncertainty of its squareness too: its near end is closer. The
+    angle of an incline from the optical axis has the uncertainty of the bench's common tilt too.
     """
     bench, stated = rig.bench, placed.standoff_sd_mm
     standoff_sd_mm = bench.placement_sd_mm if stated is None else stated
@@ -130,12 +131,13 @@ def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, r
         )
     lead_mm = _incline_lead_mm(spec, front)
     arm_mm = lead_mm / tan(radians(abs(spec.angle_deg)))
-    lead_sd_mm = arm_mm / cos(radians(spec.angle_deg)) ** 2 * radians(spec.reference_sd_deg)
+    angle_sd_deg = hypot(spec.reference_sd_deg, bench.target_tilt_sd_deg)
+    lead_sd_mm = arm_mm / cos(radians(spec.angle_deg)) ** 2 * radians(angle_sd_deg)
     return TrueValues(
         range_mm=placed.standoff_mm - lead_mm,
         range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm),
         angle_deg=spec.angle_deg,
-        angle_sd_deg=spec.reference_sd_deg,
+        angle_sd_deg=angle_sd_deg,
     )
 
 

@@ -37,7 +37,8 @@ class AngleDifference:
     angles_deg: tuple[float, float]
     error_deg: float
     expanded_deg: float
-    """Expanded uncertainty U (k = 2), with the sensor's errors at both angles taken as independent."""
+    """Expanded uncertainty U (k = 2), with the sensor's errors at both angles taken as independent: too
+    large where the calibration turns both alike, too small where it turns them against each other."""
 
 
 def incline_row(target: InclineSpec, asked_mm: float, readings: Sequence[ReadingTaken]) -> InclineRow:
@@ -49,9 +50,14 @@ def incline_row(target: InclineSpec, asked_mm: float, readings: Sequence[Reading
         asked_mm,
         readings[0].reference_mm,
         range_statistics(readings),
-        error_statistics(errors, stated, target.reference_sd_deg),
+        error_statistics(errors, stated, reference_sd_deg(readings[0])),
         sqrt(fmean(sd**2 for sd in stated)) if stated else None,
     )
+
+
+def reference_sd_deg(reading: ReadingTaken) -> float:
+    """Standard uncertainty of the true angle of a reading, deg; 0 if it is unknown."""
+    return 0.0 if reading.true is None else reading.true.angle_sd_deg or 0.0
 
 
 def angle_differences(rows: Sequence[InclineRow]) -> list[AngleDifference]:

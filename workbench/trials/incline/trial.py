@@ -19,7 +19,13 @@ from workbench.trials.errors import (
     quantity_chart,
 )
 from workbench.trials.incline.set_up import SetUp
-from workbench.trials.incline.statistics import AngleDifference, InclineRow, angle_differences, incline_row
+from workbench.trials.incline.statistics import (
+    AngleDifference,
+    InclineRow,
+    angle_differences,
+    incline_row,
+    reference_sd_deg,
+)
 from workbench.trials.readings import ClosestRange, session_ranger, take_readings
 from workbench.trials.results import finish_trial
 
@@ -86,7 +92,7 @@ def difference_table(name: str, differences: Sequence[AngleDifference]) -> Table
             Column(key="expanded_deg", name="U", unit="deg", format=".2f"),
         ),
         rows=tuple((d.asked_mm, *d.angles_deg, d.error_deg, d.expanded_deg) for d in differences),
-        caption="a tilt common to both angles cancels; U (k = 2) is an upper bound",
+        caption="a tilt common to both angles cancels; U (k = 2): errors of both taken as independent",
     )
 
 
@@ -96,9 +102,7 @@ def angle_chart(name: str, taken: Sequence[tuple[InclineRow, Sequence[ReadingTak
     for row, readings in taken:
         of = points.setdefault(f"{row.target.angle_deg:g} deg {row.target.axis}", [])
         of += [
-            ErrorPoint(
-                row.true_mm, r.angle_deg - row.target.angle_deg, r.angle_sd_deg, row.target.reference_sd_deg
-            )
+            ErrorPoint(row.true_mm, r.angle_deg - row.target.angle_deg, r.angle_sd_deg, reference_sd_deg(r))
             for r in readings
             if r.angle_deg is not None
         ]
