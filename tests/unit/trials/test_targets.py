@@ -41,6 +41,18 @@ def test_the_near_end_of_an_incline_is_at_the_range_asked_for(angle_deg: float) 
     assert true.range_sd_mm == pytest.approx(hypot(0.4, lead_sd_mm))
 
 
+def test_the_angle_of_an_incline_has_the_uncertainty_of_the_common_tilt() -> None:
+    bench = RIG.bench.model_copy(update={"target_tilt_sd_deg": 0.5})
+    rig = RIG.model_copy(update={"bench": bench})
+    spec = InclineSpec(kind="incline", angle_deg=30.0, reference_sd_deg=0.2, reference_sd_mm=0.0)
+    true = true_values(spec, target_placement(spec, "k", 300.0, rig), SENSOR, rig)
+    angle_deg = 30.0 + hypot(0.2, 0.5) * np.random.default_rng(6).standard_normal(20_000)
+    # The relative standard deviation of a variance of 20 000 trials is 1 %.
+    assert true.angle_sd_deg is not None
+    assert true.angle_sd_deg**2 == pytest.approx(angle_deg.var(), rel=0.05)
+    assert true.range_sd_mm**2 == pytest.approx((60.0 * np.tan(np.radians(angle_deg))).var(), rel=0.05)
+
+
 def test_an_incline_about_the_horizontal_axis_needs_lasers_above_each_other() -> None:
     spec = InclineSpec(kind="incline", angle_deg=30.0, axis="horizontal")
     assert front_axis(spec) == "v"

@@ -43,7 +43,8 @@ class PlacementScatter(NamedTuple):
     scale: float
     """Factor on the stated deviations; 1 where the errors agree with them."""
     p_value: float
-    """Chance of errors as large, of all but the outliers; 1 where the data show none."""
+    """Chance of errors as large, of all but the outliers; 1 where the data show none, or fewer than FEWEST
+    placements are left."""
     outliers: tuple[int, ...]
     """Indices, among the J placements, of those at a wrong standoff."""
 
@@ -73,7 +74,9 @@ def placement_scatter(errors: FloatArray, covariance: FloatArray) -> PlacementSc
         outliers.append(best)
         variance[best] = OUTLIER_SD**2
         p = _p_value(seen, variance)
-    if p < SCALED_P and len(errors) - len(outliers) >= FEWEST:
+    if len(errors) - len(outliers) < FEWEST:
+        return PlacementScatter(1.0, 1.0, tuple(outliers))
+    if p < SCALED_P:
         return PlacementScatter(float(np.sqrt(_variance(seen, variance))), p, tuple(outliers))
     return PlacementScatter(1.0, p, tuple(outliers))
 

@@ -17,7 +17,7 @@ from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.selection.drift import drift_test, fits_drift
 from workbench.calibration.verdict.observability import NullDirection, direction_lines
 from workbench.model.acceptance import Acceptance
-from workbench.model.arrays import FloatArray
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.calibration import DeterminedBy
 from workbench.model.fit_event import CrossValidatedPlacement, Fault, ResidualTest
 from workbench.model.stats import chi2_sf, norm_cdf
@@ -211,8 +211,13 @@ def _contradictions(fit: CalibrationFit) -> list[str]:
     """Priors that the data contradict: a wrong rig file, or a mistyped standoff."""
     return [
         f"{_prior_text(fit, n)}. Do: check this prior, and the standoffs"
-        for n in np.flatnonzero(np.abs(fit.prior_pull) > CONTRADICTION_SD).tolist()
+        for n in np.flatnonzero((np.abs(fit.prior_pull) > CONTRADICTION_SD) & ~_is_drift(fit)).tolist()
     ]
+
+
+def _is_drift(fit: CalibrationFit) -> BoolArray:
+    """(P,) whether each parameter is the drift of the image: it has a limit, its prior is no measurement."""
+    return np.isin(np.arange(len(fit.values)), np.arange(len(fit.values))[fit.layout.drift])
 
 
 def prior_doubts(fit: CalibrationFit) -> list[str]:
@@ -221,7 +226,7 @@ def prior_doubts(fit: CalibrationFit) -> list[str]:
     If priors and data are as stated, the posterior mean y of parameters in units of their priors has the
     covariance 1 - C, C being their posterior covariance.
     """
-    free = np.flatnonzero(fit.table.is_sensor & (fit.table.prior_sd > 0))
+    free = np.flatnonzero(fit.table.is_sensor & (fit.table.prior_sd > 0) & ~_is_drift(fit))
     sd = fit.table.prior_sd[free]
     y, narrowed = (
         fit.prior_pull[free],

@@ -27,7 +27,7 @@ Millimetres = Annotated[float, Field(ge=-LARGEST_MM, le=LARGEST_MM)]
 class ReadingRow(FileModel):
     """One reading. Columns that the statistics do not use are not read."""
 
-    true_mm: Millimetres
+    true_mm: Annotated[Millimetres, Field(ge=0)]
     measured_mm: Millimetres = nan
     """NaN: the sensor gave no range."""
     placement: str = "1"

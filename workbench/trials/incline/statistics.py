@@ -39,7 +39,8 @@ class AngleDifference:
     angles_deg: tuple[float, float]
     error_deg: float
     expanded_deg: float
-    """Expanded uncertainty U (k = 2), with the sensor's errors at both angles taken as independent."""
+    """Expanded uncertainty U (k = 2), with the sensor's errors at both angles taken as independent. It is too
+    large where the calibration turns both alike, too small where it turns them against each other."""
 
 
 def incline_row(target: InclineSpec, asked_mm: float, readings: Sequence[ReadingTaken]) -> InclineRow:

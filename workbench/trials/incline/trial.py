@@ -87,7 +87,7 @@ def difference_table(name: str, differences: Sequence[AngleDifference]) -> Table
             Column(key="expanded_deg", name="U", unit="deg", format=".2f"),
         ),
         rows=tuple((d.asked_mm, *d.angles_deg, d.error_deg, d.expanded_deg) for d in differences),
-        caption="a tilt common to both angles cancels; U (k = 2) is an upper bound",
+        caption="a tilt common to both angles cancels; U (k = 2): errors of both taken as independent",
     )
 
 

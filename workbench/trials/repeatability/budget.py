@@ -34,8 +34,9 @@ COLUMNS = (
     Column(key="note", name="note"),
 )
 CAPTION = (
-    "observed: s_R; explained: spots with speckle, and placement; alarm: variance left unexplained (low > 0);"
-    " coverage of the stated 95 % intervals; low, high: 95 % intervals"
+    "observed: as s_R, without truncation of negative components; explained: spots with speckle, and"
+    " placement; alarm: variance left unexplained (low > 0); coverage of the stated 95 % intervals; low,"
+    " high: 95 % intervals"
 )
 
 
@@ -71,7 +72,7 @@ def _budget(used: pd.DataFrame, repeats: Autocorrelation) -> ErrorBudget:
     Raises:
         TooFewReadingsError: the readings have no precision, or an uncertainty is unknown.
     """
-    found = repeatability(used, repeats).reproducibility
+    found = repeatability(used, repeats)
     stated = used[["spot_u_mm", "reference_u_mm"]]
     if stated.isna().to_numpy().any():
         raise TooFewReadingsError("expected the uncertainties of spots and placements, got unknown ones")
@@ -79,7 +80,7 @@ def _budget(used: pd.DataFrame, repeats: Autocorrelation) -> ErrorBudget:
     sources = {str(source): float(np.sqrt(square)) for source, square in mean_squares.items()}
     if not sum(sources.values()) > 0:
         raise TooFewReadingsError("expected stated uncertainties above 0 mm")
-    return ErrorBudget(found.value**2, found.degrees_of_freedom, sources)
+    return ErrorBudget(found.unbiased_variance, found.reproducibility.degrees_of_freedom, sources)
 
 
 def _budget_cells(budget: ErrorBudget) -> dict[str, Cell]:

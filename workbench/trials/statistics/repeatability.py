@@ -47,6 +47,9 @@ class Repeatability:
     """Of the sessions' own errors; None with one session."""
     reproducibility: Estimate
     """s_R, of readings at new placements (and in new sessions, if there are several)."""
+    unbiased_variance: float
+    """Square of s_R without the truncation of negative components at 0, in the squared unit of the readings;
+    its expectation is the true variance, which that of s_R^2 exceeds."""
     readings: int
     placements: int
     sessions: int
@@ -84,13 +87,13 @@ def repeatability(readings: pd.DataFrame, dependence: Autocorrelation = INDEPEND
     within = squares.within * (size - 1) / (size - factor) if size > factor else squares.within
     placement_variance = max(0.0, (squares.placement - factor * within) / size)
     session_variance = _session_variance(squares, factor * within)
+    total = _total(squares, dependence)
     return Repeatability(
         repeatability=sd_estimate(within, max(1.0, squares.within_dof * dependence.dof_factor)),
         between_placements=float(np.sqrt(placement_variance)),
         between_sessions=None if session_variance is None else float(np.sqrt(session_variance)),
-        reproducibility=_reproducibility(
-            squares, within + placement_variance + (session_variance or 0.0), dependence
-        ),
+        reproducibility=_reproducibility(total, within + placement_variance + (session_variance or 0.0)),
+        unbiased_variance=total.value**2,
         readings=squares.readings,
         placements=squares.placements,
         sessions=squares.sessions,
@@ -106,13 +109,17 @@ def _session_variance(squares: NestedSquares, mean_variance: float) -> float | N
     return max(0.0, (squares.session - expected) / squares.session_size)
 
 
-def _reproducibility(squares: NestedSquares, variance: float, dependence: Autocorrelation) -> Estimate:
-    """s_R with the interval of the sum of mean squares that estimates its variance without truncation."""
+def _total(squares: NestedSquares, dependence: Autocorrelation) -> Estimate:
+    """Standard deviation of readings at new placements by the sum of mean squares, without truncation."""
     weights, values, dofs = squares.total_variance()
     dofs[-1] = max(1.0, dofs[-1] * dependence.dof_factor)
-    interval = combined_sd(weights, values, dofs)
+    return combined_sd(weights, values, dofs)
+
+
+def _reproducibility(total: Estimate, variance: float) -> Estimate:
+    """s_R of the truncated components, with the interval of their sum without truncation."""
     value = float(np.sqrt(variance))
-    return Estimate(value, min(value, interval.low), max(value, interval.high), interval.degrees_of_freedom)
+    return Estimate(value, min(value, total.low), max(value, total.high), total.degrees_of_freedom)
 
 
 def cochran(readings: pd.DataFrame) -> OutlierTest:

@@ -28,6 +28,7 @@ from workbench.trials.thesis_hardware.quantities import (
     is_mean,
     is_round,
     is_without,
+    place,
 )
 
 Measure = Literal["error", "sd"]
@@ -149,17 +150,13 @@ def _row(claim: Claim, readings: Sequence[ReadingTaken]) -> Row:
 
 def _missing_row(left_off: int, readings: Sequence[ReadingTaken]) -> Row:
     """Mean error with lasers left off relative to that of all lasers, over the placements with both."""
-    without = {_place(g): g for g in by_placement(readings, is_without(left_off), inf)}
-    full = {_place(g): g for g in by_placement(readings, is_without(0), inf)}
-    both = [place for place in without if place in full]
-    errors = [[_relative(group) for group in (without[place], full[place])] for place in both]
+    without = {place(g[0]): g for g in by_placement(readings, is_without(left_off), inf)}
+    full = {place(g[0]): g for g in by_placement(readings, is_without(0), inf)}
+    both = [key for key in without if key in full]
+    errors = [[_relative(group) for group in (without[key], full[key])] for key in both]
     pairs = [(own, whole) for own, whole in errors if own is not None and whole is not None]
     ours = fmean(own for own, _ in pairs) / fmean(whole for _, whole in pairs) if pairs else None
     return Row("", f"{left_off} off", "error / that of all", "", None, None, ours, RATIO_GOAL)
-
-
-def _place(group: Sequence[ReadingTaken]) -> tuple[str, float]:
-    return group[0].trial, group[0].reference_mm
 
 
 def _relative(group: Sequence[ReadingTaken]) -> float | None:

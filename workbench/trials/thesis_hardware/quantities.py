@@ -104,13 +104,18 @@ def is_round(reading: ReadingTaken) -> bool:
 
 
 def by_placement(readings: Sequence[ReadingTaken], select: Select, to_mm: float) -> list[list[ReadingTaken]]:
-    """Selected readings with a true range up to `to_mm`, grouped by trial and true range, nearest first."""
-    groups: dict[tuple[float, str, float | None], list[ReadingTaken]] = {}
+    """Selected readings with a true range up to `to_mm`, grouped by placement, nearest first."""
+    groups: dict[tuple[float, str], list[ReadingTaken]] = {}
     for reading in readings:
         if select(reading) and reading.reference_mm <= to_mm + 0.5:
-            key = (reading.reference_mm, reading.trial, _true_angle(reading))
-            groups.setdefault(key, []).append(reading)
-    return [groups[key] for key in sorted(groups, key=lambda key: (key[0], key[1], key[2] or 0.0))]
+            groups.setdefault(place(reading), []).append(reading)
+    return [groups[key] for key in sorted(groups)]
+
+
+def place(reading: ReadingTaken) -> tuple[float, str]:
+    """True range, mm, and key of the placement of a reading, which its scene begins with."""
+    parts_after = 2 if reading.left_off else 1
+    return reading.reference_mm, reading.scene.rsplit("/", parts_after)[0]
 
 
 def _is_square(reading: ReadingTaken) -> bool:

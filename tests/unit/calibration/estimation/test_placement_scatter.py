@@ -58,5 +58,11 @@ def test_data_that_say_nothing_of_the_placements_leave_the_scale() -> None:
     assert (nothing.scale, nothing.p_value, nothing.outliers) == (1.0, 1.0, ())
 
 
+def test_two_placements_beside_an_outlier_have_no_scatter() -> None:
+    """The two of 2.2 deviations alone would have a p value of 0.008."""
+    found = placement_scatter(np.array([2.2, 60.0, -2.2]), np.eye(3) * 1e-3)
+    assert found == PlacementScatter(1.0, 1.0, (1,))
+
+
 def test_two_placements_have_no_scatter() -> None:
     assert placement_scatter(np.array([9.0, -9.0]), np.eye(2) * 0.1).scale == 1.0

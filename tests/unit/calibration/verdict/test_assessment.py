@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from tests.support.message_text import laser_ids, numbers
-from tests.support.rigs import World, prior, thesis_rig
+from tests.support.rigs import STANDOFFS_MM, World, prior, thesis_rig
 from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.calibration.selection.drift import with_drift
 from workbench.calibration.verdict.assessment import (
     CONTRADICTION_SD,
     Assessment,
@@ -20,6 +21,7 @@ from workbench.calibration.verdict.assessment import (
     prior_doubts,
 )
 from workbench.model.acceptance import Acceptance
+from workbench.procedure.engine.visiting_order import shuffled
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +127,20 @@ def test_a_prior_that_the_data_contradict_is_named(seed: int) -> None:
     (line,) = prior_doubts(fit(rig, world.observations()))
     assert line.startswith("offset_mm = ")
     assert numbers(line)[1] == pytest.approx(22.0 / 5.0, abs=0.2)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_fitted_drift_is_judged_by_its_limit_not_by_its_prior(seed: int) -> None:
+    """A drift of 2.8 px, more than 5 deviations of the prior that the fit gives it."""
+    rig = thesis_rig()
+    order = shuffled(STANDOFFS_MM)
+    sound = sorted(World(rig, seed).observations(), key=lambda s: order.index(s.standoff_mm))
+    time = np.linspace(-0.5, 0.5, len(sound))
+    drifted = [replace(s, u_px=s.u_px + 2.8 * t) for s, t in zip(sound, time, strict=True)]
+    found = fit(with_drift(rig), drifted)
+    assert found.drift_px[0] == pytest.approx(2.8, abs=0.5)
+    assert prior_doubts(found) == []
+    assert len(judged(found).reasons) == 1
 
 
 def test_placements_that_scatter_more_than_stated_are_a_warning_and_a_limit() -> None:

@@ -48,6 +48,7 @@ def test_readings_of_a_trial_are_such_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        ("true_mm,measured_mm\n-5,3\n", ["row 2", "true_mm", "-5"]),
         ("", ["empty"]),
         ("true_mm,range\n1,2\n", ["row 1", "measured_mm"]),
         ("true_mm,measured_mm,placment\n1,2,3\n", ["row 1", "placment", "placement"]),

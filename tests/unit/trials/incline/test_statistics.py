@@ -33,6 +33,19 @@ def test_a_reading_whose_shape_is_no_incline_has_no_angle() -> None:
     assert row.range.mean == pytest.approx(0.5)
 
 
+def test_the_reference_of_an_angle_is_that_of_its_reading_and_of_a_difference_that_of_the_set_angles() -> (
+    None
+):
+    tilted = [
+        one.model_copy(update={"true": one.true and one.true.model_copy(update={"angle_sd_deg": 0.5})})
+        for one in angles(30.0, 30.4)
+    ]
+    row = incline_row(spec(30.0), 400.0, tilted)
+    assert row.angle.expanded == pytest.approx(2 * np.hypot(0.2, 0.5))
+    (difference,) = angle_differences([row, incline_row(spec(60.0), 400.0, angles(60.0, 60.0))])
+    assert difference.expanded_deg == pytest.approx(2 * np.sqrt(2 * 0.2**2 + 2 * 0.1**2))
+
+
 def test_a_tilt_common_to_two_angles_cancels_in_their_difference() -> None:
     rows = [incline_row(spec(deg), 400.0, angles(deg, deg + 0.7)) for deg in (30.0, 60.0, -10.0)]
     found = angle_differences(rows)

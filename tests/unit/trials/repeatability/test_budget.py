@@ -40,6 +40,14 @@ def test_alarms_are_rare_with_complete_and_frequent_with_missing_sources() -> No
     assert incomplete / trials > 0.8
 
 
+def test_a_negative_component_is_not_truncated() -> None:
+    """Equal means of 8 placements with 3 repeats: 2/3 of the variance within them."""
+    frame = drawn_levels(1, [300.0])
+    frame = frame.assign(error_mm=0.3 * (frame["repeat"] - 1))
+    (row,) = budget_table("t", stated(frame)).records()
+    assert row["observed_sd_mm"] == pytest.approx(0.3 * (2 / 3) ** 0.5)
+
+
 def test_intervals_that_hold_cover_all_placements() -> None:
     row = budget_table("t", stated(drawn_levels(1, [300.0]))).records()[0]
     wide = budget_table("t", stated(drawn_levels(1, [300.0]), 5.0, 5.0)).records()[0]

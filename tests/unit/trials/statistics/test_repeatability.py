@@ -69,6 +69,16 @@ def test_intervals_cover_93_to_97_percent(placement_sd: float, session_sd: float
     assert 0.93 - spread(0.93, trials) / 2 < between / trials < 0.97 + spread(0.97, trials) / 2
 
 
+@pytest.mark.parametrize(("placement_sd", "session_sd"), [(0.0, 0.0), (0.5, 0.0), (0.5, 0.8)])
+def test_variance_without_truncation_is_unbiased(placement_sd: float, session_sd: float) -> None:
+    shape, random = ((4, 4, 3) if session_sd else (1, 8, 3)), np.random.default_rng(16)
+    draws = [drawn_readings(random, shape, (session_sd, placement_sd, 0.3)) for _ in range(300)]
+    found = np.array([repeatability(one).unbiased_variance for one in draws])
+    standard_error = found.std(ddof=1) / np.sqrt(len(found))
+    total = 0.3**2 + placement_sd**2 + session_sd**2
+    assert found.mean() == pytest.approx(total, abs=4 * standard_error)
+
+
 def test_autocorrelated_repeats_are_corrected() -> None:
     random, rho, trials = np.random.default_rng(4), 0.6, 400
     within, between = [], []

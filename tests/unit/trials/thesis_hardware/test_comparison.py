@@ -11,7 +11,9 @@ from workbench.trials.thesis_hardware.comparison import CLAIMS, Row, compare
 
 def flats(true_mm: float, *errors_mm: float, left_off: tuple[str, ...] = ()) -> list[ReadingTaken]:
     true = TrueValues(range_mm=true_mm, range_sd_mm=0.3)
-    return [reading(true, range_mm=true_mm + e, left_off=left_off) for e in errors_mm]
+    without = f"without-{'-'.join(left_off)}/" if left_off else ""
+    scene = f"t.1/{true_mm:g}mm/{without}00"
+    return [reading(true, scene=scene, range_mm=true_mm + e, left_off=left_off) for e in errors_mm]
 
 
 def row(rows: list[Row], target: str, quantity: str, to_mm: float | None = None) -> Row:

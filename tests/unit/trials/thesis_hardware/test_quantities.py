@@ -49,14 +49,32 @@ def test_errors_are_measured_minus_true() -> None:
     assert RADIUS.statistics([READINGS["round"]]).expanded == pytest.approx(2 * (0.5**2 + 0.1**2) ** 0.5)
 
 
-def test_readings_are_grouped_by_trial_and_range_nearest_first() -> None:
+def test_readings_are_grouped_by_placement_nearest_first() -> None:
     far = FLAT.model_copy(update={"range_mm": 900.0})
     readings = [
         reading(far, range_mm=901.0),
         reading(FLAT, range_mm=401.0),
         reading(FLAT, range_mm=402.0),
-        reading(FLAT, range_mm=403.0, trial="t.2"),
+        reading(FLAT, range_mm=403.0, trial="t.2", scene="t.2/400mm/00"),
     ]
     groups = by_placement(readings, is_without(0), 1000.0)
     assert [[one.range_mm for one in group] for group in groups] == [[401.0, 402.0], [403.0], [901.0]]
     assert len(by_placement(readings, is_without(0), 400.0)) == 2
+
+
+def test_equal_ranges_at_other_placements_are_other_groups() -> None:
+    """Angles of either sign, re-placements of one step, and lasers left off in turn at one placement."""
+    turned = [
+        reading(
+            INCLINE.model_copy(update={"angle_deg": deg}), range_mm=403.0, scene=f"t.1/v{deg:g}deg-400mm/00"
+        )
+        for deg in (-30.0, 30.0)
+    ]
+    assert len(by_placement(turned, is_incline(30), 1000.0)) == 2
+    again = [reading(None, range_mm=501.0, scene=f"t.1/{number:02d}-500mm/00") for number in (1, 2)]
+    assert len(by_placement(again, is_mean, 1000.0)) == 2
+    off = [
+        reading(FLAT, range_mm=401.0, scene=f"t.1/400mm/without-{laser}/00", left_off=(laser,))
+        for laser in ("L1", "L2")
+    ]
+    assert len(by_placement(off, is_without(1), 1000.0)) == 1
