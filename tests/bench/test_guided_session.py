@@ -309,7 +309,7 @@ def test_a_limit_that_stops_says_so_as_well(tmp_path: Path) -> None:
     only = UNSEEN[: UNSEEN.index("      missing")] + "      snr: {in: [8, null]}\n"
     with pytest.raises(
         LimitFailedError,
-        match=r"p.1/125mm/L4: snr: .* no spot of L4 was found in 2 captures\. .* outside the picture",
+        match=r"p.1/125mm/L4: snr: .* no spot of L4 was found in 2 captures\. .* outside the image",
     ):
         session(tmp_path, only, Says())
 

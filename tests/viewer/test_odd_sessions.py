@@ -176,7 +176,7 @@ def test_refused_fit_of_one_axis_and_readings_without_range(tmp_path: Path) -> N
     log = dict(enumerate(contents.values("/steps/log", "TextLog:level")))
     assert [level for _, (level,) in log.values()] == ["INFO", "ERROR", "WARN", "INFO", "ERROR"]
     text = contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
-    assert "4500 mm, reading 1: no_points" in text
+    assert "4500 mm, reading 1: no spot was seen" in text
     assert "4500  0" in text
     assert text.rstrip().count("2.00") == 1
 

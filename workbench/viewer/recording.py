@@ -246,9 +246,6 @@ class _OpenRecording:
         self.stream.at(Moment(moment.capture, moment.step, moment.time_ns, event.standoff_mm))
         self._trial.take(event)
         scene.log_ranged(self.stream, event.lasers, self._geometry, self._colors)
-        if event.status != "done":
-            text = f"{event.scene}, reading {event.reading} at {event.standoff_mm:g} mm: {event.status}"
-            steps.log_text(self.stream, text, steps.WARN)
         if remark := reading_remark(event):
             steps.log_text(self.stream, remark, steps.WARN)
 
