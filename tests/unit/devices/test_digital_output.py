@@ -188,7 +188,7 @@ def test_a_workbench_that_ends_well_leaves_the_guardian_at_it(log: Path) -> None
     with pytest.raises(LaserOffNotConfirmedError), lasers.lit(["L2"], for_s=30):
         fail(log, "unplugged")
     guardian = lasers._guardian._process
-    with pytest.raises(LaserOffNotConfirmedError, match=r"beams as on.* goes on trying for some 60 s"):
+    with pytest.raises(LaserOffNotConfirmedError, match=r"beams as on.* tries again for 60 s"):
         lasers.close()
     assert guardian.poll() is None
     assert masks(log)[-1] == 0b10
@@ -201,7 +201,7 @@ def test_a_workbench_that_ends_well_leaves_the_guardian_at_it(log: Path) -> None
 def test_lines_that_are_high_when_the_board_is_opened_are_tried_again(log: Path) -> None:
     """Somebody left them high, and the board does not take it: that is told, and not left at that."""
     fail(log, "stuck")
-    with pytest.raises(LaserOffNotConfirmedError, match=r"lines read back as 1111 .*goes on trying"):
+    with pytest.raises(LaserOffNotConfirmedError, match=r"lines read 1111 .*tries again"):
         bank()
     assert masks(log) == []
     repair(log)
@@ -219,7 +219,7 @@ def test_a_stop_does_not_take_the_place_of_what_the_board_tells(log: Path, tmp_p
     said, _ = process.communicate(timeout=60)
     assert time.monotonic() - began < TRY_BOARD_S / 2
     assert process.returncode == 7, said
-    assert re.search(r"error: .*lines read back as 1111 .*goes on trying", " ".join(said.split()))
+    assert re.search(r"error: .*lines read 1111 .*tries again", " ".join(said.split()))
     repair(log)
 
 
@@ -257,7 +257,7 @@ def wait_for_dark(log: Path) -> int:
 
 def test_lines_that_stay_high_are_never_taken_for_off(log: Path) -> None:
     lasers = bank()
-    told = r"read back as 100 .*treat the beams as on"
+    told = r"lines read 100 .*treat the beams as on"
     with pytest.raises(LaserOffNotConfirmedError, match=told), lasers.lit(["L3"], for_s=2.0):
         fail(log, "stuck")
     fail(log, "")
@@ -279,7 +279,7 @@ def test_a_board_unplugged_while_lit(log: Path) -> None:
 @pytest.mark.parametrize(
     ("lines", "how", "told"),
     [
-        ("Dev9/port0", "", "Physical channel specified does not exist.*named right"),
+        ("Dev9/port0", "", "Physical channel specified does not exist.*names of its lines"),
         (LINES, "no driver", "Could not find an installation of NI-DAQmx.*check that NI-DAQmx is installed"),
     ],
 )
@@ -291,13 +291,11 @@ def test_a_board_that_is_not_there(log: Path, lines: str, how: str, told: str) -
 
 def test_fewer_lines_than_lasers(log: Path, tmp_path: Path) -> None:
     """Before anything is lit, and by every command that opens the rig's devices."""
-    with pytest.raises(
-        BadInputError, match="each of the rig's 4 lasers, the board has 2 there; name as many"
-    ):
+    with pytest.raises(BadInputError, match="each of the rig's 4 lasers, got 2; name 4 lines"):
         bank("Dev1/port0/line0:1")
     done = call("doctor", rig_file(tmp_path, "Dev1/port0/line0:1"))
     assert done.returncode == 2
-    assert "each of the rig's 4 lasers, the board has 2" in done.stderr
+    assert "each of the rig's 4 lasers, got 2" in done.stderr
     assert "Traceback" not in done.stderr
     assert set(masks(log)) == {0}
 

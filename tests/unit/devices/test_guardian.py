@@ -170,7 +170,10 @@ def test_a_hang_is_told_when_it_is_over(controller: Running, bank: GuardedLaserB
         time.sleep(0.1)
         assert controller.lines() == 0  # a late beat lights nothing
 
-    with pytest.raises(RigNotReadyError, match=r"silent for 0.5 s"), bank.lit(["L1"], for_s=5.0):
+    with (
+        pytest.raises(RigNotReadyError, match=r"no sign of life from the workbench for 0.5 s"),
+        bank.lit(["L1"], for_s=5.0),
+    ):
         hang()
     with bank.lit(["L2"], for_s=5.0):  # and the next capture is as any other
         assert controller.lines() == 2
@@ -219,7 +222,10 @@ def test_after_a_signal_to_end_nothing_is_lit_any_more(controller: Running, bank
 
 def test_a_guardian_that_is_gone_confirms_nothing(controller: Running) -> None:
     bank = serial_bank(controller.port, IDS)
-    with pytest.raises(LaserOffNotConfirmedError, match=r"guardian .* is gone"), bank.lit(["L1"], for_s=5.0):
+    with (
+        pytest.raises(LaserOffNotConfirmedError, match=r"guardian .* has ended"),
+        bank.lit(["L1"], for_s=5.0),
+    ):
         os.kill(bank._guardian._process.pid, signal.SIGKILL)
     with pytest.raises(LaserOffNotConfirmedError):
         bank.close()
