@@ -195,16 +195,16 @@ def test_fit_and_range_on_the_session_s_images_give_the_session_s_results(demo: 
 
 def test_each_placement_tells_how_far_the_captures_have_come(demo: Demo) -> None:
     """From the second on; the last says of the ranges what the fit then does."""
-    told = [r.event for r in read_journal(demo.folder) if isinstance(r.event, StandoffAdvised)]
-    assert [one.placements for one in told] == list(range(2, 14))
-    assert told[0].relative_range_sd > told[0].limit == 0.03 > told[-1].relative_range_sd
+    advised = [r.event for r in read_journal(demo.folder) if isinstance(r.event, StandoffAdvised)]
+    assert [one.placements for one in advised] == list(range(2, 14))
+    assert advised[0].relative_range_sd > advised[0].limit == 0.03 > advised[-1].relative_range_sd
     stated = load_calibration(demo.folder / "calibration.yaml").laser_ranger.validity.max_relative_range_sd
-    assert told[-1].relative_range_sd == pytest.approx(stated, rel=0.05)
-    assert all(one.then_relative_range_sd < one.relative_range_sd for one in told)
-    assert all(100 <= one.next_standoff_mm <= 5000 for one in told)
-    assert all((one.worst_residual_sd or 0.0) > 0.0 for one in told)
-    assert "; worst residual 0." in told[-1].text
-    assert told[-1].text in " ".join(demo.terminal.split())
+    assert advised[-1].relative_range_sd == pytest.approx(stated, rel=0.05)
+    assert all(one.then_relative_range_sd < one.relative_range_sd for one in advised)
+    assert all(100 <= one.next_standoff_mm <= 5000 for one in advised)
+    assert all((one.worst_residual_sd or 0.0) > 0.0 for one in advised)
+    assert "; worst residual 0." in advised[-1].text
+    assert advised[-1].text in " ".join(demo.terminal.split())
 
 
 def test_a_reader_written_from_the_format_s_description_ranges_alike(demo: Demo, tmp_path: Path) -> None:

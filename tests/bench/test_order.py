@@ -19,25 +19,25 @@ from workbench.session.journal import Journal, read_journal
 
 def test_lasers_are_put_off_before_every_question(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Verified off, since the last question: whatever was lit in between, the operator may step in."""
-    told: list[str] = []
+    printed: list[str] = []
     put_off = GuardedLaserBank.all_off
 
     def all_off(bank: GuardedLaserBank) -> None:
         put_off(bank)
-        told.append("off")
+        printed.append("off")
 
     class Operator(Says):
         def ask(self, prompt: Prompt) -> Answer:
-            told.append(f"ask {prompt.key}")
+            printed.append(f"ask {prompt.key}")
             return super().ask(prompt)
 
     monkeypatch.setattr(GuardedLaserBank, "all_off", all_off)
     question = "  - {step: ask, text: Which card?, choices: [white, grey]}\n"
     session(tmp_path, GRID + question, Operator(("p.2", Answer(value="grey"))))
-    asked = [n for n, what in enumerate(told) if what != "off"]
-    assert len(asked) == 5, told
-    assert all(told[n - 1] == "off" for n in asked)
-    assert told[-1] == "off", "and at the end"
+    asked = [n for n, what in enumerate(printed) if what != "off"]
+    assert len(asked) == 5, printed
+    assert all(printed[n - 1] == "off" for n in asked)
+    assert printed[-1] == "off", "and at the end"
 
 
 def test_frames_are_on_disk_before_the_record_that_names_them(
@@ -93,7 +93,7 @@ def test_frames_are_on_disk_before_the_record_that_names_them(
 def test_a_warm_up_runs_the_camera_in_the_dark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its frames are taken, nothing is lit or kept, nobody is asked."""
     lit: list[object] = []
-    monkeypatch.setattr(GuardedLaserBank, "lit", lambda *told, **for_s: lit.append(told))
+    monkeypatch.setattr(GuardedLaserBank, "lit", lambda *printed, **for_s: lit.append(printed))
     operator = Says()
     grabbed: list[str] = []
     monkeypatch.setattr(
@@ -114,22 +114,22 @@ def test_a_plan_prints_every_step_with_captures_emission_and_time(
     steps = "  - {step: warm_up, frames: 100}\n" + GRID + "  - step: fit\n"
     rig, procedure = write_files(tmp_path, HEAD + steps)
     print_plan([procedure], rig, tmp_path / "sessions")
-    told = capsys.readouterr().err
-    assert max(map(len, told.splitlines())) <= 80
-    steps_told = [re.split(r"\s{2,}", line) for line in told.splitlines() if line.startswith("p.")]
+    printed = capsys.readouterr().err
+    assert max(map(len, printed.splitlines())) <= 80
+    step_rows = [re.split(r"\s{2,}", line) for line in printed.splitlines() if line.startswith("p.")]
     # Three placings of 64 s, 12 captures of a second, 2 s of lease each.
-    assert [row[0] for row in steps_told] == ["p.1", "p.2", "p.3"]
-    assert [row[2:] for row in steps_told] == [
+    assert [row[0] for row in step_rows] == ["p.1", "p.2", "p.3"]
+    assert [row[2:] for row in step_rows] == [
         ["-", "-", "-", "10 s"],
         ["3", "12", "24.0", "3 min"],
         ["-", "-", "-", "10 s"],
     ]
-    assert "12 captures, at most 24 s of emission (leases of 2 s); 4 min" in told
-    assert "no session of" in " ".join(told.split())
+    assert "12 captures, at most 24 s of emission (leases of 2 s); 4 min" in printed
+    assert "no session of" in " ".join(printed.split())
     session(tmp_path, steps.replace("  - step: fit\n", ""), Says())
     print_plan([procedure], rig, tmp_path)
-    told = " ".join(capsys.readouterr().err.split())
-    assert "the last session of" in told
-    assert "at most" not in told.partition("trial exposures")[0].partition("If ")[0], (
+    printed = " ".join(capsys.readouterr().err.split())
+    assert "the last session of" in printed
+    assert "at most" not in printed.partition("trial exposures")[0].partition("If ")[0], (
         "emission as it was measured"
     )

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import pytest
 
 from tests.bench.sensors import calibration_of
 from tests.crash.short import ROOT, results
+from tests.support.killed_session import wait_for_capture
 from workbench.calibration.verdict.export import render
 from workbench.model.event import CalibrationLoaded, ReadingTaken, TrialFinished
 from workbench.model.rig import load_rig
@@ -99,20 +99,8 @@ def test_every_trial_ends_with_ranges_angles_and_radii(bench: Bench) -> None:
 def test_a_trial_that_is_killed_and_resumed_gives_the_same_tables(bench: Bench, step: str) -> None:
     sessions = f"killed-{step}"
     process = subprocess.Popen(bench.arguments(sessions), cwd=ROOT, stderr=subprocess.DEVNULL)
-    killed = captured(bench.folder / sessions, step, process)
+    killed = wait_for_capture(bench.folder / sessions, step, process)
     process.send_signal(signal.SIGKILL)
     process.wait()
     call(str(SCRIPT), "resume", str(killed))
     assert results(killed) == results(bench.whole)
-
-
-def captured(sessions: Path, step: str, process: subprocess.Popen[bytes]) -> Path:
-    """The session's folder, as soon as the step has captured something and has not ended."""
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline:
-        assert process.poll() is None, "it ended before it was killed"
-        for journal in sessions.glob("*/journal.jsonl"):
-            if f'"kind":"capture_taken","key":"{step}/' in journal.read_text(errors="replace"):
-                return journal.parent
-        time.sleep(0.01)
-    raise AssertionError(f"{step} captured nothing")

@@ -111,7 +111,7 @@ def lines() -> Iterator[str]:
     yield f"Time from a {size} uint8 pair to spots, ranges, shape and sigmas, one core, microseconds."
     yield f"Without camera; {PAIRS} different pairs in turn, {ROUNDS} rounds, after {WARM_UP} readings."
     yield "p50, p99: by the clock. cpu: mean by the processor's time, and the same of one cv2.subtract."
-    yield "Worst: spots that tell nothing, then every laser alone (5 or 9 pairs a reading)."
+    yield "Worst: spots without information, then every laser alone (5 or 9 pairs a reading)."
     yield "Targets: 1000 readings/s or better, p99 below 5000 us."
     columns = f"{'p50':>8}{'p99':>8}{'cpu':>8}{'readings/s':>12}{'subtract':>10}{'cpu/subtract':>14}"
     yield f"{'scene':>30}{columns}  shape"

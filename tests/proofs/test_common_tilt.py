@@ -60,8 +60,8 @@ def test_a_square_flat_is_no_incline_whatever_tilt_was_stated(
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_tilt_of_one_degree_that_nobody_measured_is_no_incline(seed: int) -> None:
-    """Two deviations of its prior: what is left of it is within the interval, held at 0 it is not."""
+def test_an_unmeasured_tilt_of_one_degree_is_no_incline(seed: int) -> None:
+    """Two deviations of its prior: the remaining tilt is within the interval; held at 0 it is not."""
     true = stating(1.0, 0.0)
     z, held = incline_z(true, RIG, seed), incline_z(true, stating(0.0, 0.0), seed)
     assert np.mean(np.abs(z) < 1.96) > 0.8

@@ -62,13 +62,13 @@ class BoardWorld:
     ) -> tuple[list[Observation], BoardView]:
         rig, values, rng = self.world.rig, self.world.values, self.rng
         sd = TILTED_SD_MM if yaw or pitch else rig.bench.placement_sd_mm
-        told_sd = sd if yaw or pitch else float("nan")
+        stated_sd_mm = sd if yaw or pitch else float("nan")
         turn = np.radians(np.array([yaw, pitch]) + rng.normal(0.0, rig.bench.tilt_sd_deg, 2))
         slopes = np.tan(turn + self.world.common_tilt)
         z0 = standoff * (1 + values["ruler_scale"]) + rng.normal(0.0, sd) + values["offset_mm"]
         stood = Stood(float(z0), *map(float, slopes))
         corners = self._corners(stood)
-        view = BoardView(PlacementInfo(key, standoff, told_sd, 0.0, key), corners)
+        view = BoardView(PlacementInfo(key, standoff, stated_sd_mm, 0.0, key), corners)
         observations = []
         for laser in rig.lasers:
             spot = self.world.pixel(laser.id, stood.z0_mm, *np.arctan(slopes))
@@ -77,7 +77,7 @@ class BoardWorld:
                 u, v = spot + rng.normal(0.0, rig.noise.spot_sd_px, 2)
                 source = f"{key} {laser.id} {repeat}"
                 observations.append(
-                    Observation(source, laser.id, key, standoff, repeat, u, v, standoff_sd_mm=told_sd)
+                    Observation(source, laser.id, key, standoff, repeat, u, v, standoff_sd_mm=stated_sd_mm)
                 )
         return observations, view
 

@@ -21,8 +21,8 @@ def mirrored(world: World, observations: list[Observation]) -> list[Observation]
     return [replace(s, u_px=world.rig.camera.width_px - 1 - s.u_px) for s in observations]
 
 
-def told_as(observations: list[Observation], standoff_mm: float, told_mm: float) -> list[Observation]:
-    return [replace(s, standoff_mm=told_mm) if s.standoff_mm == standoff_mm else s for s in observations]
+def stated_as(observations: list[Observation], standoff_mm: float, stated_mm: float) -> list[Observation]:
+    return [replace(s, standoff_mm=stated_mm) if s.standoff_mm == standoff_mm else s for s in observations]
 
 
 def shifted(

@@ -15,10 +15,9 @@ def wait_for_capture(sessions: Path, step: str, process: subprocess.Popen[bytes]
     deadline = time.monotonic() + 120
     while time.monotonic() < deadline:
         assert process.poll() is None, "it ended before it was killed"
-        for folder in sessions.glob("*/journal.jsonl"):
-            text = folder.read_text(errors="replace")
-            if f'"key":"{step}/' in text and '"capture_taken"' in text.split(f'"key":"{step}/', 1)[1]:
-                return folder.parent
+        for journal in sessions.glob("*/journal.jsonl"):
+            if f'"kind":"capture_taken","key":"{step}/' in journal.read_text(errors="replace"):
+                return journal.parent
         time.sleep(0.01)
     raise AssertionError(f"{step} captured nothing")
 

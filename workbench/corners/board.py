@@ -52,7 +52,8 @@ def find_board(frames: Sequence[Image], board: Board) -> BoardCorners:
     if len(ids) < FEWEST_CORNERS:
         raise BadInputError(
             f"expected at least {FEWEST_CORNERS} corners of the board, got {len(ids)} (from"
-            f" {len(markers.ids)} of its markers); use more light, a nearer board, or more of it in the frame"
+            f" {len(markers.ids)} of its markers); use more light, a nearer board, or show"
+            " a larger part of the board"
         )
     px_per_mm = _px_per_mm(board.corners_mm[ids], markers)
     fitted = fit_saddles(mean, start_px, px_per_mm, board.square_mm, (board.square_mm - board.marker_mm) / 2)

@@ -83,7 +83,7 @@ class GuardedLine(Protocol):
 
 
 class CheckedLine:
-    """Laser driver whose failures are errors of the workbench: a defect of it must not end the guardian."""
+    """Laser driver with failures as errors of the workbench: a defect must not end the guardian."""
 
     def __init__(self, line: GuardedLine) -> None:
         self._line = line

@@ -118,8 +118,8 @@ def test_a_file_of_another_kind_is_refused_as_captures(workbench: Run, tmp_path:
 def test_a_picture_is_refused_as_yaml(workbench: Run, tmp_path: Path, line: str) -> None:
     wrong = tmp_path / "wrong"
     wrong.write_bytes(PNG)
-    told = workbench(*line.format(wrong, wrong, rig=ROOT / "rigs/thesis-emulated.yaml").split())
-    refused(told, 2, f"{wrong}: ", "got a PNG image")
+    outcome = workbench(*line.format(wrong, wrong, rig=ROOT / "rigs/thesis-emulated.yaml").split())
+    refused(outcome, 2, f"{wrong}: ", "got a PNG image")
 
 
 def test_a_folder_of_another_kind_is_refused(workbench: Run, tmp_path: Path) -> None:

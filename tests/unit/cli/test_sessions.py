@@ -27,12 +27,12 @@ def test_sessions_are_listed_with_whole_names(
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
     list_sessions(Path("sessions"), as_json=False)
-    told = capsys.readouterr().err.splitlines()
-    assert max(map(len, told[:-1])) <= 80
-    assert told[0].split() == [names[0], "finished", "440", "captures"]
-    assert told[1].split() == [names[1], "failed", "12", "captures"]
-    assert " ".join(line.strip() for line in told[2:-1]) == LONG_WHY
-    assert told[-1] == f"resume: workbench resume sessions/{names[1]}"
+    printed = capsys.readouterr().err.splitlines()
+    assert max(map(len, printed[:-1])) <= 80
+    assert printed[0].split() == [names[0], "finished", "440", "captures"]
+    assert printed[1].split() == [names[1], "failed", "12", "captures"]
+    assert " ".join(line.strip() for line in printed[2:-1]) == LONG_WHY
+    assert printed[-1] == f"resume: workbench resume sessions/{names[1]}"
 
 
 def test_a_session_with_a_name_as_long_as_the_line_has_two(
@@ -43,9 +43,9 @@ def test_a_session_with_a_name_as_long_as_the_line_has_two(
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
     list_sessions(Path("sessions"), as_json=False)
-    told = capsys.readouterr().err.splitlines()
-    assert max(map(len, told)) <= 80
-    assert [line.split() for line in told] == [
+    printed = capsys.readouterr().err.splitlines()
+    assert max(map(len, printed)) <= 80
+    assert [line.split() for line in printed] == [
         [names[0], "finished", "440", "captures"],
         [names[1]],
         ["finished", "440", "captures"],
@@ -71,9 +71,9 @@ def test_how_a_session_ended_takes_two_lines_at_most(
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
     list_sessions(Path("sessions"), as_json=False)
-    told = capsys.readouterr().err.splitlines()
-    assert len(told) == 4
-    assert told[2].rstrip().endswith("...")
+    printed = capsys.readouterr().err.splitlines()
+    assert len(printed) == 4
+    assert printed[2].rstrip().endswith("...")
     list_sessions(Path("sessions"), as_json=True)
     assert json.loads(capsys.readouterr().out)["why"] == why
 

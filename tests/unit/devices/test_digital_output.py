@@ -257,8 +257,8 @@ def wait_for_dark(log: Path) -> int:
 
 def test_lines_that_stay_high_are_never_taken_for_off(log: Path) -> None:
     lasers = bank()
-    told = r"lines read 100 .*treat the beams as on"
-    with pytest.raises(LaserOffNotConfirmedError, match=told), lasers.lit(["L3"], for_s=2.0):
+    message = r"lines read 100 .*treat the beams as on"
+    with pytest.raises(LaserOffNotConfirmedError, match=message), lasers.lit(["L3"], for_s=2.0):
         fail(log, "stuck")
     fail(log, "")
     lasers.close()
@@ -277,15 +277,15 @@ def test_a_board_unplugged_while_lit(log: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lines", "how", "told"),
+    ("lines", "how", "message"),
     [
         ("Dev9/port0", "", "Physical channel specified does not exist.*names of its lines"),
         (LINES, "no driver", "Could not find an installation of NI-DAQmx.*check that NI-DAQmx is installed"),
     ],
 )
-def test_a_board_that_is_not_there(log: Path, lines: str, how: str, told: str) -> None:
+def test_a_board_that_is_not_there(log: Path, lines: str, how: str, message: str) -> None:
     fail(log, how)
-    with pytest.raises(RigNotReadyError, match=told):
+    with pytest.raises(RigNotReadyError, match=message):
         bank(lines)
 
 

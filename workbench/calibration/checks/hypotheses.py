@@ -23,6 +23,7 @@ from typing import Literal
 import numpy as np
 
 from workbench.calibration.checks.cross_validation import by_standoff, predictive, range_error, rows_at
+from workbench.calibration.checks.priors import prior_strain
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit, rows_of
@@ -206,7 +207,9 @@ def _wrong_standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
     """
     cost = STANDOFF_COST + 2 * log(len(fit.cells.placements))
     boards = {view.placement.key for view in fit.boards}
-    strain = [_strain(fit, state, index) for index in range(len(fit.cells.placements))]
+    strain = [
+        _strain(state, np.array([_error_index(fit, index)])) for index in range(len(fit.cells.placements))
+    ]
     sound = not is_improbable(state)
     for index in np.argsort(strain)[::-1].tolist():
         on_board = fit.cells.placements[index].key in boards
@@ -229,14 +232,9 @@ def _wrong_standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
                 return
 
 
-def _strain(fit: CalibrationFit, state: Refit, index: int) -> float:
-    """First-order decrease of the cost without the prior of a placement's error: y^2 / (1 - C).
-
-    y is the error in prior deviations and C its posterior variance in units of the prior's.
-    """
-    error = _error_index(fit, index)
-    narrowing = 1.0 - state.covariance[error, error]
-    return float(state.y[error] ** 2 / narrowing) if narrowing > LEAST_NARROWING else 0.0
+def _strain(state: Refit, index: IndexArray) -> float:
+    """First-order decrease of the cost without the priors of some parameters."""
+    return prior_strain(state.y[index], state.covariance[np.ix_(index, index)], LEAST_NARROWING).chi2
 
 
 def _gain_without(state: Refit, rows: BoolArray) -> float:
@@ -318,9 +316,9 @@ def _tilted_targets(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
     slopes = {n: s for n in flat if len(s := slope_indices(fit, n))}
     if not slopes:
         return
-    index = max(slopes, key=lambda n: _joint_strain(state, slopes[n]))
+    index = max(slopes, key=lambda n: _strain(state, slopes[n]))
     cost = 2 * log(2 * len(slopes))
-    if _joint_strain(state, slopes[index]) < FIRST_ORDER_SHARE * (cost + DECISIVE):
+    if _strain(state, slopes[index]) < FIRST_ORDER_SHARE * (cost + DECISIVE):
         return
     for slope in slopes[index].tolist():
         sd = np.array(state.problem.data.sd, float)
@@ -343,14 +341,6 @@ def tilt_deg(state: Refit, slope: int) -> float:
     data = state.problem.data
     value = np.asarray(data.mean)[slope] + np.asarray(data.sd)[slope] * state.y[slope]
     return float(np.degrees(np.arctan(value)))
-
-
-def _joint_strain(state: Refit, index: IndexArray) -> float:
-    """Squared distance of parameters from their priors by the covariance that it has if these hold."""
-    narrowed = np.eye(len(index)) - state.covariance[np.ix_(index, index)]
-    values, vectors = np.linalg.eigh(narrowed)
-    seen = values > LEAST_NARROWING
-    return float(((vectors.T @ state.y[index])[seen] ** 2 / values[seen]).sum())
 
 
 def _wrong_spots(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:

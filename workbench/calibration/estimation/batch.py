@@ -1,7 +1,8 @@
 """Batch solver: many calibrations of one layout at once, for simulation, bootstrap and design of standoffs.
 
-The posterior is that of `fit`; the solver is Gauss-Newton on the normal equations, with Levenberg's damping
-where a step would increase the cost. With y = (sensor s, placements p) the equations are
+The posterior is that of `fit`, without a drift and with placement errors as stated. The solver is Gauss-
+Newton on the normal equations, with Levenberg's damping where a step would increase the cost. With y =
+(sensor s, placements p) the equations are
 
     [H_ss  H_sp] [ds]     [g_s]
     [H_ps  H_pp] [dp] = - [g_p]

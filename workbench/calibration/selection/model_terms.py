@@ -80,7 +80,7 @@ def fit_calibration(
         fitted = fit_cells(rig, sound.cells, sound.rejected, boards)
     else:
         fitted = without_outliers(whole, rejected)
-    if drift_is_shown(fitted):  # which outliers may have hidden
+    if fitted is not whole and drift_is_shown(fitted):  # which outliers may have hidden
         fitted = fit_cells(with_drift(rig), fitted.cells, fitted.rejected, boards)
     if fitted is not whole:
         missing = _called_for(fitted)

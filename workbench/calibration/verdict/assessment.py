@@ -11,21 +11,17 @@ import numpy as np
 
 from workbench.calibration.checks.cross_validation import alarms
 from workbench.calibration.checks.faults import find_faults, refuses
+from workbench.calibration.checks.priors import contradicted_priors, doubted_priors
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.checks.residuals import explain, residual_tests
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.selection.drift import drift_test, fits_drift
 from workbench.calibration.verdict.observability import NullDirection, direction_lines
 from workbench.model.acceptance import Acceptance
-from workbench.model.arrays import BoolArray, FloatArray
+from workbench.model.arrays import FloatArray
 from workbench.model.calibration import DeterminedBy
 from workbench.model.fit_event import CrossValidatedPlacement, Fault, ResidualTest
-from workbench.model.stats import chi2_sf, norm_cdf
 
-CONTRADICTION_SD = 5.0
-"""Distance from its prior at which a parameter refuses the fit; 1 in 2 million lies so far by chance."""
-DOUBT_P = 0.005
-"""Probability that the priors of a sound fit raise a warning, one by one; the same for all together."""
 WARNED_P = 0.01
 """P value of the placement errors below which their scatter is a warning."""
 NOTICED_SD = 3.4
@@ -36,9 +32,6 @@ SPECKLE_SCALE = 1.5
 """Noise scale from which a missing speckle_sd_px is named as the cause."""
 DATA_SHARE_DETERMINED = 0.9
 """Information share of the data from which a parameter is determined by them."""
-LEAST_NARROWING = 0.1
-"""Least relative decrease of a prior's variance by the data for its pull to be tested. Where the data hardly
-constrain a combination, the curvature of the model moves it more than their noise does."""
 PRIOR_UNMOVED = 0.9
 """Ratio of posterior to prior sd above which neither data nor other priors constrain the parameter."""
 
@@ -123,7 +116,7 @@ def assess(
     else:
         warnings = [*direction_lines(directions), *warnings, *_warnings(fit)]
         reasons += [
-            *_contradictions(fit),
+            *contradicted_priors(fit),
             *map(_alarm, alarms(placements)),
             *_missed_limits(fit, limits, max_relative_range_sd),
         ]
@@ -207,58 +200,6 @@ def _too_few_standoffs(fit: CalibrationFit, limits: Acceptance) -> list[str]:
     ]
 
 
-def _contradictions(fit: CalibrationFit) -> list[str]:
-    """Priors that the data contradict: a wrong rig file, or a mistyped standoff."""
-    return [
-        f"{_prior_text(fit, n)}. Do: check this prior, and the standoffs"
-        for n in np.flatnonzero((np.abs(fit.prior_pull) > CONTRADICTION_SD) & ~_is_drift(fit)).tolist()
-    ]
-
-
-def _is_drift(fit: CalibrationFit) -> BoolArray:
-    """(P,) whether each parameter is the drift of the image: it has a limit, its prior is no measurement."""
-    return np.isin(np.arange(len(fit.values)), np.arange(len(fit.values))[fit.layout.drift])
-
-
-def prior_doubts(fit: CalibrationFit) -> list[str]:
-    """Priors of the sensor that the data move improbably far, one by one and all together.
-
-    If priors and data are as stated, the posterior mean y of parameters in units of their priors has the
-    covariance 1 - C, C being their posterior covariance.
-    """
-    free = np.flatnonzero(fit.table.is_sensor & (fit.table.prior_sd > 0) & ~_is_drift(fit))
-    sd = fit.table.prior_sd[free]
-    y, narrowed = (
-        fit.prior_pull[free],
-        np.eye(len(free)) - fit.covariance[np.ix_(free, free)] / np.outer(sd, sd),
-    )
-    values, vectors = np.linalg.eigh(narrowed)
-    seen = values > LEAST_NARROWING
-    chi2 = float(((vectors.T @ y)[seen] ** 2 / values[seen]).sum())
-    decrease = np.diag(narrowed)
-    z = np.where(decrease > LEAST_NARROWING, np.abs(y) / np.sqrt(np.maximum(decrease, LEAST_NARROWING)), 0.0)
-    p = np.minimum(1.0, len(free) * 2.0 * norm_cdf(-z))
-    order = np.argsort(-z)
-    doubted = [int(free[n]) for n in order if p[n] < DOUBT_P]
-    together = seen.any() and chi2_sf(chi2, seen.sum()) < DOUBT_P
-    lines = [f"{_prior_text(fit, n)}. Check this value in the rig file." for n in doubted]
-    if together and not doubted:
-        largest = ", ".join(fit.table.parameters[free[n]].name for n in order[:3])
-        lines.append(
-            f"the priors of the rig file together contradict the data (chi2 {chi2:.0f}, expected"
-            f" {seen.sum()}); {largest} move most. Check these values in the rig file."
-        )
-    return lines
-
-
-def _prior_text(fit: CalibrationFit, index: int) -> str:
-    p, pull = fit.table.parameters[index], abs(fit.prior_pull[index])
-    return (
-        f"{p.name} = {fit.values[index]:.5g} {p.unit} lies {pull:.1f} sd from its prior in the rig file"
-        f" ({p.prior.value:g} +- {p.prior.sd:g} {p.unit})"
-    )
-
-
 def _alarm(one: CrossValidatedPlacement) -> str:
     if one.range_p <= one.spots_p:
         evidence = f"range error {one.error_mm:+.2f} mm, expected 0 +- {one.sd_mm:.2g} mm (1 sigma)"
@@ -292,7 +233,7 @@ def _largest_residual(fit: CalibrationFit) -> str:
 def _warnings(fit: CalibrationFit) -> list[str]:
     sensor = [(p, by) for p, by in zip(fit.table.parameters, determined_by(fit), strict=True) if p.prior.sd]
     prior = [p.name for p, by in sensor if by == "prior" and p.kind == "sensor"]
-    warnings = prior_doubts(fit)
+    warnings = doubted_priors(fit)
     if prior:
         are, priors = ("is", "prior is") if len(prior) == 1 else ("are", "priors are")
         warnings.append(

@@ -143,7 +143,7 @@ def _parameters(fit: CalibrationFit) -> Parameters:
     table = fit.table.parameters[sensor]
     names = [p.name for p in table]
     covariance = np.array(fit.covariance[sensor, sensor])
-    # The image was anywhere along its drift: half of it is added as the deviation of the image centre.
+    # The image was anywhere along its drift: half the drift is added as the deviation of the image centre.
     centre = [names.index(name) for name in ("cx_px", "cy_px")]
     covariance[centre, centre] += (fit.drift_px / 2) ** 2
     symmetric = (covariance + covariance.T) / 2

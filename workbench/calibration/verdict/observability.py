@@ -2,7 +2,7 @@
 
 The information of the data is the inverse posterior covariance minus that of the priors. Parameters are taken
 in turn, those that all spots depend on first. A parameter is open where the data constrain it less than its
-own prior does, with all others free. The change of the others that hides a change of it is a null direction.
+own prior does, with all others free. The change of the others that hides its change is a null direction.
 The parameter is then held fixed and the next one taken: eigenvectors of the information would mix directions
 that are equally open, and could not be named.
 """

@@ -12,7 +12,7 @@ TAIL_WIDTHS = 2.5
 """Radius of a spot in widths; its light beyond does not shift the fit of another spot."""
 _SAME_WIDTHS = 0.6
 # Signal-to-noise ratio of the flux above which a spot is no spike of noise; below, a rival within two
-# widths of it may replace it.
+# widths may replace the spot.
 CLEAR_SNR = 7.0
 _RIVAL_WIDTHS = 2.0
 

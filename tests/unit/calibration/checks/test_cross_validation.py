@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.corrupted_data import told_as
+from tests.support.corrupted_data import stated_as
 from tests.support.message_text import numbers
 from tests.support.rigs import STANDOFFS_MM, World, thesis_rig
 from workbench.calibration.checks.cross_validation import alarms, leave_each_out
@@ -72,7 +72,7 @@ def test_sound_calibrations_raise_no_alarm(sound: list[tuple[CrossValidatedPlace
 @pytest.mark.parametrize("standoff_mm", STANDOFFS_MM[:7])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_ten_millimetres_are_found_up_to_900(seed: int, standoff_mm: float) -> None:
-    result = fit(RIG, told_as(World(RIG, seed).observations(), standoff_mm, standoff_mm + 10))
+    result = fit(RIG, stated_as(World(RIG, seed).observations(), standoff_mm, standoff_mm + 10))
     found = alarms(leave_each_out(result))
     worst = min(found, key=lambda fold: min(fold.range_p, fold.spots_p))
     assert worst.standoff_mm == standoff_mm + 10
@@ -82,7 +82,7 @@ def test_ten_millimetres_are_found_up_to_900(seed: int, standoff_mm: float) -> N
 
 def test_an_alarm_refuses_and_says_what_to_do() -> None:
     """12 mm at 1400: seen, though not so clearly that it could have no other name."""
-    fitted = fit(RIG, told_as(World(RIG, 5).observations(), 1400.0, 1412.0))
+    fitted = fit(RIG, stated_as(World(RIG, 5).observations(), 1400.0, 1412.0))
     assessment = assess(fitted, Acceptance(), 0.01, leave_each_out(fitted))
     assert (assessment.verdict, assessment.faults) == ("refused", ())
     (reason,) = assessment.reasons

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support.board_world import PLACINGS, BoardWorld
-from tests.support.corrupted_data import exchanged, mirrored, moved, shifted, told_as, turned_at
+from tests.support.corrupted_data import exchanged, mirrored, moved, shifted, stated_as, turned_at
 from tests.support.message_text import laser_ids, numbers
 from tests.support.rigs import World, board_rig, prior, thesis_rig
 from workbench.calibration.checks.cross_validation import leave_each_out
@@ -65,20 +65,20 @@ class TestFaults:
         assert "vertical" in message
 
     @pytest.mark.parametrize(
-        ("standoff_mm", "told_mm", "slip"),
+        ("standoff_mm", "stated_mm", "slip"),
         [(600.0, 6000.0, "a digit too many"), (160.0, 1600.0, "too many"), (400.0, 40.0, "a digit too few")],
     )
-    def test_a_standoff_mistyped(self, seed: int, standoff_mm: float, told_mm: float, slip: str) -> None:
-        message = the(named(told_as(World(RIG, seed).observations(), standoff_mm, told_mm)), "standoff")
+    def test_a_standoff_mistyped(self, seed: int, standoff_mm: float, stated_mm: float, slip: str) -> None:
+        message = the(named(stated_as(World(RIG, seed).observations(), standoff_mm, stated_mm)), "standoff")
         stated, fitted, *_ = numbers(message)
-        assert stated == told_mm
+        assert stated == stated_mm
         assert slip in message
         assert fitted == pytest.approx(standoff_mm, abs=5 * RIG.bench.placement_sd_mm + 0.005 * standoff_mm)
 
     @pytest.mark.parametrize("standoff_mm", [125.0, 400.0, 900.0])
     def test_a_standoff_ten_millimetres_off(self, seed: int, standoff_mm: float) -> None:
         message = the(
-            named(told_as(World(RIG, seed).observations(), standoff_mm, standoff_mm + 10)), "standoff"
+            named(stated_as(World(RIG, seed).observations(), standoff_mm, standoff_mm + 10)), "standoff"
         )
         assert numbers(message)[0] == standoff_mm + 10
 
@@ -142,7 +142,7 @@ def test_lasers_read_across_their_line_alone_are_not_called_far() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_two_standoffs_mistyped(seed: int) -> None:
-    observations = told_as(told_as(World(RIG, seed).observations(), 600.0, 6000.0), 160.0, 170.0)
+    observations = stated_as(stated_as(World(RIG, seed).observations(), 600.0, 6000.0), 160.0, 170.0)
     faults = named(observations)
     assert {fault.name for fault in faults} == {"standoff"}
     assert {numbers(fault.message)[0] for fault in faults} == {6000.0, 170.0}
@@ -165,7 +165,7 @@ def test_a_camera_on_its_head_where_lasers_stand_above_and_below() -> None:
     [
         lambda world, s: exchanged(s, "L1", "L2"),
         mirrored,
-        lambda world, s: told_as(s, 600.0, 6000.0),
+        lambda world, s: stated_as(s, 600.0, 6000.0),
         lambda world, s: moved(world, s, 160.0, 8, 2.0),
     ],
 )
@@ -271,18 +271,18 @@ SHAPES: list[tuple[str, Rig, Rig, Callable[[World], list[Observation]]]] = [
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(
-    ("told", "true", "seen"), [shape[1:] for shape in SHAPES], ids=[n for n, *_ in SHAPES]
+    ("assumed", "true", "seen"), [shape[1:] for shape in SHAPES], ids=[n for n, *_ in SHAPES]
 )
 def test_sound_data_of_any_shape_are_judged_without_a_fault(
-    seed: int, told: Rig, true: Rig, seen: Callable[[World], list[Observation]]
+    seed: int, assumed: Rig, true: Rig, seen: Callable[[World], list[Observation]]
 ) -> None:
     observations = seen(World(true, seed))
-    fitted = fit_without_outliers(told, observations)
+    fitted = fit_without_outliers(assumed, observations)
     assessment = assess(fitted, Acceptance(), 0.001, leave_each_out(fitted))
     assert assessment.faults == ()
     few = len({s.standoff_mm for s in observations}) < Acceptance().min_standoffs
     assert (assessment.verdict == "refused") == few
-    assert len(assessment.reasons) == (len(told.lasers) if few else 0)
+    assert len(assessment.reasons) == (len(assumed.lasers) if few else 0)
     assert all(numbers(reason)[1] == Acceptance().min_standoffs for reason in assessment.reasons)
 
 
@@ -292,7 +292,7 @@ def test_a_boards_standoff_mistyped(seed: int, off_mm: float) -> None:
     """Its corners and its spots agree with one another and contradict the ruler."""
     world = World(board_rig(), seed)
     observations, views = BoardWorld(world).measure(PLACINGS[:5])
-    told = [
+    assumed = [
         replace(s, standoff_mm=s.standoff_mm + off_mm) if s.placement == "B1" else s for s in observations
     ] + world.observations((600.0, 1400.0))
     boards = [
@@ -301,7 +301,7 @@ def test_a_boards_standoff_mistyped(seed: int, off_mm: float) -> None:
         else view
         for view in views
     ]
-    faults = find_faults(fit_without_outliers(world.rig, told, (), boards), ())
+    faults = find_faults(fit_without_outliers(world.rig, assumed, (), boards), ())
     if not off_mm:
         assert faults == ()
     else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.support.corrupted_data import exchanged, mirrored, shifted, told_as
+from tests.support.corrupted_data import exchanged, mirrored, shifted, stated_as
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.checks import hypotheses
 from workbench.calibration.checks.cross_validation import rows_at
@@ -33,7 +33,7 @@ def test_what_leaving_a_placement_out_gains_is_known_to_first_order() -> None:
 def test_nothing_is_missed_where_no_refit_is_made(
     standoff_mm: float, off_mm: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    observations = told_as(World(RIG, 20_001).observations(), standoff_mm, standoff_mm + off_mm)
+    observations = stated_as(World(RIG, 20_001).observations(), standoff_mm, standoff_mm + off_mm)
     fit = fit_without_outliers(RIG, observations)
     quick = explain_misfit(fit)
     monkeypatch.setattr(hypotheses, "FIRST_ORDER_SHARE", 0.0)
@@ -62,7 +62,7 @@ def test_a_mirrored_picture_is_the_only_account(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_wrong_standoff_is_freed_to_where_the_target_stood(seed: int) -> None:
-    fitted = fit(RIG, told_as(World(RIG, seed).observations(), 600.0, 6000.0))
+    fitted = fit(RIG, stated_as(World(RIG, seed).observations(), 600.0, 6000.0))
     (found,) = explain_misfit(fitted)
     assert found.kind == "standoff"
     (index,) = found.subject

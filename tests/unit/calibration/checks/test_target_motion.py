@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.corrupted_data import moved, shifted, told_as
+from tests.support.corrupted_data import moved, shifted, stated_as
 from tests.support.rigs import STANDOFFS_MM, World, thesis_rig
 from workbench.calibration.checks.target_motion import find_target_motion
 from workbench.calibration.data.observations import Observation
@@ -52,7 +52,7 @@ def test_only_suspects_are_looked_at() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_wrong_standoff_is_no_step(seed: int) -> None:
-    fitted = fit(RIG, told_as(World(RIG, seed).observations(), 400.0, 410.0))
+    fitted = fit(RIG, stated_as(World(RIG, seed).observations(), 400.0, 410.0))
     index = [p.standoff_mm for p in fitted.cells.placements].index(410.0)
     assert find_target_motion(fitted, [index]) == ()
 

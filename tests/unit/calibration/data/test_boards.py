@@ -185,9 +185,9 @@ def test_terms_are_weighed_with_the_board_as_well(seed: int) -> None:
     world = World(rig, seed)
     observations, views = BoardWorld(world).measure()
     fitted = fit_calibration(rig, [*observations, *world.observations(FAR_MM)], (), views)
-    told = {term.name: term for term in fitted.terms}
-    assert told["k1"].verdict == "shown"
-    assert set(told) == {"k2", "k1", "ruler_scale", "target_slope_x target_slope_y", "tilts"}
+    terms = {term.name: term for term in fitted.terms}
+    assert terms["k1"].verdict == "shown"
+    assert set(terms) == {"k2", "k1", "ruler_scale", "target_slope_x target_slope_y", "tilts"}
 
 
 @pytest.mark.parametrize("seed", SEEDS[:2])

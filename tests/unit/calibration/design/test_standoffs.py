@@ -54,8 +54,8 @@ class TestProposal:
         sensors = drawn_sensors(RIG)
         goals = RangeGoals.of(sensors, np.array(RANGES_MM), RIG.noise)
         candidates = Candidates.of(sensors, np.array(SHIPPED), 10, goals)
-        told = forecast(RIG, SHIPPED, 10).worst_relative_sd
-        assert candidates.worst(range(len(SHIPPED))) == pytest.approx(told, rel=1e-12)
+        predicted = forecast(RIG, SHIPPED, 10).worst_relative_sd
+        assert candidates.worst(range(len(SHIPPED))) == pytest.approx(predicted, rel=1e-12)
 
     def test_noise_that_another_laser_has_changes_the_choice(self) -> None:
         """Two ranges: one hurt by the calibration, the other by its spot, which is the worst in all."""

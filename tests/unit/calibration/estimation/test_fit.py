@@ -201,8 +201,8 @@ def test_more_repeats_at_one_placement_do_not_wash_out_its_error() -> None:
 def test_what_captures_state_of_a_placement_replaces_the_rig_s_prior() -> None:
     rig = thesis_rig()
     observations = World(rig, 1).observations(repeats=1)
-    told = [replace(s, standoff_sd_mm=0.4, yaw_deg=2.0) for s in observations]
-    result = fit(rig, told)
+    stated = [replace(s, standoff_sd_mm=0.4, yaw_deg=2.0) for s in observations]
+    result = fit(rig, stated)
     by_name = {p.name: p.prior for p in result.table.parameters}
     assert by_name["125.error_mm"].sd == 0.4 * result.placement_scale
     slope = np.tan(np.radians(2.0))
@@ -247,8 +247,8 @@ def test_positions_that_contradict_everything_are_said_to() -> None:
 def test_repeats_that_scatter_more_than_stated_are_believed() -> None:
     """Noise ten times the stated: the means' deviations and the exported spot's must follow."""
     rig = thesis_rig(noise_px=0.3)
-    told = thesis_rig(noise_px=0.03)
-    result = fit(told, World(rig, 1).observations(repeats=20))
+    stated = thesis_rig(noise_px=0.03)
+    result = fit(stated, World(rig, 1).observations(repeats=20))
     # 44 cells of 20 repeats and 2 coordinates: the ratio is known to 1 / sqrt(2 x 1672) = 1.7 %.
     assert result.cells.repeat_scale == pytest.approx(10.0, rel=0.06)
     np.testing.assert_allclose(result.cells.sd_px, np.hypot(0.3 / np.sqrt(20), 0.04), rtol=0.06)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.support.corrupted_data import exchanged, moved, shifted, told_as
+from tests.support.corrupted_data import exchanged, moved, shifted, stated_as
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.data.observations import RejectedObservation
 from workbench.calibration.estimation.fit import fit
@@ -47,7 +47,7 @@ def test_what_another_account_explains_costs_no_spot(seed: int) -> None:
     sound = world.observations()
     for spoilt in (
         exchanged(sound, "L1", "L2"),
-        told_as(sound, 400.0, 410.0),
+        stated_as(sound, 400.0, 410.0),
         moved(world, sound, 160.0, 8, 2.0),
     ):
         before = fit(RIG, spoilt)

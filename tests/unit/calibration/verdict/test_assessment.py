@@ -10,15 +10,14 @@ import pytest
 from tests.support.message_text import laser_ids, numbers
 from tests.support.rigs import STANDOFFS_MM, World, prior, thesis_rig
 from workbench.calibration.checks.cross_validation import leave_each_out
+from workbench.calibration.checks.priors import CONTRADICTION_SD, doubted_priors
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.selection.drift import with_drift
 from workbench.calibration.verdict.assessment import (
-    CONTRADICTION_SD,
     Assessment,
     assess,
     basis,
     derive,
-    prior_doubts,
 )
 from workbench.model.acceptance import Acceptance
 from workbench.procedure.engine.visiting_order import shuffled
@@ -111,24 +110,6 @@ def test_a_solver_that_did_not_converge_is_a_reason() -> None:
     assert len(found.reasons) == 1
 
 
-def test_priors_that_hold_are_not_doubted() -> None:
-    """40 sound sensors: none (expected 0.4, by 0.5 % of each of two tests)."""
-    rig = thesis_rig()
-    fits = (fit(rig, World(rig, seed).observations()) for seed in range(40))
-    assert [line for fitted in fits for line in prior_doubts(fitted)] == []
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_prior_that_the_data_contradict_is_named(seed: int) -> None:
-    """An offset of 22 mm where the rig file says 0 +- 5; a flat determines it to less than a millimetre."""
-    rig = thesis_rig()
-    world = World(rig, seed)
-    world.values["offset_mm"] = 22.0
-    (line,) = prior_doubts(fit(rig, world.observations()))
-    assert line.startswith("offset_mm = ")
-    assert numbers(line)[1] == pytest.approx(22.0 / 5.0, abs=0.2)
-
-
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_fitted_drift_is_judged_by_its_limit_not_by_its_prior(seed: int) -> None:
     """A drift of 2.8 px, more than 5 deviations of the prior that the fit gives it."""
@@ -139,7 +120,7 @@ def test_a_fitted_drift_is_judged_by_its_limit_not_by_its_prior(seed: int) -> No
     drifted = [replace(s, u_px=s.u_px + 2.8 * t) for s, t in zip(sound, time, strict=True)]
     found = fit(with_drift(rig), drifted)
     assert found.drift_px[0] == pytest.approx(2.8, abs=0.5)
-    assert prior_doubts(found) == []
+    assert doubted_priors(found) == []
     assert len(judged(found).reasons) == 1
 
 

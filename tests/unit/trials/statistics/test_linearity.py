@@ -13,7 +13,7 @@ TRUE_MM = np.array([100.0, 200.0, 300.0, 500.0])
 
 
 def test_best_line_balances_the_largest_deviations() -> None:
-    """A parabola over -1 to 1 deviates by half its sag from the best line, by all of it from its chord."""
+    """A parabola over -1 to 1 deviates from the best line by half its sag, from its chord by the whole."""
     x = np.linspace(-1, 1, 201)
     found = linearity(1000 + 500 * x, 1000 + 500 * x + 2 * x**2)
     assert found.independent_mm == pytest.approx(1.0, abs=1e-6)
