@@ -11,7 +11,8 @@ from tests.proofs import bound, fisheye, report, sessions, shapes, simulate, stu
 from tests.proofs.ranging import ranges
 from tests.proofs.solve import at_once, one_by_one
 from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, fisheye_rig, thesis_rig
-from workbench.calibration.estimation.batch import as_grid, fit_batch
+from workbench.calibration.data.observations import as_grid
+from workbench.calibration.estimation.batch import fit_batch
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance

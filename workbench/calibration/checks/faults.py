@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit, tilt_deg
+from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit
 from workbench.calibration.checks.target_motion import TargetMotion, find_target_motion
 from workbench.calibration.data.averaging import scatter_chi2, weighted_mean
 from workbench.calibration.data.observations import Observation, RejectedObservation, positions, stated_sd
@@ -115,11 +115,19 @@ def _tilt_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
     axis, expected_deg = ("vertical", info.yaw_deg) if name.endswith("slope_x") else ("horizontal", 0.0)
     return Fault(
         name="tilted",
-        message=f"the target at {info.standoff_mm:g} mm was turned by {tilt_deg(h.state, slope):+.1f} deg"
+        message=f"the target at {info.standoff_mm:g} mm was turned by {_tilt_deg(h):+.1f} deg"
         f" about the {axis} (expected {expected_deg:g} +- {fit.rig.bench.tilt_sd_deg:g} deg). Do: set it"
         " square, then capture this standoff again or leave it out (--without-standoff"
         f" {info.standoff_mm:g})",
     )
+
+
+def _tilt_deg(h: Hypothesis) -> float:
+    """Fitted tilt of a hypothesis `tilted`."""
+    _, slope = h.subject
+    data = h.state.problem.data
+    value = np.asarray(data.mean)[slope] + np.asarray(data.sd)[slope] * h.state.y[slope]
+    return float(np.degrees(np.arctan(value)))
 
 
 def _digit_error(stated_mm: float, fitted_mm: float) -> str:

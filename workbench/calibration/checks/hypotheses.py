@@ -336,13 +336,6 @@ def slope_indices(fit: CalibrationFit, index: int) -> IndexArray:
     return np.flatnonzero([p.name in names and p.prior.sd > 0 for p in fit.table.parameters])
 
 
-def tilt_deg(state: Refit, slope: int) -> float:
-    """Tilt by the refit, from a slope's index among the parameters."""
-    data = state.problem.data
-    value = np.asarray(data.mean)[slope] + np.asarray(data.sd)[slope] * state.y[slope]
-    return float(np.degrees(np.arctan(value)))
-
-
 def _wrong_spots(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
     """The spot farthest from its prediction by all others, left out.
 

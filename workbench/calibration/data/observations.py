@@ -179,6 +179,15 @@ def _mean_times(captured: Sequence[Observation], cells: Sequence[Sequence[Observ
     return np.array([np.mean([time[id(s)] for s in members]) for members in cells])
 
 
+def as_grid(cells: MeanObservations, lasers: int) -> tuple[FloatArray, FloatArray]:
+    """(J, L, 2) mean positions of one calibration and their standard deviations, NaN where not seen."""
+    shape = (len(cells.placements), lasers, 2)
+    position, sd = np.full(shape, np.nan), np.full(shape, np.nan)
+    position[cells.placement, cells.laser] = cells.position_px
+    sd[cells.placement, cells.laser] = cells.sd_px
+    return position, sd
+
+
 def positions(observations: Sequence[Observation]) -> FloatArray:
     """(n, 2) measured u, v."""
     return np.array([(s.u_px, s.v_px) for s in observations]).reshape(-1, 2)

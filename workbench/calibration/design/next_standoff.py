@@ -12,10 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from workbench.calibration.data.observations import MeanObservations, Observation, group, positions, stated_sd
+from workbench.calibration.data.observations import (
+    MeanObservations,
+    Observation,
+    as_grid,
+    group,
+    positions,
+    stated_sd,
+)
 from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.design.standoffs import Candidates, RangeGoals, candidate_standoffs
-from workbench.calibration.estimation.batch import as_grid
 from workbench.calibration.estimation.fit import table_of
 from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.calibration.estimation.problem import LeastSquaresProblem

@@ -26,7 +26,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from workbench.calibration.data.observations import MeanObservations, PlacementInfo
+from workbench.calibration.data.observations import PlacementInfo
 from workbench.calibration.estimation.fit import table_of
 from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.calibration.model.layout import Layout
@@ -131,15 +131,6 @@ def fit_batch(
         degrees_of_freedom=solved.freedom,
         converged=solved.converged,
     )
-
-
-def as_grid(cells: MeanObservations, lasers: int) -> tuple[FloatArray, FloatArray]:
-    """(J, L, 2) mean positions of one calibration and their standard deviations, NaN where not seen."""
-    shape = (len(cells.placements), lasers, 2)
-    position, sd = np.full(shape, np.nan), np.full(shape, np.nan)
-    position[cells.placement, cells.laser] = cells.position_px
-    sd[cells.placement, cells.laser] = cells.sd_px
-    return position, sd
 
 
 class _Solved(NamedTuple):

@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from tests.support.rigs import World, thesis_rig
-from workbench.calibration.data.observations import Observation, group
-from workbench.calibration.estimation.batch import CHUNK, BatchFit, as_grid, fit_batch
+from workbench.calibration.data.observations import Observation, as_grid, group
+from workbench.calibration.estimation.batch import CHUNK, BatchFit, fit_batch
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.model.rig import Rig
 

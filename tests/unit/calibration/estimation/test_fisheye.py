@@ -7,8 +7,8 @@ import pytest
 
 from tests.support.board_world import BoardWorld
 from tests.support.rigs import FISHEYE_STANDOFFS_MM, PROVENANCE, World, fisheye_rig, prior
-from workbench.calibration.data.observations import Observation
-from workbench.calibration.estimation.batch import as_grid, fit_batch
+from workbench.calibration.data.observations import Observation, as_grid
+from workbench.calibration.estimation.batch import fit_batch
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict.export import calibrate
