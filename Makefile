@@ -9,7 +9,7 @@ INSTALLED := $(VENV)/.installed
 # The dependencies of the workbench alone, without those of its developers.
 RUNNABLE := $(VENV)/.runnable
 
-.PHONY: help demo test quick wheel lint bench prove crash lock clean schema
+.PHONY: help demo test quick wheel lint bench prove mutants crash lock clean schema
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
@@ -17,6 +17,7 @@ help:
 	@echo "make quick  lint, type check and the fast unit tests (a minute and a half)"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
 	@echo "make prove  stated uncertainties compared with 12 000 simulated calibrations (a few minutes)"
+	@echo "make mutants  200 wrong versions of the core; the tests must find nine of ten (hours)"
 	@echo "make crash  a session of 10 000 captures with random faults; none may be lost (a quarter of an hour)"
 	@echo "make wheel  build the wheel, install it with the run-time dependencies only, run a session (two minutes)"
 	@echo "make lint   only the linters and the type checker"
@@ -41,6 +42,9 @@ demo: $(RUNNABLE)
 
 prove: $(INSTALLED)
 	$(BIN)/python -m tests.proofs
+
+mutants: $(INSTALLED)
+	$(BIN)/python -m tests.mutants
 
 crash: $(INSTALLED)
 	$(BIN)/python -m tests.crash.long

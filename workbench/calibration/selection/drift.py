@@ -31,6 +31,8 @@ SHOWN_P = 0.003
 """P value below which the drift is fitted."""
 PRIOR_SD_PX = 0.5
 """Prior deviation of a drift that the data show, px over the session."""
+UNKNOWN_SHARE = 1e-6
+"""Squared component of an axis in the unknown directions above which the axis is not estimated."""
 LEAST_INFORMATION = 1e-6
 """Information on a drift, 1/px^2, below which the drift is not estimated."""
 
@@ -58,14 +60,22 @@ def drift_test(fitted: CalibrationFit) -> DriftTest:
     shift = _shifts(problem) / fitted.noise_scale
     along = jacobian.T @ shift
     information = shift.T @ shift - along.T @ covariance @ along
-    score = -shift.T @ residual
+    return score_test(information, -shift.T @ residual)
+
+
+def score_test(information: FloatArray, score: FloatArray) -> DriftTest:
+    """The test by the information on a drift (2, 2), 1/px^2, and its score (2,), 1/px.
+
+    An axis is estimated only where the data constrain all of it: where u and v are known in one combination
+    alone, the estimate of least norm would share the combination between them.
+    """
     values, vectors = np.linalg.eigh(information)
     known = values > LEAST_INFORMATION
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
     chi2 = float(score @ inverse @ score)
     spread = np.eye(2) + PRIOR_SD_PX**2 * information
     evidence = score @ np.linalg.solve(spread, PRIOR_SD_PX**2 * score) - np.linalg.slogdet(spread)[1]
-    axis_known = np.diag(information) > LEAST_INFORMATION
+    axis_known = (vectors[:, ~known] ** 2).sum(axis=1) < UNKNOWN_SHARE
     return DriftTest(
         shift_px=np.where(axis_known, inverse @ score, 0.0),
         sd_px=np.where(axis_known, np.sqrt(np.diag(inverse)), np.inf),

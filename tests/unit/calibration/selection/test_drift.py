@@ -10,7 +10,13 @@ import pytest
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import fit
-from workbench.calibration.selection.drift import drift_is_shown, drift_test, fit_with_drift, fits_drift
+from workbench.calibration.selection.drift import (
+    drift_is_shown,
+    drift_test,
+    fit_with_drift,
+    fits_drift,
+    score_test,
+)
 from workbench.procedure.engine.visiting_order import shuffled
 
 RIG = thesis_rig(0.05, 0.048)
@@ -66,3 +72,19 @@ def test_a_session_without_a_drift_is_fitted_as_before() -> None:
     assert not fits_drift(found.rig)
     assert found.drift_px.tolist() == [0.0, 0.0]
     np.testing.assert_array_equal(found.values, fit(RIG, sound).values)
+
+
+def test_an_axis_known_only_in_combination_with_the_other_is_not_estimated() -> None:
+    diagonal = np.array([1.0, 1.0]) / 2**0.5
+    found = score_test(400.0 * np.outer(diagonal, diagonal), 80.0 * diagonal)
+    assert found.shift_px.tolist() == [0.0, 0.0]
+    assert np.isinf(found.sd_px).all()
+    assert found.p_value == pytest.approx(6.3e-5, rel=0.02), (
+        "a shift along the diagonal by 4 sd, one degree of freedom"
+    )
+
+
+def test_an_axis_without_information_does_not_hide_the_other() -> None:
+    found = score_test(np.diag([400.0, 0.0]), np.array([80.0, 0.0]))
+    np.testing.assert_allclose(found.shift_px, [0.2, 0.0])
+    np.testing.assert_allclose(found.sd_px, [0.05, np.inf])
