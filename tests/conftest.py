@@ -1,9 +1,17 @@
 import os
+import shutil
+from pathlib import Path
 
 import pytest
 
 # As the command line does. Two workers with two threads each on two cores spend most of their time waiting.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+MEMORY = Path("/dev/shm")  # noqa: S108  # only a place for pytest's own temporary folders
+ROOM_BYTES = 6 * 2**30
+"""Sessions of all tests together take a quarter of this. In memory they wait for no disk."""
+if MEMORY.is_dir() and shutil.disk_usage(MEMORY).free > ROOM_BYTES:
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
 
 REAL_TIME = {
     "tests/bench/test_example_laser_driver.py",

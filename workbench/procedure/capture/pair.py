@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -127,8 +128,12 @@ class PairSource:
         with self.bench.lasers.lit([i for i in laser_ids if i not in left_off], for_s=LEASE_S):
             on = self.bench.camera.grab()
         lit_s = time.monotonic() - began
-        off = self.bench.camera.grab()
         frames = FrameStore(self.session_dir)
+        with ThreadPoolExecutor(1) as beside:  # the lit frame is stored while the dark one is exposed
+            storing = beside.submit(frames.save, key, "on", on.image, on.time_ns)
+            off = self.bench.camera.grab()
+            off_stored = frames.save(key, "off", off.image, off.time_ns)
+            on_stored = storing.result()
         taken = ev.CaptureTaken(
             key=key,
             purpose="calibration" if scene is None else "trial",
@@ -139,8 +144,8 @@ class PairSource:
             standoff_mm=placement.standoff_mm,
             standoff_sd_mm=placement.standoff_sd_mm,
             repeat=repeat,
-            on=frames.save(key, "on", on.image, on.time_ns),
-            off=frames.save(key, "off", off.image, off.time_ns),
+            on=on_stored,
+            off=off_stored,
             exposure=None if self._exposure is None else self._exposure.exposure,
             exposure_unit=None if self._exposure is None else self._exposure.unit or None,
             lit_s=lit_s,
