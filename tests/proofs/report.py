@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.proofs import simulate
+from tests.proofs import joint, simulate
 from tests.proofs.score import HEADER, Score, score
 from tests.proofs.study import HELD_MM, RANGES_MM, Outcome
 from workbench.calibration.verdict.assessment import PRIOR_UNMOVED
@@ -19,7 +19,8 @@ def tables(rig: Rig, outcome: Outcome, fitted_by: str) -> tuple[list[str], list[
     parameters, undetermined = parameter_scores(rig, outcome)
     by_range = range_scores(rig, outcome)
     accuracy, missed_accuracy = _accuracy(rig, outcome)
-    misses = [miss for s in (*parameters, *by_range) for miss in s.misses] + missed_accuracy
+    together, missed_joint = joint.lines(outcome.joint_p)
+    misses = [miss for s in (*parameters, *by_range) for miss in s.misses] + missed_joint + missed_accuracy
     if unsolved := int(outcome.unsolved.sum()):
         misses.append(f"{unsolved} fits did not converge")
     lines = [
@@ -29,6 +30,7 @@ def tables(rig: Rig, outcome: Outcome, fitted_by: str) -> tuple[list[str], list[
         HEADER,
         *(s.line() for s in parameters),
         f"not determined, their priors stand: {', '.join(undetermined) or 'none'}",
+        *together,
         "",
         "Range in mm of a target that the calibration has not seen, by one spot of one laser",
         HEADER,

@@ -25,6 +25,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -34,7 +35,6 @@ from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, prior, thesis_ri
 from workbench.calibration.checks.priors import DOUBT_P
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import CalibrationFit, fit_cells
-from workbench.calibration.model.parameters import TARGET_TILT
 from workbench.calibration.selection.drift import fits_drift
 from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict.assessment import Assessment
@@ -42,7 +42,7 @@ from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import FloatArray
 from workbench.model.errors import WorkbenchError
-from workbench.model.rig import Rig
+from workbench.model.rig import TARGET_TILT, Rig
 from workbench.model.stats import norm_cdf, norm_ppf
 from workbench.procedure.engine.visiting_order import returned, shuffled
 from workbench.sensor.calibrated import CalibratedSensor
@@ -131,7 +131,7 @@ class Row:
 def observations(world: World, capture: Capture, seed: int) -> list[Observation]:
     """A session of one world, in the order of its captures."""
     rng = np.random.default_rng([seed, 9])
-    order = capture.standoffs_mm if capture.ascending else shuffled(capture.standoffs_mm)
+    order = capture.standoffs_mm if capture.ascending else _shuffled(capture.standoffs_mm)
     visits = [(s, f"{s:g}") for s in order]
     if not capture.ascending:
         visits += [(s, f"{s:g} again") for s in returned(order, 2)]
@@ -151,6 +151,9 @@ def observations(world: World, capture: Capture, seed: int) -> list[Observation]
                     found.append(Observation(f"{len(found)}", laser, key, standoff, repeat, u, v))
     time = np.linspace(-0.5, 0.5, len(found)) * capture.drift_px
     return [_shifted(s, float(t)) for s, t in zip(found, time, strict=True)]
+
+
+_shuffled = cache(shuffled)
 
 
 def run(situation: Situation, calibrations: int, first_seed: int = 0) -> Row:

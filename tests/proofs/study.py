@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tests.proofs import bound, simulate
+from tests.proofs.joint import joint_p
 from tests.proofs.ranging import ranges
 from tests.proofs.solve import Solve, at_once
 from workbench.calibration.data.observations import Observation, PlacementInfo, group
@@ -42,6 +43,8 @@ class Outcome:
     """(N,) 1 where the fit did not converge."""
     missing: FloatArray
     """(N,) share of the cells without a spot in the frame."""
+    joint_p: FloatArray
+    """(N,) P value of all parameters together."""
 
 
 def run(
@@ -69,6 +72,7 @@ def run(
         noise_scaled=(fitted.noise_scale > 1).astype(float),
         unsolved=1.0 - fitted.converged,
         missing=np.isnan(data.position_px[..., 0]).mean(axis=(1, 2)),
+        joint_p=joint_p(rig, fitted.sensor, fitted.covariance, data.truth),
     )
 
 

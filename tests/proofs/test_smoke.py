@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
-from tests.proofs import bound, fisheye, report, sessions, shapes, simulate, study
+from tests.proofs import bound, fisheye, joint, report, sessions, shapes, simulate, study
 from tests.proofs.ranging import ranges
 from tests.proofs.solve import at_once, one_by_one
 from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, fisheye_rig, thesis_rig
@@ -79,6 +80,25 @@ def test_a_small_proof_makes_its_tables() -> None:
     assert any(line.startswith("not determined") and "ruler_scale" in line for line in lines)
     assert np.isfinite(outcome.parameter).all()
     assert not outcome.unsolved.any()
+
+
+def test_joint_distance_of_a_small_error_is_that_in_the_parameters() -> None:
+    """A change of coordinates changes a distance only by its curvature."""
+    rig = thesis_rig()
+    rng = np.random.default_rng(3)
+    sensor = simulate.draw_truths(rig, 5, rng)
+    free = np.array([prior.sd > 0 for prior in simulate.priors(rig)])
+    root = (
+        rng.normal(size=(5, free.sum(), free.sum()))
+        * np.array([p.sd for p in simulate.priors(rig)])[free, None]
+    )
+    covariance = np.zeros((5, len(free), len(free)))
+    covariance[np.ix_(range(5), free, free)] = 1e-10 * root @ root.transpose(0, 2, 1)
+    error = np.zeros_like(sensor)
+    error[:, free] = 1e-5 * (root @ rng.normal(size=(5, free.sum(), 1)))[..., 0]
+    found = joint.joint_p(rig, sensor, covariance, sensor + error)
+    whitened = np.linalg.solve(1e-5 * root, error[:, free, None])[..., 0]
+    np.testing.assert_allclose(found, chi2.sf((whitened**2).sum(axis=1), free.sum()), rtol=0.01)
 
 
 def test_a_small_proof_of_the_fisheye_scores_every_range() -> None:
