@@ -93,7 +93,7 @@ def test_joint_distance_of_a_small_error_is_that_in_the_parameters() -> None:
         * np.array([p.sd for p in simulate.priors(rig)])[free, None]
     )
     covariance = np.zeros((5, len(free), len(free)))
-    covariance[np.ix_(range(5), free, free)] = 1e-10 * root @ root.transpose(0, 2, 1)
+    covariance[np.ix_(np.arange(5), free, free)] = 1e-10 * root @ root.transpose(0, 2, 1)
     error = np.zeros_like(sensor)
     error[:, free] = 1e-5 * (root @ rng.normal(size=(5, free.sum(), 1)))[..., 0]
     found = joint.joint_p(rig, sensor, covariance, sensor + error)
