@@ -134,6 +134,8 @@ class Chart(FileModel):
     series: tuple[Series, ...]
     bands: tuple[Band, ...] = ()
     limits: tuple[LimitLine, ...] = ()
+    flagged_x: tuple[float, ...] = ()
+    """Values of x whose points contradict the others; shaded."""
     caption: str = ""
 
     @model_validator(mode="after")

@@ -18,6 +18,7 @@ def residual_chart(fit: FitFinished, axis: ImageAxis) -> Chart:
         series=tuple(
             _series(laser, [one for one in fit.residuals if one.laser_id == laser], axis) for laser in lasers
         ),
+        flagged_x=tuple(dict.fromkeys(one.standoff_mm for one in fit.left_out if one.alarm)),
     )
 
 

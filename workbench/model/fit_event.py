@@ -32,6 +32,8 @@ class ResidualRecord(FileModel):
     v_px: float | None
     u_sd_px: float | None
     v_sd_px: float | None
+    placement: str | None = None
+    """Key of the placement; None in sessions of versions that did not record it."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from workbench.model.calibration import TERM_VERDICTS, TermSummary
 from workbench.model.fit_event import CrossValidatedPlacement, FitFinished, ParameterRecord
@@ -54,6 +54,42 @@ def cross_validation_table(placements: Sequence[CrossValidatedPlacement]) -> Tab
         caption=(
             "error: range - standoff; u: 1 sigma; %: relative error of each laser alone;"
             " !: error larger than u explains"
+        ),
+    )
+
+
+def worst_placements_table(fit: FitFinished, captures: Mapping[str, str], most: int = 5) -> Table:
+    """Placements that agree least with the others, the least probable first.
+
+    Args:
+        fit: the fit.
+        captures: numbers of the captures by key of placement, as text.
+        most: largest number of rows.
+    """
+    ordered = sorted(fit.left_out, key=lambda one: min(one.range_p, one.spots_p))
+    return Table(
+        name="worst_placements",
+        title="Worst placements, ranged by the fit without them",
+        columns=(
+            Column(key="standoff_mm", name="standoff", unit="mm", format="g"),
+            Column(key="error_mm", name="error", unit="mm", format="+.2f"),
+            Column(key="sd_mm", name="stated u", unit="mm", format="sd"),
+            Column(key="normalised_error", name="error / u", format="+.1f"),
+            Column(key="p", name="p", format=".1g"),
+            Column(key="alarm", name="alarm"),
+            Column(key="captures", name="captures"),
+        ),
+        rows=tuple(
+            (
+                one.standoff_mm,
+                one.error_mm,
+                one.sd_mm,
+                one.z,
+                min(one.range_p, one.spots_p),
+                one.alarm,
+                captures.get(one.placement, ""),
+            )
+            for one in ordered[:most]
         ),
     )
 

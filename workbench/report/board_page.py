@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
+from workbench.figures.plot_style import own_style
 from workbench.model.board import BELOW_MM, PAGE_MARGIN_MM, Board
-from workbench.report.plot_style import own_style
 
 MM_PER_INCH = 25.4
 POINTS_PER_INCH = 72

@@ -21,7 +21,7 @@ class FigureWriter:
     def __call__(self, record: Record) -> None:
         """Write the charts of a finished trial; ignore other records."""
         if isinstance(record.event, TrialFinished) and record.event.charts:
-            from workbench.report.figure import svg  # loads matplotlib, which most sessions do not need
+            from workbench.figures.figure import svg  # loads matplotlib, which most sessions do not need
 
             for chart in record.event.charts:
                 write_record(self.session_dir / f"{chart.name}.svg", svg(chart, self.colors))

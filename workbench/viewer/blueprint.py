@@ -1,116 +1,184 @@
-"""Layout of a recording in the viewer: one tab for the technician at the bench, three for the engineer."""
+"""Layout of a recording in the viewer.
+
+One screen for each phase of a session: captures as they come, the result of the calibration, each trial. All
+have the frame and the spots at the time cursor at the top. What is wrong in a chart and what the camera saw
+are so on one screen.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
 
+import rerun as rr
 import rerun.blueprint as rrb
 
-from workbench.model.chart import Chart
-from workbench.model.reading_chart import SENSOR
+from workbench.figures.picture import SIZE_PX
 from workbench.model.rig import Rig
 from workbench.viewer import entities as at
-from workbench.viewer.chart import BOUNDS_X, BOUNDS_Y
+from workbench.viewer.crops import mosaic_size
 
-PICTURE_VIEW = "Picture, lasers on"
-"""Name of the view of the frames."""
-RESULTS_VIEW = "Results"
-TABLE_FORMAT = rrb.archetypes.TextDocumentFormat(monospace=True, word_wrap=False)
-"""Format of views of tables in plain text."""
+FRAME_VIEW = "Frame, lasers on, contrast stretched"
+CROPS_VIEW = "Spots: lit minus dark | remainder of the fit"
+Phase = Literal["capture", "fit", "trial"]
+"""Screen in front: captures, result of the fit, the last trial."""
+PLAYED_PER_SECOND = 10.0
+"""Captures per second when a recording is played."""
+TEXT = rrb.archetypes.TextDocumentFormat(monospace=True, word_wrap=False)
+"""Format of tables in plain text."""
+WHOLE_TIME = rrb.TimeAxis(
+    view_range=rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
+)
+DARK = [18, 20, 22]
 
 
-def blueprint(rig: Rig, charts: Sequence[Chart] = ()) -> rrb.Blueprint:
-    """Layout for one rig; the technician's tab is in front, and the time cursor follows new data.
+@dataclass(frozen=True)
+class TrialTab:
+    """One trial in the layout."""
+
+    trial: str
+    """Name of the step."""
+    charts: tuple[tuple[str, str], ...]
+    """Name and title of each chart."""
+
+
+def blueprint(rig: Rig, trials: Sequence[TrialTab] = (), phase: Phase = "capture") -> rrb.Blueprint:
+    """Layout for one rig; the time cursor follows new data.
 
     Args:
         rig: rig with the camera and the lasers.
-        charts: charts of the last trial in the order of `entities.trial_charts`; several charts get one tab
-            each.
+        trials: trials so far, in order.
+        phase: screen in front.
     """
+    screens = [_captures(rig), _result(rig), _parameters(), *(_trial(rig, one) for one in trials), _bench()]
+    front = {"capture": 0, "fit": 1, "trial": len(screens) - 2}[phase]
     return rrb.Blueprint(
-        rrb.Tabs(_live(rig), _fit(), _trial(charts), _bench(), active_tab=0),
+        rrb.Tabs(*screens, active_tab=front),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=at.CAPTURE, play_state="following"),
+        rrb.TimePanel(state="collapsed", timeline=at.CAPTURE, play_state="following", fps=PLAYED_PER_SECOND),
         auto_layout=False,
         auto_views=False,
     )
 
 
-def _live(rig: Rig) -> rrb.Container:
+def _captures(rig: Rig) -> rrb.Container:
+    """Screen of the technician: what is captured now, and how the uncertainty decreases."""
     axis = f"{rig.lasers[0].axis}_px"
-    picture = rrb.Spatial2DView(
-        origin=at.CAMERA, name=PICTURE_VIEW, visual_bounds=_frame_bounds(rig), background=[0, 0, 0]
-    )
-    curves = rrb.Vertical(
-        rrb.TimeSeriesView(origin=at.STANDOFF_SCALAR, name="Standoff [mm]"),
-        rrb.TimeSeriesView(origin=f"{at.SPOTS}/{axis}", name=f"Spot position {axis[0]} [px]"),
-        rrb.TimeSeriesView(origin=f"{at.SPOTS}/peak_dn", name="Peak brightness [DN]"),
-    )
-    activity = rrb.Horizontal(
-        rrb.StateTimelineView(origin=at.LANES, name="Steps"),
+    texts = rrb.Vertical(
+        _text(at.NOW, "Now"),
         rrb.TextLogView(
             origin=at.STEP_LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
         ),
+        row_shares=[1, 2],
     )
-    return rrb.Vertical(
-        rrb.Horizontal(picture, curves, column_shares=[3, 2]), activity, row_shares=[3, 1], name="Live"
+    curves = rrb.Horizontal(
+        _series(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
+        _series(f"{at.SPOTS}/{axis}", f"Spot position {axis[0]} [px]"),
+        _series(at.ADVICE, "Largest range uncertainty so far [%]"),
+        rrb.StateTimelineView(origin=at.LANES, name="Steps"),
+        column_shares=[3, 3, 3, 4],
     )
+    return rrb.Vertical(_seen(rig, texts), curves, row_shares=[5, 4], name="Captures")
 
 
-def _fit() -> rrb.Container:
-    charts = rrb.Vertical(
-        _chart(f"{at.FIT_CHART}/u", "Residuals u"),
-        _chart(f"{at.FIT_CHART}/v", "Residuals v"),
-    )
+def _result(rig: Rig) -> rrb.Container:
+    """Screen of the engineer: which standoff is bad, and what the camera saw there."""
+    axis = rig.lasers[0].axis
     texts = rrb.Vertical(
-        rrb.TextDocumentView(origin=at.FIT_SUMMARY, name="Verdict"),
-        rrb.TextDocumentView(origin=at.FIT_CHECKS, name="Checks", format_options=TABLE_FORMAT),
-        rrb.TextDocumentView(origin=at.FIT_TABLE, name="Parameters", format_options=TABLE_FORMAT),
-        row_shares=[2, 3, 3],
+        _text(at.NOW, "Now"),
+        _text(at.FIT_VERDICT, "Verdict"),
+        _table(at.FIT_WORST, "Worst"),
+        row_shares=[2, 4, 5],
     )
-    return rrb.Horizontal(charts, texts, column_shares=[3, 2], name="Fit")
-
-
-def _trial(charts: Sequence[Chart]) -> rrb.Container:
-    curves = rrb.Vertical(
-        _results(charts),
-        rrb.TimeSeriesView(
-            origin=f"{at.TRIAL_ERRORS}/{SENSOR}", name="Error of the sensor [mm] during the trial"
+    charts = rrb.Horizontal(
+        _picture(f"{at.FIT_PICTURE}/{axis}", f"Residuals along {axis}"),
+        _series(
+            f"{at.FIT_RESIDUALS_IN_SD}/{axis}",
+            "Residual in sd; right click: go to the capture",
+            time=WHOLE_TIME,
         ),
-        row_shares=[3, 2],
+        column_shares=[10, 5],
     )
-    table = rrb.TextDocumentView(origin=at.TRIAL_SUMMARY, name="Tables", format_options=TABLE_FORMAT)
-    return rrb.Horizontal(curves, table, column_shares=[3, 2], name="Trial")
+    return rrb.Vertical(_seen(rig, texts), charts, row_shares=[5, 4], name="Calibration: which standoff?")
 
 
-def _results(charts: Sequence[Chart]) -> rrb.Container | rrb.View:
-    """View of the live chart, which becomes the first chart of the results; tabs if there are several."""
-    if len(charts) <= 1:
-        return _chart(at.TRIAL_CHART, RESULTS_VIEW)
-    places = at.trial_charts([chart.name for chart in charts])
-    views = [_chart(place, chart.title or chart.name) for place, chart in zip(places, charts, strict=True)]
-    return rrb.Tabs(*views, active_tab=0, name=RESULTS_VIEW)
+def _parameters() -> rrb.Container:
+    charts = rrb.Vertical(*(_picture(f"{at.FIT_PICTURE}/{axis}", f"Residuals {axis}") for axis in "uv"))
+    texts = rrb.Vertical(_table(at.FIT_CHECKS, "Checks"), _table(at.FIT_TABLE, "Parameters"))
+    return rrb.Horizontal(charts, texts, column_shares=[1, 1], name="Calibration: details")
+
+
+def _trial(rig: Rig, trial: TrialTab) -> rrb.Container:
+    texts = rrb.Vertical(
+        _text(at.NOW, "Now"), _table(at.trial_tables(trial.trial), "Tables"), row_shares=[1, 4]
+    )
+    pictures = [_picture(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
+    charts = rrb.Horizontal(
+        pictures[0] if len(pictures) == 1 else rrb.Tabs(*pictures, active_tab=0),
+        _series(
+            at.trial_errors(trial.trial),
+            "Error [mm], u shaded; right click: go to the reading",
+        ),
+        column_shares=[10, 5],
+    )
+    return rrb.Vertical(_seen(rig, texts), charts, row_shares=[5, 4], name=trial.trial)
 
 
 def _bench() -> rrb.Container:
     eye = rrb.EyeControls3D(
         kind="Orbital",
-        position=(-330.0, -280.0, -400.0),
-        look_target=(0.0, 30.0, 700.0),
+        position=(-330.0, -260.0, -230.0),
+        look_target=(0.0, 10.0, 330.0),
         eye_up=(0.0, -1.0, 0.0),
     )
     return rrb.Horizontal(
-        rrb.Spatial3DView(origin=at.BENCH, name="Bench: rays, target, spots", eye_controls=eye), name="3D"
+        rrb.Spatial3DView(
+            origin=at.BENCH, name="Bench: depth is drawn relative to the standoff", eye_controls=eye
+        ),
+        name="3D",
     )
 
 
-def _chart(origin: str, name: str) -> rrb.View:
-    bounds = rrb.VisualBounds2D(x_range=BOUNDS_X, y_range=BOUNDS_Y)
-    return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=bounds, background=[18, 20, 22])
-
-
-def _frame_bounds(rig: Rig) -> rrb.VisualBounds2D:
-    return rrb.VisualBounds2D(
-        x_range=(0.0, float(rig.camera.width_px)), y_range=(0.0, float(rig.camera.height_px))
+def _seen(rig: Rig, texts: rrb.Container) -> rrb.Container:
+    """Upper half of a screen: the frame, the spots, texts."""
+    width, height = float(rig.camera.width_px), float(rig.camera.height_px)
+    frame = rrb.Spatial2DView(
+        origin=at.FRAME, name=FRAME_VIEW, visual_bounds=_bounds(width, height), background=[0, 0, 0]
     )
+    crops = rrb.Spatial2DView(
+        origin=at.CROPS,
+        name=CROPS_VIEW,
+        visual_bounds=_bounds(*mosaic_size(len(rig.lasers))),
+        background=DARK,
+    )
+    return rrb.Horizontal(frame, crops, texts, column_shares=[4, 5, 5])
+
+
+def _picture(origin: str, name: str) -> rrb.View:
+    return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=_bounds(*SIZE_PX), background=DARK)
+
+
+def _series(
+    origin: str, name: str, y: tuple[float, float] | None = None, time: rrb.TimeAxis | None = None
+) -> rrb.View:
+    return rrb.TimeSeriesView(
+        origin=origin,
+        name=name,
+        axis_y=None if y is None else rrb.ScalarAxis(range=y),
+        axis_x=time,
+        plot_legend=rrb.PlotLegend(corner="RightTop"),
+    )
+
+
+def _text(origin: str, name: str) -> rrb.View:
+    return rrb.TextDocumentView(origin=origin, name=name, titlebar=False)
+
+
+def _table(origin: str, name: str) -> rrb.View:
+    return rrb.TextDocumentView(origin=origin, name=name, titlebar=False, format_options=TEXT)
+
+
+def _bounds(width: float, height: float) -> rrb.VisualBounds2D:
+    return rrb.VisualBounds2D(x_range=(0.0, float(width)), y_range=(0.0, float(height)))

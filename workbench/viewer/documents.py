@@ -1,25 +1,38 @@
-"""Text documents about a fit and a trial."""
+"""Text documents about a capture, a fit and a trial."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from workbench.model.event import (
-    FitFinished,
-    ReadingTaken,
-)
+from workbench.model.event import CaptureTaken, FitFinished, ReadingTaken
+
+MOST_LINES = 6
+"""Largest number of reasons or warnings in a summary; the checks list all."""
+
+
+def capture_line(number: int, capture: CaptureTaken, step: str) -> str:
+    """What a capture is of, in Markdown: the line under the time cursor."""
+    laser = "all lasers" if capture.laser_id == "all" else capture.laser_id
+    off = f" without {', '.join(capture.left_off)}" if capture.left_off else ""
+    exposure = (
+        "" if capture.exposure is None else f", exposure {capture.exposure:g} {capture.exposure_unit or ''}"
+    )
+    return (
+        f"**Capture {number}: {capture.standoff_mm:g} mm, {laser}{off}**, repeat {capture.repeat}"
+        f"{exposure.rstrip()}\n\n{step}"
+    )
 
 
 def fit_summary(fit: FitFinished) -> str:
-    """Summary of a fit in Markdown: verdict, reasons, warnings, residual."""
-    lines = [
-        f"**Calibration {fit.verdict}**",
-        _bullets("Reasons", fit.reasons),
-        _bullets("Warnings", fit.warnings),
-        f"**Residual** {fit.rms_px:.3f} px rms over {fit.observations} observations, "
-        f"{len(fit.rejected)} rejected.",
-    ]
-    return "\n\n".join(line for line in lines if line)
+    """Verdict of a fit in Markdown: the named faults or reasons first."""
+    head = (
+        f"**Calibration {fit.verdict}**: {fit.rms_px:.3f} px rms, {fit.observations} spots,"
+        f" {len(fit.rejected)} not used"
+    )
+    causes = [fault.message for fault in fit.faults]
+    others = [reason for reason in fit.reasons if reason not in causes]
+    lines = [head, *_bullets([*causes, *others]), *_bullets(fit.warnings)]
+    return "\n\n".join(lines)
 
 
 def without_range(readings: Iterable[ReadingTaken]) -> str:
@@ -32,6 +45,9 @@ def without_range(readings: Iterable[ReadingTaken]) -> str:
     return "\n".join(["Readings without a range", *missing]) if missing else ""
 
 
-def _bullets(title: str, lines: Iterable[str]) -> str:
-    items = "\n".join(f"- {line}" for line in lines)
-    return f"**{title}**\n\n{items}" if items else ""
+def _bullets(lines: Iterable[str]) -> list[str]:
+    items = list(dict.fromkeys(lines))
+    shown = [f"- {item}" for item in items[:MOST_LINES]]
+    if len(items) > MOST_LINES:
+        shown.append(f"- and {len(items) - MOST_LINES} more, see Checks")
+    return ["\n".join(shown)] if shown else []

@@ -15,40 +15,58 @@ STEP = "step"
 WALL_CLOCK = "time"
 """Timeline: wall clock; frames and their spots have the time of exposure."""
 STANDOFF = "standoff_mm"
-"""Timeline: standoff by the ruler in whole millimetres, for measurements at one standoff."""
+"""Timeline: standoff of the present placement by the ruler, in whole millimetres."""
+
+FRAME = "frame"
+IMAGE = f"{FRAME}/image"
+SCANLINES = f"{FRAME}/scanlines"
+PREDICTED_SPOTS = f"{FRAME}/predicted"
+SPOTS_IN_IMAGE = f"{FRAME}/spots"
+LEADERS_IN_IMAGE = f"{FRAME}/leaders"
+
+CROPS = "crops"
+CROPS_IMAGE = f"{CROPS}/image"
+CROPS_CENTRES = f"{CROPS}/centres"
+CROPS_LABELS = f"{CROPS}/labels"
+
+NOW = "now"
+"""Text about the capture at the time cursor."""
 
 BENCH = "bench"
 CAMERA = f"{BENCH}/camera"
-IMAGE = f"{CAMERA}/image"
-SPOTS_IN_IMAGE = f"{CAMERA}/spots"
-RINGS_IN_IMAGE = f"{CAMERA}/rings"
 RAYS = f"{BENCH}/rays"
 TARGET = f"{BENCH}/target"
 SPOTS_ON_TARGET = f"{BENCH}/spots"
 RANGED_POINTS = f"{BENCH}/ranged"
 
 SPOTS = "spots"
+SPOTS_RECORD = f"{SPOTS}/record"
+"""All quantities of all spots of a capture."""
 UNASSIGNED = "unassigned"
-STANDOFF_SCALAR = "target/standoff_mm"
 
 STEP_LOG = "steps/log"
 LANES = "steps/lanes"
 LANE_PROCEDURE = f"{LANES}/procedure"
 LANE_STEP = f"{LANES}/step"
 LANE_LASER = f"{LANES}/laser"
+LANE_EXPOSURE = f"{LANES}/exposure"
+LANE_SATURATION = f"{LANES}/saturation"
+LANE_DARK = f"{LANES}/dark_frame"
 
-FIT_SUMMARY = "fit/summary"
+ADVICE = "advice"
+RANGE_SD = f"{ADVICE}/largest_range_sd"
+RANGE_SD_LIMIT = f"{ADVICE}/limit"
+
+FIT_VERDICT = "fit/verdict"
+FIT_WORST = "fit/worst"
 FIT_TABLE = "fit/parameter_table"
 FIT_CHECKS = "fit/checks"
 FIT_PARAMETERS = "fit/parameters"
 FIT_RESIDUALS = "fit/residuals"
-FIT_CHART = "fit/chart"
+FIT_RESIDUALS_IN_SD = "fit/residuals_in_sd"
+FIT_PICTURE = "fit/picture"
 
-TRIAL_SUMMARY = "trial/summary"
-TRIAL_ERRORS = "trial/errors"
-TRIAL_CHART = "trial/chart"
-TRIAL_CHARTS = "trial/charts"
-"""Parent of the charts of a trial's results except the first."""
+TRIALS = "trials"
 
 Rgb = tuple[int, int, int]
 
@@ -73,9 +91,19 @@ def to_hex(color: Rgb) -> str:
     return f"#{bytes(color).hex()}"
 
 
-def trial_charts(names: Sequence[str]) -> list[str]:
-    """Entities of the charts of a trial's results, by name; the first chart replaces the live chart."""
-    return [TRIAL_CHART, *(under(TRIAL_CHARTS, name) for name in names[1:])][: len(names)]
+def trial_tables(trial: str) -> str:
+    """Entity of the tables of a trial."""
+    return under(TRIALS, trial, "tables")
+
+
+def trial_errors(trial: str) -> str:
+    """Parent of the errors of a trial's readings, one entity for the sensor and each laser."""
+    return under(TRIALS, trial, "errors")
+
+
+def trial_picture(trial: str, chart_name: str) -> str:
+    """Entity of the picture of one chart of a trial."""
+    return under(TRIALS, trial, "pictures", chart_name)
 
 
 def under(parent: str, *parts: str) -> str:

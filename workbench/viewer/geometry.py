@@ -77,6 +77,22 @@ class Geometry:
         x, y, tx, ty = self.rays[laser]
         return (x + tx * z_mm, y + ty * z_mm, z_mm)
 
+    def spot_on(self, laser: str, target: FlatTarget | BoardTarget, standoff_mm: float) -> FloatArray:
+        """Spot (2,), px, of a laser on a flat target."""
+        x, y, tx, ty = self.rays[laser]
+        slope_x, slope_y = tan(radians(target.yaw_deg)), tan(radians(target.pitch_deg))
+        facing = 1.0 - slope_x * tx - slope_y * ty
+        depth = (standoff_mm + self.offset_mm + slope_x * x + slope_y * y) / facing
+        return self._project(self.ray_at(laser, depth))
+
+    def scanline(self, laser: str, reach_mm: tuple[float, float]) -> FloatArray:
+        """(2, 2) spots of a laser at both ends of the reach, px."""
+        return np.array([self._project(self.ray_at(laser, z + self.offset_mm)) for z in reach_mm])
+
+    def _project(self, point_mm: tuple[float, float, float]) -> FloatArray:
+        x, y, z = point_mm
+        return np.array(lens_model(self.lens_name).project(list(self.lens.values()), x / z, y / z), float)
+
     def seen_on(self, target: FlatTarget | BoardTarget, standoff_mm: float, pixels: FloatArray) -> FloatArray:
         """Points where the lines of sight of `pixels`, (N, 2), meet a flat target: (N, 3) mm."""
         slope_x, slope_y = tan(radians(target.yaw_deg)), tan(radians(target.pitch_deg))

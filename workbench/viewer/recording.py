@@ -5,25 +5,32 @@ Journal and frames are the record. A damaged or incomplete recording can be made
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import singledispatchmethod
 from hashlib import sha256
 from pathlib import Path
 from types import TracebackType
 
+import cv2
+import numpy as np
+import rerun as rr
+
 from workbench.model import event as ev
+from workbench.model.arrays import FloatArray, Image
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError
 from workbench.model.reading_text import reading_remark
 from workbench.model.rig import Rig
-from workbench.model.spot import Spot
-from workbench.model.target import Placement
-from workbench.viewer import camera, fit, scene, steps
+from workbench.model.spot import Failure, Spot
+from workbench.model.target import BoardTarget, FlatTarget, Placement
+from workbench.viewer import documents, fit, frame, scene, steps
 from workbench.viewer import entities as at
 from workbench.viewer.blueprint import blueprint
+from workbench.viewer.captures import CaptureLog
+from workbench.viewer.crops import Crops
 from workbench.viewer.geometry import Geometry
 from workbench.viewer.stream import Moment, Stream
-from workbench.viewer.trial import TrialView
+from workbench.viewer.trial import TrialView, tabs
 
 RECORDING_FILE = "recording.rrd"
 
@@ -95,30 +102,36 @@ class _OpenRecording:
         self._rig = rig
         self._colors = at.laser_colors(rig.laser_ids)
         self._geometry = Geometry.of_rig(rig)
-        self._trial = TrialView(stream, rig, self._colors)
+        self._crops = Crops(stream, self._colors)
+        self._trials: list[TrialView] = []
         self._placement: Placement | None = None
-        self._captures: dict[str, tuple[int, ev.CaptureTaken, Placement | None]] = {}
+        self._captures = CaptureLog()
         self._exposure = Moment(0, 0, 0)
+        self._frames: tuple[Image, Image | None] | None = None
         self._spots: tuple[Spot, ...] = ()
+        self._title = ""
         self._capture = 0
         self._step = 0
 
     def take(self, record: ev.Record) -> None:
         """Log one record at its position on the timelines."""
         self._advance(record.event)
-        moment = Moment(self._capture, self._step, record.time_ns)
+        standoff_mm = None if self._placement is None else self._placement.standoff_mm
+        moment = Moment(self._capture, self._step, record.time_ns, standoff_mm)
         self.stream.at(moment)
         self._log(record.event, moment)
 
     def _advance(self, event: object) -> None:
-        """Count captures and steps.
+        """Count captures and steps, and note the placement.
 
         Preparations of a capture (a step, a placement) have the number of the next capture. With the number
         of the previous one, the last picture of a standoff would show the target of the next standoff.
         """
-        taken = len(self._captures)
+        taken = len(self._captures.numbers)
         if isinstance(event, ev.StepStarted):
             self._step += 1
+        if isinstance(event, ev.TargetPlaced):
+            self._placement = event.placement
         if isinstance(event, ev.CaptureTaken | ev.StepStarted | ev.TargetPlaced):
             self._capture = taken + 1
 
@@ -130,11 +143,12 @@ class _OpenRecording:
     def _(self, event: ev.SessionStarted, moment: Moment) -> None:
         rig = self._rig
         self.stream.describe("session", id=event.session, rig=event.rig, serial=rig.serial)
-        scene.log_styles(self.stream)
-        scene.log_sensor(self.stream, rig.camera, self._geometry, self._colors)
-        camera.log_series_styles(self.stream, self._colors)
+        self._show_sensor()
+        frame.log_series_styles(self.stream, self._colors)
+        steps.log_styles(self.stream)
+        fit.log_series_styles(self.stream, self._colors)
         fit.log_no_fit_yet(self.stream)
-        self._trial.log_none_yet()
+        self._crops.log_none()
         steps.log_text(self.stream, f"Session {event.session} on {event.rig}: {', '.join(event.procedures)}")
 
     @_log.register
@@ -144,6 +158,8 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.StepStarted, moment: Moment) -> None:
+        self._title = event.title
+        self._note(f"**{event.title}**")
         steps.lane(self.stream, at.LANE_STEP, event.title)
         if event.shots == 0:
             steps.lane(self.stream, at.LANE_LASER, steps.LASERS_OFF)
@@ -155,8 +171,9 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.TargetPlaced, moment: Moment) -> None:
-        self._placement = event.placement
-        scene.log_target(self.stream, event.placement, self._geometry)
+        scene.log_placement(self.stream, event.placement, self._geometry, self._colors)
+        self._crops.log_none()
+        frame.log_predicted(self.stream, self._expected(), self._colors)
         steps.log_text(self.stream, f"Target placed at {event.placement.standoff_mm:g} mm")
 
     @_log.register
@@ -167,7 +184,7 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.PlacementFinished, moment: Moment) -> None:
-        """Nothing to show: only a resumed session uses this event."""
+        steps.lane(self.stream, at.LANE_DARK, "no beam stuck")
 
     @_log.register
     def _(self, event: ev.SetAside, moment: Moment) -> None:
@@ -179,18 +196,27 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.CaptureTaken, moment: Moment) -> None:
-        self._captures[event.key] = (moment.capture, event, self._placement)
         self._exposure = Moment(moment.capture, moment.step, event.on.time_ns, event.standoff_mm)
+        self._captures.add(event, self._placement, self._exposure)
         self.stream.at(self._exposure)
-        camera.log_frame(self.stream, self._read(event.on))
+        png = self._read(event.on)
+        off = None if event.off is None else _decoded(self._read(event.off))
+        self._frames = _decoded(png), off
+        frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
+        self._note(documents.capture_line(moment.capture, event, self._title))
         steps.lane(self.stream, at.LANE_LASER, event.laser_id)
 
     @_log.register
     def _(self, event: ev.SpotsFound, moment: Moment) -> None:
-        number, capture, placement = self._captures[event.key]
-        self.stream.at(Moment(number, moment.step, capture.on.time_ns, capture.standoff_mm))
+        capture = self._captures.taken[event.key]
+        placement = self._captures.placements[event.key]
+        self.stream.at(self._captures.moments[event.key])
         self._spots = event.spots
-        camera.log_spots(self.stream, event.spots, self._colors)
+        frame.log_spots(self.stream, event.spots, self._colors)
+        if capture.laser_id in self._colors:
+            self._show_crops(event.spots, [capture.laser_id])
+        saturated = any(Failure.SATURATED in spot.flags for spot in event.spots)
+        steps.lane(self.stream, at.LANE_SATURATION, "saturated" if saturated else "no pixel saturated")
         if placement is not None:
             scene.log_spots_on_target(self.stream, event.spots, placement, self._geometry, self._colors)
         for failure in event.failures:
@@ -209,16 +235,19 @@ class _OpenRecording:
     @_log.register
     def _(self, event: ev.ExposureSet, moment: Moment) -> None:
         steps.log_text(self.stream, event.text, steps.INFO if event.verdict == "good" else steps.WARN)
+        steps.lane(self.stream, at.LANE_EXPOSURE, f"{event.exposure:g} {event.unit}".rstrip())
 
     @_log.register
     def _(self, event: ev.StandoffAdvised, moment: Moment) -> None:
         steps.log_text(self.stream, f"After {event.placements} placements, {event.text}")
+        steps.log_advice(self.stream, event)
 
     @_log.register
     def _(self, event: ev.FitFinished, moment: Moment) -> None:
         self._geometry = self._geometry.fitted(event.parameters)
-        scene.log_sensor(self.stream, self._rig.camera, self._geometry, self._colors)
-        fit.log_fit(self.stream, event, moment, self._colors)
+        self._show_sensor()
+        fit.log_fit(self.stream, event, self._captures, moment, self._colors)
+        self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "fit"))
         good = event.verdict == "accepted"
         steps.log_text(
             self.stream,
@@ -236,22 +265,29 @@ class _OpenRecording:
     def _(self, event: ev.CalibrationLoaded, moment: Moment) -> None:
         calibration = load_calibration(self._session_dir / event.path)
         self._geometry = self._geometry.calibrated(calibration)
-        scene.log_sensor(self.stream, self._rig.camera, self._geometry, self._colors)
+        self._show_sensor()
         steps.log_text(self.stream, event.text)
 
     @_log.register
     def _(self, event: ev.ReadingTaken, moment: Moment) -> None:
         self.stream.at(self._exposure)
-        camera.log_assigned(self.stream, self._spots, event.lasers, self._colors)
-        self.stream.at(Moment(moment.capture, moment.step, moment.time_ns, event.standoff_mm))
-        self._trial.take(event)
-        scene.log_ranged(self.stream, event.lasers, self._geometry, self._colors)
+        spots = frame.assigned(self._spots, event.lasers)
+        frame.log_assigned(self.stream, spots, self._colors)
+        self._show_crops(spots, [laser for laser in self._colors if laser not in event.left_off])
+        if self._placement is not None:
+            scene.log_ranged(self.stream, event.lasers, self._placement, self._geometry, self._colors)
+        self._trial(event.trial).take(event, self._exposure)
+        self.stream.at(moment)
         if remark := reading_remark(event):
             steps.log_text(self.stream, remark, steps.WARN)
 
     @_log.register
     def _(self, event: ev.TrialFinished, moment: Moment) -> None:
-        self._trial.finish(event)
+        trial = self._trial(event.trial)
+        trial.finish(event)
+        self.stream.at(moment)
+        if trial.charts:
+            self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "trial"))
         steps.log_text(self.stream, f"Trial {event.trial} finished, {len(event.tables)} tables")
 
     @_log.register
@@ -260,10 +296,47 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.SessionFinished, moment: Moment) -> None:
-        self._trial.stop()
+        for trial in self._trials:
+            trial.stop()
+        self.stream.at(moment)
         steps.end_all(self.stream)
         level = steps.INFO if event.exit_code == 0 else steps.ERROR
         steps.log_text(self.stream, f"Session ended ({event.exit_code}): {event.message}", level)
+
+    def _trial(self, name: str) -> TrialView:
+        """View of a trial; the first mention of it gives it a tab."""
+        for trial in self._trials:
+            if trial.trial == name:
+                return trial
+        trial = TrialView(self.stream, self._colors, name)
+        trial.start()
+        self._trials.append(trial)
+        self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "trial"))
+        return trial
+
+    def _note(self, markdown: str) -> None:
+        self.stream.log(at.NOW, rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN))
+
+    def _show_sensor(self) -> None:
+        """Log camera, rays and scanlines with the present parameters."""
+        scene.log_camera(self.stream, self._rig.camera, self._geometry)
+        if self._placement is not None:
+            scene.log_placement(self.stream, self._placement, self._geometry, self._colors)
+        lines = {laser: self._geometry.scanline(laser, self._rig.bench.reach_mm) for laser in self._colors}
+        frame.log_scanlines(self.stream, lines, self._colors)
+
+    def _show_crops(self, spots: Sequence[Spot], lasers: Sequence[str]) -> None:
+        if self._frames is not None:
+            expected = {laser: spot for laser, spot in self._expected().items() if laser in lasers}
+            self._crops.take(*self._frames, spots, expected)
+
+    def _expected(self) -> dict[str, FloatArray]:
+        """Expected spot (2,), px, of each laser on a flat at the present placement; empty without one."""
+        placement = self._placement
+        if placement is None or not isinstance(placement.target, FlatTarget | BoardTarget):
+            return {}
+        target, standoff_mm = placement.target, placement.standoff_mm
+        return {laser: self._geometry.spot_on(laser, target, standoff_mm) for laser in self._colors}
 
     def _read(self, frame: ev.FrameRef) -> bytes:
         path = self._session_dir / frame.path
@@ -281,3 +354,11 @@ class _OpenRecording:
                 f" {frame.sha256[:12]}...); restore it from a copy of the session folder"
             )
         return png
+
+
+def _decoded(png: bytes) -> Image:
+    """Image of a frame whose content has been checked, (height, width)."""
+    image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise BadInputError("a frame of the session is no picture")
+    return image.astype(np.uint8) if image.dtype == np.uint8 else image.astype(np.uint16)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,14 +59,9 @@ class Stream:
         """Log archetypes at one entity."""
         self._recording.log(entity, *what, static=static)
 
-    def curve(self, entity: str, values: Mapping[int, float]) -> None:
-        """Log values by standoff (whole mm) on the standoff timeline only."""
-        if values:
-            self._recording.send_columns(
-                entity,
-                indexes=[rr.TimeColumn(STANDOFF, sequence=list(values))],
-                columns=rr.Scalars.columns(scalars=list(values.values())),
-            )
+    def log_static_text(self, entity: str, text: str, kind: rr.MediaType = rr.MediaType.TEXT) -> None:
+        """Log a text that is the same at every time."""
+        self.log(entity, rr.TextDocument(text, media_type=kind), static=True)
 
     def describe(self, name: str, **values: str | int) -> None:
         """Set properties of the recording."""

@@ -7,95 +7,109 @@ from dataclasses import dataclass, field
 
 import rerun as rr
 
+from workbench.figures.picture import Picture
 from workbench.model.chart import Chart
 from workbench.model.event import ReadingTaken, TrialFinished
 from workbench.model.reading_chart import SENSOR, error_chart
-from workbench.model.rig import Rig
+from workbench.model.reading_text import reading_remark
 from workbench.viewer import documents
 from workbench.viewer import entities as at
-from workbench.viewer.blueprint import blueprint
-from workbench.viewer.chart import log_chart
-from workbench.viewer.stream import Stream
+from workbench.viewer.blueprint import TrialTab
+from workbench.viewer.chart import log_chart, log_cursor
+from workbench.viewer.stream import Moment, Stream
 from workbench.viewer.table_text import table_text
 
-NO_TRIAL = "no trial yet"
+LIVE_CHART = "errors"
+NO_READING = "no reading yet"
 
 
 @dataclass
 class TrialView:
-    """View of the readings and results of one trial."""
+    """View of the readings and results of one trial; its entities are below the name of the trial."""
 
     stream: Stream
-    rig: Rig
     colors: Mapping[str, at.Rgb]
+    trial: str
     readings: list[ReadingTaken] = field(default_factory=list)
-    laid_out: list[tuple[str, str]] = field(default_factory=list)
-    """Names and titles of the charts with their own views; empty if there is only the live chart."""
+    moments: list[Moment] = field(default_factory=list)
+    """Moment of each reading."""
+    charts: tuple[Chart, ...] = ()
+    """Charts of the results; empty before the trial has finished."""
 
-    def log_none_yet(self) -> None:
-        """Log a note in each view of the trial."""
-        self._log_errors()
-        self._document(NO_TRIAL)
+    @property
+    def tab(self) -> TrialTab:
+        """The trial's part of the layout."""
+        charts = [(chart.name, chart.title or chart.name) for chart in self.charts]
+        return TrialTab(self.trial, tuple(charts) or ((LIVE_CHART, "Errors so far"),))
 
-    def take(self, reading: ReadingTaken) -> None:
-        """Log one reading. The chart is drawn once per standoff, or its size would grow quadratically."""
-        if self.readings and reading.trial != self.readings[-1].trial:
-            self.readings.clear()
-        elif self.readings and reading.standoff_mm != self.readings[-1].standoff_mm:
-            self._log_errors()
-            self._document(f"Trial {reading.trial}\n\n{len(self.readings)} readings so far.")
+    def start(self) -> None:
+        """Log notes in the views that the first reading does not fill."""
+        self._draw(error_chart(LIVE_CHART, []))
+        self._document(NO_READING)
+
+    def take(self, reading: ReadingTaken, moment: Moment) -> None:
+        """Log one reading. The chart is drawn once per standoff."""
+        if self.readings and reading.standoff_mm != self.readings[-1].standoff_mm:
+            self._so_far()
+        self.stream.at(moment)
         self.readings.append(reading)
-        log_errors(self.stream, reading, self.colors)
+        self.moments.append(moment)
+        log_errors(self.stream, at.trial_errors(self.trial), reading, self.colors)
 
-    def finish(self, trial: TrialFinished) -> None:
-        """Log tables, readings without a range, and charts, replacing those of an earlier trial."""
-        self.stream.log(at.TRIAL_CHARTS, rr.Clear(recursive=True))
-        if not trial.charts:
-            self.stop()
-        places = at.trial_charts([chart.name for chart in trial.charts])
-        for place, chart in zip(places, trial.charts, strict=True):
-            self._log(place, chart)
-        self._lay_out(trial.charts)
-        parts = [
-            f"Trial {trial.trial}",
-            *map(table_text, trial.tables),
-            documents.without_range(self.readings),
-        ]
+    def finish(self, results: TrialFinished) -> None:
+        """Log tables, readings without a range, and charts."""
+        self.charts = results.charts
+        for chart in results.charts:
+            self._draw(chart)
+        parts = [*map(table_text, results.tables), documents.without_range(self.readings)]
         self._document("\n\n".join(part for part in parts if part))
-        self.readings.clear()  # otherwise `stop` would draw them over the first chart
 
     def stop(self) -> None:
-        """Log the readings so far at the end of the session."""
-        if self.readings:
-            self._log_errors()
+        """Log the readings so far at the end of a session that ends before the trial."""
+        if self.readings and not self.charts:
+            self._so_far()
 
-    def _lay_out(self, charts: Sequence[Chart]) -> None:
-        """Lay out one view per chart, unless the layout fits already: the user may have changed it."""
-        titles = [(chart.name, chart.title) for chart in charts] if len(charts) > 1 else []
-        if titles != self.laid_out:
-            self.stream.lay_out(blueprint(self.rig, charts))
-            self.laid_out = titles
+    def _so_far(self) -> None:
+        self._draw(error_chart(LIVE_CHART, self.readings))
+        remarks = [remark for one in self.readings if (remark := reading_remark(one))]
+        self._document("\n".join([f"{len(self.readings)} readings so far", *remarks]))
 
-    def _log_errors(self) -> None:
-        self._log(at.TRIAL_CHART, error_chart("errors", self.readings))
+    def _draw(self, chart: Chart) -> None:
+        entity = at.trial_picture(self.trial, chart.name)
+        drawn = log_chart(self.stream, entity, chart, {**self.colors, SENSOR: at.WHITE}, NO_READING)
+        if drawn is not None:
+            self._log_cursors(entity, drawn)
 
-    def _log(self, entity: str, chart: Chart) -> None:
-        log_chart(self.stream, entity, chart, {**self.colors, SENSOR: at.WHITE}, NO_TRIAL)
+    def _log_cursors(self, entity: str, drawn: Picture) -> None:
+        """Log the frame around the present reading's points, at the first reading of each value of x."""
+        before: float | None = None
+        for reading, moment in zip(self.readings, self.moments, strict=True):
+            if reading.reference_mm != before:
+                self.stream.at(moment)
+                log_cursor(self.stream, entity, drawn, reading.reference_mm)
+                before = reading.reference_mm
 
     def _document(self, text: str) -> None:
-        self.stream.log(at.TRIAL_SUMMARY, rr.TextDocument(text, media_type=rr.MediaType.TEXT))
+        self.stream.log_static_text(at.trial_tables(self.trial), text)
 
 
-def log_errors(stream: Stream, reading: ReadingTaken, colors: Mapping[str, at.Rgb]) -> None:
+def tabs(trials: Sequence[TrialView]) -> list[TrialTab]:
+    """Tabs of the trials of a session."""
+    return [trial.tab for trial in trials]
+
+
+def log_errors(stream: Stream, parent: str, reading: ReadingTaken, colors: Mapping[str, at.Rgb]) -> None:
     """Log errors (measured - true, mm) of a reading and of its lasers, with their stated 1 sigma."""
     if reading.error_mm is not None:
-        _log_error(stream, SENSOR, reading.error_mm, reading.sigma_mm, at.WHITE)
+        _log_error(stream, parent, SENSOR, reading.error_mm, reading.sigma_mm, at.WHITE)
     for one in reading.lasers if reading.true is None else ():
         color = colors.get(one.laser_id, at.WHITE)
-        _log_error(stream, one.laser_id, one.range_mm - reading.standoff_mm, one.sigma_mm, color)
+        _log_error(stream, parent, one.laser_id, one.range_mm - reading.standoff_mm, one.sigma_mm, color)
 
 
-def _log_error(stream: Stream, name: str, error_mm: float, sigma_mm: float | None, color: at.Rgb) -> None:
+def _log_error(
+    stream: Stream, parent: str, name: str, error_mm: float, sigma_mm: float | None, color: at.Rgb
+) -> None:
     variances = None if sigma_mm is None else [sigma_mm**2]
     error = rr.Measurements(values=[error_mm], variances=variances, units="mm", names=name, colors=color)
-    stream.log(at.under(at.TRIAL_ERRORS, name), error)
+    stream.log(at.under(parent, name), error)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.event import Event, Record, TrialFinished, TrialProgress
-from workbench.report.figure import svg
+from workbench.figures.figure import svg
 from workbench.report.figure_writer import FigureWriter
 
 COLORS = {"a": "#112233"}

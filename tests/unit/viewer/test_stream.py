@@ -51,17 +51,6 @@ def test_static_data_are_on_no_timeline(tmp_path: Path) -> None:
     assert contents.everything()["/a"] == ["[('Scalars:scalars', [1.0])]"]
 
 
-def test_a_curve_is_over_standoffs_alone_and_an_empty_one_is_none(tmp_path: Path) -> None:
-    def log(stream: Stream) -> None:
-        stream.curve("c", {100: 1.0, 250: -2.0})
-        stream.curve("nothing", {})
-
-    contents = logged(tmp_path, log)
-    assert contents.values("/c", SCALARS, "standoff_mm") == [(100, [1.0]), (250, [-2.0])]
-    assert not any("capture" in row for row in contents.everything()["/c"])
-    assert "/nothing" not in contents.entities
-
-
 def test_the_recording_is_named_after_the_session_and_has_its_properties(tmp_path: Path) -> None:
     contents = logged(tmp_path, lambda stream: stream.describe("session", id="x", captures=3))
     (recording,) = RrdReader(str(tmp_path / "part.rrd")).recordings()

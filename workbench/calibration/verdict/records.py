@@ -70,6 +70,7 @@ def _residuals(fit: CalibrationFit) -> tuple[ResidualRecord, ...]:
             v_px=_finite_or_none(v),
             u_sd_px=_finite_or_none(u_sd),
             v_sd_px=_finite_or_none(v_sd),
+            placement=cells.placements[placement].key,
         )
         for laser, placement, (u, v), (u_sd, v_sd) in columns
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import matplotlib as mpl
 import pytest
 
-from workbench.report.plot_style import own_style
+from workbench.figures.plot_style import own_style
 
 
 def test_a_user_s_settings_take_no_part_and_come_back() -> None:

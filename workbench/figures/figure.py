@@ -1,17 +1,18 @@
-"""SVG picture of a chart, drawn by matplotlib; equal charts give equal bytes."""
+"""Figure of a chart, drawn by matplotlib; equal charts give equal bytes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from io import BytesIO
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
+from matplotlib.transforms import ScaledTranslation, Transform
 
+from workbench.figures.plot_style import own_style
 from workbench.model.chart import Chart, Series, series_colors
 from workbench.model.chart_scale import x_scale, x_ticks, y_scale
-from workbench.report.plot_style import own_style
 
 SIZE_IN = (7.6, 4.4)
 TICK_DISTANCE = 0.07
@@ -20,6 +21,10 @@ LEGEND_CHARACTERS, SYMBOL_CHARACTERS = 100, 8
 """Width of a line of the legend and of a symbol with its gaps, in characters."""
 MARKER_POINTS = 4
 OUTLIER_COLOR = "#d00000"
+ASIDE_POINTS = 3.0
+"""Distance sideways between points of series at equal x."""
+FLAG_HALF_WIDTH = 0.02
+"""Half width of a shaded range, as a share of the axis."""
 
 
 def svg(chart: Chart, colors: Mapping[str, str]) -> bytes:
@@ -35,17 +40,22 @@ def svg(chart: Chart, colors: Mapping[str, str]) -> bytes:
     return file.getvalue()
 
 
-def draw(chart: Chart, colors: Mapping[str, str]) -> Figure:
+def draw(chart: Chart, colors: Mapping[str, str], size_in: tuple[float, float] = SIZE_IN) -> Figure:
     """Figure of a chart, without pyplot and its global state. Call it within `own_style`."""
-    figure = Figure(figsize=SIZE_IN, layout="constrained")
+    figure = Figure(figsize=size_in, layout="constrained")
     axes = figure.add_subplot()
     _draw_axes(axes, chart)
+    for low, high in _flagged(chart):
+        axes.axvspan(low, high, color=OUTLIER_COLOR, alpha=0.25, linewidth=0)
     for band in chart.bands:
         axes.fill_between(band.x, band.low, band.high, alpha=0.2, label=band.name, linewidth=0)
     for limit in chart.limits:
         axes.axhline(limit.y, color=OUTLIER_COLOR, linestyle="--", linewidth=1, label=limit.name)
-    for series, color in zip(chart.series, series_colors(chart.series, colors), strict=True):
-        _draw_series(axes, series, color)
+    drawn = list(zip(chart.series, series_colors(chart.series, colors), strict=True))
+    points = [series.name for series in chart.series if series.style == "points"]
+    for series, color in drawn:
+        aside = points.index(series.name) - (len(points) - 1) / 2 if series.name in points else 0.0
+        _draw_series(axes, series, color, _beside(figure, axes, aside * ASIDE_POINTS))
     axes.set_title(chart.title, loc="left", fontsize=11, fontweight="bold")
     names = [series.name for series in chart.series] + [band.name for band in chart.bands]
     names += [limit.name for limit in chart.limits]
@@ -65,13 +75,30 @@ def _draw_axes(axes: Axes, chart: Chart) -> None:
     axes.set_yticks(y.round_ticks(), [f"{tick:g}" for tick in y.round_ticks()])
     for one in (axes.xaxis, axes.yaxis):
         one.set_minor_locator(NullLocator())
-    axes.grid(color="#dddddd", linewidth=0.7)
+    axes.grid()
     axes.set_axisbelow(True)
     if y.low < 0 < y.high:
         axes.axhline(0, color="#888888", linewidth=0.8)
 
 
-def _draw_series(axes: Axes, series: Series, color: str) -> None:
+def _flagged(chart: Chart) -> Iterator[tuple[float, float]]:
+    """Ends of the shaded ranges of x about the chart's flagged values."""
+    scale = x_scale(chart)
+    for x in chart.flagged_x:
+        if scale.is_log:
+            factor = (scale.high / scale.low) ** FLAG_HALF_WIDTH
+            yield x / factor, x * factor
+        else:
+            half = FLAG_HALF_WIDTH * (scale.high - scale.low)
+            yield x - half, x + half
+
+
+def _beside(figure: Figure, axes: Axes, points: float) -> Transform:
+    """Transformation of the data that moves marks sideways, so that series at equal x do not overlap."""
+    return axes.transData + ScaledTranslation(points / 72.0, 0.0, figure.dpi_scale_trans)
+
+
+def _draw_series(axes: Axes, series: Series, color: str, beside: Transform) -> None:
     y = [float("nan") if value is None else value for value in series.y]
     if series.style == "line":
         dash = "--" if series.dashed else "-"
@@ -82,8 +109,18 @@ def _draw_series(axes: Axes, series: Series, color: str) -> None:
             axes.plot(*at, "o", color=color, markersize=MARKER_POINTS)
     else:
         sd = [float("nan") if value is None else value for value in series.sd] or None
-        axes.errorbar(series.x, y, sd, color=color, fmt="o", markersize=MARKER_POINTS, label=series.name)
+        axes.errorbar(
+            series.x,
+            y,
+            sd,
+            color=color,
+            fmt="o",
+            markersize=MARKER_POINTS,
+            label=series.name,
+            transform=beside,
+        )
     outliers = [i for i in range(len(series.x)) if series.is_outlier(i)]
     if outliers:
         at = [series.x[i] for i in outliers], [y[i] for i in outliers]
-        axes.plot(*at, "o", color=OUTLIER_COLOR, fillstyle="none", markersize=10)
+        place = beside if series.style == "points" else axes.transData
+        axes.plot(*at, "o", color=OUTLIER_COLOR, fillstyle="none", markersize=10, transform=place)

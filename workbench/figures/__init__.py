@@ -1,0 +1,1 @@
+"""Figures of charts by matplotlib, for the report, the session folder and the recording."""

@@ -1,0 +1,55 @@
+"""Captures of the recording so far, and the positions of their placements on the timelines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from workbench.model.event import CaptureTaken
+from workbench.model.target import Placement
+from workbench.viewer.stream import Moment
+
+
+@dataclass(frozen=True)
+class CaptureLog:
+    """Captures by key, in order."""
+
+    numbers: dict[str, int] = field(default_factory=dict)
+    """Number of each capture, from 1."""
+    taken: dict[str, CaptureTaken] = field(default_factory=dict)
+    placements: dict[str, Placement | None] = field(default_factory=dict)
+    """Placement of the target by key of capture."""
+    moments: dict[str, Moment] = field(default_factory=dict)
+
+    def add(self, capture: CaptureTaken, placement: Placement | None, moment: Moment) -> None:
+        """Append a capture at its moment."""
+        self.numbers[capture.key] = moment.capture
+        self.taken[capture.key] = capture
+        self.placements[capture.key] = placement
+        self.moments[capture.key] = moment
+
+    def first_of(
+        self, placement_key: str | None, standoff_mm: float, laser_id: str | None = None
+    ) -> Moment | None:
+        """Moment of the first capture at a placement, of one laser where it is named; None without one.
+
+        Args:
+            placement_key: key of the placement; None, as in old sessions: the first at this standoff.
+            standoff_mm: standoff of the placement.
+            laser_id: laser of the capture; None: any.
+        """
+        for key, capture in self.taken.items():
+            here = (
+                capture.standoff_mm == standoff_mm
+                if placement_key is None
+                else capture.placement_key == placement_key
+            )
+            if here and laser_id in (None, capture.laser_id):
+                return self.moments[key]
+        return None
+
+    def ranges(self) -> dict[str, str]:
+        """Numbers of the captures at each placement as text, `361-400`, by key of the placement."""
+        found: dict[str, list[int]] = {}
+        for key, capture in self.taken.items():
+            found.setdefault(capture.placement_key, []).append(self.numbers[key])
+        return {key: f"{min(n)}-{max(n)}" for key, n in found.items()}

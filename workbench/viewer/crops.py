@@ -1,0 +1,211 @@
+"""Crops of the frames around the spots of all lasers, magnified, in one picture.
+
+Each laser has a cell of two squares: the lit frame minus the dark frame, and beside it what remains after
+subtraction of the fitted profile. Brightness is the square root of the signal, each square relative to the
+peak of its spot. Squares of lasers that were lit earlier at the same placement stay, labelled "earlier".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import ceil
+
+import cv2
+import numpy as np
+import rerun as rr
+from scipy.special import ndtr
+
+from workbench.model.arrays import FloatArray, Image
+from workbench.model.spot import Failure, Spot
+from workbench.viewer import entities as at
+from workbench.viewer.frame import RERUN_PIXEL_CENTRE
+from workbench.viewer.stream import Stream
+
+SIDE_PX = 41
+"""Side of a square, pixels of the frame."""
+GAP_PX = 3
+LABEL_PX = 10
+"""Height of the line of labels above each row of squares."""
+CROSS_PX = (4.0, 9.0)
+"""Inner and outer end of the arms of the cross at a centre."""
+ELLIPSE_SD = 10.0
+"""Half axes of the drawn ellipse in standard deviations of the centre."""
+RESIDUAL_GAIN = 4.0
+"""Factor on the brightness of the residual, which is a few per cent of the spot."""
+MIDDLE = 128
+_THIN = rr.Radius.ui_points(0.75)
+_NO_DOT = rr.Radius.ui_points(0.0)
+
+
+@dataclass(frozen=True)
+class Crop:
+    """Square of a frame around one laser's spot."""
+
+    signal: FloatArray
+    """(SIDE_PX, SIDE_PX) lit minus dark, DN; 0 beyond the frame."""
+    left_px: int
+    """Column of the frame of the square's first column."""
+    top_px: int
+    spot: Spot | None
+    """None: no spot; the square shows where it was expected."""
+    earlier: bool = False
+    """Whether it is of an earlier capture at the same placement."""
+
+
+@dataclass
+class Crops:
+    """Latest crop of each laser at the present placement."""
+
+    stream: Stream
+    colors: Mapping[str, at.Rgb]
+    latest: dict[str, Crop] = field(default_factory=dict)
+
+    def log_none(self) -> None:
+        """Remove the crops of the previous placement and log an empty picture."""
+        self.latest.clear()
+        self._log()
+
+    def take(
+        self, on: Image, off: Image | None, spots: Sequence[Spot], expected: Mapping[str, FloatArray]
+    ) -> None:
+        """Log the crops of one capture.
+
+        Args:
+            on: frame with the lasers on, (height, width).
+            off: frame with the lasers off.
+            spots: spots with their lasers; others are ignored.
+            expected: (2,) expected position, px, of the spot of each laser that was on.
+        """
+        signal = on.astype(np.float64) - (0.0 if off is None else off.astype(np.float64))
+        by_laser = {spot.laser_id: spot for spot in spots if spot.laser_id in self.colors}
+        self.latest = {laser: _as_earlier(crop) for laser, crop in self.latest.items()}
+        for laser in self.colors:
+            if laser not in by_laser and laser not in expected:
+                continue
+            spot = by_laser.get(laser)
+            centre = expected[laser] if spot is None else np.array([spot.u_px, spot.v_px])
+            if np.isfinite(centre).all():
+                self.latest[laser] = _crop(signal, centre, spot)
+        self._log()
+
+    def _log(self) -> None:
+        lasers = list(self.colors)
+        png = cv2.imencode(".png", mosaic([self.latest.get(laser) for laser in lasers]))[1].tobytes()
+        self.stream.log(at.CROPS_IMAGE, rr.EncodedImage(contents=png, media_type="image/png"))
+        strips, strip_colors, places, labels, label_colors = [], [], [], [], []
+        for n, laser in enumerate(lasers):
+            column, row = cell_corner(n, len(lasers))
+            crop = self.latest.get(laser)
+            places.append((column + SIDE_PX + GAP_PX / 2, row - LABEL_PX / 2))
+            labels.append(label(laser, crop))
+            saturated = crop is not None and crop.spot is not None and Failure.SATURATED in crop.spot.flags
+            label_colors.append(at.RED if saturated else self.colors[laser])
+            for strip in [] if crop is None else marks(crop):
+                strips.append(strip + np.array([column, row]) + RERUN_PIXEL_CENTRE)
+                strip_colors.append(self.colors[laser])
+        self.stream.log(
+            at.CROPS_CENTRES, rr.LineStrips2D(strips, colors=strip_colors, radii=_THIN if strips else None)
+        )
+        self.stream.log(
+            at.CROPS_LABELS,
+            rr.Points2D(places, labels=labels, colors=label_colors, radii=_NO_DOT, show_labels=True),
+        )
+
+
+def label(laser: str, crop: Crop | None) -> str:
+    """Text above a laser's squares."""
+    if crop is None:
+        return laser
+    earlier = " earlier" if crop.earlier else ""
+    if crop.spot is None:
+        return f"{laser}{earlier} no spot"
+    flags = "".join(f", {flag}" for flag in sorted(crop.spot.flags))
+    return f"{laser}{earlier} peak {crop.spot.peak_dn:.0f} DN{flags}"
+
+
+def grid_size(lasers: int) -> tuple[int, int]:
+    """Columns and rows of cells."""
+    columns = max(1, ceil(lasers / 2))
+    return columns, ceil(lasers / columns)
+
+
+def cell_corner(index: int, lasers: int) -> tuple[int, int]:
+    """Column and row of the mosaic of the first pixel of a laser's first square."""
+    columns, _ = grid_size(lasers)
+    row, column = divmod(index, columns)
+    return GAP_PX + column * (2 * SIDE_PX + 3 * GAP_PX), LABEL_PX + row * (SIDE_PX + LABEL_PX + GAP_PX)
+
+
+def mosaic_size(lasers: int) -> tuple[int, int]:
+    """Width and height of the mosaic, px."""
+    columns, rows = grid_size(lasers)
+    return columns * (2 * SIDE_PX + 3 * GAP_PX), rows * (SIDE_PX + LABEL_PX + GAP_PX)
+
+
+def mosaic(crops: Sequence[Crop | None]) -> Image:
+    """Grey picture of all lasers' squares, in the order of the rig file."""
+    width, height = mosaic_size(len(crops))
+    canvas = np.full((height, width), 26, np.uint8)
+    for n, crop in enumerate(crops):
+        column, row = cell_corner(n, len(crops))
+        squares = (np.zeros((SIDE_PX, SIDE_PX), np.uint8),) * 2 if crop is None else drawn(crop)
+        for k, square in enumerate(squares):
+            left = column + k * (SIDE_PX + GAP_PX)
+            canvas[row : row + SIDE_PX, left : left + SIDE_PX] = square
+    return canvas
+
+
+def drawn(crop: Crop) -> tuple[Image, Image]:
+    """The square of the signal, and that of the residual (grey where the profile fits)."""
+    peak = max(float(crop.signal.max()), 1.0)
+    shown = 255.0 * np.sqrt(np.clip(crop.signal / peak, 0.0, 1.0))
+    if crop.spot is None:
+        return shown.astype(np.uint8), np.full((SIDE_PX, SIDE_PX), MIDDLE, np.uint8)
+    residual = crop.signal - profile(crop.spot, crop.left_px, crop.top_px)
+    scaled = MIDDLE + RESIDUAL_GAIN * MIDDLE * residual / max(crop.spot.peak_dn, 1.0)
+    return shown.astype(np.uint8), np.clip(scaled, 0, 255).astype(np.uint8)
+
+
+def profile(spot: Spot, left_px: int, top_px: int) -> FloatArray:
+    """(SIDE_PX, SIDE_PX) Gaussian profile of a spot, integrated over pixels, DN above the background."""
+
+    def along(centre: float, first: int) -> FloatArray:
+        edges = (np.arange(SIDE_PX + 1) + first - 0.5 - centre) / max(spot.width_px, 0.1)
+        return np.asarray(np.diff(ndtr(edges)))
+
+    return spot.flux_dn * np.outer(along(spot.v_px, top_px), along(spot.u_px, left_px))
+
+
+def marks(crop: Crop) -> list[FloatArray]:
+    """Cross with a gap and ellipse at the centre of a crop's spot, in pixels of the square."""
+    if crop.spot is None:
+        return []
+    spot = crop.spot
+    centre = np.array([spot.u_px - crop.left_px, spot.v_px - crop.top_px])
+    inner, outer = CROSS_PX
+    arms = [
+        np.array([centre + inner * way, centre + outer * way])
+        for way in np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+    ]
+    turn = np.linspace(0.0, 2.0 * np.pi, 25)
+    axes = ELLIPSE_SD * np.array([spot.u_sd_px, spot.v_sd_px])
+    return [*arms, centre + axes * np.column_stack([np.cos(turn), np.sin(turn)])]
+
+
+def _crop(signal: FloatArray, centre: FloatArray, spot: Spot | None) -> Crop:
+    left, top = (round(float(c)) - SIDE_PX // 2 for c in centre)
+    square = np.zeros((SIDE_PX, SIDE_PX))
+    height, width = signal.shape
+    rows, columns = (
+        slice(max(top, 0), min(top + SIDE_PX, height)),
+        slice(max(left, 0), min(left + SIDE_PX, width)),
+    )
+    inside = signal[rows, columns]
+    if inside.size:
+        square[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left] = inside
+    return Crop(square, left, top, spot)
+
+
+def _as_earlier(crop: Crop) -> Crop:
+    return Crop(crop.signal, crop.left_px, crop.top_px, crop.spot, earlier=True)

@@ -1,0 +1,184 @@
+"""Frames with the spots found in them, and curves of the spots' quantities.
+
+A frame is shown with its contrast stretched: grey levels run from 0 to a few times the room light, so that
+spots of some pixels and their surroundings are visible. Marks leave the spots themselves uncovered.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import hypot
+
+import numpy as np
+import rerun as rr
+
+from workbench.model.arrays import FloatArray, Image
+from workbench.model.event import LaserRange
+from workbench.model.spot import Spot
+from workbench.viewer import entities as at
+from workbench.viewer.stream import Stream
+
+QUANTITIES = ("u_px", "v_px", "peak_dn")
+"""Quantities with a curve for each laser."""
+RECORDED = ("u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "peak_dn")
+"""Quantities in the record of all spots of a capture, as stored in the journal."""
+RERUN_PIXEL_CENTRE = 0.5
+"""Shift of drawings: Rerun's (0, 0) is the corner of the top-left pixel, the workbench's its centre."""
+AMBIENT_SHARE = 0.12
+"""Grey level of the room light, as a share of white."""
+LEAST_WHITE = 0.25
+"""Least value that is shown as white, as a share of full scale; above the noise of a dark room."""
+LABEL_DISTANCE_PX = 44.0
+"""Distance between labels of neighbouring spots."""
+LEADER_PX = (8.0, 40.0)
+"""Ends of the line from a spot to its label, below the spot."""
+PREDICTED_PX = 7.0
+"""Half diagonal of the mark at a predicted spot."""
+_LINE = rr.Radius.ui_points(0.75)
+_NO_DOT = rr.Radius.ui_points(0.0)
+_SAME_PX = 0.01
+
+
+def log_series_styles(stream: Stream, colors: Mapping[str, at.Rgb]) -> None:
+    """Log name and colour of every laser's curve."""
+    for quantity in QUANTITIES:
+        for laser, color in colors.items():
+            style = rr.SeriesPoints(colors=color, names=laser, markers="circle", marker_sizes=3.0)
+            stream.log(at.under(at.SPOTS, quantity, laser), style, static=True)
+
+
+def log_scanlines(stream: Stream, lines: Mapping[str, FloatArray], colors: Mapping[str, at.Rgb]) -> None:
+    """Log the line of each laser's spots in the picture, (2, 2) pixels."""
+    strips = [line + RERUN_PIXEL_CENTRE for line in lines.values()]
+    faint = [(*colors[laser], 60) for laser in lines]
+    stream.log(at.SCANLINES, rr.LineStrips2D(strips, colors=faint, radii=_LINE if strips else None))
+
+
+def log_frame(stream: Stream, png: bytes, off: Image | None, full_scale: int) -> None:
+    """Log a frame with the lasers on, as stored; its contrast follows the room light.
+
+    Args:
+        stream: recording.
+        png: the stored frame.
+        off: frame with the lasers off, (height, width); None for a frame in room light.
+        full_scale: largest value of a pixel.
+    """
+    ambient = 0.0 if off is None else float(np.median(off))
+    white = 1.0 if off is None else min(1.0, max(LEAST_WHITE, ambient / full_scale / AMBIENT_SHARE))
+    # Rerun scales 8 bits to 0..1, and takes 16 bits as they are.
+    high = white if full_scale <= 255 else white * full_scale
+    stream.log(
+        at.IMAGE,
+        rr.EncodedDepthImage(png, media_type="image/png", colormap="grayscale", depth_range=[0.0, high]),
+    )
+
+
+def log_predicted(stream: Stream, spots: Mapping[str, FloatArray], colors: Mapping[str, at.Rgb]) -> None:
+    """Log where spots are expected: a thin diamond around each, (2,) pixels."""
+    turn = PREDICTED_PX * np.array([(1, 0), (0, 1), (-1, 0), (0, -1), (1, 0)])
+    strips = [turn + spot + RERUN_PIXEL_CENTRE for spot in spots.values()]
+    faint = [(*colors[laser], 110) for laser in spots]
+    stream.log(at.PREDICTED_SPOTS, rr.LineStrips2D(strips, colors=faint, radii=_LINE if strips else None))
+
+
+def log_spots(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
+    """Log the spots of one capture, as marks in the picture and as numbers for curves."""
+    _draw(stream, spots, colors)
+    by_laser: dict[str | None, list[Spot]] = defaultdict(list)
+    for spot in spots:
+        by_laser[spot.laser_id].append(spot)
+    for laser, found in by_laser.items():
+        for quantity in QUANTITIES:
+            values = [getattr(spot, quantity) for spot in found]
+            stream.log(_curve(quantity, laser), rr.Scalars(values))
+    if spots:
+        stream.log(at.SPOTS_RECORD, rr.AnyValues(drop_untyped_nones=True, **_record(spots)))
+
+
+def _record(spots: Sequence[Spot]) -> dict[str, list[float] | list[str]]:
+    """All spots of a capture, a list for each quantity."""
+    numbers = {name: [float(getattr(spot, name)) for spot in spots] for name in RECORDED}
+    return {
+        **numbers,
+        "laser_id": [spot.laser_id or "" for spot in spots],
+        "flags": [" ".join(sorted(spot.flags)) for spot in spots],
+    }
+
+
+def log_assigned(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
+    """Draw the spots of a frame again, with the lasers that a reading has assigned to them."""
+    _draw(stream, spots, colors)
+
+
+def assigned(spots: Sequence[Spot], lasers: Sequence[LaserRange]) -> list[Spot]:
+    """The spots with the lasers whose ranges come from them."""
+    return [replace(spot, laser_id=_assigned_laser(spot, lasers)) for spot in spots]
+
+
+def _assigned_laser(spot: Spot, lasers: Sequence[LaserRange]) -> str | None:
+    for one in lasers:
+        if one.u_px is None or one.v_px is None:
+            continue
+        if hypot(one.u_px - spot.u_px, one.v_px - spot.v_px) < _SAME_PX:
+            return one.laser_id
+    return spot.laser_id
+
+
+def _curve(quantity: str, laser: str | None) -> str:
+    """Entity of a spot's curve. Unassigned spots are separate: their order varies between captures."""
+    if laser is None:
+        return at.under(at.SPOTS, at.UNASSIGNED, quantity)
+    return at.under(at.SPOTS, quantity, laser)
+
+
+def _draw(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
+    """Lines from each spot to a label below it; the labels do not overlap."""
+    ordered = sorted(spots, key=lambda spot: spot.u_px)
+    columns = label_columns([spot.u_px for spot in ordered])
+    near, far = LEADER_PX
+    leaders = [
+        [(spot.u_px, spot.v_px + near), (spot.u_px, spot.v_px + far / 2), (column, spot.v_px + far)]
+        for spot, column in zip(ordered, columns, strict=True)
+    ]
+    drawn = [colors.get(spot.laser_id or at.UNASSIGNED, at.WHITE) for spot in ordered]
+    lines = [[(u + RERUN_PIXEL_CENTRE, v + RERUN_PIXEL_CENTRE) for u, v in leader] for leader in leaders]
+    stream.log(at.LEADERS_IN_IMAGE, rr.LineStrips2D(lines, colors=drawn, radii=_LINE if lines else None))
+    stream.log(
+        at.SPOTS_IN_IMAGE,
+        rr.Points2D(
+            [line[-1] for line in lines],
+            colors=drawn,
+            labels=[label(spot) for spot in ordered],
+            show_labels=True,
+            radii=_NO_DOT if lines else None,
+        ),
+    )
+
+
+def label_columns(columns: Sequence[float]) -> list[float]:
+    """Columns of labels for ascending columns of spots, at least `LABEL_DISTANCE_PX` apart, near their spots.
+
+    Labels that would overlap are spread about the middle of their spots.
+    """
+    groups: list[list[float]] = []
+    for column in columns:
+        groups.append([column])
+        while len(groups) > 1 and _left(groups[-1]) - _right(groups[-2]) < LABEL_DISTANCE_PX:
+            groups[-2:] = [groups[-2] + groups[-1]]
+    return [_left(group) + n * LABEL_DISTANCE_PX for group in groups for n in range(len(group))]
+
+
+def _left(group: Sequence[float]) -> float:
+    return sum(group) / len(group) - LABEL_DISTANCE_PX * (len(group) - 1) / 2
+
+
+def _right(group: Sequence[float]) -> float:
+    return _left(group) + LABEL_DISTANCE_PX * (len(group) - 1)
+
+
+def label(spot: Spot) -> str:
+    """Laser and flags of a spot."""
+    flags = f" ({', '.join(sorted(spot.flags))})" if spot.flags else ""
+    return f"{spot.laser_id or '?'}{flags}"
