@@ -61,6 +61,10 @@ AnswersFile = Annotated[
 NoInput = Annotated[
     bool, typer.Option("--no-input", help="Do not ask: an open prompt ends with exit code 6.")
 ]
+View = Annotated[
+    bool | None,
+    typer.Option("--view/--no-view", help="Watch in the Rerun viewer. Default: if there is a display."),
+]
 
 
 ExistingCalibration = Annotated[
@@ -85,11 +89,12 @@ def run(
     calibration: ExistingCalibration = None,
     answers: AnswersFile = None,
     no_input: NoInput = False,
+    view: View = None,
 ) -> None:
     """Run procedures on a rig in one session."""
     from workbench.cli.run import Answers, run_procedures
 
-    run_procedures(procedures, rig, sessions, Answers(answers, no_input), calibration)
+    run_procedures(procedures, rig, sessions, Answers(answers, no_input), calibration, view)
 
 
 Sessions = Annotated[Path, typer.Option(help="Folder of sessions.")]
@@ -115,12 +120,13 @@ def resume(
     ] = None,
     answers: AnswersFile = None,
     no_input: NoInput = False,
+    view: View = None,
 ) -> None:
     """Resume a session that ended early; complete placements are not captured again."""
     from workbench.cli.run import Answers, resume_session
     from workbench.cli.sessions import find_session
 
-    resume_session(find_session(session, sessions), accept_changes, Answers(answers, no_input))
+    resume_session(find_session(session, sessions), accept_changes, Answers(answers, no_input), view)
 
 
 @app.command(name="sessions")

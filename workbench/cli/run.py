@@ -35,6 +35,7 @@ from workbench.session.caller import now, operator
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
+from workbench.viewer.window import has_display, viewer_executable, watch
 
 
 @dataclass(frozen=True)
@@ -57,20 +58,27 @@ class SessionInterface:
 
 
 def run_procedures(
-    procedures: list[Path], rig_path: Path, sessions: Path, answers: Answers, calibration: Path | None = None
+    procedures: list[Path],
+    rig_path: Path,
+    sessions: Path,
+    answers: Answers,
+    calibration: Path | None = None,
+    view: bool | None = None,
 ) -> None:
-    """Run procedures in a new session with progress on the terminal.
+    """Run procedures in a new session with progress on the terminal, and in the viewer (`view_live`).
 
     Raises:
         WorkbenchError: see `workbench.procedure.engine.run.run`.
     """
     plan = Plan.load(rig_path, procedures, calibration)
     session_dir = plan.new_session(sessions)
-    with session_interface(session_dir, plan, answers) as ui:
+    with session_interface(session_dir, plan, answers, view) as ui:
         run(plan, session_dir, ui.consumers, _caller(), ui.stopping, ui.operator)
 
 
-def resume_session(session_dir: Path, accept_changes: str | None, answers: Answers) -> None:
+def resume_session(
+    session_dir: Path, accept_changes: str | None, answers: Answers, view: bool | None = None
+) -> None:
     """Resume a session that ended early.
 
     Raises:
@@ -78,13 +86,25 @@ def resume_session(session_dir: Path, accept_changes: str | None, answers: Answe
     """
     now, _ = files_now(session_dir, load_manifest(session_dir))
     plan = plan_of(session_dir, now)
-    with session_interface(session_dir, plan, answers) as ui:
+    with session_interface(session_dir, plan, answers, view) as ui:
         resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes)
 
 
 @contextmanager
-def session_interface(session_dir: Path, plan: Plan, answers: Answers) -> Iterator[SessionInterface]:
-    """Terminal, recording, figures and operator for a session; prints its paths at the end."""
+def session_interface(
+    session_dir: Path, plan: Plan, answers: Answers, view: bool | None = None
+) -> Iterator[SessionInterface]:
+    """Terminal, recording, viewer, figures and operator for a session; prints its paths at the end.
+
+    Args:
+        session_dir: folder of the session.
+        plan: rig and procedures.
+        answers: options for answers to prompts.
+        view: whether to open the viewer; None: if there is a display.
+    """
+    watched = watch if view or (view is None and has_display()) else None
+    if watched is not None:
+        viewer_executable()  # missing, it is named before the bench is opened
     console = Console(stderr=True, markup=False)
     stop = StopAfterCapture()
     script = None
@@ -94,7 +114,7 @@ def session_interface(session_dir: Path, plan: Plan, answers: Answers) -> Iterat
     if not is_compiled():
         print_message("note: the first capture compiles the search for spots, once, in one or two minutes")
     forecast = TimeLeft(steps, learn_durations(session_dir.parent, plan.rig.rig))
-    recording = RecordingConsumer(session_dir, plan.rig)
+    recording = RecordingConsumer(session_dir, plan.rig, watch=watched)
     file = session_dir / RECORDING_FILE
     with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
         person = choose_operator(answers.no_input, console, lambda: stop.reason, terminal.quiet)

@@ -5,7 +5,7 @@ Journal and frames are the record. A damaged or incomplete recording can be made
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import singledispatchmethod
 from hashlib import sha256
 from pathlib import Path
@@ -31,12 +31,15 @@ from workbench.viewer.crops import Crops
 from workbench.viewer.geometry import Geometry
 from workbench.viewer.stream import Moment, Stream
 from workbench.viewer.trial import TrialView, tabs
+from workbench.viewer.window import free_port
 
 RECORDING_FILE = "recording.rrd"
 
 
 class RecordingConsumer:
     """Consumer that writes `recording.rrd` into the session folder.
+
+    With `watch` the recording is also served on loopback, and `watch` is called with the port.
 
     The first record replaces an existing recording; a resumed session therefore passes all earlier records
     first. Use the consumer as a context manager, or call `close`. Without that only the footer of the file is
@@ -46,8 +49,11 @@ class RecordingConsumer:
         BadInputError: a frame of a record is missing in the session folder, or has changed.
     """
 
-    def __init__(self, session_dir: Path, rig: Rig, out: Path | None = None) -> None:
+    def __init__(
+        self, session_dir: Path, rig: Rig, out: Path | None = None, watch: Callable[[int], None] | None = None
+    ) -> None:
         self._session_dir = session_dir
+        self._watch = watch
         self._rig = rig
         self._out = out or session_dir / RECORDING_FILE
         self._colors = at.laser_colors(rig.laser_ids)
@@ -58,8 +64,11 @@ class RecordingConsumer:
         if self._open is None:
             if not isinstance(record.event, ev.SessionStarted):
                 raise ValueError(f"expected session_started as the first record, got {record.event.kind}")
-            stream = Stream(self._out, record.event.session, blueprint(self._rig))
+            port = None if self._watch is None else free_port()
+            stream = Stream(self._out, record.event.session, blueprint(self._rig), port)
             self._open = _OpenRecording(stream, self._session_dir, self._rig)
+            if self._watch is not None and port is not None:
+                self._watch(port)
         self._open.take(record)
 
     def close(self) -> None:

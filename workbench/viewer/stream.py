@@ -10,8 +10,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from workbench.viewer.entities import APPLICATION, CAPTURE, STANDOFF, STEP, WALL_CLOCK
+from workbench.viewer.window import LOOPBACK
 
 FLUSH_SECONDS = 20.0
+SERVER_MEMORY = "256MiB"
+"""Memory that the server keeps for a viewer that has not yet come."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +29,17 @@ class Moment:
 
 
 class Stream:
-    """Rerun recording that is written to a file while it is logged."""
+    """Rerun recording that is written to a file while it is logged, and served to a viewer.
 
-    def __init__(self, path: Path, session: str, layout: rrb.Blueprint) -> None:
+    Args:
+        path: file of the recording.
+        session: name of the recording.
+        layout: first layout.
+        port: port on loopback at which a viewer may watch; None: none may. The recording does not wait for a
+            viewer: one that hangs, or never comes, costs memory up to a limit.
+    """
+
+    def __init__(self, path: Path, session: str, layout: rrb.Blueprint, port: int | None = None) -> None:
         self._recording = rr.RecordingStream(
             APPLICATION,
             recording_id=session,
@@ -39,7 +50,10 @@ class Stream:
         # No timelines of the logging itself: they would differ in a rebuilt recording.
         rr.set_log_time_enabled(False, self._recording)
         rr.set_log_tick_enabled(False, self._recording)
-        self._recording.set_sinks(rr.FileSink(str(path)), default_blueprint=layout)
+        sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(str(path))]
+        if port is not None:
+            sinks.append(rr.GrpcServerSink(bind_ip=LOOPBACK, port=port, server_memory_limit=SERVER_MEMORY))
+        self._recording.set_sinks(*sinks, default_blueprint=layout)
         self._recording.send_recording_name(session)
 
     def lay_out(self, layout: rrb.Blueprint) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -36,6 +37,38 @@ def viewer_environment() -> dict[str, str]:
     return {**os.environ, "CI": "1"}
 
 
+def has_display() -> bool:
+    """Whether a window can be opened."""
+    return sys.platform != "linux" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ))
+
+
+def free_port() -> int:
+    """Port on loopback that no program listens on."""
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
+
+
+def watch(port: int) -> None:
+    """Open a viewer that watches a recording served at a port, and go on without waiting for it.
+
+    The window stays open when the session ends; it then shows the whole recording.
+
+    Raises:
+        BadInputError: the viewer is not installed.
+    """
+    command = [str(viewer_executable()), "--bind", LOOPBACK, "--port", "0"]
+    command += ["--connect", f"rerun+http://{LOOPBACK}:{port}/proxy"]
+    subprocess.Popen(  # noqa: S603  # the executable comes from our own dependency
+        command,
+        env=viewer_environment(),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,  # Ctrl-C at the terminal ends the session, not the window
+    )
+
+
 def open_viewer(recording: Path) -> int:
     """Show a recording in the viewer until the window is closed; returns the viewer's exit code.
 
@@ -47,7 +80,7 @@ def open_viewer(recording: Path) -> int:
     """
     if not recording.is_file():
         raise BadInputError(f"{recording}: no such recording; expected the recording.rrd of a session")
-    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+    if not has_display():
         raise BadInputError(f"{recording}: no display to show it; copy the file to a computer with a display")
     command = [str(viewer_executable()), "--bind", LOOPBACK, "--port", "0", str(recording)]
     # The executable comes from our own dependency, the path is a file that exists.
