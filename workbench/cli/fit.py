@@ -19,11 +19,11 @@ from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict.assessment import Assessment, derive
 from workbench.calibration.verdict.export import accept_with_reason, calibrate, write_calibration
-from workbench.calibration.verdict.records import parameter_records
+from workbench.calibration.verdict.records import fit_finished, parameter_records
 from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.invocation import command_line
 from workbench.model.acceptance import Acceptance
-from workbench.model.calibration import Provenance
+from workbench.model.calibration import Calibration, Provenance
 from workbench.model.captures import (
     CaptureRow,
     check_images,
@@ -62,8 +62,39 @@ class Request:
     """Reason for accepting a calibration that fails its limits."""
     without_mm: tuple[float, ...]
     """Standoffs to exclude."""
-    fixed: tuple[str, ...]
+    fixed: tuple[str, ...] = ()
     """Names of parameters to fix at the rig file's value."""
+    recording: Path | None = None
+    """Recording of the fit for the viewer; None: none."""
+
+
+@dataclass(frozen=True)
+class FittedSource:
+    """Fit of a captures file, or of a session."""
+
+    rows: Sequence[CaptureRow]
+    """Rows that were not excluded."""
+    fitted: CalibrationFit
+    calibration: Calibration
+    assessment: Assessment
+
+
+def fit_source(request: Request) -> FittedSource:
+    """Fit the captures of a request, without writing anything.
+
+    Raises:
+        BadInputError: a file or an option is wrong.
+        LimitFailedError: the fit has no finite result.
+    """
+    rig = fix_parameters(_rig(request), request.fixed)
+    captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
+    content = read_captures_file(captures)
+    rows = parse_captures(captures, content)
+    check_images(captures, rows)
+    fitted = fit_calibration(rig, *_observations(rig, rows, captures, request))
+    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
+    kept = [row for row in rows if row.standoff_mm not in request.without_mm]
+    return FittedSource(kept, fitted, calibration, assessment)
 
 
 def fit_captures(request: Request, as_json: bool) -> None:
@@ -74,20 +105,18 @@ def fit_captures(request: Request, as_json: bool) -> None:
         LimitFailedError: the calibration is refused; nothing is written.
     """
     check_output(request.output)
+    if request.recording is not None:
+        check_output(request.recording)
     _check_distinct(request)
-    rig = fix_parameters(_rig(request), request.fixed)
-    captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
-    content = read_captures_file(captures)
-    rows = parse_captures(captures, content)
-    check_images(captures, rows)
-    data = _observations(rig, rows, captures, request)
-    fitted = fit_calibration(rig, *data)
-    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
+    found = fit_source(request)
+    fitted, calibration, assessment = found.fitted, found.calibration, found.assessment
     refused = assessment.verdict == "refused" and request.accept is None
     if assessment.verdict == "refused" and request.accept is not None:
         calibration = accept_with_reason(calibration, request.accept)
     if not refused:  # before printing, which fails if the reader of the output has ended
         write_calibration(request.output, calibration)
+    if request.recording is not None:  # of a refused fit, too: to see why
+        record_fit(found, request.source.stem, request.recording)
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))
     _print_tables(fitted, assessment)
@@ -98,6 +127,15 @@ def fit_captures(request: Request, as_json: bool) -> None:
     Console(stderr=True, markup=False).print(
         f"{request.output} written{reason}", highlight=False, soft_wrap=True
     )
+
+
+def record_fit(found: FittedSource, name: str, out: Path) -> None:
+    """Write the recording of a fit: its captures with their frames, residuals, tables and verdict."""
+    from workbench.viewer.fit_records import fit_records
+    from workbench.viewer.recording import rebuild
+
+    finished = fit_finished(found.fitted, found.assessment)
+    rebuild(Path(), found.fitted.rig, fit_records(name, found.rows, found.fitted, finished), out)
 
 
 def _check_distinct(request: Request) -> None:

@@ -188,13 +188,17 @@ def fit(
         list[str] | None,
         typer.Option(metavar="NAME", help="Fix a parameter at the rig file's value; repeatable."),
     ] = None,
+    recording: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Recording of the fit to write, for `workbench view`.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Fit a calibration to images or pixel positions at known standoffs."""
     gc.set_threshold(1_000_000)  # more objects than a fit creates: collection would only take time
     from workbench.cli.fit import Request, fit_captures
 
-    request = Request(source, rig, output, accept, tuple(without_standoff or ()), tuple(fix or ()))
+    without, fixed = tuple(without_standoff or ()), tuple(fix or ())
+    request = Request(source, rig, output, accept, without, fixed, recording)
     fit_captures(request, json)
     exit_program(0, at_once=True)
 
@@ -300,12 +304,29 @@ def target(
 
 @app.command()
 def view(
-    session: Annotated[Path, typer.Argument(help="Session folder.")],
+    what: Annotated[
+        list[Path],
+        typer.Argument(
+            help="One or two sessions or captures files; or one calibration or recording (.rrd).",
+            show_default=False,
+        ),
+    ],
+    sessions: Sessions = Path("sessions"),
+    rig: Annotated[Path | None, typer.Option(help="Rig file of a captures file.")] = None,
+    without_standoff: Annotated[
+        list[float] | None,
+        typer.Option(metavar="MM", parser=millimetres(0), help="Beside it, a fit without this standoff."),
+    ] = None,
+    rebuild: Annotated[
+        bool, typer.Option("--rebuild", help="Make the recording again from frames and journal.")
+    ] = False,
+    web: Annotated[bool, typer.Option("--web", help="In a browser on this computer.")] = False,
 ) -> None:
-    """Open a session's recording in the Rerun viewer."""
-    from workbench.cli.view import view_session
+    """Replay in the Rerun viewer: frames, spots, residuals and trials."""
+    from workbench.cli.view import Request, view
 
-    raise typer.Exit(view_session(session))
+    asked = Request(tuple(what), sessions, rig, tuple(without_standoff or ()), rebuild, web)
+    raise typer.Exit(view(asked))
 
 
 @lasers.command(name="off")

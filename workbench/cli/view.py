@@ -1,26 +1,141 @@
-"""`workbench view`."""
+"""`workbench view`: a session, two of them, a captures file, a calibration or a recording in the viewer."""
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from workbench.cli.sessions import find_session
+from workbench.model.errors import BadInputError
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_session_rig
 from workbench.session.state import effective
-from workbench.viewer.window import open_viewer
+from workbench.viewer.window import is_complete, open_viewer, serve
+
+if TYPE_CHECKING:  # loads Rerun
+    from workbench.viewer.recording import Source
+
+RECORDING_FILE = "recording.rrd"
+MOST_SIDES = 2
+"""Number of sessions that fit side by side on a screen."""
 
 
-def view_session(session: Path) -> int:
-    """Show a session's recording until the window is closed; returns the viewer's exit code.
+@dataclass(frozen=True)
+class Request:
+    """Arguments of the command."""
 
-    A missing recording is made again from frames and journal.
+    what: tuple[Path, ...]
+    """One or two: names or folders of sessions, captures files; or one calibration or recording."""
+    sessions: Path
+    """Folder of sessions."""
+    rig: Path | None
+    """Rig file of captures files."""
+    without_mm: tuple[float, ...] = ()
+    """Standoffs to exclude from a refit that is shown beside the session."""
+    rebuild: bool = False
+    web: bool = False
+
+
+def view(request: Request) -> int:
+    """Show what is asked for until the window is closed; returns the viewer's exit code.
 
     Raises:
-        BadInputError: `session` is not a session folder, or a frame in it is damaged.
+        BadInputError: see `recording_of`.
     """
-    recording = session / "recording.rrd"
-    if not recording.exists():
-        from workbench.viewer.recording import rebuild
+    with tempfile.TemporaryDirectory() as folder:
+        recording = recording_of(request, Path(folder))
+        return serve(recording) if request.web else open_viewer(recording)
 
-        rebuild(session, load_session_rig(session), effective(read_journal(session)), recording)
-    return open_viewer(recording)
+
+def recording_of(request: Request, folder: Path) -> Path:
+    """The recording to show: that of a session, or one made in `folder`.
+
+    Raises:
+        BadInputError: there is nothing of that name, an option does not fit to it, or a frame is damaged.
+    """
+    if len(request.what) > MOST_SIDES:
+        raise BadInputError(f"expected one or two sessions or captures files, got {len(request.what)}")
+    first = request.what[0]
+    if len(request.what) == 1 and not request.without_mm:
+        if first.suffix == ".rrd":
+            return first
+        if first.suffix in {".yaml", ".yml"}:
+            return _of_calibration(first, folder)
+        if first.suffix == ".csv":
+            return _of_captures(first, request, folder)
+        return _of_session(find_session(first, request.sessions), rebuild=request.rebuild)
+    return _side_by_side(request, folder)
+
+
+def _of_session(session: Path, *, rebuild: bool) -> Path:
+    """The session's recording; made again where it is missing, incomplete, or asked for."""
+    recording = session / RECORDING_FILE
+    if rebuild or not is_complete(recording):
+        from workbench.viewer.recording import rebuild as made_again
+
+        made_again(session, load_session_rig(session), effective(read_journal(session)), recording)
+    return recording
+
+
+def _of_captures(captures: Path, request: Request, folder: Path) -> Path:
+    from workbench.cli.fit import Request as FitRequest
+    from workbench.cli.fit import fit_source, record_fit
+
+    out = folder / RECORDING_FILE
+    record_fit(fit_source(FitRequest(captures, request.rig, Path(), None, ())), captures.stem, out)
+    return out
+
+
+def _of_calibration(path: Path, folder: Path) -> Path:
+    from workbench.model.calibration import load_calibration
+    from workbench.viewer.calibration_view import record_calibration
+
+    return record_calibration(load_calibration(path), path.stem, folder / RECORDING_FILE)
+
+
+def _side_by_side(request: Request, folder: Path) -> Path:
+    from workbench.viewer.recording import Source, compare
+
+    sources = []
+    for path in request.what:
+        if path.suffix == ".csv":
+            sources.append(_refit(path, request.rig, (), path.stem))
+            continue
+        session = find_session(path, request.sessions)
+        records = effective(read_journal(session))
+        sources.append(Source(session.name, session, load_session_rig(session), records))
+    if request.without_mm:
+        if len(sources) != 1:
+            raise BadInputError(
+                "--without-standoff shows a refit beside one session or captures file, got two"
+            )
+        left_out = ", ".join(f"{s:g}" for s in request.without_mm)
+        sources.append(
+            _refit(_captures_of(request), request.rig, request.without_mm, f"without {left_out} mm")
+        )
+    out = folder / RECORDING_FILE
+    compare(sources, out)
+    return out
+
+
+def _captures_of(request: Request) -> Path:
+    """The captures file, or the session's folder, of the first argument."""
+    first = request.what[0]
+    return first if first.suffix == ".csv" else find_session(first, request.sessions)
+
+
+def _refit(path: Path, rig_path: Path | None, without_mm: Sequence[float], name: str) -> Source:
+    """Fit of a captures file, or of a session's captures, with its records."""
+    from workbench.calibration.verdict.records import fit_finished
+    from workbench.cli.fit import Request as FitRequest
+    from workbench.cli.fit import fit_source
+    from workbench.viewer.fit_records import fit_records
+    from workbench.viewer.recording import Source
+
+    found = fit_source(FitRequest(path, rig_path, Path(), None, tuple(without_mm)))
+    finished = fit_finished(found.fitted, found.assessment)
+    records = fit_records(name, found.rows, found.fitted, finished)
+    return Source(name, Path(), found.fitted.rig, list(records))

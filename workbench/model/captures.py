@@ -72,6 +72,11 @@ class CaptureRow(FileModel):
     exposure_unit: str = ""
     """Unit of `exposure`; empty: the camera driver's own."""
 
+    @property
+    def placement_key(self) -> str:
+        """Name of the placement for a fit: as stated, else the scene, else the standoff."""
+        return self.placement or self.scene or f"{self.standoff_mm:g} mm"
+
     @model_validator(mode="after")
     def _has_an_image_or_a_position(self) -> CaptureRow:
         measured = isfinite(self.u_px) or isfinite(self.v_px)

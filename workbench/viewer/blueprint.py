@@ -7,7 +7,7 @@ are so on one screen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -63,6 +63,50 @@ def blueprint(rig: Rig, trials: Sequence[TrialTab] = (), phase: Phase = "capture
     )
 
 
+def comparison(columns: Mapping[str, tuple[Rig, str]]) -> rrb.Blueprint:
+    """Layout of several recordings side by side, with the time cursor on the standoff.
+
+    Args:
+        columns: rig and title of each recording by the prefix of its entities.
+    """
+    sides = [_side(prefix, rig, title) for prefix, (rig, title) in columns.items()]
+    return rrb.Blueprint(
+        rrb.Horizontal(*sides, name="Comparison"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=at.STANDOFF),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
+    axis = rig.lasers[0].axis
+    width, height = float(rig.camera.width_px), float(rig.camera.height_px)
+    frame = rrb.Spatial2DView(
+        origin=f"{prefix}/{at.FRAME}",
+        name=f"{title}: frame",
+        visual_bounds=_bounds(width, height),
+        background=[0, 0, 0],
+    )
+    crops = rrb.Spatial2DView(
+        origin=f"{prefix}/{at.CROPS}",
+        name="Spots",
+        visual_bounds=_bounds(*mosaic_size(len(rig.lasers))),
+        background=DARK,
+    )
+    texts = rrb.Horizontal(
+        rrb.Vertical(_text(f"{prefix}/{at.NOW}", "Now"), _text(f"{prefix}/{at.FIT_VERDICT}", "Verdict")),
+        _table(f"{prefix}/{at.FIT_WORST}", "Worst"),
+    )
+    return rrb.Vertical(
+        rrb.Horizontal(frame, crops),
+        picture_view(f"{prefix}/{at.FIT_PICTURE}/{axis}", f"{title}: residuals along {axis}"),
+        texts,
+        row_shares=[4, 4, 3],
+    )
+
+
 def _captures(rig: Rig) -> rrb.Container:
     """Screen of the technician: what is captured now, and how the uncertainty decreases."""
     axis = f"{rig.lasers[0].axis}_px"
@@ -93,7 +137,7 @@ def _result(rig: Rig) -> rrb.Container:
         row_shares=[2, 4, 5],
     )
     charts = rrb.Horizontal(
-        _picture(f"{at.FIT_PICTURE}/{axis}", f"Residuals along {axis}"),
+        picture_view(f"{at.FIT_PICTURE}/{axis}", f"Residuals along {axis}"),
         _series(
             f"{at.FIT_RESIDUALS_IN_SD}/{axis}",
             "Residual in sd; right click: go to the capture",
@@ -105,7 +149,7 @@ def _result(rig: Rig) -> rrb.Container:
 
 
 def _parameters() -> rrb.Container:
-    charts = rrb.Vertical(*(_picture(f"{at.FIT_PICTURE}/{axis}", f"Residuals {axis}") for axis in "uv"))
+    charts = rrb.Vertical(*(picture_view(f"{at.FIT_PICTURE}/{axis}", f"Residuals {axis}") for axis in "uv"))
     texts = rrb.Vertical(_table(at.FIT_CHECKS, "Checks"), _table(at.FIT_TABLE, "Parameters"))
     return rrb.Horizontal(charts, texts, column_shares=[1, 1], name="Calibration: details")
 
@@ -114,7 +158,7 @@ def _trial(rig: Rig, trial: TrialTab) -> rrb.Container:
     texts = rrb.Vertical(
         _text(at.NOW, "Now"), _table(at.trial_tables(trial.trial), "Tables"), row_shares=[1, 4]
     )
-    pictures = [_picture(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
+    pictures = [picture_view(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
     charts = rrb.Horizontal(
         pictures[0] if len(pictures) == 1 else rrb.Tabs(*pictures, active_tab=0),
         _series(
@@ -156,7 +200,8 @@ def _seen(rig: Rig, texts: rrb.Container) -> rrb.Container:
     return rrb.Horizontal(frame, crops, texts, column_shares=[4, 5, 5])
 
 
-def _picture(origin: str, name: str) -> rrb.View:
+def picture_view(origin: str, name: str) -> rrb.View:
+    """View of the picture of a chart."""
     return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=_bounds(*SIZE_PX), background=DARK)
 
 

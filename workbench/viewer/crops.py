@@ -121,7 +121,8 @@ def label(laser: str, crop: Crop | None) -> str:
     if crop.spot is None:
         return f"{laser}{earlier} no spot"
     flags = "".join(f", {flag}" for flag in sorted(crop.spot.flags))
-    return f"{laser}{earlier} peak {crop.spot.peak_dn:.0f} DN{flags}"
+    peak = f" peak {crop.spot.peak_dn:.0f} DN" if np.isfinite(crop.spot.peak_dn) else ""
+    return f"{laser}{earlier}{peak}{flags}"
 
 
 def grid_size(lasers: int) -> tuple[int, int]:
@@ -160,7 +161,7 @@ def drawn(crop: Crop) -> tuple[Image, Image]:
     """The square of the signal, and that of the residual (grey where the profile fits)."""
     peak = max(float(crop.signal.max()), 1.0)
     shown = 255.0 * np.sqrt(np.clip(crop.signal / peak, 0.0, 1.0))
-    if crop.spot is None:
+    if crop.spot is None or not np.isfinite(crop.spot.flux_dn):
         return shown.astype(np.uint8), np.full((SIDE_PX, SIDE_PX), MIDDLE, np.uint8)
     residual = crop.signal - profile(crop.spot, crop.left_px, crop.top_px)
     scaled = MIDDLE + RESIDUAL_GAIN * MIDDLE * residual / max(crop.spot.peak_dn, 1.0)

@@ -6,6 +6,7 @@ Journal and frames are the record. A damaged or incomplete recording can be made
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import singledispatchmethod
 from hashlib import sha256
 from pathlib import Path
@@ -25,7 +26,7 @@ from workbench.model.spot import Failure, Spot
 from workbench.model.target import BoardTarget, FlatTarget, Placement
 from workbench.viewer import documents, fit, frame, scene, steps
 from workbench.viewer import entities as at
-from workbench.viewer.blueprint import blueprint
+from workbench.viewer.blueprint import blueprint, comparison
 from workbench.viewer.captures import CaptureLog
 from workbench.viewer.crops import Crops
 from workbench.viewer.geometry import Geometry
@@ -34,6 +35,7 @@ from workbench.viewer.trial import TrialView, tabs
 from workbench.viewer.window import free_port
 
 RECORDING_FILE = "recording.rrd"
+PNG_SIGNATURE = b"\x89PNG"
 
 
 class RecordingConsumer:
@@ -100,6 +102,33 @@ def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path
         partial.replace(out)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def compare(sources: Sequence[Source], out: Path) -> None:
+    """Record several sessions side by side, with one cursor on the standoff.
+
+    Raises:
+        BadInputError: a frame of a record is missing, or has changed.
+    """
+    prefixes = [chr(ord("a") + n) for n in range(len(sources))]
+    columns = {prefix: (source.rig, source.name) for prefix, source in zip(prefixes, sources, strict=True)}
+    stream = Stream(out, " and ".join(source.name for source in sources), comparison(columns))
+    for prefix, source in zip(prefixes, sources, strict=True):
+        part = _OpenRecording(stream.below(prefix), source.folder, source.rig)
+        for record in source.records:
+            part.take(record)
+    stream.close()
+
+
+@dataclass(frozen=True)
+class Source:
+    """Records of a session, or of a fit of a captures file."""
+
+    name: str
+    folder: Path
+    """Folder to which the paths of frames are relative."""
+    rig: Rig
+    records: Iterable[ev.Record]
 
 
 class _OpenRecording:
@@ -208,10 +237,7 @@ class _OpenRecording:
         self._exposure = Moment(moment.capture, moment.step, event.on.time_ns, event.standoff_mm)
         self._captures.add(event, self._placement, self._exposure)
         self.stream.at(self._exposure)
-        png = self._read(event.on)
-        off = None if event.off is None else _decoded(self._read(event.off))
-        self._frames = _decoded(png), off
-        frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
+        self._show_frame(event)
         self._note(documents.capture_line(moment.capture, event, self._title))
         steps.lane(self.stream, at.LANE_LASER, event.laser_id)
 
@@ -334,6 +360,16 @@ class _OpenRecording:
         lines = {laser: self._geometry.scanline(laser, self._rig.bench.reach_mm) for laser in self._colors}
         frame.log_scanlines(self.stream, lines, self._colors)
 
+    def _show_frame(self, event: ev.CaptureTaken) -> None:
+        """Log the lit frame of a capture; a row of a captures file may state positions without any."""
+        if not event.on.path:
+            self._frames = None
+            return
+        png, on = _as_png(self._read(event.on))
+        off = None if event.off is None else _as_png(self._read(event.off))[1]
+        self._frames = on, off
+        frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
+
     def _show_crops(self, spots: Sequence[Spot], lasers: Sequence[str]) -> None:
         if self._frames is not None:
             expected = {laser: spot for laser, spot in self._expected().items() if laser in lasers}
@@ -357,7 +393,7 @@ class _OpenRecording:
                 "restore it from a copy of the session folder"
             ) from None
         # The viewer would show a damaged picture, or none, without an error.
-        if sha256(png).hexdigest() != frame.sha256:
+        if frame.sha256 and sha256(png).hexdigest() != frame.sha256:
             raise BadInputError(
                 f"{path}: the frame has changed since it was captured (expected sha256"
                 f" {frame.sha256[:12]}...); restore it from a copy of the session folder"
@@ -365,9 +401,14 @@ class _OpenRecording:
         return png
 
 
-def _decoded(png: bytes) -> Image:
-    """Image of a frame whose content has been checked, (height, width)."""
-    image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
+def _as_png(content: bytes) -> tuple[bytes, Image]:
+    """Grey image, (height, width), and its PNG file: the content itself where that is one."""
+    image = cv2.imdecode(
+        np.frombuffer(content, np.uint8),
+        cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION,
+    )
     if image is None:
-        raise BadInputError("a frame of the session is no picture")
-    return image.astype(np.uint8) if image.dtype == np.uint8 else image.astype(np.uint16)
+        raise BadInputError("a frame of the recording is no picture that OpenCV reads")
+    grey = image.astype(np.uint8) if image.dtype == np.uint8 else image.astype(np.uint16)
+    is_png = content.startswith(PNG_SIGNATURE)
+    return (content if is_png else cv2.imencode(".png", grey)[1].tobytes()), grey

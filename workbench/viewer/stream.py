@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,10 +56,18 @@ class Stream:
             sinks.append(rr.GrpcServerSink(bind_ip=LOOPBACK, port=port, server_memory_limit=SERVER_MEMORY))
         self._recording.set_sinks(*sinks, default_blueprint=layout)
         self._recording.send_recording_name(session)
+        self._prefix = ""
+
+    def below(self, prefix: str) -> Stream:
+        """The same recording with all entities below `prefix`; its layout is that of the whole."""
+        part = copy(self)
+        part._prefix = f"{prefix}/"
+        return part
 
     def lay_out(self, layout: rrb.Blueprint) -> None:
         """Replace the layout, also in a viewer that shows the recording."""
-        self._recording.send_blueprint(layout)
+        if not self._prefix:
+            self._recording.send_blueprint(layout)
 
     def at(self, moment: Moment) -> None:
         """Set the position on the timelines for everything logged afterwards."""
@@ -71,7 +80,7 @@ class Stream:
 
     def log(self, entity: str, *what: rr.AsComponents, static: bool = False) -> None:
         """Log archetypes at one entity."""
-        self._recording.log(entity, *what, static=static)
+        self._recording.log(f"{self._prefix}{entity}", *what, static=static)
 
     def log_static_text(self, entity: str, text: str, kind: rr.MediaType = rr.MediaType.TEXT) -> None:
         """Log a text that is the same at every time."""
@@ -79,7 +88,8 @@ class Stream:
 
     def describe(self, name: str, **values: str | int) -> None:
         """Set properties of the recording."""
-        self._recording.send_property(name, rr.AnyValues(drop_untyped_nones=True, **values))
+        properties = rr.AnyValues(drop_untyped_nones=True, **values)
+        self._recording.send_property(f"{self._prefix.replace('/', '_')}{name}", properties)
 
     def close(self) -> None:
         """Write buffered data and the footer of the file."""

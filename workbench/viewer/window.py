@@ -12,6 +12,9 @@ from pathlib import Path
 from workbench.model.errors import BadInputError
 
 LOOPBACK = "127.0.0.1"
+FOOTER = b"RRF2FOOT"
+"""Mark at the end of a complete recording."""
+TAIL_BYTES = 64
 
 
 def viewer_executable() -> Path:
@@ -69,6 +72,29 @@ def watch(port: int) -> None:
     )
 
 
+def is_complete(recording: Path) -> bool:
+    """Whether a recording exists and has its footer; one that was interrupted has none."""
+    try:
+        with recording.open("rb") as file:
+            file.seek(0, os.SEEK_END)
+            file.seek(max(0, file.tell() - TAIL_BYTES))
+            return FOOTER in file.read()
+    except OSError:
+        return False
+
+
+def serve(recording: Path) -> int:
+    """Serve a recording and the viewer to a browser on this computer until Ctrl-C; returns the exit code.
+
+    Raises:
+        BadInputError: there is no such recording, or no viewer.
+    """
+    _check(recording)
+    command = [str(viewer_executable()), "--serve-web", "--bind", LOOPBACK]
+    command += ["--port", str(free_port()), "--web-viewer-port", str(free_port()), str(recording)]
+    return subprocess.run(command, env=viewer_environment(), check=False).returncode  # noqa: S603
+
+
 def open_viewer(recording: Path) -> int:
     """Show a recording in the viewer until the window is closed; returns the viewer's exit code.
 
@@ -78,10 +104,16 @@ def open_viewer(recording: Path) -> int:
     Raises:
         BadInputError: there is no such recording, or no viewer.
     """
-    if not recording.is_file():
-        raise BadInputError(f"{recording}: no such recording; expected the recording.rrd of a session")
+    _check(recording)
     if not has_display():
-        raise BadInputError(f"{recording}: no display to show it; copy the file to a computer with a display")
+        raise BadInputError(
+            f"{recording}: no display to show it; use --web, or copy the file to a computer with a display"
+        )
     command = [str(viewer_executable()), "--bind", LOOPBACK, "--port", "0", str(recording)]
     # The executable comes from our own dependency, the path is a file that exists.
     return subprocess.run(command, env=viewer_environment(), check=False).returncode  # noqa: S603
+
+
+def _check(recording: Path) -> None:
+    if not recording.is_file():
+        raise BadInputError(f"{recording}: no such recording; expected a file that ends in .rrd")

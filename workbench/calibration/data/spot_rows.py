@@ -124,7 +124,7 @@ def _see_boards(rig: Rig, rows: Sequence[CaptureRow]) -> dict[str, BoardView | R
     """Views of the board by placement, each from the mean of its frames."""
     placed: dict[str, list[CaptureRow]] = defaultdict(list)
     for row in rows:
-        placed[_placement(row)].append(row)
+        placed[row.placement_key].append(row)
     return {key: _see_board(rig, key, of_one) for key, of_one in placed.items()}
 
 
@@ -141,10 +141,6 @@ def _see_board(rig: Rig, key: str, rows: Sequence[CaptureRow]) -> BoardView | Re
     return see_board(frames, rig.board, placement)
 
 
-def _placement(row: CaptureRow) -> str:
-    return row.placement or row.scene or f"{row.standoff_mm:g} mm"
-
-
 def _sight_row(rig: Rig, row: CaptureRow) -> Observation | Rejected:
     source = f"row {row.row}"
     if row.laser_id == ALL_LASERS:
@@ -157,7 +153,7 @@ def _sight_row(rig: Rig, row: CaptureRow) -> Observation | Rejected:
     observation = Observation(
         source=source,
         laser_id=row.laser_id,
-        placement=_placement(row),
+        placement=row.placement_key,
         standoff_mm=row.standoff_mm,
         repeat=row.repeat,
         u_px=row.u_px,
