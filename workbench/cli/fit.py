@@ -87,6 +87,8 @@ def fit_source(request: Request) -> FittedSource:
         LimitFailedError: the fit has no finite result.
     """
     rig = fix_parameters(_rig(request), request.fixed)
+    if request.source.suffix == ".rrd":
+        return _fit_recording(rig, request)
     captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
     content = read_captures_file(captures)
     rows = parse_captures(captures, content)
@@ -95,6 +97,21 @@ def fit_source(request: Request) -> FittedSource:
     calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
     kept = [row for row in rows if row.standoff_mm not in request.without_mm]
     return FittedSource(kept, fitted, calibration, assessment)
+
+
+def _fit_recording(rig: Rig, request: Request) -> FittedSource:
+    from workbench.viewer.readback import observations_of_recording
+
+    found, rejected, boards = observations_of_recording(request.source, rig)
+    known = {observation.standoff_mm for observation in found}
+    if unknown := [s for s in request.without_mm if s not in known]:
+        raise BadInputError(f"--without-standoff: no capture has the standoff {unknown[0]:g} mm")
+    kept = [one for one in found if one.standoff_mm not in request.without_mm]
+    views = [view for view in boards if view.placement.standoff_mm not in request.without_mm]
+    fitted = fit_calibration(rig, kept, rejected, views)
+    content = read_captures_file(request.source)
+    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
+    return FittedSource((), fitted, calibration, assessment)
 
 
 def fit_captures(request: Request, as_json: bool) -> None:
@@ -159,6 +176,8 @@ def _rig(request: Request) -> Rig:
     source = request.source
     if not source.exists():
         raise BadInputError(f"{source}: no such file or folder; expected a captures file or a session folder")
+    if source.suffix == ".rrd" and (source.parent / MANIFEST).is_file():
+        return load_session_rig(source.parent)
     if not source.is_dir():
         raise BadInputError(f"{source}: a captures file needs --rig; only a session contains its rig file")
     return load_session_rig(source)

@@ -42,6 +42,8 @@ RANGED_POINTS = f"{BENCH}/ranged"
 SPOTS = "spots"
 SPOTS_RECORD = f"{SPOTS}/record"
 """All quantities of all spots of a capture."""
+CAPTURE_RECORD = "capture/record"
+"""What each capture is of: laser, placement, standoff."""
 UNASSIGNED = "unassigned"
 
 STEP_LOG = "steps/log"

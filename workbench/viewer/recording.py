@@ -104,6 +104,20 @@ def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path
         partial.unlink(missing_ok=True)
 
 
+def capture_record(capture: ev.CaptureTaken) -> dict[str, str | float | int]:
+    """What a capture is of, for `readback.observations_of_recording`."""
+    unknown = float("nan")
+    return {
+        "purpose": capture.purpose,
+        "laser_id": capture.laser_id,
+        "placement": capture.placement_key,
+        "nominal_mm": float(capture.standoff_mm),  # `standoff_mm` is a timeline
+        "nominal_sd_mm": unknown if capture.standoff_sd_mm is None else float(capture.standoff_sd_mm),
+        "repeat": capture.repeat,
+        "source": capture.on.path,
+    }
+
+
 def compare(sources: Sequence[Source], out: Path) -> None:
     """Record several sessions side by side, with one cursor on the standoff.
 
@@ -238,6 +252,7 @@ class _OpenRecording:
         self._captures.add(event, self._placement, self._exposure)
         self.stream.at(self._exposure)
         self._show_frame(event)
+        self.stream.log(at.CAPTURE_RECORD, rr.AnyValues(drop_untyped_nones=True, **capture_record(event)))
         self._note(documents.capture_line(moment.capture, event, self._title))
         steps.lane(self.stream, at.LANE_LASER, event.laser_id)
 

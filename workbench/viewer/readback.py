@@ -1,0 +1,135 @@
+"""Observations from a recording: the spots of every capture as the session found them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from rerun.chunk import RrdReader
+
+from workbench.calibration.data.boards import BoardView, on_boards, see_board
+from workbench.calibration.data.observations import Observation, PlacementInfo
+from workbench.calibration.data.spot_rows import observe
+from workbench.model.arrays import Image
+from workbench.model.captures import BOARD
+from workbench.model.errors import BadInputError
+from workbench.model.fit_event import Rejected
+from workbench.model.rig import Rig
+from workbench.model.spot import Failure, Spot
+from workbench.spots import Finding
+from workbench.viewer import entities as at
+
+BLOB = "EncodedDepthImage:blob"
+Row = dict[str, Any]
+
+
+def observations_of_recording(
+    path: Path, rig: Rig
+) -> tuple[list[Observation], list[Rejected], list[BoardView]]:
+    """Observations, rejected captures and views of the board, as a fit of the session uses them.
+
+    Args:
+        path: recording of a session, complete or not.
+        rig: rig of the session.
+
+    Raises:
+        BadInputError: the file is no recording of the workbench, or a laser is not of this rig.
+    """
+    try:
+        captures, spots, frames = _rows(path)
+    except (RuntimeError, OSError) as error:
+        raise BadInputError(f"{path}: expected a recording of the workbench: {error}") from None
+    if not captures:
+        raise BadInputError(f"{path}: expected a recording of a calibration, it has no captures")
+    boards = _boards(captures, frames, rig)
+    found = [
+        _observation(row, spots.get(number, {}), rig, path)
+        for number, row in sorted(captures.items())
+        if row["purpose"] == "calibration" and row["laser_id"] != BOARD
+    ]
+    seen = on_boards(rig.board, boards, found)
+    return (
+        [one for one in seen if isinstance(one, Observation)],
+        [one for one in (*seen, *boards.values()) if isinstance(one, Rejected)],
+        [one for one in boards.values() if isinstance(one, BoardView)],
+    )
+
+
+def _rows(path: Path) -> tuple[dict[int, Row], dict[int, Row], dict[int, bytes]]:
+    """Records of the captures, records of their spots, and frames of the board, by number of capture."""
+    captures: dict[int, Row] = {}
+    spots: dict[int, Row] = {}
+    blobs: dict[int, bytes] = {}
+    for chunk in RrdReader(str(path)).stream():
+        entity = str(chunk.entity_path).removeprefix("/")
+        if entity not in {at.CAPTURE_RECORD, at.SPOTS_RECORD, at.IMAGE}:
+            continue
+        batch = chunk.to_record_batch()
+        numbers = batch.column(at.CAPTURE).to_pylist()
+        if entity == at.IMAGE:
+            column = batch.column(BLOB)
+            blobs |= {n: column[i].values.flatten().to_numpy().tobytes() for i, n in enumerate(numbers)}
+            continue
+        table = {name: batch.column(name).to_pylist() for name in batch.schema.names}
+        kept = captures if entity == at.CAPTURE_RECORD else spots
+        for i, number in enumerate(numbers):
+            row = {name: values[i] for name, values in table.items()}
+            kept[number] = (
+                {n: v[0] for n, v in row.items() if isinstance(v, list) and v} if kept is captures else row
+            )
+    return (
+        captures,
+        spots,
+        {n: blob for n, blob in blobs.items() if captures.get(n, {}).get("laser_id") == BOARD},
+    )
+
+
+def _observation(row: Row, spots: Row, rig: Rig, path: Path) -> Observation | Rejected:
+    if row["laser_id"] not in rig.laser_ids:
+        raise BadInputError(f"{path}: expected lasers {', '.join(rig.laser_ids)}, got {row['laser_id']}")
+    observation = Observation(
+        source=row["source"],
+        laser_id=row["laser_id"],
+        placement=row["placement"],
+        standoff_mm=row["nominal_mm"],
+        repeat=row["repeat"],
+        u_px=float("nan"),
+        v_px=float("nan"),
+        standoff_sd_mm=row["nominal_sd_mm"],
+    )
+    count = len(spots.get("u_px") or ())
+    found = tuple(
+        Spot(
+            **{name: spots[name][n] for name in NUMBERS},
+            flags=frozenset(Failure(flag) for flag in spots["flags"][n].split()),
+        )
+        for n in range(count)
+    )
+    return observe(Finding(found), rig.lasers[rig.laser_ids.index(row["laser_id"])], observation)
+
+
+NUMBERS = ("u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "peak_dn")
+
+
+def _boards(captures: dict[int, Row], frames: dict[int, bytes], rig: Rig) -> dict[str, BoardView | Rejected]:
+    """Views of the board by placement, each from the mean of its frames."""
+    placed: dict[str, list[int]] = defaultdict(list)
+    for number, row in sorted(captures.items()):
+        if row["laser_id"] == BOARD:
+            placed[row["placement"]].append(number)
+    found: dict[str, BoardView | Rejected] = {}
+    for key, numbers in placed.items():
+        first = captures[numbers[0]]
+        info = PlacementInfo(key, first["nominal_mm"], first["nominal_sd_mm"], 0.0, first["source"])
+        found[key] = see_board([_grey(frames[n]) for n in numbers], rig.board, info)
+    return found
+
+
+def _grey(png: bytes) -> Image:
+    image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise BadInputError("a frame of the recording is no picture")
+    return image.astype(np.uint8) if image.dtype == np.uint8 else image.astype(np.uint16)
