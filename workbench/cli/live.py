@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import tempfile
 import time
+from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
 from workbench.cli.console import print_message
+from workbench.cli.live_window import LiveWindow, watching
 from workbench.cli.reading_json import plain
 from workbench.cli.stopping import StopAfterCapture
 from workbench.devices.protocols import Bench
@@ -41,6 +43,8 @@ class LiveRequest:
     """Standoff at which the bench's target is placed first; None: not placed."""
     stats: bool
     """Whether to print the latency at the end."""
+    view: bool = False
+    """Whether to show the readings in the viewer."""
 
 
 def range_live(request: LiveRequest, as_json: bool) -> None:
@@ -60,7 +64,9 @@ def range_live(request: LiveRequest, as_json: bool) -> None:
         tempfile.TemporaryDirectory(prefix="workbench-range-") as folder,
         watched(open_bench(rig, Path(folder) / "live")) as bench,
     ):
-        _read_all(bench, Ranger(calibration), request, as_json, stopping)
+        ranger = Ranger(calibration)
+        with watching(rig, ranger) if request.view else nullcontext() as window:
+            _read_all(bench, ranger, request, as_json, stopping, window)
 
 
 def _read_all(
@@ -69,6 +75,7 @@ def _read_all(
     request: LiveRequest,
     as_json: bool,
     stopping: StopAfterCapture,
+    window: LiveWindow | None,
 ) -> None:
     live = LiveRanger(ranger, bench)
     live.warm_up()
@@ -85,6 +92,8 @@ def _read_all(
                 raise StoppedError(stopping.reason)
             reading = live.read(f"{number}")
             _show(reading, as_json)
+            if window is not None and live.seen is not None:
+                window.show(reading, *live.seen)
             if number == 0 and reading.status == "no_points":
                 print_message(f"hint: {_hint_without_spot(request, bench.virtual)}")
     finally:

@@ -250,21 +250,24 @@ def range_(
         typer.Option(metavar="MM", parser=millimetres(1), help="Live: place the bench's target there."),
     ] = None,
     stats: Annotated[bool, typer.Option("--stats", help="Live: print the latency at the end.")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Live: show readings in the Rerun viewer.")] = False,
     json: Json = False,
 ) -> None:
     """Range the scenes of a captures file, or live on a bench, with a calibration."""
     if (captures is None) == (rig is None):
         raise typer.BadParameter("expected either a captures file or --rig for live ranging")
     if captures is not None:
-        if readings is not None or standoff is not None or stats:
-            raise typer.BadParameter("--readings, --standoff and --stats require --rig (live ranging)")
+        if readings is not None or standoff is not None or stats or view:
+            raise typer.BadParameter(
+                "--readings, --standoff, --stats and --view require --rig (live ranging)"
+            )
         from workbench.cli.range import range_captures
 
         range_captures(captures, calibration, json)
     if rig is not None:
         from workbench.cli.live import LiveRequest, range_live
 
-        range_live(LiveRequest(rig, calibration, readings, standoff, stats), json)
+        range_live(LiveRequest(rig, calibration, readings, standoff, stats, view), json)
 
 
 class TrialKind(StrEnum):

@@ -30,6 +30,8 @@ class LiveRanger:
     ranger: Ranger
     bench: Bench
     latencies_s: list[float] = field(default_factory=list)
+    seen: tuple[Image, Image, tuple[Spot, ...]] | None = None
+    """Frames with the lasers on and off, and spots, of the last capture with all lasers."""
     _finders: dict[tuple[str, ...], SpotFinder] = field(default_factory=dict)
     _second_frame_at: float = 0.0
     _dark: Image | None = None
@@ -79,7 +81,10 @@ class LiveRanger:
         off = self.bench.camera.grab()
         self._second_frame_at = time.perf_counter()
         self._dark = off.image
-        return self._find(ids, on.image, off.image)
+        finding = self._find(ids, on.image, off.image)
+        if ids == self.ranger.sensor.ids:
+            self.seen = on.image, off.image, finding.spots
+        return finding
 
     def _look_for_stuck_beam(self, reading: Reading) -> Reading:
         """Check the last frame with all lasers off; a light known from before becomes a note.

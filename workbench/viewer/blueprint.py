@@ -81,27 +81,15 @@ def comparison(columns: Mapping[str, tuple[Rig, str]]) -> rrb.Blueprint:
 
 
 def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
-    axis = rig.lasers[0].axis
-    width, height = float(rig.camera.width_px), float(rig.camera.height_px)
-    frame = rrb.Spatial2DView(
-        origin=f"{prefix}/{at.FRAME}",
-        name=f"{title}: frame",
-        visual_bounds=_bounds(width, height),
-        background=[0, 0, 0],
-    )
-    crops = rrb.Spatial2DView(
-        origin=f"{prefix}/{at.CROPS}",
-        name="Spots",
-        visual_bounds=_bounds(*mosaic_size(len(rig.lasers))),
-        background=DARK,
-    )
+    axis, below = rig.lasers[0].axis, f"{prefix}/"
     texts = rrb.Horizontal(
-        rrb.Vertical(_text(f"{prefix}/{at.NOW}", "Now"), _text(f"{prefix}/{at.FIT_VERDICT}", "Verdict")),
-        _table(f"{prefix}/{at.FIT_WORST}", "Worst"),
+        rrb.Vertical(text_view(f"{below}{at.NOW}", "Now"), text_view(f"{below}{at.FIT_VERDICT}", "Verdict")),
+        table_view(f"{below}{at.FIT_WORST}", "Worst"),
+        column_shares=[2, 3],
     )
     return rrb.Vertical(
-        rrb.Horizontal(frame, crops),
-        picture_view(f"{prefix}/{at.FIT_PICTURE}/{axis}", f"{title}: residuals along {axis}"),
+        rrb.Horizontal(frame_view(rig, below, f"{title}: frame"), crops_view(rig, below, "Spots")),
+        picture_view(f"{below}{at.FIT_PICTURE}/{axis}", f"{title}: residuals along {axis}"),
         texts,
         row_shares=[4, 4, 3],
     )
@@ -111,7 +99,7 @@ def _captures(rig: Rig) -> rrb.Container:
     """Screen of the technician: what is captured now, and how the uncertainty decreases."""
     axis = f"{rig.lasers[0].axis}_px"
     texts = rrb.Vertical(
-        _text(at.NOW, "Now"),
+        text_view(at.NOW, "Now"),
         rrb.TextLogView(
             origin=at.STEP_LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
         ),
@@ -131,9 +119,9 @@ def _result(rig: Rig) -> rrb.Container:
     """Screen of the engineer: which standoff is bad, and what the camera saw there."""
     axis = rig.lasers[0].axis
     texts = rrb.Vertical(
-        _text(at.NOW, "Now"),
-        _text(at.FIT_VERDICT, "Verdict"),
-        _table(at.FIT_WORST, "Worst"),
+        text_view(at.NOW, "Now"),
+        text_view(at.FIT_VERDICT, "Verdict"),
+        table_view(at.FIT_WORST, "Worst"),
         row_shares=[2, 4, 5],
     )
     charts = rrb.Horizontal(
@@ -150,13 +138,13 @@ def _result(rig: Rig) -> rrb.Container:
 
 def _parameters() -> rrb.Container:
     charts = rrb.Vertical(*(picture_view(f"{at.FIT_PICTURE}/{axis}", f"Residuals {axis}") for axis in "uv"))
-    texts = rrb.Vertical(_table(at.FIT_CHECKS, "Checks"), _table(at.FIT_TABLE, "Parameters"))
+    texts = rrb.Vertical(table_view(at.FIT_CHECKS, "Checks"), table_view(at.FIT_TABLE, "Parameters"))
     return rrb.Horizontal(charts, texts, column_shares=[1, 1], name="Calibration: details")
 
 
 def _trial(rig: Rig, trial: TrialTab) -> rrb.Container:
     texts = rrb.Vertical(
-        _text(at.NOW, "Now"), _table(at.trial_tables(trial.trial), "Tables"), row_shares=[1, 4]
+        text_view(at.NOW, "Now"), table_view(at.trial_tables(trial.trial), "Tables"), row_shares=[1, 4]
     )
     pictures = [picture_view(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
     charts = rrb.Horizontal(
@@ -187,17 +175,21 @@ def _bench() -> rrb.Container:
 
 def _seen(rig: Rig, texts: rrb.Container) -> rrb.Container:
     """Upper half of a screen: the frame, the spots, texts."""
-    width, height = float(rig.camera.width_px), float(rig.camera.height_px)
-    frame = rrb.Spatial2DView(
-        origin=at.FRAME, name=FRAME_VIEW, visual_bounds=_bounds(width, height), background=[0, 0, 0]
+    return rrb.Horizontal(frame_view(rig), crops_view(rig), texts, column_shares=[4, 5, 5])
+
+
+def frame_view(rig: Rig, prefix: str = "", name: str = FRAME_VIEW) -> rrb.View:
+    """View of the frame, with the size of the camera's."""
+    bounds = _bounds(rig.camera.width_px, rig.camera.height_px)
+    return rrb.Spatial2DView(
+        origin=f"{prefix}{at.FRAME}", name=name, visual_bounds=bounds, background=[0, 0, 0]
     )
-    crops = rrb.Spatial2DView(
-        origin=at.CROPS,
-        name=CROPS_VIEW,
-        visual_bounds=_bounds(*mosaic_size(len(rig.lasers))),
-        background=DARK,
-    )
-    return rrb.Horizontal(frame, crops, texts, column_shares=[4, 5, 5])
+
+
+def crops_view(rig: Rig, prefix: str = "", name: str = CROPS_VIEW) -> rrb.View:
+    """View of the crops of all lasers."""
+    bounds = _bounds(*mosaic_size(len(rig.lasers)))
+    return rrb.Spatial2DView(origin=f"{prefix}{at.CROPS}", name=name, visual_bounds=bounds, background=DARK)
 
 
 def picture_view(origin: str, name: str) -> rrb.View:
@@ -217,11 +209,13 @@ def _series(
     )
 
 
-def _text(origin: str, name: str) -> rrb.View:
+def text_view(origin: str, name: str) -> rrb.View:
+    """View of a text in Markdown."""
     return rrb.TextDocumentView(origin=origin, name=name, titlebar=False)
 
 
-def _table(origin: str, name: str) -> rrb.View:
+def table_view(origin: str, name: str) -> rrb.View:
+    """View of tables in plain text."""
     return rrb.TextDocumentView(origin=origin, name=name, titlebar=False, format_options=TEXT)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import hypot
 
+import cv2
 import numpy as np
 import rerun as rr
 
@@ -65,14 +66,23 @@ def log_frame(stream: Stream, png: bytes, off: Image | None, full_scale: int) ->
         off: frame with the lasers off, (height, width); None for a frame in room light.
         full_scale: largest value of a pixel.
     """
-    ambient = 0.0 if off is None else float(np.median(off))
-    white = 1.0 if off is None else min(1.0, max(LEAST_WHITE, ambient / full_scale / AMBIENT_SHARE))
-    # Rerun scales 8 bits to 0..1, and takes 16 bits as they are.
-    high = white if full_scale <= 255 else white * full_scale
+    shown = [0.0, white_level(off, full_scale)]
     stream.log(
         at.IMAGE,
-        rr.EncodedDepthImage(png, media_type="image/png", colormap="grayscale", depth_range=[0.0, high]),
+        rr.EncodedDepthImage(png, media_type="image/png", colormap="grayscale", depth_range=shown),
     )
+
+
+def log_image(stream: Stream, on: Image, off: Image, full_scale: int) -> None:
+    """Log a frame that is not stored; arguments as of `log_frame`."""
+    log_frame(stream, cv2.imencode(".png", on)[1].tobytes(), off, full_scale)
+
+
+def white_level(off: Image | None, full_scale: int) -> float:
+    """Value that is shown as white, as Rerun takes it: of 8 bits a share of full scale, of 16 bits in DN."""
+    ambient = 0.0 if off is None else float(np.median(off))
+    white = 1.0 if off is None else min(1.0, max(LEAST_WHITE, ambient / full_scale / AMBIENT_SHARE))
+    return white if full_scale <= 255 else white * full_scale
 
 
 def log_predicted(stream: Stream, spots: Mapping[str, FloatArray], colors: Mapping[str, at.Rgb]) -> None:

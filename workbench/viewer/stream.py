@@ -33,14 +33,16 @@ class Stream:
     """Rerun recording that is written to a file while it is logged, and served to a viewer.
 
     Args:
-        path: file of the recording.
+        path: file of the recording; None: it is only served.
         session: name of the recording.
         layout: first layout.
         port: port on loopback at which a viewer may watch; None: none may. The recording does not wait for a
             viewer: one that hangs, or never comes, costs memory up to a limit.
     """
 
-    def __init__(self, path: Path, session: str, layout: rrb.Blueprint, port: int | None = None) -> None:
+    def __init__(
+        self, path: Path | None, session: str, layout: rrb.Blueprint, port: int | None = None
+    ) -> None:
         self._recording = rr.RecordingStream(
             APPLICATION,
             recording_id=session,
@@ -51,7 +53,7 @@ class Stream:
         # No timelines of the logging itself: they would differ in a rebuilt recording.
         rr.set_log_time_enabled(False, self._recording)
         rr.set_log_tick_enabled(False, self._recording)
-        sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(str(path))]
+        sinks: list[rr.FileSink | rr.GrpcServerSink] = [] if path is None else [rr.FileSink(str(path))]
         if port is not None:
             sinks.append(rr.GrpcServerSink(bind_ip=LOOPBACK, port=port, server_memory_limit=SERVER_MEMORY))
         self._recording.set_sinks(*sinks, default_blueprint=layout)
