@@ -43,7 +43,7 @@ SPOTS = "spots"
 SPOTS_RECORD = f"{SPOTS}/record"
 """All quantities of all spots of a capture."""
 CAPTURE_RECORD = "capture/record"
-"""What each capture is of: laser, placement, standoff."""
+"""Subject of each capture: laser, placement, standoff."""
 UNASSIGNED = "unassigned"
 
 STEP_LOG = "steps/log"

@@ -105,7 +105,7 @@ def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path
 
 
 def capture_record(capture: ev.CaptureTaken) -> dict[str, str | float | int]:
-    """What a capture is of, for `readback.observations_of_recording`."""
+    """Subject of a capture, for `readback.observations_of_recording`."""
     unknown = float("nan")
     return {
         "purpose": capture.purpose,

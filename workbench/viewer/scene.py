@@ -1,7 +1,7 @@
 """3D view of the bench: camera, laser rays, target and spots, in the camera frame.
 
-x and y are millimetres. Depth is drawn relative to the standoff of the placement, which always lies at
-`DRAWN_DEPTH_MM`: a target at 140 mm and one at 4 m are then seen equally well from one place.
+x and y are millimetres. Depth is drawn relative to the standoff of the placement: the target is always at
+`DRAWN_DEPTH_MM`. A target at 140 mm and one at 4 m are then seen equally well from one place.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from workbench.viewer.geometry import Geometry
 from workbench.viewer.stream import Stream
 
 DRAWN_DEPTH_MM = 600.0
-"""Depth at which the target is drawn, whatever its standoff."""
+"""Depth at which the target is drawn, for every standoff."""
 BEYOND = 1.15
 """Length of the drawn rays, relative to the depth of the target."""
 TARGET_HALF_MM = 150.0

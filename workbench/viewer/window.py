@@ -53,7 +53,7 @@ def free_port() -> int:
 
 
 def watch(port: int) -> None:
-    """Open a viewer that watches a recording served at a port, and go on without waiting for it.
+    """Open a viewer that watches a recording served at a port, without waiting for it.
 
     The window stays open when the session ends; it then shows the whole recording.
 
