@@ -58,7 +58,7 @@ def cross_validation_table(placements: Sequence[CrossValidatedPlacement]) -> Tab
     )
 
 
-def worst_placements_table(fit: FitFinished, captures: Mapping[str, str], most: int = 5) -> Table:
+def worst_placements_table(fit: FitFinished, captures: Mapping[str, str], most: int) -> Table:
     """Placements that agree least with the others, the least probable first.
 
     Args:

@@ -122,7 +122,7 @@ def _result(rig: Rig) -> rrb.Container:
         text_view(at.NOW, "Now"),
         text_view(at.FIT_VERDICT, "Verdict"),
         table_view(at.FIT_WORST, "Worst"),
-        row_shares=[2, 4, 5],
+        row_shares=[2, 6, 6],
     )
     charts = rrb.Horizontal(
         picture_view(f"{at.FIT_PICTURE}/{axis}", f"Residuals along {axis}"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from workbench.model.event import CaptureTaken
+from workbench.model.spot import Spot
+from workbench.model.table import Column, Table
 from workbench.model.target import Placement
 from workbench.viewer.stream import Moment
 
@@ -19,6 +21,7 @@ class CaptureLog:
     placements: dict[str, Placement | None] = field(default_factory=dict)
     """Placement of the target by key of capture."""
     moments: dict[str, Moment] = field(default_factory=dict)
+    spots: dict[str, tuple[Spot, ...]] = field(default_factory=dict)
 
     def add(self, capture: CaptureTaken, placement: Placement | None, moment: Moment) -> None:
         """Append a capture at its moment."""
@@ -26,6 +29,29 @@ class CaptureLog:
         self.taken[capture.key] = capture
         self.placements[capture.key] = placement
         self.moments[capture.key] = moment
+
+    def defects(self) -> Table:
+        """Captures of one laser with more or fewer spots than one, or a flagged spot; a row for each cell."""
+        numbers: dict[tuple[float, str, str, str], list[int]] = {}
+        for key, spots in self.spots.items():
+            capture = self.taken[key]
+            if capture.purpose == "calibration" and (defect := _defect(spots)):
+                cell = capture.standoff_mm, capture.laser_id, capture.placement_key, defect
+                numbers.setdefault(cell, []).append(self.numbers[key])
+        return Table(
+            name="defects",
+            title="Captures with a defect",
+            columns=(
+                Column(key="standoff_mm", name="standoff", unit="mm", format="g"),
+                Column(key="laser", name="laser"),
+                Column(key="defect", name="defect"),
+                Column(key="captures", name="captures"),
+            ),
+            rows=tuple(
+                (standoff_mm, laser, defect, f"{min(n)}-{max(n)}")
+                for (standoff_mm, laser, _, defect), n in sorted(numbers.items())
+            ),
+        )
 
     def first_of(
         self, placement_key: str | None, standoff_mm: float, laser_id: str | None = None
@@ -53,3 +79,10 @@ class CaptureLog:
         for key, capture in self.taken.items():
             found.setdefault(capture.placement_key, []).append(self.numbers[key])
         return {key: f"{min(n)}-{max(n)}" for key, n in found.items()}
+
+
+def _defect(spots: tuple[Spot, ...]) -> str:
+    """Defect of a capture of one laser; empty for one sound spot."""
+    if len(spots) != 1:
+        return f"{len(spots)} spots instead of 1" if spots else "no spot"
+    return ", ".join(sorted(spots[0].flags))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from workbench.model.event import CaptureTaken, FitFinished, ReadingTaken
+from workbench.model.table import Table
 
 MOST_LINES = 6
 """Largest number of reasons or warnings in a summary; the checks list all."""
@@ -23,15 +24,18 @@ def capture_line(number: int, capture: CaptureTaken, step: str) -> str:
     )
 
 
-def fit_summary(fit: FitFinished) -> str:
-    """Verdict of a fit in Markdown: the named faults or reasons first."""
+def fit_summary(fit: FitFinished, defects: Table) -> str:
+    """Verdict of a fit in Markdown: the named faults or reasons first, then defects of captures."""
     head = (
         f"**Calibration {fit.verdict}**: {fit.rms_px:.3f} px rms, {fit.observations} spots,"
         f" {len(fit.rejected)} not used"
     )
     causes = [fault.message for fault in fit.faults]
     others = [reason for reason in fit.reasons if reason not in causes]
-    lines = [head, *_bullets([*causes, *others]), *_bullets(fit.warnings)]
+    bad = [
+        f"{laser} at {mm:g} mm: {defect} (captures {numbers})" for mm, laser, defect, numbers in defects.rows
+    ]
+    lines = [head, *_bullets([*causes, *others]), *_bullets(bad), *_bullets(fit.warnings)]
     return "\n\n".join(lines)
 
 

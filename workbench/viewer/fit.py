@@ -27,6 +27,8 @@ from workbench.viewer.chart import log_chart, log_cursor, log_note
 from workbench.viewer.stream import Moment, Stream
 from workbench.viewer.table_text import table_text
 
+MOST_ROWS = 4
+"""Number of the worst placements on the screen."""
 AXES: tuple[ImageAxis, ...] = get_args(ImageAxis)
 
 
@@ -58,9 +60,11 @@ def log_fit(
     """Log parameters, residuals, tables and summary of a fit."""
     for parameter in fit.parameters:
         _log_parameter(stream, parameter)
-    stream.log_static_text(at.FIT_VERDICT, documents.fit_summary(fit), rr.MediaType.MARKDOWN)
-    _log_tables(stream, at.FIT_WORST, worst_placements_table(fit, captures.ranges()))
-    _log_tables(stream, at.FIT_CHECKS, cross_validation_table(fit.left_out), term_table(fit.terms))
+    defects = captures.defects()
+    stream.log_static_text(at.FIT_VERDICT, documents.fit_summary(fit, defects), rr.MediaType.MARKDOWN)
+    worst = worst_placements_table(fit, captures.ranges(), MOST_ROWS)
+    _log_tables(stream, at.FIT_WORST, worst)
+    _log_tables(stream, at.FIT_CHECKS, defects, cross_validation_table(fit.left_out), term_table(fit.terms))
     _log_tables(stream, at.FIT_TABLE, parameter_table(fit.parameters))
     for axis in AXES:
         _log_residuals(stream, fit, axis, captures, moment, colors)
@@ -119,4 +123,4 @@ def _log_residual(stream: Stream, one: ResidualRecord) -> None:
 def _log_tables(stream: Stream, entity: str, *tables: Table) -> None:
     """Log the tables that have rows, one below the other."""
     texts = [table_text(table) for table in tables if table.rows]
-    stream.log_static_text(entity, "\n\n\n".join(texts) or "Nothing was checked")
+    stream.log_static_text(entity, "\n\n".join(texts) or "Nothing was checked")

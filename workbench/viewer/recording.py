@@ -262,6 +262,8 @@ class _OpenRecording:
         placement = self._captures.placements[event.key]
         self.stream.at(self._captures.moments[event.key])
         self._spots = event.spots
+        if capture.laser_id in self._colors:
+            self._captures.spots[event.key] = event.spots
         frame.log_spots(self.stream, event.spots, self._colors)
         if capture.laser_id in self._colors:
             self._show_crops(event.spots, [capture.laser_id])
