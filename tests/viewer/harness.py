@@ -39,7 +39,11 @@ class Viewer:
 
     def open(self, recording: Path) -> None:
         """Load a recording and wait until it is the one on screen."""
-        self.client.open(str(recording.resolve()))
+        self.open_url(str(recording.resolve()))
+
+    def open_url(self, url: str) -> None:
+        """Watch a recording that is served, and wait until it is the one on screen."""
+        self.client.open(url)
         deadline = time.monotonic() + START_SECONDS
         while time.monotonic() < deadline:
             with suppress(ConnectionError):  # what it answers while nothing is on screen

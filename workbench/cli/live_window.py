@@ -21,10 +21,12 @@ class LiveWindow:
     """Draws the latest reading in a thread; readings that come while it draws are skipped."""
 
     def __init__(self, rig: Rig, ranger: Ranger, port: int) -> None:
-        from workbench.viewer.ranger_view import RangerView, Shown
+        from workbench.viewer.ranger_view import RangerView, Shown, ranger_layout
+        from workbench.viewer.stream import Stream
 
+        stream = Stream(None, f"range {rig.rig}", ranger_layout(rig), port)
         self._shown = Shown
-        self._view = RangerView(rig, ranger, port)
+        self._view = RangerView(stream, rig, ranger)
         self._waiting: queue.Queue[Shown | None] = queue.Queue(1)
         self._thread = threading.Thread(target=self._work, name="live window", daemon=True)
         self._thread.start()

@@ -47,13 +47,13 @@ class Shown:
 
 
 class RangerView:
-    """View of readings as they come, served to a viewer on this computer."""
+    """View of readings as they come."""
 
-    def __init__(self, rig: Rig, ranger: Ranger, port: int) -> None:
+    def __init__(self, stream: Stream, rig: Rig, ranger: Ranger) -> None:
         self._ranger = ranger
         self._full_scale = 2**rig.camera.bits - 1
         self._colors = at.laser_colors(rig.laser_ids)
-        self._stream = Stream(None, f"range {rig.rig}", ranger_layout(rig), port)
+        self._stream = stream
         self._crops = Crops(self._stream, self._colors)
         self._number = 0
 
