@@ -77,7 +77,6 @@ class Crops:
             spots: spots with their lasers; others are ignored.
             expected: (2,) expected position, px, of the spot of each laser that was on.
         """
-        signal = on.astype(np.float64) - (0.0 if off is None else off.astype(np.float64))
         by_laser = {spot.laser_id: spot for spot in spots if spot.laser_id in self.colors}
         self.latest = {laser: _as_earlier(crop) for laser, crop in self.latest.items()}
         for laser in self.colors:
@@ -86,7 +85,7 @@ class Crops:
             spot = by_laser.get(laser)
             centre = expected[laser] if spot is None else np.array([spot.u_px, spot.v_px])
             if np.isfinite(centre).all():
-                self.latest[laser] = _crop(signal, centre, spot)
+                self.latest[laser] = _crop(on, off, centre, spot)
         self._log()
 
     def _log(self) -> None:
@@ -194,15 +193,17 @@ def marks(crop: Crop) -> list[FloatArray]:
     return [*arms, centre + axes * np.column_stack([np.cos(turn), np.sin(turn)])]
 
 
-def _crop(signal: FloatArray, centre: FloatArray, spot: Spot | None) -> Crop:
+def _crop(on: Image, off: Image | None, centre: FloatArray, spot: Spot | None) -> Crop:
     left, top = (round(float(c)) - SIDE_PX // 2 for c in centre)
     square = np.zeros((SIDE_PX, SIDE_PX))
-    height, width = signal.shape
+    height, width = on.shape
     rows, columns = (
         slice(max(top, 0), min(top + SIDE_PX, height)),
         slice(max(left, 0), min(left + SIDE_PX, width)),
     )
-    inside = signal[rows, columns]
+    inside = on[rows, columns].astype(np.float64)
+    if off is not None:
+        inside -= off[rows, columns]
     if inside.size:
         square[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left] = inside
     return Crop(square, left, top, spot)

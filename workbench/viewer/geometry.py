@@ -90,8 +90,12 @@ class Geometry:
         return np.array([self._project(self.ray_at(laser, z + self.offset_mm)) for z in reach_mm])
 
     def _project(self, point_mm: tuple[float, float, float]) -> FloatArray:
-        x, y, z = point_mm
-        return np.array(lens_model(self.lens_name).project(list(self.lens.values()), x / z, y / z), float)
+        x, y, z = np.array(point_mm)[:, None]
+        # Arrays of numpy throughout: JAX takes a hundred times longer for a single point.
+        lens = np.array(list(self.lens.values()))[:, None]
+        return np.concatenate(
+            [np.asarray(part) for part in lens_model(self.lens_name).project(lens, x / z, y / z)]
+        )
 
     def seen_on(self, target: FlatTarget | BoardTarget, standoff_mm: float, pixels: FloatArray) -> FloatArray:
         """Points where the lines of sight of `pixels`, (N, 2), meet a flat target: (N, 3) mm."""
