@@ -8,11 +8,14 @@ from typing import ClassVar, Literal
 from pydantic import model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.limits import result_limit_prompts
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel, flat_placement
+from workbench.trials.accuracy.limits import AccuracyLimits
 
 
 @register
@@ -24,6 +27,7 @@ class AccuracyTrialStep(StepModel):
     step: Literal["accuracy_trial"]
     standoffs_mm: Standoffs
     readings: Count
+    limits: AccuracyLimits = AccuracyLimits()
 
     @model_validator(mode="after")
     def _standoffs_differ(self) -> AccuracyTrialStep:
@@ -43,14 +47,19 @@ class AccuracyTrialStep(StepModel):
         """One capture per reading; ambiguous readings take further captures of single lasers."""
         return len(self.standoffs_mm) * self.readings
 
+    def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
+        """Prompts of the placements and of limits with `on_fail: ask`."""
+        return [*super().prompts(name, rig), *result_limit_prompts(name, self.limits)]
+
     def run(self, context: Context, name: str) -> str:
         """Take the readings at every placement and write their statistics.
 
         Raises:
             BadInputError: there is no calibration.
+            LimitFailedError: a limit failed, or a standoff has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.
         from workbench.trials.accuracy.trial import run_trial
 
-        return run_trial(context, name, self.placements(name, context.rig), self.readings)
+        return run_trial(context, name, self.placements(name, context.rig), self.readings, self.limits)

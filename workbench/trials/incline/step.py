@@ -8,13 +8,27 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.limit import Limit
+from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
+from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.limits import refuse_retry, result_limit_prompts
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
 from workbench.trials.incline.set_up import SetUp
 from workbench.trials.targets import InclineSpec, target_placement
+
+
+class InclineLimits(FileModel):
+    """Limits on the mean errors at every set-up, with guard bands."""
+
+    range_error_mm: Limit | None = None
+    relative_range_error: Limit | None = None
+    angle_error_deg: Limit | None = None
+
+    _no_retry = model_validator(mode="after")(refuse_retry)
 
 
 @register
@@ -28,6 +42,7 @@ class InclineTrialStep(StepModel):
     """Closest ranges over the front, at which the near end of the target is placed."""
     targets: Annotated[tuple[InclineSpec, ...], Field(min_length=1)]
     readings: Count
+    limits: InclineLimits = InclineLimits()
 
     @model_validator(mode="after")
     def _placements_differ(self) -> InclineTrialStep:
@@ -64,14 +79,19 @@ class InclineTrialStep(StepModel):
         """One capture per reading; ambiguous readings take further captures of single lasers."""
         return len(self.targets) * len(self.ranges_mm) * self.readings
 
+    def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
+        """Prompts of the placements and of limits with `on_fail: ask`."""
+        return [*super().prompts(name, rig), *result_limit_prompts(name, self.limits)]
+
     def run(self, context: Context, name: str) -> str:
         """Take the readings at every placement and write their statistics.
 
         Raises:
             BadInputError: there is no calibration.
+            LimitFailedError: a limit failed, or a set-up has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.
         from workbench.trials.incline.trial import run_trial
 
-        return run_trial(context, name, self.set_ups(name, context.rig), self.readings)
+        return run_trial(context, name, self.set_ups(name, context.rig), self.readings, self.limits)

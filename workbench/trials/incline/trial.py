@@ -20,6 +20,8 @@ from workbench.trials.errors import (
 )
 from workbench.trials.incline.set_up import SetUp
 from workbench.trials.incline.statistics import AngleDifference, InclineRow, angle_differences, incline_row
+from workbench.trials.incline.step import InclineLimits
+from workbench.trials.limits import Result, check_results, error_result, range_results, require_readings
 from workbench.trials.readings import ClosestRange, session_ranger, take_readings
 from workbench.trials.results import finish_trial
 
@@ -31,11 +33,14 @@ SET_UP = (
 U_CAPTION = "U: expanded uncertainty (k = 2) of the error, by sensor and reference"
 
 
-def run_trial(context: Context, name: str, set_ups: Sequence[SetUp], count: int) -> str:
+def run_trial(
+    context: Context, name: str, set_ups: Sequence[SetUp], count: int, limits: InclineLimits
+) -> str:
     """Take `count` readings at each set-up; returns the outcome in one line.
 
     Raises:
         BadInputError: there is no calibration.
+        LimitFailedError: a limit failed, or a set-up has no range.
         WorkbenchError: see `visit_placements`.
     """
     ranger = session_ranger(context, name)
@@ -57,8 +62,16 @@ def run_trial(context: Context, name: str, set_ups: Sequence[SetUp], count: int)
     ]
     charts = [error_chart(f"{name}-errors", readings), angle_chart(name, taken)]
     finish_trial(context, name, tables, charts)
+    require_readings(name, [of for _, of in taken])
+    check_results(context, name, [one for row, of in taken for one in incline_results(row, of)], limits)
     angles = sum(row.angle.n for row in rows)
     return f"{len(readings)} readings, {angles} with an angle, tables in {name}.csv and {name}-angle.csv"
+
+
+def incline_results(row: InclineRow, readings: Sequence[ReadingTaken]) -> list[Result]:
+    """Mean errors at one set-up, for limits."""
+    of = f"{row.target.angle_deg:g} deg {row.target.axis} at {row.true_mm:.6g} mm"
+    return [*range_results(of, readings), error_result("angle_error_deg", of, row.angle)]
 
 
 def incline_tables(

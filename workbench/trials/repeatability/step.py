@@ -8,16 +8,28 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from workbench.model.fields import Standoffs, require_different
+from workbench.model.limit import Limit
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
+from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.limits import refuse_retry, result_limit_prompts
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel, flat_placement
 from workbench.trials.dither import dither_prompts
 
 MOST = 1000
 """Largest number of placements or repeats."""
+
+
+class RepeatabilityLimits(FileModel):
+    """Limits on the standard deviations at every standoff, decided by their 95 % intervals."""
+
+    repeatability_sd_mm: Limit | None = None
+    reproducibility_sd_mm: Limit | None = None
+
+    _no_retry = model_validator(mode="after")(refuse_retry)
 
 
 @register
@@ -31,6 +43,7 @@ class RepeatabilityTrialStep(StepModel):
     repeats: Annotated[int, Field(ge=2, le=MOST)] = 3
     dither_mm: Annotated[float, Field(gt=0, le=100)] | None = None
     """Sideways displacement of the target between repeats, which changes the speckle; None: none."""
+    limits: RepeatabilityLimits = RepeatabilityLimits()
 
     @model_validator(mode="after")
     def _standoffs_differ(self) -> RepeatabilityTrialStep:
@@ -61,19 +74,20 @@ class RepeatabilityTrialStep(StepModel):
         return len(self.standoffs_mm) * self.placements_each * self.repeats
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Prompts of the placements, and of the displacements between repeats."""
+        """Prompts of the placements, of the displacements between repeats, and of limits."""
         moves = [
             prompt
             for placement in self.placements(name, rig)
             for prompt in dither_prompts(placement, self.repeats, self.dither_mm)
         ]
-        return [*super().prompts(name, rig), *moves]
+        return [*super().prompts(name, rig), *moves, *result_limit_prompts(name, self.limits)]
 
     def run(self, context: Context, name: str) -> str:
         """Take the readings at every placement and write their statistics.
 
         Raises:
             BadInputError: there is no calibration.
+            LimitFailedError: a limit failed, or a standoff has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.

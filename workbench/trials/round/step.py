@@ -8,12 +8,27 @@ from typing import ClassVar, Literal
 from pydantic import model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.limit import Limit
+from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
+from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.limits import refuse_retry, result_limit_prompts
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
 from workbench.trials.targets import CylinderSpec, target_placement
+
+
+class RoundLimits(FileModel):
+    """Limits on the mean errors at every range, with guard bands."""
+
+    range_error_mm: Limit | None = None
+    relative_range_error: Limit | None = None
+    cylinder_error_mm: Limit | None = None
+    radius_error_mm: Limit | None = None
+
+    _no_retry = model_validator(mode="after")(refuse_retry)
 
 
 @register
@@ -27,6 +42,7 @@ class RoundTrialStep(StepModel):
     """Closest ranges over the front: of the cylinder's nearest line, if it faces the front."""
     target: CylinderSpec
     readings: Count
+    limits: RoundLimits = RoundLimits()
 
     @model_validator(mode="after")
     def _ranges_differ(self) -> RoundTrialStep:
@@ -56,14 +72,19 @@ class RoundTrialStep(StepModel):
         """One capture per reading; ambiguous readings take further captures of single lasers."""
         return len(self.ranges_mm) * self.readings
 
+    def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
+        """Prompts of the placements and of limits with `on_fail: ask`."""
+        return [*super().prompts(name, rig), *result_limit_prompts(name, self.limits)]
+
     def run(self, context: Context, name: str) -> str:
         """Take the readings at every placement and write their statistics.
 
         Raises:
             BadInputError: there is no calibration.
+            LimitFailedError: a limit failed, or a placement has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.
         from workbench.trials.round.trial import run_trial
 
-        return run_trial(context, name, self.target, self.placements(name, context.rig), self.readings)
+        return run_trial(context, name, self, self.placements(name, context.rig))
