@@ -39,7 +39,9 @@ class TrueValues(FileModel):
     """Closest range over the front."""
     range_sd_mm: float
     angle_deg: float | None = None
-    """None: the target is no incline."""
+    """None: the target is no incline. It contains the tilt common to all placements, as measured."""
+    set_deg: float | None = None
+    """Angle as set on the target's mount; None in sessions of versions that did not record it."""
     angle_sd_deg: float | None = None
     radius_mm: float | None = None
     """None: the target is no cylinder."""

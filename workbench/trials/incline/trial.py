@@ -110,7 +110,7 @@ def angle_chart(name: str, taken: Sequence[tuple[InclineRow, Sequence[ReadingTak
     for row, readings in taken:
         of = points.setdefault(f"{row.target.angle_deg:g} deg {row.target.axis}", [])
         of += [
-            ErrorPoint(row.true_mm, r.angle_deg - row.target.angle_deg, r.angle_sd_deg, row.reference_sd_deg)
+            ErrorPoint(row.true_mm, r.angle_deg - row.true_deg, r.angle_sd_deg, row.reference_sd_deg)
             for r in readings
             if r.angle_deg is not None
         ]
@@ -128,4 +128,4 @@ def _range_row(row: InclineRow) -> tuple[Cell, ...]:
 
 
 def _angle_row(row: InclineRow) -> tuple[Cell, ...]:
-    return (row.target.axis, row.target.angle_deg, row.true_mm, *error_cells(row.angle, row.target.angle_deg))
+    return (row.target.axis, row.target.angle_deg, row.true_mm, *error_cells(row.angle, row.true_deg))

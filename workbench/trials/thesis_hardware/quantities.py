@@ -123,4 +123,7 @@ def _is_square(reading: ReadingTaken) -> bool:
 
 
 def _true_angle(reading: ReadingTaken) -> float | None:
-    return None if reading.true is None or reading.true.angle_deg is None else abs(reading.true.angle_deg)
+    """Angle as set, without its sign; None for a target that is no incline."""
+    if reading.true is None or reading.true.angle_deg is None:
+        return None
+    return abs(reading.true.angle_deg if reading.true.set_deg is None else reading.true.set_deg)
