@@ -88,6 +88,8 @@ class ReadingTaken(FileModel):
     cylinder_sd_mm: float | None = None
     left_off: tuple[str, ...] = ()
     """Lasers that were left off."""
+    blocked: tuple[str, ...] = ()
+    """Lasers whose beams were blocked before the target."""
     notes: tuple[str, ...] = ()
     """Reasons of missing ranges, and remarks on uncertain ones."""
     lasers: tuple[LaserRange, ...]

@@ -30,6 +30,8 @@ class ClosestRange:
     """Line of lasers whose shape gives angle and radius."""
     left_off: tuple[str, ...] = ()
     """Lasers that stay off as if they had failed."""
+    blocked: tuple[str, ...] = ()
+    """Lasers whose beams are blocked before the target."""
 
     @classmethod
     def of(cls, target: TargetSpec, placed: Placement, sensor: CalibratedSensor, rig: Rig) -> ClosestRange:
@@ -98,8 +100,7 @@ def take_full_reading(
 ) -> tuple[ReadingTaken, Reading]:
     """Take the reading `number` at a placement; returns it as journalled and as the ranger gave it."""
     left_off = () if closest is None else closest.left_off
-    without = f"without-{'-'.join(left_off)}/" if left_off else ""
-    scene = f"{placement.key}/{without}{number:02d}"
+    scene = f"{placement.key}/{_without(closest)}{number:02d}"
     reading = acquire(ranger, scene, _capture(context, ranger, placement, scene, number, left_off))
     taken = reading_taken(context.rig, name, placement, number, reading, closest)
     context.emit(taken)
@@ -136,6 +137,14 @@ def reading_taken(
     return taken if closest is None else _closest_reading(taken, reading, closest)
 
 
+def _without(closest: ClosestRange | None) -> str:
+    """Part of a scene's name that states the missing spots; empty with all."""
+    if closest is None:
+        return ""
+    parts = {"without": closest.left_off, "blocked": closest.blocked}
+    return "".join(f"{name}-{'-'.join(ids)}/" for name, ids in parts.items() if ids)
+
+
 def _closest_reading(taken: ReadingTaken, reading: Reading, closest: ClosestRange) -> ReadingTaken:
     shape = next((line.shape for line in reading.lines if line.axis == closest.axis), None)
     return taken.model_copy(
@@ -147,6 +156,7 @@ def _closest_reading(taken: ReadingTaken, reading: Reading, closest: ClosestRang
             "true": closest.true,
             "reference_sd_mm": closest.true.range_sd_mm,
             "left_off": closest.left_off,
+            "blocked": closest.blocked,
             **_angle(shape),
             **_cylinder(shape, closest.front_mm),
         }

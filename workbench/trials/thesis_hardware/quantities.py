@@ -90,7 +90,7 @@ def is_mean(reading: ReadingTaken) -> bool:
 
 def is_without(left_off: int) -> Select:
     """Whether the closest range is that of a flat and square target with this number of lasers left off."""
-    return lambda reading: len(reading.left_off) == left_off and _is_square(reading)
+    return lambda r: len(r.left_off) == left_off and not r.blocked and _is_square(r)
 
 
 def is_incline(*angles_deg: float) -> Select:
