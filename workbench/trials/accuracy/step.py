@@ -8,21 +8,19 @@ from typing import ClassVar, Literal
 from pydantic import model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
-from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.limits import result_limit_prompts
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel, flat_placement
+from workbench.procedure.engine.step import flat_placement
 from workbench.trials.accuracy.limits import AccuracyLimits
+from workbench.trials.trial_step import TrialStepModel
 
 
 @register
-class AccuracyTrialStep(StepModel):
+class AccuracyTrialStep(TrialStepModel):
     """Range a flat target at standoffs that the fit has not used; give a table and a chart of the errors."""
 
-    needs: ClassVar[str | None] = "calibration"
     gives: ClassVar[str | None] = "readings"
     step: Literal["accuracy_trial"]
     standoffs_mm: Standoffs
@@ -46,10 +44,6 @@ class AccuracyTrialStep(StepModel):
     def captures(self, rig: Rig) -> int:
         """One capture per reading; ambiguous readings take further captures of single lasers."""
         return len(self.standoffs_mm) * self.readings
-
-    def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Prompts of the placements and of limits with `on_fail: ask`."""
-        return [*super().prompts(name, rig), *result_limit_prompts(name, self.limits)]
 
     def run(self, context: Context, name: str) -> str:
         """Take the readings at every placement and write their statistics.

@@ -9,7 +9,6 @@ from workbench.model.event import ReadingTaken
 from workbench.model.reading_chart import error_chart
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.placements import visit_placements
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.accuracy.agreement import Agreement, Bench, PlacementErrors
 from workbench.trials.accuracy.limits import AccuracyLimits
@@ -18,8 +17,8 @@ from workbench.trials.accuracy.statistics import accuracy_row
 from workbench.trials.accuracy.tables import accuracy_table, detail_tables, verdict_table
 from workbench.trials.accuracy.verdict import results_of, verdict_of
 from workbench.trials.limits import check_results, require_readings
-from workbench.trials.readings import session_ranger, take_full_reading
-from workbench.trials.results import finish_trial
+from workbench.trials.readings import take_full_reading
+from workbench.trials.trial_run import TrialRun
 
 
 @dataclass(frozen=True)
@@ -39,9 +38,10 @@ def run_trial(
     Raises:
         BadInputError: there is no calibration.
         LimitFailedError: a limit failed, or a standoff has no range.
-        WorkbenchError: see `visit_placements`.
+        WorkbenchError: see `TrialRun.visit`.
     """
-    ranger = session_ranger(context, name)
+    run = TrialRun(context, name)
+    ranger = run.ranger
 
     def work(placement: Placement) -> PlacementReadings:
         reference = Reference.of(context.rig.bench, placement.standoff_mm, placement.standoff_sd_mm)
@@ -49,12 +49,12 @@ def run_trial(
         errors = [range_errors(ranger.sensor, reading, taken, reference) for taken, reading in both]
         return PlacementReadings([taken for taken, _ in both], reference, errors)
 
-    visited = visit_placements(context, placements, work)
+    visited = run.visit(placements, work)
     rows = [accuracy_row(one.taken) for one in visited]
     chart = error_chart(f"{name}-errors", [reading for one in visited for reading in one.taken])
     ranges = agreements(ranger.sensor, context.rig.bench.ruler_scale.sd, visited)
     if not ranges:
-        finish_trial(context, name, [accuracy_table(name, rows)], [chart])
+        run.finish([accuracy_table(name, rows)], [chart])
         require_readings(name, [one.taken for one in visited])
     verdict = verdict_of(ranges, limits)
     tables = [
@@ -62,7 +62,7 @@ def run_trial(
         accuracy_table(name, rows),
         *detail_tables(name, ranges),
     ]
-    finish_trial(context, name, tables, [chart])
+    run.finish(tables, [chart])
     require_readings(name, [one.taken for one in visited])
     check_results(context, name, results_of(ranges, limits), limits)
     return f"{sum(row.readings for row in rows)} readings, table in {name}.csv; {verdict.text}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -13,11 +13,10 @@ from workbench.model.limit import Limit
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
-from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.limits import refuse_retry, result_limit_prompts
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel, flat_placement
+from workbench.procedure.engine.step import flat_placement
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Round:
     placements: Sequence[Placement]
 
 
-class GaugeLimits(FileModel):
+class GaugeLimits(ResultLimits):
     """Limits on the result of the study; the standard deviation is decided by its 95 % interval."""
 
     gauge_sd_mm: Limit | None = None
@@ -39,14 +38,11 @@ class GaugeLimits(FileModel):
     """Limit on GRR / total variation, without unit."""
     distinct_categories: Limit | None = None
 
-    _no_retry = model_validator(mode="after")(refuse_retry)
-
 
 @register
-class GaugeTrialStep(StepModel):
+class GaugeTrialStep(TrialStepModel):
     """Separate operators from repeatability: each places the target at every standoff several times."""
 
-    needs: ClassVar[str | None] = "calibration"
     step: Literal["gauge_rr_trial"]
     standoffs_mm: Annotated[tuple[Standoff, ...], Field(min_length=2)]
     operators: Annotated[tuple[str, ...], Field(min_length=2, max_length=100)]
@@ -92,7 +88,7 @@ class GaugeTrialStep(StepModel):
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
         """Prompts of the placements, of the changes of operator, and of limits."""
         changes = [each.prompt for each in self.rounds(name)]
-        return [*super().prompts(name, rig), *changes, *result_limit_prompts(name, self.limits)]
+        return [*super().prompts(name, rig), *changes]
 
     def run(self, context: Context, name: str) -> str:
         """Take the readings of every pass and write their statistics.

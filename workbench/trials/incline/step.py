@@ -9,33 +9,27 @@ from pydantic import Field, model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
 from workbench.model.limit import Limit
-from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
-from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.limits import refuse_retry, result_limit_prompts
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel
 from workbench.trials.incline.set_up import SetUp
 from workbench.trials.targets import InclineSpec, target_placement
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
 
 
-class InclineLimits(FileModel):
+class InclineLimits(ResultLimits):
     """Limits on the mean errors at every set-up, with guard bands."""
 
     range_error_mm: Limit | None = None
     relative_range_error: Limit | None = None
     angle_error_deg: Limit | None = None
 
-    _no_retry = model_validator(mode="after")(refuse_retry)
-
 
 @register
-class InclineTrialStep(StepModel):
+class InclineTrialStep(TrialStepModel):
     """Range a flat target turned by set angles; give the errors of range, angle, and angle differences."""
 
-    needs: ClassVar[str | None] = "calibration"
     gives: ClassVar[str | None] = "readings"
     step: Literal["incline_trial"]
     ranges_mm: Standoffs
@@ -78,10 +72,6 @@ class InclineTrialStep(StepModel):
     def captures(self, rig: Rig) -> int:
         """One capture per reading; ambiguous readings take further captures of single lasers."""
         return len(self.targets) * len(self.ranges_mm) * self.readings
-
-    def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Prompts of the placements and of limits with `on_fail: ask`."""
-        return [*super().prompts(name, rig), *result_limit_prompts(name, self.limits)]
 
     def run(self, context: Context, name: str) -> str:
         """Take the readings at every placement and write their statistics.

@@ -10,7 +10,6 @@ from workbench.model.reading_chart import error_chart
 from workbench.model.table import Cell, Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.placements import visit_placements
 from workbench.trials.errors import (
     ErrorPoint,
     error_cells,
@@ -22,8 +21,8 @@ from workbench.trials.incline.set_up import SetUp
 from workbench.trials.incline.statistics import AngleDifference, InclineRow, angle_differences, incline_row
 from workbench.trials.incline.step import InclineLimits
 from workbench.trials.limits import Result, check_results, error_result, range_results, require_readings
-from workbench.trials.readings import ClosestRange, session_ranger, take_readings
-from workbench.trials.results import finish_trial
+from workbench.trials.readings import ClosestRange, take_readings
+from workbench.trials.trial_run import TrialRun
 
 SET_UP = (
     Column(key="axis", name="axis"),
@@ -41,9 +40,10 @@ def run_trial(
     Raises:
         BadInputError: there is no calibration.
         LimitFailedError: a limit failed, or a set-up has no range.
-        WorkbenchError: see `visit_placements`.
+        WorkbenchError: see `TrialRun.visit`.
     """
-    ranger = session_ranger(context, name)
+    run = TrialRun(context, name)
+    ranger = run.ranger
     by_key = {set_up.placement.key: set_up for set_up in set_ups}
 
     def work(placed: Placement) -> tuple[InclineRow, list[ReadingTaken]]:
@@ -52,7 +52,7 @@ def run_trial(
         readings = take_readings(context, ranger, name, placed, count, closest)
         return incline_row(set_up.target, set_up.range_mm, readings), readings
 
-    taken = visit_placements(context, [set_up.placement for set_up in set_ups], work)
+    taken = run.visit([set_up.placement for set_up in set_ups], work)
     rows = [row for row, _ in taken]
     readings = [reading for _, of in taken for reading in of]
     tables = [
@@ -61,7 +61,7 @@ def run_trial(
         *missing_table(name, readings, "angle", "angle_deg"),
     ]
     charts = [error_chart(f"{name}-errors", readings), angle_chart(name, taken)]
-    finish_trial(context, name, tables, charts)
+    run.finish(tables, charts)
     require_readings(name, [of for _, of in taken])
     check_results(context, name, [one for row, of in taken for one in incline_results(row, of)], limits)
     angles = sum(row.angle.n for row in rows)

@@ -13,16 +13,14 @@ from workbench.model.limit import Limit
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
-from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.limits import refuse_retry, result_limit_prompts
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel
 from workbench.trials.missing_spots.sets import ALL, Condition, block_prompts
 from workbench.trials.targets import FlatTargetSpec, TargetSpec, target_placement
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
 
 
-class MissingSpotsLimits(FileModel):
+class MissingSpotsLimits(ResultLimits):
     """Limits on the errors, with guard bands, and on the summary of each number of missing spots."""
 
     range_error_mm: Limit | None = None
@@ -33,14 +31,11 @@ class MissingSpotsLimits(FileModel):
     lost: Limit | None = None
     """Limit on the share of readings without a range."""
 
-    _no_retry = model_validator(mode="after")(refuse_retry)
-
 
 @register
-class MissingSpotsTrialStep(StepModel):
+class MissingSpotsTrialStep(TrialStepModel):
     """Range a target with all lasers, and with some left off or blocked; compare the errors of the range."""
 
-    needs: ClassVar[str | None] = "calibration"
     gives: ClassVar[str | None] = "readings"
     step: Literal["missing_spots_trial"]
     ranges_mm: Standoffs
@@ -107,7 +102,7 @@ class MissingSpotsTrialStep(StepModel):
             for placement in self.placements(name, rig)
             for prompt in block_prompts(placement, rig.laser_ids, self.blocked, self.readings)
         ]
-        return [*super().prompts(name, rig), *blocks, *result_limit_prompts(name, self.limits)]
+        return [*super().prompts(name, rig), *blocks]
 
     def run(self, context: Context, name: str) -> str:
         """Take the readings at every placement and write their statistics.

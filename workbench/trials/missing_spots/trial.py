@@ -10,7 +10,6 @@ from workbench.model.event import ReadingTaken
 from workbench.model.table import Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.placements import visit_placements
 from workbench.ranging.ranger import Ranger
 from workbench.trials.errors import (
     ErrorPoint,
@@ -24,8 +23,8 @@ from workbench.trials.limits import Result, check_results, range_results, requir
 from workbench.trials.missing_spots.sets import ALL, Condition, block, missing_sets
 from workbench.trials.missing_spots.statistics import MissingSummary, missing_summary
 from workbench.trials.missing_spots.step import MissingSpotsTrialStep
-from workbench.trials.readings import ClosestRange, session_ranger, take_reading
-from workbench.trials.results import finish_trial
+from workbench.trials.readings import ClosestRange, take_reading
+from workbench.trials.trial_run import TrialRun
 
 PERCENT = 100.0
 ByCondition = dict[Condition, list[ReadingTaken]]
@@ -40,9 +39,10 @@ def run_trial(
     Raises:
         BadInputError: there is no calibration.
         LimitFailedError: a limit failed, or a placement has no range.
-        WorkbenchError: see `visit_placements`.
+        WorkbenchError: see `TrialRun.visit`.
     """
-    ranger = session_ranger(context, name)
+    run = TrialRun(context, name)
+    ranger = run.ranger
 
     def work(placed: Placement) -> ByCondition:
         closest = ClosestRange.of(step.target, placed, ranger.sensor, context.rig)
@@ -54,13 +54,13 @@ def run_trial(
             block(context, placed, ())
         return found
 
-    taken = visit_placements(context, placements, work)
+    taken = run.visit(placements, work)
     by_placement = [[reading for readings in of.values() for reading in readings] for of in taken]
     readings = [reading for of in by_placement for reading in of]
     full = [of[ALL] for of in taken]
     summaries = [missing_summary(one, [of[one] for of in taken], full) for one in step.conditions if taken]
     tables = [error_table(name, taken), summary_table(name, summaries), *missing_table(name, readings)]
-    finish_trial(context, name, tables, [missing_chart(name, taken)])
+    run.finish(tables, [missing_chart(name, taken)])
     require_readings(name, by_placement)
     check_results(context, name, missing_results(taken, summaries), step.limits)
     return f"{len(readings)} readings, tables in {name}.csv and {name}-summary.csv"

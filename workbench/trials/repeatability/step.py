@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -12,31 +12,27 @@ from workbench.model.limit import Limit
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
-from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.limits import refuse_retry, result_limit_prompts
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel, flat_placement
+from workbench.procedure.engine.step import flat_placement
 from workbench.trials.dither import dither_prompts
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
 
 MOST = 1000
 """Largest number of placements or repeats."""
 
 
-class RepeatabilityLimits(FileModel):
+class RepeatabilityLimits(ResultLimits):
     """Limits on the standard deviations at every standoff, decided by their 95 % intervals."""
 
     repeatability_sd_mm: Limit | None = None
     reproducibility_sd_mm: Limit | None = None
 
-    _no_retry = model_validator(mode="after")(refuse_retry)
-
 
 @register
-class RepeatabilityTrialStep(StepModel):
+class RepeatabilityTrialStep(TrialStepModel):
     """Separate the scatter of repeats from that of re-placements of a flat target."""
 
-    needs: ClassVar[str | None] = "calibration"
     step: Literal["repeatability_trial"]
     standoffs_mm: Standoffs
     placements_each: Annotated[int, Field(ge=2, le=MOST, alias="placements")] = 8
@@ -80,7 +76,7 @@ class RepeatabilityTrialStep(StepModel):
             for placement in self.placements(name, rig)
             for prompt in dither_prompts(placement, self.repeats, self.dither_mm)
         ]
-        return [*super().prompts(name, rig), *moves, *result_limit_prompts(name, self.limits)]
+        return [*super().prompts(name, rig), *moves]
 
     def run(self, context: Context, name: str) -> str:
         """Take the readings at every placement and write their statistics.

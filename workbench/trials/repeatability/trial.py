@@ -7,15 +7,15 @@ from workbench.model.reading_chart import error_chart
 from workbench.model.table import Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.placements import visit_placements
 from workbench.trials.dither import dither
 from workbench.trials.limits import Result, cell_number, check_results, require_readings
 from workbench.trials.reading_frame import reading_frame, reading_rows
-from workbench.trials.readings import session_ranger, take_reading
+from workbench.trials.readings import take_reading
 from workbench.trials.repeatability.budget import budget_table
 from workbench.trials.repeatability.step import RepeatabilityTrialStep
 from workbench.trials.repeatability.table import precision_chart, precision_table
-from workbench.trials.results import finish_trial, write_readings
+from workbench.trials.results import write_readings
+from workbench.trials.trial_run import TrialRun
 
 
 def run_trial(context: Context, name: str, step: RepeatabilityTrialStep) -> str:
@@ -24,9 +24,9 @@ def run_trial(context: Context, name: str, step: RepeatabilityTrialStep) -> str:
     Raises:
         BadInputError: there is no calibration.
         LimitFailedError: a limit failed, or a standoff has no range.
-        WorkbenchError: see `visit_placements`.
+        WorkbenchError: see `TrialRun.visit`.
     """
-    ranger = session_ranger(context, name)
+    run = TrialRun(context, name)
     placements = step.placements(name, context.rig)
     standoffs_mm = {placement.key: placement.standoff_mm for placement in placements}
 
@@ -34,14 +34,14 @@ def run_trial(context: Context, name: str, step: RepeatabilityTrialStep) -> str:
         readings = []
         for number in range(step.repeats):
             dither(context, placement, number, step.dither_mm)
-            readings.append(take_reading(context, ranger, name, placement, number))
+            readings.append(take_reading(context, run.ranger, name, placement, number))
         return placement.key, readings
 
     rows: list[dict[str, object]] = []
     taken: list[ReadingTaken] = []
     visited: dict[float, int] = {}
     by_standoff: dict[float, list[ReadingTaken]] = {}
-    for key, readings in visit_placements(context, placements, work):
+    for key, readings in run.visit(placements, work):
         standoff_mm = standoffs_mm[key]
         visited[standoff_mm] = visited.get(standoff_mm, 0) + 1
         rows += reading_rows(readings, standoff_mm, visited[standoff_mm])
@@ -52,7 +52,7 @@ def run_trial(context: Context, name: str, step: RepeatabilityTrialStep) -> str:
     table = precision_table(f"{name}-table", frame)
     budget = budget_table(f"{name}-budget", frame)
     charts = [error_chart(f"{name}-errors", taken), precision_chart(f"{name}-precision", table)]
-    finish_trial(context, name, [table, budget], charts)
+    run.finish([table, budget], charts)
     require_readings(name, by_standoff.values())
     check_results(context, name, precision_results(table), step.limits)
     return f"{frame['measured_mm'].count()} readings in {name}.csv, statistics in {name}-table.csv"

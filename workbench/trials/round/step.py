@@ -9,18 +9,15 @@ from pydantic import model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
 from workbench.model.limit import Limit
-from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
-from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.limits import refuse_retry, result_limit_prompts
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel
 from workbench.trials.targets import CylinderSpec, target_placement
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
 
 
-class RoundLimits(FileModel):
+class RoundLimits(ResultLimits):
     """Limits on the mean errors at every range, with guard bands."""
 
     range_error_mm: Limit | None = None
@@ -28,14 +25,11 @@ class RoundLimits(FileModel):
     cylinder_error_mm: Limit | None = None
     radius_error_mm: Limit | None = None
 
-    _no_retry = model_validator(mode="after")(refuse_retry)
-
 
 @register
-class RoundTrialStep(StepModel):
+class RoundTrialStep(TrialStepModel):
     """Range a cylinder; give tables of the errors of range and radius. The prompts warn of reflections."""
 
-    needs: ClassVar[str | None] = "calibration"
     gives: ClassVar[str | None] = "readings"
     step: Literal["round_trial"]
     ranges_mm: Standoffs
@@ -71,10 +65,6 @@ class RoundTrialStep(StepModel):
     def captures(self, rig: Rig) -> int:
         """One capture per reading; ambiguous readings take further captures of single lasers."""
         return len(self.ranges_mm) * self.readings
-
-    def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Prompts of the placements and of limits with `on_fail: ask`."""
-        return [*super().prompts(name, rig), *result_limit_prompts(name, self.limits)]
 
     def run(self, context: Context, name: str) -> str:
         """Take the readings at every placement and write their statistics.
