@@ -98,8 +98,8 @@ class Plane:
     angles_deg: tuple[float, float]
     """About the vertical and the horizontal axis; 0 where the spots do not extend."""
     sd_deg: tuple[float, float]
-    probability: float
-    """P value of the residuals; 1 without degrees of freedom."""
+    probability: float | None
+    """P value of the residuals; None without degrees of freedom."""
 
 
 def other_target(
@@ -119,9 +119,9 @@ def other_target(
         return ""
     covariance = points.covariance(surface.slopes) + surface.covariance
     p = _probability(points.range_mm - surface.depth_mm, np.ones((len(points.range_mm), 1)), covariance)
-    if p >= ALARM:
+    if p is None or p >= ALARM:
         return ""
-    return f"{_found(points, readings)}, not {_name(placement)} (p = {p:.1g})"
+    return f"the readings show {_found(points, readings)}, not {_name(placement)} (p = {p:.1g})"
 
 
 def fit_plane(points: Points) -> Plane:
@@ -170,11 +170,11 @@ def _asked_for(points: Points, placement: Placement, bench: BenchSpec) -> Surfac
     return None
 
 
-def _probability(values: FloatArray, design: FloatArray, covariance: FloatArray) -> float:
-    """P value of the residuals of a generalised least-squares fit; 1 without degrees of freedom."""
+def _probability(values: FloatArray, design: FloatArray, covariance: FloatArray) -> float | None:
+    """P value of the residuals of a generalised least-squares fit; None without degrees of freedom."""
     freedom = len(values) - design.shape[1]
     if freedom < 1:
-        return 1.0
+        return None
     weight = np.linalg.pinv(covariance)
     solution = np.linalg.pinv(design.T @ weight @ design) @ design.T @ weight @ values
     residuals = values - design @ solution
@@ -183,7 +183,7 @@ def _probability(values: FloatArray, design: FloatArray, covariance: FloatArray)
 
 def _found(points: Points, readings: Sequence[ReadingTaken]) -> str:
     plane = fit_plane(points)
-    if plane.probability >= PLANE_ALARM:
+    if plane.probability is None or plane.probability >= PLANE_ALARM:
         turns = [
             f"{angle:+.1f} +- {sd:.1f} deg about the {axis} axis"
             for angle, sd, axis in zip(
@@ -191,11 +191,11 @@ def _found(points: Points, readings: Sequence[ReadingTaken]) -> str:
             )
             if sd > 0
         ]
-        return f"the readings show a flat target at {' and '.join(turns)}"
+        return f"a flat target at {' and '.join(turns)}"
     radii = [one.radius_mm for one in readings if one.radius_mm is not None]
     if radii:
-        return f"the readings show a curved target, radius {float(np.mean(radii)):.4g} mm"
-    return "the readings show a target of another shape"
+        return f"a curved target, radius {float(np.mean(radii)):.4g} mm"
+    return "a target of another shape (or the sensor has changed)"
 
 
 def _name(placement: Placement) -> str:
