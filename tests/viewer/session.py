@@ -16,7 +16,7 @@ from workbench.model.rig import CameraSpec, LaserSpec, Prior, Rig
 from workbench.model.spot import Spot
 from workbench.model.target import FlatTarget, Placement
 from workbench.trials.accuracy.statistics import AccuracyRow
-from workbench.trials.accuracy.trial import accuracy_table
+from workbench.trials.accuracy.tables import accuracy_table
 
 SESSION = "20261105T101500-made-up"
 LASERS = {"L1": -60.0, "L2": -30.0, "L3": 30.0, "L4": 60.0}

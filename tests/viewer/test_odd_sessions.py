@@ -26,7 +26,7 @@ from workbench.model.target import (
     TargetShape,
 )
 from workbench.trials.accuracy.statistics import AccuracyRow
-from workbench.trials.accuracy.trial import accuracy_table
+from workbench.trials.accuracy.tables import accuracy_table
 from workbench.viewer.recording import RecordingConsumer
 from workbench.viewer.window import viewer_environment, viewer_executable
 

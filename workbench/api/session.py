@@ -51,14 +51,14 @@ class Trial:
 
     @property
     def table(self) -> pd.DataFrame:
-        """The first table.
+        """The table with the trial's name, else the first one.
 
         Raises:
             BadInputError: the trial has no table.
         """
         if not self.tables:
             raise BadInputError(f"trial {self.name}: expected a table, it has none")
-        return next(iter(self.tables.values()))
+        return self.tables.get(self.name, next(iter(self.tables.values())))
 
 
 @dataclass(frozen=True)

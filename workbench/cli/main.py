@@ -283,8 +283,10 @@ class TrialKind(StrEnum):
 def trial(
     kind: Annotated[TrialKind, typer.Argument(help="Statistics to compute.")],
     readings: Annotated[
-        Path,
-        typer.Argument(help="Readings (CSV): true_mm, measured_mm; also placement, repeat, session."),
+        list[Path],
+        typer.Argument(
+            help="Readings (CSV): true_mm, measured_mm; also placement, repeat, session. A file is a session."
+        ),
     ],
     json: Json = False,
 ) -> None:

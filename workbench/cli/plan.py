@@ -4,19 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from workbench.model.errors import BadInputError
 from workbench.model.number_text import duration
 from workbench.model.table import Column, Table
+from workbench.model.target import Placement
 from workbench.procedure.capture.exposure import LIT_FRAMES, MOST_TRIALS
 from workbench.procedure.capture.latency import LEASE_S
 from workbench.procedure.engine.check import check_file
 from workbench.procedure.engine.durations import StepDurations, learn_durations
+from workbench.procedure.engine.existing_calibration import GIVES
 from workbench.procedure.engine.plan import Plan, PlannedStep
 from workbench.report.terminal_table import TerminalTable
 from workbench.session.caller import now
+
+if TYPE_CHECKING:
+    from workbench.trials.spot_map import SpotMap
+
+MOST_LOST = 12
+"""Largest number of placements with lost spots that are printed."""
 
 
 def check_files(files: list[Path]) -> None:
@@ -72,6 +81,38 @@ def print_plan(
             highlight=False,
         )
     console.print(_source_of_times(durations, plan.rig.rig), highlight=False)
+    for line in lost_spot_lines(plan):
+        console.print(line, highlight=False)
+
+
+def lost_spot_lines(plan: Plan) -> list[str]:
+    """Spots that the trials of a plan will lose or find merged, by the calibration or the rig's design."""
+    trials = [
+        placement
+        for procedure in plan.procedures
+        for index, step in enumerate(procedure.steps, start=1)
+        if step.needs == GIVES
+        for placement in step.placements(procedure.step_name(index), plan.rig)
+    ]
+    if not trials:
+        return []
+    # Imported here: only plans with trials need the lens models.
+    from workbench.trials.spot_map import SpotMap
+
+    known = plan.calibration
+    spots = SpotMap.of_rig(plan.rig) if known is None else SpotMap.of_calibration(known.calibration, plan.rig)
+    lines = [line for placement in trials for line in _lost_at(placement, spots)]
+    if not lines:
+        return ["Every spot of the trials is expected in the image."]
+    more = [f"  and {len(lines) - MOST_LOST} more"] if len(lines) > MOST_LOST else []
+    source = "the rig's design" if known is None else "the calibration"
+    return [f"Lost or merging spots of the trials, by {source}:", *lines[:MOST_LOST], *more]
+
+
+def _lost_at(placement: Placement, spots: SpotMap) -> list[str]:
+    lost = [f"{laser_id} {cause}" for laser_id, cause in spots.lost(placement).items()]
+    merged = [f"{a} and {b} may merge" for a, b in spots.merged(placement)]
+    return [f"  {placement.key}: {'; '.join([*lost, *merged])}"] if lost or merged else []
 
 
 def emission(captures: int, durations: StepDurations, lit_frames: int = 1) -> str:

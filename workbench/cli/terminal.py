@@ -107,7 +107,8 @@ class Terminal:
                 self._print(remark, style="yellow")
             case ev.TrialFinished() as e:
                 for table in e.tables:
-                    self._console.print(TerminalTable(table))
+                    if not table.is_detail:
+                        self._console.print(TerminalTable(table))
             case ev.TrialProgress() as e:
                 self._print(e.text)
             case _:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import select
 import sys
 import termios
@@ -22,6 +23,8 @@ from workbench.procedure.engine.operator import NoOperator
 LOOK_S = 0.1
 """Interval at which stop requests are checked while waiting for input, s."""
 ACTIONS = ("redo", "skip", "abort")
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
+"""Number such as `2,200`, in which the comma may separate thousands or decimals: it is refused."""
 
 
 def choose_operator(
@@ -140,6 +143,8 @@ def _answer(prompt: Prompt, typed: str) -> Answer:
     if prompt.quantity is not None:
         if not typed and prompt.quantity.usual is not None:
             return Answer(value=prompt.quantity.usual)
+        if THOUSANDS.match(typed):
+            return Answer(value=typed)
         try:
             return Answer(value=float(typed.removesuffix(prompt.quantity.unit).replace(",", ".")))
         except ValueError:

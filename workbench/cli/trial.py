@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
 
+from workbench.model.errors import BadInputError
 from workbench.model.table import Cell
 from workbench.report.terminal_table import TerminalTable
 from workbench.trials.any_sensor.analysis import Analysis, analyse
-from workbench.trials.any_sensor.readings_file import load_readings
+from workbench.trials.any_sensor.readings_file import load_sessions
+
+OPERATORS = "gauge-rr"
+"""Kind of trial in which the column `session` names an operator, not a session."""
 
 
-def analyse_readings(kind: str, path: Path, as_json: bool) -> None:
-    """Analyse a file of readings: JSON on standard output, table and notes on standard error.
+def analyse_readings(kind: str, paths: Sequence[Path], as_json: bool) -> None:
+    """Analyse files of readings: JSON on standard output, table and notes on standard error.
 
     Raises:
-        BadInputError: the file is wrong.
+        BadInputError: a file is wrong, or there are several for a gauge R&R study.
     """
-    result = analyse(kind, load_readings(path))
+    if kind == OPERATORS and len(paths) > 1:
+        raise BadInputError(
+            f"{kind}: expected one file, whose column `session` names the operators, got {len(paths)} files"
+        )
+    result = analyse(kind, load_sessions(paths))
     if as_json:
         print(json.dumps(_plain(result)))
     console = Console(stderr=True, markup=False)

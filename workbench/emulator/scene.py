@@ -52,6 +52,7 @@ class BenchScene:
         self._image = ImageFormat(rig.camera.width_px, rig.camera.height_px)
         self._beams = {name: Beam(ray, spec.beam) for name, ray in truth.lasers.items()}
         self._surfaces: list[tuple[Surface, float]] = []
+        self._blocked: tuple[str, ...] = ()
         self._key = ""
         self._drift = STEADY
         self._spots: dict[str, list[SpotImage]] = {}
@@ -83,7 +84,7 @@ class BenchScene:
         else:
             self._surfaces = _surfaces(placement.target, z_mm, error, self._spec.surface)
             self._file.add(placement.key, own)
-        self._key = _speckle_key(placement)
+        self._key, self._blocked = _speckle_key(placement), placement.blocked
         self._spots, self._picture = {}, None
         self.moves += 1
         return placement
@@ -131,6 +132,8 @@ class BenchScene:
         return aside
 
     def _paint(self, laser_id: str) -> list[SpotImage]:
+        if laser_id in self._blocked:
+            return []
         painter = SpotPainter(self._spec, self._lens(), self._image, self._truth.f_px)
         painted = [
             painter.paint(self._beams[laser_id], surface, gain, (self._key, laser_id, str(index)))

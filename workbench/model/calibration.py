@@ -142,6 +142,15 @@ class TermSummary(FileModel):
     """Largest change of a range without the term, in standard deviations; null if the model lacks it."""
 
 
+class CrossValidatedRange(FileModel):
+    """Range of one placement of the calibration by the fit without it; mm, 1 sigma."""
+
+    standoff_mm: float
+    error_mm: float
+    """Range by all spots of the placement - standoff."""
+    sd_mm: NonNegativeFloat
+
+
 class FitSummary(FileModel):
     """Quality, verdict and warnings of the fit."""
 
@@ -157,6 +166,8 @@ class FitSummary(FileModel):
     """Reason of a person for accepting a refused fit."""
     warnings: tuple[str, ...] = ()
     terms: tuple[TermSummary, ...] = ()
+    cross_validation: tuple[CrossValidatedRange, ...] = ()
+    """Empty in files of versions that did not write it."""
 
     @property
     def usable(self) -> bool:

@@ -216,7 +216,16 @@ def _plain(value: object) -> bool:
 
 
 def _number_in(value: object, kind: str) -> str:
-    """Number meant by a text with a unit or a decimal comma; an example number if there is none."""
+    """Number meant by a text with a unit or a decimal comma; an example number if there is none.
+
+    `2,200` may mean either number: both are named.
+    """
+    if found := re.match(r"\s*([+-]?[1-9]\d{0,2}),(\d{3})(?!\d)", str(value)):
+        return (
+            f"{found[1]}{found[2]}"
+            if kind.startswith("int")
+            else f"{found[1]}{found[2]} or {found[1]}.{found[2]}"
+        )
     found = re.match(r"\s*([+-]?\d+)(?:[.,](\d+))?", str(value)) if _plain(value) else None
     if kind.startswith("int"):
         return found[1] if found else "10"

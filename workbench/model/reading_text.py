@@ -8,8 +8,9 @@ from workbench.model.trial_event import ReadingTaken
 
 def reading_remark(reading: ReadingTaken) -> str:
     """Remark on a reading in one line; empty for one with a range inside its 95 % interval."""
-    off = f" ({', '.join(reading.left_off)} off)" if reading.left_off else ""
-    where = f"{reading.reference_mm:.6g} mm, reading {reading.reading}{off}"
+    missing = {"off": reading.left_off, "blocked": reading.blocked}
+    words = "".join(f" ({', '.join(ids)} {cause})" for cause, ids in missing.items() if ids)
+    where = f"{reading.reference_mm:.6g} mm, reading {reading.reading}{words}"
     error, interval = reading.error_mm, reading.interval_mm
     if error is None:
         return f"{where}: no range: {reading.cause}"

@@ -65,6 +65,8 @@ class Table(FileModel):
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
     caption: str = ""
+    is_detail: bool = False
+    """Whether the terminal leaves the table to the recording and its CSV file."""
 
     @model_validator(mode="after")
     def _is_rectangular(self) -> Table:

@@ -77,3 +77,5 @@ class Placement(FileModel):
     target: TargetShape = FlatTarget()
     standoff_sd_mm: Annotated[float, Field(ge=0)] | None = None
     """Standard uncertainty of the standoff; None: the rig's `placement_sd_mm`."""
+    blocked: tuple[str, ...] = ()
+    """Lasers whose beams are blocked before they meet the target."""

@@ -39,7 +39,9 @@ class TrueValues(FileModel):
     """Closest range over the front."""
     range_sd_mm: float
     angle_deg: float | None = None
-    """None: the target is no incline."""
+    """None: the target is no incline. It contains the tilt common to all placements, as measured."""
+    set_deg: float | None = None
+    """Angle as set on the target's mount; None in sessions of versions that did not record it."""
     angle_sd_deg: float | None = None
     radius_mm: float | None = None
     """None: the target is no cylinder."""
@@ -86,6 +88,8 @@ class ReadingTaken(FileModel):
     cylinder_sd_mm: float | None = None
     left_off: tuple[str, ...] = ()
     """Lasers that were left off."""
+    blocked: tuple[str, ...] = ()
+    """Lasers whose beams were blocked before the target."""
     notes: tuple[str, ...] = ()
     """Reasons of missing ranges, and remarks on uncertain ones."""
     lasers: tuple[LaserRange, ...]

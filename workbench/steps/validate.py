@@ -13,7 +13,7 @@ from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.limits import check_fit, fit_limit_prompts, refuse_retry
+from workbench.procedure.engine.limits import check_fit, refuse_retry, result_limit_prompts
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
 
@@ -49,7 +49,7 @@ class ValidateStep(StepModel):
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
         """One prompt per limit with `on_fail: ask`."""
-        return fit_limit_prompts(name, self.limits)
+        return result_limit_prompts(name, self.limits)
 
     def run(self, context: Context, name: str) -> str:
         """Check the limits; raises the errors of `check_fit`."""

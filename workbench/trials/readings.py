@@ -30,6 +30,8 @@ class ClosestRange:
     """Line of lasers whose shape gives angle and radius."""
     left_off: tuple[str, ...] = ()
     """Lasers that stay off as if they had failed."""
+    blocked: tuple[str, ...] = ()
+    """Lasers whose beams are blocked before the target."""
 
     @classmethod
     def of(cls, target: TargetSpec, placed: Placement, sensor: CalibratedSensor, rig: Rig) -> ClosestRange:
@@ -85,23 +87,38 @@ def take_reading(
     closest: ClosestRange | None = None,
 ) -> ReadingTaken:
     """Take the reading `number` at a placement and journal it; see `take_readings`."""
+    return take_full_reading(context, ranger, name, placement, number, closest)[0]
+
+
+def take_full_reading(
+    context: Context,
+    ranger: Ranger,
+    name: str,
+    placement: Placement,
+    number: int,
+    closest: ClosestRange | None = None,
+) -> tuple[ReadingTaken, Reading]:
+    """Take the reading `number` at a placement; returns it as journalled and as the ranger gave it."""
     left_off = () if closest is None else closest.left_off
-    without = f"without-{'-'.join(left_off)}/" if left_off else ""
-    scene = f"{placement.key}/{without}{number:02d}"
+    scene = f"{placement.key}/{_without(closest)}{number:02d}"
     reading = acquire(ranger, scene, _capture(context, ranger, placement, scene, number, left_off))
-    taken = _flat_reading(context, name, placement, number, reading)
-    if closest is not None:
-        taken = _closest_reading(taken, reading, closest)
+    taken = reading_taken(context.rig, name, placement, number, reading, closest)
     context.emit(taken)
     context.readings.append(taken)
-    return taken
+    return taken, reading
 
 
-def _flat_reading(
-    context: Context, name: str, placement: Placement, number: int, reading: Reading
+def reading_taken(
+    rig: Rig,
+    name: str,
+    placement: Placement,
+    number: int,
+    reading: Reading,
+    closest: ClosestRange | None = None,
 ) -> ReadingTaken:
+    """Reading as it is journalled; arguments as of `take_readings`."""
     stated = placement.standoff_sd_mm
-    return ReadingTaken(
+    taken = ReadingTaken(
         trial=name,
         scene=reading.scene,
         standoff_mm=placement.standoff_mm,
@@ -110,13 +127,22 @@ def _flat_reading(
         range_mm=reading.flat_mm,
         sigma_mm=reading.flat_sigma_mm,
         spot_sd_mm=reading.flat_spot_sd_mm,
-        reference_sd_mm=context.rig.bench.placement_sd_mm if stated is None else stated,
+        reference_sd_mm=rig.bench.placement_sd_mm if stated is None else stated,
         closest_mm=reading.closest_mm,
         closest_sigma_mm=reading.sigma_mm,
         shape=", ".join(line.shape.kind for line in reading.lines),
         notes=reading.notes,
         lasers=reading.lasers,
     )
+    return taken if closest is None else _closest_reading(taken, reading, closest)
+
+
+def _without(closest: ClosestRange | None) -> str:
+    """Part of a scene's name that states the missing spots; empty with all."""
+    if closest is None:
+        return ""
+    parts = {"without": closest.left_off, "blocked": closest.blocked}
+    return "".join(f"{name}-{'-'.join(ids)}/" for name, ids in parts.items() if ids)
 
 
 def _closest_reading(taken: ReadingTaken, reading: Reading, closest: ClosestRange) -> ReadingTaken:
@@ -130,6 +156,7 @@ def _closest_reading(taken: ReadingTaken, reading: Reading, closest: ClosestRang
             "true": closest.true,
             "reference_sd_mm": closest.true.range_sd_mm,
             "left_off": closest.left_off,
+            "blocked": closest.blocked,
             **_angle(shape),
             **_cylinder(shape, closest.front_mm),
         }

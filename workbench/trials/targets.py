@@ -6,6 +6,7 @@ the origins of the outer lasers of a line.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, hypot, radians, sqrt, tan
 from typing import Annotated, Literal
 
@@ -13,11 +14,13 @@ from pydantic import AfterValidator, Field
 
 from workbench.model.errors import BadInputError
 from workbench.model.event import TrueValues
-from workbench.model.rig import LARGEST, ImageAxis, NonNegativeFloat, Rig
+from workbench.model.rig import LARGEST, BenchSpec, ImageAxis, NonNegativeFloat, Rig
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 from workbench.model.yamlfile import FileModel
 from workbench.sensor.calibrated import CalibratedSensor
 
+RULER_DECIMALS = 1
+"""Decimals of a standoff in mm that is asked for: a ruler can be read to 0.1 mm."""
 STEEPEST_DEG = 80.0
 """Largest angle of an incline; beyond it a spot is longer than six times its width."""
 STEEPEST_ON_CYLINDER = 0.95
@@ -76,7 +79,7 @@ def front_axis(spec: TargetSpec) -> ImageAxis:
 
 
 def target_placement(spec: TargetSpec, key: str, range_mm: float, rig: Rig) -> Placement:
-    """Placement at which the closest range over the rig's front is `range_mm`.
+    """Placement at which the closest range over the rig's front is `range_mm`, as far as a ruler can be read.
 
     The standoff is that on the optical axis for a flat target, that of the nearest line for a cylinder.
 
@@ -89,7 +92,8 @@ def target_placement(spec: TargetSpec, key: str, range_mm: float, rig: Rig) -> P
         shape = CylinderTarget(
             diameter_mm=spec.diameter_mm, shift_mm=spec.shift_mm, diameter_sd_mm=spec.diameter_sd_mm
         )
-        standoff_mm = range_mm - _cylinder_recess_mm(spec, (min(front), max(front)))
+        recess_mm = _cylinder_recess_mm(spec, (min(front), max(front)))
+        standoff_mm = round(range_mm - recess_mm, RULER_DECIMALS)
         return Placement(key=key, standoff_mm=standoff_mm, target=shape, standoff_sd_mm=spec.reference_sd_mm)
     if isinstance(spec, FlatTargetSpec):
         return Placement(key=key, standoff_mm=range_mm, standoff_sd_mm=spec.reference_sd_mm)
@@ -101,7 +105,7 @@ def target_placement(spec: TargetSpec, key: str, range_mm: float, rig: Rig) -> P
     turn = {"yaw_deg" if spec.axis == "vertical" else "pitch_deg": spec.angle_deg}
     return Placement(
         key=key,
-        standoff_mm=range_mm + _incline_lead_mm(spec, (min(front), max(front))),
+        standoff_mm=round(range_mm + _lead_mm(_angle_deg(spec, rig.bench), front), RULER_DECIMALS),
         target=FlatTarget(turn_sd_deg=spec.reference_sd_deg, **turn),
         standoff_sd_mm=spec.reference_sd_mm,
     )
@@ -111,14 +115,15 @@ def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, r
     """True values at a placement as measured; the front is that of the calibration.
 
     The closest range of a flat target has the uncertainty of its squareness too: its near end is closer. The
-    tilt common to all placements adds to the uncertainty of a set angle.
+    tilt common to all placements, as measured, adds to a set angle, and its uncertainty to that of the angle.
     """
     bench, stated = rig.bench, placed.standoff_sd_mm
     standoff_sd_mm = bench.placement_sd_mm if stated is None else stated
     if isinstance(spec, FlatTargetSpec):
         tilt_sd = radians(hypot(bench.tilt_sd_deg, bench.target_tilt_sd_deg))
         lead_sd_mm = tilt_sd * _half_front_mm(sensor)
-        return TrueValues(range_mm=placed.standoff_mm, range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm))
+        range_mm = placed.standoff_mm - _tilt_lead_mm(bench, sensor)
+        return TrueValues(range_mm=range_mm, range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm))
     front = sensor.front_mm(front_axis(spec))
     if isinstance(spec, CylinderSpec):
         recess_mm = _cylinder_recess_mm(spec, front)
@@ -129,14 +134,16 @@ def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, r
             radius_mm=spec.diameter_mm / 2,
             radius_sd_mm=radius_sd_mm,
         )
-    lead_mm = _incline_lead_mm(spec, front)
-    arm_mm = lead_mm / tan(radians(abs(spec.angle_deg)))
+    angle_deg = _angle_deg(spec, bench)
+    lead_mm = _lead_mm(angle_deg, front)
+    arm_mm = abs(front[0] if angle_deg > 0 else front[1])
     angle_sd_deg = hypot(spec.reference_sd_deg, bench.target_tilt_sd_deg)
-    lead_sd_mm = arm_mm / cos(radians(spec.angle_deg)) ** 2 * radians(angle_sd_deg)
+    lead_sd_mm = arm_mm / cos(radians(angle_deg)) ** 2 * radians(angle_sd_deg)
     return TrueValues(
         range_mm=placed.standoff_mm - lead_mm,
         range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm),
-        angle_deg=spec.angle_deg,
+        angle_deg=angle_deg,
+        set_deg=spec.angle_deg,
         angle_sd_deg=angle_sd_deg,
     )
 
@@ -153,10 +160,26 @@ def _half_front_mm(sensor: CalibratedSensor) -> float:
     return max(abs(end) for axis in axes if len(sensor.lasers_on(axis)) for end in sensor.front_mm(axis))
 
 
-def _incline_lead_mm(spec: InclineSpec, front_mm: tuple[float, float]) -> float:
+def _angle_deg(spec: InclineSpec, bench: BenchSpec) -> float:
+    """Angle to the sensor: as set, with the tilt common to all placements as measured."""
+    common_deg = bench.target_yaw_deg if spec.axis == "vertical" else bench.target_pitch_deg
+    return spec.angle_deg + common_deg
+
+
+def _lead_mm(angle_deg: float, front_mm: Sequence[float]) -> float:
     """Distance by which the near end of the front is closer than the optical axis."""
-    slope = tan(radians(spec.angle_deg))
-    return max(-slope * front_mm[0], -slope * front_mm[1])
+    slope = tan(radians(angle_deg))
+    return max(-slope * end for end in front_mm)
+
+
+def _tilt_lead_mm(bench: BenchSpec, sensor: CalibratedSensor) -> float:
+    """Distance by which the near end of a flat target is closer, by the common tilt as measured."""
+    tilts: dict[ImageAxis, float] = {"u": bench.target_yaw_deg, "v": bench.target_pitch_deg}
+    return max(
+        _lead_mm(angle_deg, sensor.front_mm(axis)) if angle_deg else 0.0
+        for axis, angle_deg in tilts.items()
+        if len(sensor.lasers_on(axis))
+    )
 
 
 def _cylinder_recess_mm(spec: CylinderSpec, front_mm: tuple[float, float]) -> float:

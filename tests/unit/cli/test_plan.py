@@ -82,3 +82,19 @@ def test_plan_states_the_age_of_an_existing_calibration(workbench: Run, tmp_path
     assert "days old" in " ".join(outcome.err.split())
     rig.write_text(rig.read_text().replace("serial: emulated-1", "serial: emulated-9"))
     refused(workbench("plan", procedure, "--rig", rig, "--calibration", calibration), 2, "emulated-9")
+
+
+@pytest.mark.parametrize(("standoff_mm", "is_lost"), [(400, False), (105, True)])
+def test_plan_names_the_spots_that_a_trial_will_lose(
+    workbench: Run, tmp_path: Path, standoff_mm: int, is_lost: bool
+) -> None:
+    """The beams at 60 mm leave an image of 640 pixels at 100 mm, and one of 600 pixels at 107 mm."""
+    rig, procedure = write_files(
+        tmp_path,
+        f"{SHORT}  - {{step: capture_grid, standoffs_mm: [300, 600], repeats: 1}}\n  - {{step: fit}}\n"
+        f"  - {{step: export}}\n  - {{step: accuracy_trial, standoffs_mm: [{standoff_mm}], readings: 2}}\n",
+    )
+    rig.write_text(rig.read_text().replace("width_px: 640", "width_px: 600"))
+    outcome = workbench("plan", procedure, "--rig", rig)
+    assert outcome.code == 0
+    assert (f"p.4/{standoff_mm}mm" in outcome.err) == is_lost

@@ -17,6 +17,7 @@ from workbench.model.prompt import Answer, Prompt, Quantity
 from workbench.procedure.engine.operator import NoOperator
 
 NUMBER = Prompt("p", "Read it.", quantity=Quantity("mm", 450.0, 550.0, 500.0), may={"skip": "leave it out"})
+STANDOFF = Prompt("p", "Read it.", quantity=Quantity("mm", 1.0, 5000.0))
 CONFIRM = Prompt("safety", "Safe?")
 CHOICE = Prompt("card", "Which card?", choices=("grey", "white"))
 
@@ -74,6 +75,7 @@ def test_what_fits_is_the_answer(
     [
         (NUMBER, "5000", "500"),
         (NUMBER, "half", "500"),
+        (STANDOFF, "2,200", "2200"),
         (CONFIRM, "", "yes"),
         (CONFIRM, "y", "yes"),
         (CHOICE, "green", "grey"),

@@ -64,3 +64,14 @@ def test_wrong_values_end_with_2_row_and_column(workbench: Run, tmp_path: Path) 
 
 def test_an_unknown_kind_ends_with_2(workbench: Run, readings: Path) -> None:
     assert workbench("trial", "precision", readings).code == 2
+
+
+def test_each_file_is_a_session(workbench: Run, readings: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.csv"
+    drawn_levels(2, shape=(1, 4, 3))[USED].to_csv(other, index=False)
+    outcome = workbench("trial", "repeatability", readings, other, "--json")
+    assert [row["sessions"] for row in json.loads(outcome.out)["rows"]] == [3, 3, 3]
+    assert all(row["session_sd_mm"] is not None for row in json.loads(outcome.out)["rows"])
+    assert json.loads(outcome.out)["readings"] == 72 + 36
+    for arguments in (("repeatability", readings, readings), ("gauge-rr", readings, other)):
+        assert workbench("trial", *arguments).code == 2

@@ -11,6 +11,7 @@ from tests.support.exact import calibration_of
 from tests.support.four_lasers import four_laser_rig
 from tests.support.running import two_laser_rig
 from workbench.model.errors import BadInputError
+from workbench.model.rig import Rig
 from workbench.model.target import CylinderTarget, FlatTarget
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.targets import (
@@ -23,6 +24,7 @@ from workbench.trials.targets import (
     true_values,
 )
 
+RULER_STEP_MM = 0.1
 RIG = four_laser_rig()
 SENSOR = CalibratedSensor(calibration_of(RIG))
 
@@ -34,9 +36,11 @@ def test_the_near_end_of_an_incline_is_at_the_range_asked_for(angle_deg: float) 
     placed = target_placement(spec, "k", 300.0, rig)
     assert isinstance(placed.target, FlatTarget)
     ends = [placed.standoff_mm + tan(radians(placed.target.yaw_deg)) * x for x in (-60.0, 60.0)]
-    assert min(ends) == pytest.approx(300.0)
+    assert min(ends) == pytest.approx(300.0, abs=RULER_STEP_MM / 2)
+    assert placed.standoff_mm == pytest.approx(round(placed.standoff_mm, 1))
     true = true_values(spec, placed, SENSOR, rig)
-    assert (true.range_mm, true.angle_deg, true.angle_sd_deg) == pytest.approx((300.0, angle_deg, 0.25))
+    assert (true.angle_deg, true.set_deg, true.angle_sd_deg) == pytest.approx((angle_deg, angle_deg, 0.25))
+    assert true.range_mm == pytest.approx(min(ends))
     lead_sd_mm = 60.0 / cos(radians(angle_deg)) ** 2 * radians(0.25)
     assert true.range_sd_mm == pytest.approx(hypot(0.4, lead_sd_mm))
 
@@ -51,6 +55,28 @@ def test_the_angle_of_an_incline_has_the_uncertainty_of_the_common_tilt() -> Non
     assert true.angle_sd_deg is not None
     assert true.angle_sd_deg**2 == pytest.approx(angle_deg.var(), rel=0.05)
     assert true.range_sd_mm**2 == pytest.approx((60.0 * np.tan(np.radians(angle_deg))).var(), rel=0.05)
+
+
+def tilted_rig(yaw_deg: float) -> Rig:
+    return RIG.model_copy(update={"bench": RIG.bench.model_copy(update={"target_yaw_deg": yaw_deg})})
+
+
+@pytest.mark.parametrize("yaw_deg", [-2.0, 1.5])
+def test_a_measured_common_tilt_adds_to_the_set_angle(yaw_deg: float) -> None:
+    spec, rig = InclineSpec(kind="incline", angle_deg=30.0), tilted_rig(yaw_deg)
+    placed = target_placement(spec, "k", 300.0, rig)
+    true = true_values(spec, placed, SENSOR, rig)
+    assert (true.angle_deg, true.set_deg) == pytest.approx((30.0 + yaw_deg, 30.0))
+    near_mm = placed.standoff_mm - 60.0 * tan(radians(30.0 + yaw_deg))
+    assert true.range_mm == pytest.approx(near_mm)
+    assert true.range_mm == pytest.approx(300.0, abs=RULER_STEP_MM / 2)
+
+
+@pytest.mark.parametrize("yaw_deg", [-2.0, 0.0, 1.5])
+def test_a_measured_common_tilt_brings_an_end_of_a_flat_target_nearer(yaw_deg: float) -> None:
+    spec, rig = FlatTargetSpec(), tilted_rig(yaw_deg)
+    true = true_values(spec, target_placement(spec, "k", 300.0, rig), SENSOR, rig)
+    assert true.range_mm == pytest.approx(300.0 - 60.0 * tan(radians(abs(yaw_deg))))
 
 
 def test_an_incline_about_the_horizontal_axis_needs_lasers_above_each_other() -> None:
@@ -68,9 +94,10 @@ def test_the_closest_point_of_a_cylinder_lies_over_the_front(shift_mm: float, re
     spec = CylinderSpec(kind="cylinder", diameter_mm=400.0, shift_mm=shift_mm, diameter_sd_mm=0.2)
     placed = target_placement(spec, "k", 400.0, RIG)
     assert isinstance(placed.target, CylinderTarget)
-    assert placed.standoff_mm == pytest.approx(400.0 - recess_mm)
+    assert placed.standoff_mm == round(400.0 - recess_mm, 1)
     true = true_values(spec, placed, SENSOR, RIG)
-    assert (true.range_mm, true.radius_mm, true.radius_sd_mm) == pytest.approx((400.0, 200.0, 0.1))
+    assert (true.radius_mm, true.radius_sd_mm) == pytest.approx((200.0, 0.1))
+    assert true.range_mm == pytest.approx(placed.standoff_mm + recess_mm)
 
 
 @pytest.mark.parametrize(("factor", "seen"), [(0.999, False), (1.001, True)])

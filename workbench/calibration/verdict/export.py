@@ -15,6 +15,7 @@ from workbench.calibration.verdict.yaml_text import yaml_text
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import (
     Calibration,
+    CrossValidatedRange,
     FitSummary,
     LaserRanger,
     LaserRay,
@@ -132,6 +133,10 @@ def _calibration(
                 reasons=assessment.reasons,
                 warnings=assessment.warnings,
                 terms=fit.terms,
+                cross_validation=tuple(
+                    CrossValidatedRange(standoff_mm=one.standoff_mm, error_mm=one.error_mm, sd_mm=one.sd_mm)
+                    for one in assessment.cross_validation
+                ),
             ),
             provenance=provenance,
         ),

@@ -33,20 +33,22 @@ def capture_limit_prompts(placements: Sequence[Placement], rig: Rig, limits: Cap
     ]
 
 
-def fit_limit_prompts(step: str, limits: FileModel) -> list[Prompt]:
-    """Possible prompts of limits on a fit with `on_fail: ask`."""
+def result_limit_prompts(step: str, limits: FileModel) -> list[Prompt]:
+    """Possible prompts of limits on results of a fit or a trial with `on_fail: ask`."""
     return [Prompt(f"{step}/{name}", CONTINUE) for name in _asking(limits)]
 
 
 def refuse_retry(limits: Limits) -> Limits:
-    """Validate limits on a fit, which would be the same after a retry.
+    """Validate limits on results of a fit or a trial, which would be the same after a retry.
 
     Raises:
         ValueError: a limit has `on_fail: retry`.
     """
-    for name, limit in _stated(limits):
+    for name, limit in stated_limits(limits):
         if limit.on_fail == "retry":
-            raise ValueError(f"{name}: on_fail: expected ask or stop, got retry; a retry gives the same fit")
+            raise ValueError(
+                f"{name}: on_fail: expected ask or stop, got retry; a retry gives the same result"
+            )
     return limits
 
 
@@ -68,7 +70,7 @@ def check_captures(context: Context, step: str, placement: Placement, limits: Ca
         found = [context.findings[key].spots for key in keys]
         quality = quality_of(found)
         missing, answered = quality.u_px is None, False
-        for name, limit in _stated(limits):
+        for name, limit in stated_limits(limits):
             of = f"{placement.key}/{laser_id}"
             why = why_not_measured(name, laser_id, [len(spots) for spots in found])
             failed = _check(context, step, of, name, getattr(quality, name), limit, f"none: {why}")
@@ -93,7 +95,7 @@ def check_fit(context: Context, step: str, values: Mapping[str, float], limits: 
         StoppedError: the operator aborts at a failed limit.
     """
     remarks = []
-    for name, limit in _stated(limits):
+    for name, limit in stated_limits(limits):
         failed = _check(context, step, "fit", name, float(values[name]), limit)
         if failed is None:
             continue
@@ -125,10 +127,11 @@ def _check(
 
 
 def _asking(limits: FileModel) -> Iterator[str]:
-    return (name for name, limit in _stated(limits) if limit.on_fail == "ask")
+    return (name for name, limit in stated_limits(limits) if limit.on_fail == "ask")
 
 
-def _stated(limits: FileModel) -> Iterator[tuple[str, Limit]]:
+def stated_limits(limits: FileModel) -> Iterator[tuple[str, Limit]]:
+    """Limits of a model that are not None, with their names."""
     return ((name, limit) for name, limit in limits if limit is not None)
 
 

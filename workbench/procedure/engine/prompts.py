@@ -132,7 +132,9 @@ def _nearer(target: FlatTarget) -> str:
 def _expected_sight(placement: Placement) -> str:
     if isinstance(placement.target, CylinderTarget):
         return "Every spot lies on the cylinder, and no beam is reflected towards a person or the camera."
-    return "Its face is square to the ruler unless turned, and every spot lies on it."
+    if _turn(placement):
+        return "It is turned as stated, and every spot lies on it."
+    return "Its face is square to the ruler, and every spot lies on it."
 
 
 def _turn(placement: Placement) -> str:

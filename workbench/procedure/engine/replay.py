@@ -15,7 +15,7 @@ from workbench.model.errors import BadInputError
 from workbench.model.prompt import Answer
 from workbench.procedure.engine.prompts import SAFETY
 from workbench.session.journal import Journal
-from workbench.session.state import PlacementCaptures, placement_captures, safe_part
+from workbench.session.state import PlacementCaptures, effective, placement_captures, safe_part
 
 
 class ReplayingJournal:
@@ -48,6 +48,7 @@ class ReplayingJournal:
             e.key: e for e in (record.event for record in self._kept) if isinstance(e, ev.Answered)
         }
 
+        self._set_aside = [r.event for r in effective(before) if isinstance(r.event, ev.SetAside)]
         self._retries = Counter(r.event.key for r in before if _is_retry(r.event))
         measured = [e for e in (r.event for r in self._kept) if isinstance(e, ev.LatencyMeasured)]
         self.latency = measured[-1].frames if measured else None
@@ -60,6 +61,8 @@ class ReplayingJournal:
             StoppedError: the journal cannot be written.
             BadInputError: the journal began with other procedures, another rig or another session name.
         """
+        if isinstance(event, ev.SetAside):
+            self._set_aside.append(event)
         if _is_retry(event):
             self._retries[event.key] += 1
         self._show_notes()
@@ -87,6 +90,10 @@ class ReplayingJournal:
     def retries(self, key: str) -> int:
         """Number of retries of a placement by limits in this session, including before resumptions."""
         return self._retries[key]
+
+    def set_aside(self, prefix: str) -> list[ev.SetAside]:
+        """Placements by the beginning of their key that were captured again or skipped in this session."""
+        return [event for event in self._set_aside if event.key.startswith(prefix)]
 
     def answer(self, key: str) -> Answer | None:
         """Answer that was given before the session ended early; None if there is none."""

@@ -12,18 +12,20 @@ from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel, flat_placement
+from workbench.procedure.engine.step import flat_placement
+from workbench.trials.accuracy.limits import AccuracyLimits
+from workbench.trials.trial_step import TrialStepModel
 
 
 @register
-class AccuracyTrialStep(StepModel):
+class AccuracyTrialStep(TrialStepModel):
     """Range a flat target at standoffs that the fit has not used; give a table and a chart of the errors."""
 
-    needs: ClassVar[str | None] = "calibration"
     gives: ClassVar[str | None] = "readings"
     step: Literal["accuracy_trial"]
     standoffs_mm: Standoffs
     readings: Count
+    limits: AccuracyLimits = AccuracyLimits()
 
     @model_validator(mode="after")
     def _standoffs_differ(self) -> AccuracyTrialStep:
@@ -48,9 +50,10 @@ class AccuracyTrialStep(StepModel):
 
         Raises:
             BadInputError: there is no calibration.
+            LimitFailedError: a limit failed, or a standoff has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.
         from workbench.trials.accuracy.trial import run_trial
 
-        return run_trial(context, name, self.placements(name, context.rig), self.readings)
+        return run_trial(context, name, self.placements(name, context.rig), self.readings, self.limits)

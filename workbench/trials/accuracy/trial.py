@@ -1,58 +1,86 @@
-"""Execution of the accuracy trial, with its table and chart."""
+"""Execution of the accuracy trial: readings, verdict, tables and chart."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from workbench.model.event import ReadingTaken
 from workbench.model.reading_chart import error_chart
-from workbench.model.table import Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.placements import visit_placements
-from workbench.trials.accuracy.statistics import AccuracyRow, accuracy_row
-from workbench.trials.readings import session_ranger, take_readings
-from workbench.trials.results import finish_trial
-
-COLUMNS = (
-    Column(key="standoff_mm", name="true", unit="mm"),
-    Column(key="readings", name="n"),
-    Column(key="missing", name="missing"),
-    Column(key="mean_error_mm", name="mean error", unit="mm", format="+.2f"),
-    Column(key="max_error_mm", name="max", unit="mm", format="+.2f"),
-    Column(key="min_error_mm", name="min", unit="mm", format="+.2f"),
-    Column(key="sd_mm", name="sd", unit="mm", format=".2f"),
-    Column(key="range_sd_mm", name="stated u", unit="mm", format=".2f"),
-    Column(key="reference_sd_mm", name="reference u", unit="mm", format=".2f"),
-    Column(key="mean_relative_error", name="mean error", unit="%", scale=100, format="+.2f"),
-)
+from workbench.sensor.calibrated import CalibratedSensor
+from workbench.trials.accuracy.agreement import Agreement, Bench, PlacementErrors
+from workbench.trials.accuracy.limits import AccuracyLimits
+from workbench.trials.accuracy.ranges import CLOSEST, MEAN, RangeError, Reference, range_errors
+from workbench.trials.accuracy.statistics import accuracy_row
+from workbench.trials.accuracy.tables import accuracy_table, detail_tables, verdict_table
+from workbench.trials.accuracy.verdict import results_of, verdict_of
+from workbench.trials.limits import check_results, require_readings
+from workbench.trials.readings import take_full_reading
+from workbench.trials.trial_run import TrialRun
 
 
-def run_trial(context: Context, name: str, placements: Sequence[Placement], count: int) -> str:
+@dataclass(frozen=True)
+class PlacementReadings:
+    """Readings at one placement, and the errors of their ranges by name."""
+
+    taken: Sequence[ReadingTaken]
+    reference: Reference
+    errors: Sequence[Mapping[str, RangeError]]
+
+
+def run_trial(
+    context: Context, name: str, placements: Sequence[Placement], count: int, limits: AccuracyLimits
+) -> str:
     """Take `count` readings at each placement; returns the outcome in one line.
 
     Raises:
         BadInputError: there is no calibration.
-        WorkbenchError: see `visit_placements`.
+        LimitFailedError: a limit failed, or a standoff has no range.
+        WorkbenchError: see `TrialRun.visit`.
     """
-    ranger = session_ranger(context, name)
+    run = TrialRun(context, name)
+    ranger = run.ranger
 
-    def work(placement: Placement) -> list[ReadingTaken]:
-        return take_readings(context, ranger, name, placement, count)
+    def work(placement: Placement) -> PlacementReadings:
+        reference = Reference.of(context.rig.bench, placement.standoff_mm, placement.standoff_sd_mm)
+        both = [take_full_reading(context, ranger, name, placement, number) for number in range(count)]
+        errors = [range_errors(ranger.sensor, reading, taken, reference) for taken, reading in both]
+        return PlacementReadings([taken for taken, _ in both], reference, errors)
 
-    taken = visit_placements(context, placements, work)
-    rows = [accuracy_row(readings) for readings in taken]
-    chart = error_chart(f"{name}-errors", [reading for readings in taken for reading in readings])
-    finish_trial(context, name, [accuracy_table(name, rows)], [chart])
-    return f"{sum(row.readings for row in rows)} readings, table in {name}.csv"
+    visited = run.visit(placements, work)
+    rows = [accuracy_row(one.taken) for one in visited]
+    chart = error_chart(f"{name}-errors", [reading for one in visited for reading in one.taken])
+    ranges = agreements(ranger.sensor, context.rig.bench.ruler_scale.sd, visited)
+    if not ranges:
+        run.finish([accuracy_table(name, rows)], [chart])
+        require_readings(name, [one.taken for one in visited])
+    verdict = verdict_of(ranges, limits)
+    tables = [
+        verdict_table(name, ranges, verdict, limits),
+        accuracy_table(name, rows),
+        *detail_tables(name, ranges),
+    ]
+    run.finish(tables, [chart])
+    require_readings(name, [one.taken for one in visited])
+    check_results(context, name, results_of(ranges, limits), limits)
+    return f"{sum(row.readings for row in rows)} readings, table in {name}.csv; {verdict.text}"
 
 
-def accuracy_table(name: str, rows: Sequence[AccuracyRow]) -> Table:
-    """Table of the error statistics, one row per standoff."""
-    return Table(
-        name=name,
-        title="Accuracy: error = measured - true",
-        columns=COLUMNS,
-        rows=tuple(tuple(getattr(row, column.key) for column in COLUMNS) for row in rows),
-        caption="a reading is the mean of the lasers; u: standard uncertainty",
-    )
+def agreements(
+    sensor: CalibratedSensor, scale_sd: float, visited: Sequence[PlacementReadings]
+) -> list[Agreement]:
+    """Agreement of the closest range, the mean range and each laser's range; without readings, none."""
+    bench = Bench(sensor.covariance, scale_sd)
+    found = []
+    for name in (CLOSEST, MEAN, *sensor.ids):
+        placements, missing = [], 0
+        for one in visited:
+            errors = [by_name[name] for by_name in one.errors if name in by_name]
+            missing += len(one.errors) - len(errors)
+            if errors:
+                placements.append(PlacementErrors.of(one.reference, errors))
+        if placements:
+            found.append(Agreement(name, bench, tuple(placements), missing))
+    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from math import nan
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,6 +22,8 @@ from workbench.trials.reading_frame import COLUMNS, reading_frame
 REQUIRED = ("true_mm", "measured_mm")
 LARGEST_MM = 1e9
 """Largest accepted range in either direction, mm."""
+FARTHEST_RATIO = 9.0
+"""Largest median ratio of measured and true ranges; cm for mm give 10."""
 Millimetres = Annotated[float, Field(ge=-LARGEST_MM, le=LARGEST_MM)]
 
 
@@ -36,6 +39,26 @@ class ReadingRow(FileModel):
     session: str = "1"
     standoff_mm: Millimetres | None = None
     """Level to which the reading belongs; None: its true range."""
+
+
+def load_sessions(paths: Sequence[Path]) -> pd.DataFrame:
+    """Read files of readings; of several, each is a session of its own, or has those of its own column.
+
+    Sessions of different files are different, also where they have equal labels.
+
+    Raises:
+        BadInputError: see `load_readings`; or a file is named twice.
+    """
+    if len(paths) == 1:
+        return load_readings(paths[0])
+    if len({path.resolve() for path in paths}) < len(paths):
+        raise BadInputError(f"expected each file of readings once, got {', '.join(map(str, paths))}")
+    frames = [load_readings(path) for path in paths]
+    labelled = [
+        frame.assign(session=str(path) + "/" + frame["session"].astype(str))
+        for path, frame in zip(paths, frames, strict=True)
+    ]
+    return pd.concat(labelled, ignore_index=True)
 
 
 def load_readings(path: Path) -> pd.DataFrame:
@@ -67,7 +90,23 @@ def load_readings(path: Path) -> pd.DataFrame:
     frame = reading_frame(rows)
     if not frame["measured_mm"].count():
         raise BadInputError(f"{path}: expected at least one reading with a range, got {len(frame)} without")
+    _check_unit(path, frame)
     return frame
+
+
+def _check_unit(path: Path, frame: pd.DataFrame) -> None:
+    """Refuse readings in another unit, and thousands separators that were read as column separators.
+
+    Raises:
+        BadInputError: the median measured range is far from the true one.
+    """
+    used = frame[(frame["true_mm"] > 0) & frame["measured_mm"].notna()]
+    ratio = float((used["measured_mm"] / used["true_mm"]).median()) if len(used) else 1.0
+    if not 1 / FARTHEST_RATIO < ratio < FARTHEST_RATIO:
+        raise BadInputError(
+            f"{path}: expected measured_mm near true_mm, got a median ratio of {ratio:.3g}; state both in mm,"
+            " and write numbers without thousands separators (2200, not 2,200)"
+        )
 
 
 def _row(where: str, number: int, cells: dict[str | Any, str | Any]) -> dict[str, object]:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from workbench.model.fields import Count, Standoff, require_different
+from workbench.model.limit import Limit
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel, flat_placement
+from workbench.procedure.engine.step import flat_placement
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
 
 
 @dataclass(frozen=True)
@@ -28,11 +30,19 @@ class Round:
     placements: Sequence[Placement]
 
 
+class GaugeLimits(ResultLimits):
+    """Limits on the result of the study; the standard deviation is decided by its 95 % interval."""
+
+    gauge_sd_mm: Limit | None = None
+    study_variation: Limit | None = None
+    """Limit on GRR / total variation, without unit."""
+    distinct_categories: Limit | None = None
+
+
 @register
-class GaugeTrialStep(StepModel):
+class GaugeTrialStep(TrialStepModel):
     """Separate operators from repeatability: each places the target at every standoff several times."""
 
-    needs: ClassVar[str | None] = "calibration"
     step: Literal["gauge_rr_trial"]
     standoffs_mm: Annotated[tuple[Standoff, ...], Field(min_length=2)]
     operators: Annotated[tuple[str, ...], Field(min_length=2, max_length=100)]
@@ -40,6 +50,7 @@ class GaugeTrialStep(StepModel):
     """Placements of each standoff by each operator."""
     readings: Count = 1
     """Readings at one placement, of which the mean counts."""
+    limits: GaugeLimits = GaugeLimits()
 
     @model_validator(mode="after")
     def _parts_and_operators_differ(self) -> GaugeTrialStep:
@@ -75,14 +86,16 @@ class GaugeTrialStep(StepModel):
         return len(self.standoffs_mm) * len(self.operators) * self.trials * self.readings
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Prompts of the placements and of the changes of operator."""
-        return [*super().prompts(name, rig), *(each.prompt for each in self.rounds(name))]
+        """Prompts of the placements, of the changes of operator, and of limits."""
+        changes = [each.prompt for each in self.rounds(name)]
+        return [*super().prompts(name, rig), *changes]
 
     def run(self, context: Context, name: str) -> str:
         """Take the readings of every pass and write their statistics.
 
         Raises:
             BadInputError: there is no calibration.
+            LimitFailedError: a limit failed, or a standoff has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.

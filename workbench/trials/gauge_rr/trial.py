@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from workbench.model.event import ReadingTaken
+from workbench.model.table import Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.placements import visit_placements
 from workbench.trials.gauge_rr.step import GaugeTrialStep
 from workbench.trials.gauge_rr.table import gauge_chart, gauge_table
+from workbench.trials.limits import Result, cell_number, check_results, require_readings
 from workbench.trials.reading_frame import reading_frame, reading_rows
-from workbench.trials.readings import session_ranger, take_readings
-from workbench.trials.results import finish_trial, write_readings
+from workbench.trials.readings import take_readings
+from workbench.trials.results import write_readings
+from workbench.trials.trial_run import TrialRun
 
 
 def run_trial(context: Context, name: str, step: GaugeTrialStep) -> str:
@@ -18,20 +20,41 @@ def run_trial(context: Context, name: str, step: GaugeTrialStep) -> str:
 
     Raises:
         BadInputError: there is no calibration.
-        WorkbenchError: see `visit_placements`.
+        LimitFailedError: a limit failed, or a standoff has no range.
+        WorkbenchError: see `TrialRun.visit`.
     """
-    ranger = session_ranger(context, name)
+    run = TrialRun(context, name)
 
     def work(placement: Placement) -> tuple[str, list[ReadingTaken]]:
-        return placement.key, take_readings(context, ranger, name, placement, step.readings)
+        return placement.key, take_readings(context, run.ranger, name, placement, step.readings)
 
     rows: list[dict[str, object]] = []
+    by_standoff: dict[float, list[ReadingTaken]] = {}
     for each in step.rounds(name):
         context.ask(each.prompt)
         standoffs_mm = {placement.key: placement.standoff_mm for placement in each.placements}
-        for key, readings in visit_placements(context, each.placements, work):
+        for key, readings in run.visit(each.placements, work):
+            by_standoff.setdefault(standoffs_mm[key], []).extend(readings)
             rows += reading_rows(readings, standoffs_mm[key], each.trial, each.operator)
     frame = reading_frame(rows)
     write_readings(context, name, frame)
-    finish_trial(context, name, [gauge_table(f"{name}-table", frame)], [gauge_chart(f"{name}-errors", frame)])
+    table = gauge_table(f"{name}-table", frame)
+    run.finish([table], [gauge_chart(f"{name}-errors", frame)])
+    require_readings(name, by_standoff.values())
+    check_results(context, name, gauge_results(table), step.limits)
     return f"{frame['measured_mm'].count()} readings in {name}.csv, statistics in {name}-table.csv"
+
+
+def gauge_results(table: Table) -> list[Result]:
+    """GRR with its 95 % interval, its share of the total variation, and the categories, for limits.
+
+    Args:
+        table: result of `gauge_table`.
+    """
+    (row,) = [one for one in table.records() if one["component"] == "GRR"]
+    found = {column.key: cell_number(row[column.key]) for column in table.columns}
+    return [
+        Result("gauge_sd_mm", "GRR", found["sd_mm"], found["low_mm"], found["high_mm"]),
+        Result("study_variation", "GRR", found["study_variation"]),
+        Result("distinct_categories", "GRR", found["distinct_categories"]),
+    ]

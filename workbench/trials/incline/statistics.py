@@ -29,6 +29,8 @@ class InclineRow:
     """Stated standard uncertainty of an angle (root mean square); None without an angle."""
     reference_sd_deg: float
     """Reference uncertainty of the set angle, with the tilt common to all placements."""
+    true_deg: float
+    """Set angle, with the tilt common to all placements as measured."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,8 @@ class AngleDifference:
 
 def incline_row(target: InclineSpec, asked_mm: float, readings: Sequence[ReadingTaken]) -> InclineRow:
     """Statistics of the readings at one set-up, at least one."""
-    errors = [None if r.angle_deg is None else r.angle_deg - target.angle_deg for r in readings]
+    angle_deg = true_angle_deg(target, readings[0])
+    errors = [None if r.angle_deg is None else r.angle_deg - angle_deg for r in readings]
     stated = [r.angle_sd_deg for r in readings if r.angle_sd_deg is not None]
     return InclineRow(
         target,
@@ -55,7 +58,14 @@ def incline_row(target: InclineSpec, asked_mm: float, readings: Sequence[Reading
         error_statistics(errors, stated, _reference_sd_deg(target, readings[0])),
         sqrt(fmean(sd**2 for sd in stated)) if stated else None,
         _reference_sd_deg(target, readings[0]),
+        angle_deg,
     )
+
+
+def true_angle_deg(target: InclineSpec, reading: ReadingTaken) -> float:
+    """True angle of a reading."""
+    stated = None if reading.true is None else reading.true.angle_deg
+    return target.angle_deg if stated is None else stated
 
 
 def _reference_sd_deg(target: InclineSpec, reading: ReadingTaken) -> float:

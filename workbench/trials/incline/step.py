@@ -8,26 +8,35 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.limit import Limit
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel
 from workbench.trials.incline.set_up import SetUp
 from workbench.trials.targets import InclineSpec, target_placement
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
+
+
+class InclineLimits(ResultLimits):
+    """Limits on the mean errors at every set-up, with guard bands."""
+
+    range_error_mm: Limit | None = None
+    relative_range_error: Limit | None = None
+    angle_error_deg: Limit | None = None
 
 
 @register
-class InclineTrialStep(StepModel):
+class InclineTrialStep(TrialStepModel):
     """Range a flat target turned by set angles; give the errors of range, angle, and angle differences."""
 
-    needs: ClassVar[str | None] = "calibration"
     gives: ClassVar[str | None] = "readings"
     step: Literal["incline_trial"]
     ranges_mm: Standoffs
     """Closest ranges over the front, at which the near end of the target is placed."""
     targets: Annotated[tuple[InclineSpec, ...], Field(min_length=1)]
     readings: Count
+    limits: InclineLimits = InclineLimits()
 
     @model_validator(mode="after")
     def _placements_differ(self) -> InclineTrialStep:
@@ -69,9 +78,10 @@ class InclineTrialStep(StepModel):
 
         Raises:
             BadInputError: there is no calibration.
+            LimitFailedError: a limit failed, or a set-up has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.
         from workbench.trials.incline.trial import run_trial
 
-        return run_trial(context, name, self.set_ups(name, context.rig), self.readings)
+        return run_trial(context, name, self.set_ups(name, context.rig), self.readings, self.limits)

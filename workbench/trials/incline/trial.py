@@ -10,7 +10,6 @@ from workbench.model.reading_chart import error_chart
 from workbench.model.table import Cell, Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.placements import visit_placements
 from workbench.trials.errors import (
     ErrorPoint,
     error_cells,
@@ -20,8 +19,10 @@ from workbench.trials.errors import (
 )
 from workbench.trials.incline.set_up import SetUp
 from workbench.trials.incline.statistics import AngleDifference, InclineRow, angle_differences, incline_row
-from workbench.trials.readings import ClosestRange, session_ranger, take_readings
-from workbench.trials.results import finish_trial
+from workbench.trials.incline.step import InclineLimits
+from workbench.trials.limits import Result, check_results, error_result, range_results, require_readings
+from workbench.trials.readings import ClosestRange, take_readings
+from workbench.trials.trial_run import TrialRun
 
 SET_UP = (
     Column(key="axis", name="axis"),
@@ -31,14 +32,18 @@ SET_UP = (
 U_CAPTION = "U: expanded uncertainty (k = 2) of the error, by sensor and reference"
 
 
-def run_trial(context: Context, name: str, set_ups: Sequence[SetUp], count: int) -> str:
+def run_trial(
+    context: Context, name: str, set_ups: Sequence[SetUp], count: int, limits: InclineLimits
+) -> str:
     """Take `count` readings at each set-up; returns the outcome in one line.
 
     Raises:
         BadInputError: there is no calibration.
-        WorkbenchError: see `visit_placements`.
+        LimitFailedError: a limit failed, or a set-up has no range.
+        WorkbenchError: see `TrialRun.visit`.
     """
-    ranger = session_ranger(context, name)
+    run = TrialRun(context, name)
+    ranger = run.ranger
     by_key = {set_up.placement.key: set_up for set_up in set_ups}
 
     def work(placed: Placement) -> tuple[InclineRow, list[ReadingTaken]]:
@@ -47,7 +52,7 @@ def run_trial(context: Context, name: str, set_ups: Sequence[SetUp], count: int)
         readings = take_readings(context, ranger, name, placed, count, closest)
         return incline_row(set_up.target, set_up.range_mm, readings), readings
 
-    taken = visit_placements(context, [set_up.placement for set_up in set_ups], work)
+    taken = run.visit([set_up.placement for set_up in set_ups], work)
     rows = [row for row, _ in taken]
     readings = [reading for _, of in taken for reading in of]
     tables = [
@@ -56,9 +61,17 @@ def run_trial(context: Context, name: str, set_ups: Sequence[SetUp], count: int)
         *missing_table(name, readings, "angle", "angle_deg"),
     ]
     charts = [error_chart(f"{name}-errors", readings), angle_chart(name, taken)]
-    finish_trial(context, name, tables, charts)
+    run.finish(tables, charts)
+    require_readings(name, [of for _, of in taken])
+    check_results(context, name, [one for row, of in taken for one in incline_results(row, of)], limits)
     angles = sum(row.angle.n for row in rows)
     return f"{len(readings)} readings, {angles} with an angle, tables in {name}.csv and {name}-angle.csv"
+
+
+def incline_results(row: InclineRow, readings: Sequence[ReadingTaken]) -> list[Result]:
+    """Mean errors at one set-up, for limits."""
+    of = f"{row.target.angle_deg:g} deg {row.target.axis} at {row.true_mm:.6g} mm"
+    return [*range_results(of, readings), error_result("angle_error_deg", of, row.angle)]
 
 
 def incline_tables(
@@ -97,7 +110,7 @@ def angle_chart(name: str, taken: Sequence[tuple[InclineRow, Sequence[ReadingTak
     for row, readings in taken:
         of = points.setdefault(f"{row.target.angle_deg:g} deg {row.target.axis}", [])
         of += [
-            ErrorPoint(row.true_mm, r.angle_deg - row.target.angle_deg, r.angle_sd_deg, row.reference_sd_deg)
+            ErrorPoint(row.true_mm, r.angle_deg - row.true_deg, r.angle_sd_deg, row.reference_sd_deg)
             for r in readings
             if r.angle_deg is not None
         ]
@@ -115,4 +128,4 @@ def _range_row(row: InclineRow) -> tuple[Cell, ...]:
 
 
 def _angle_row(row: InclineRow) -> tuple[Cell, ...]:
-    return (row.target.axis, row.target.angle_deg, row.true_mm, *error_cells(row.angle, row.target.angle_deg))
+    return (row.target.axis, row.target.angle_deg, row.true_mm, *error_cells(row.angle, row.true_deg))

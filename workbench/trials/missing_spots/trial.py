@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 
 from workbench.model.chart import Axis, Chart
 from workbench.model.event import ReadingTaken
 from workbench.model.table import Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.placements import visit_placements
 from workbench.ranging.ranger import Ranger
 from workbench.trials.errors import (
     ErrorPoint,
@@ -21,62 +19,83 @@ from workbench.trials.errors import (
     quantity_chart,
     range_statistics,
 )
+from workbench.trials.limits import Result, check_results, range_results, require_readings
+from workbench.trials.missing_spots.sets import ALL, Condition, block, missing_sets
 from workbench.trials.missing_spots.statistics import MissingSummary, missing_summary
-from workbench.trials.readings import ClosestRange, session_ranger, take_reading
-from workbench.trials.results import finish_trial
-from workbench.trials.targets import TargetSpec
+from workbench.trials.missing_spots.step import MissingSpotsTrialStep
+from workbench.trials.readings import ClosestRange, take_reading
+from workbench.trials.trial_run import TrialRun
 
 PERCENT = 100.0
-ByNumber = dict[int, list[ReadingTaken]]
-"""Readings at one placement by the number of lasers left off."""
+ByCondition = dict[Condition, list[ReadingTaken]]
+"""Readings at one placement by the number and cause of missing spots."""
 
 
 def run_trial(
-    context: Context,
-    name: str,
-    target: TargetSpec,
-    placements: Sequence[Placement],
-    numbers: Sequence[int],
-    count: int,
+    context: Context, name: str, step: MissingSpotsTrialStep, placements: Sequence[Placement]
 ) -> str:
-    """Take `count` readings with each number of lasers left off at each placement.
-
-    Args:
-        context: session.
-        name: name of the step.
-        target: target of the trial.
-        placements: its placements.
-        numbers: numbers of lasers left off, 0 first.
-        count: number of readings of each number.
-
-    Returns:
-        The outcome in one line.
+    """Take the readings under each condition at each placement; returns the outcome in one line.
 
     Raises:
         BadInputError: there is no calibration.
-        WorkbenchError: see `visit_placements`.
+        LimitFailedError: a limit failed, or a placement has no range.
+        WorkbenchError: see `TrialRun.visit`.
     """
-    ranger = session_ranger(context, name)
+    run = TrialRun(context, name)
+    ranger = run.ranger
 
-    def work(placed: Placement) -> ByNumber:
-        closest = ClosestRange.of(target, placed, ranger.sensor, context.rig)
-        return {n: _readings(context, ranger, name, placed, closest, n, count) for n in numbers}
+    def work(placed: Placement) -> ByCondition:
+        closest = ClosestRange.of(step.target, placed, ranger.sensor, context.rig)
+        found = {
+            one: _readings(context, ranger, name, placed, closest, one, step.readings)
+            for one in step.conditions
+        }
+        if step.blocked:
+            block(context, placed, ())
+        return found
 
-    taken = visit_placements(context, placements, work)
-    readings = [reading for of in taken for n in numbers for reading in of[n]]
-    full = [of[0] for of in taken]
-    summaries = [missing_summary(n, [of[n] for of in taken], full) for n in numbers]
+    taken = run.visit(placements, work)
+    by_placement = [[reading for readings in of.values() for reading in readings] for of in taken]
+    readings = [reading for of in by_placement for reading in of]
+    full = [of[ALL] for of in taken]
+    summaries = [missing_summary(one, [of[one] for of in taken], full) for one in step.conditions if taken]
     tables = [error_table(name, taken), summary_table(name, summaries), *missing_table(name, readings)]
-    finish_trial(context, name, tables, [missing_chart(name, taken)])
+    run.finish(tables, [missing_chart(name, taken)])
+    require_readings(name, by_placement)
+    check_results(context, name, missing_results(taken, summaries), step.limits)
     return f"{len(readings)} readings, tables in {name}.csv and {name}-summary.csv"
 
 
-def error_table(name: str, taken: Sequence[ByNumber]) -> Table:
-    """Table of the errors of the range, one row per placement and number of lasers left off."""
-    rows = [
-        (readings[0].reference_mm, n, *error_cells(range_statistics(readings), readings[0].reference_mm))
+def missing_results(taken: Sequence[ByCondition], summaries: Sequence[MissingSummary]) -> list[Result]:
+    """Mean errors at each placement, and the summary of each condition, for limits."""
+    errors = [
+        result
         for of in taken
-        for n, readings in of.items()
+        for condition, readings in of.items()
+        for result in range_results(f"{readings[0].reference_mm:.6g} mm, {condition.name}", readings)
+    ]
+    totals = [
+        result
+        for one in summaries
+        for result in (
+            *([Result("ratio", one.condition.name, one.ratio)] if one.condition.number else []),
+            Result("coverage", one.condition.name, one.coverage, one.coverage_low, one.coverage_high),
+            Result("lost", one.condition.name, one.lost),
+        )
+    ]
+    return [*errors, *totals]
+
+
+def error_table(name: str, taken: Sequence[ByCondition]) -> Table:
+    """Table of the errors of the range, one row per placement and condition."""
+    rows = [
+        (
+            readings[0].reference_mm,
+            *_counts(condition),
+            *error_cells(range_statistics(readings), readings[0].reference_mm),
+        )
+        for of in taken
+        for condition, readings in of.items()
     ]
     return Table(
         name=name,
@@ -84,17 +103,17 @@ def error_table(name: str, taken: Sequence[ByNumber]) -> Table:
         columns=(
             Column(key="true_mm", name="true", unit="mm", format=".1f"),
             Column(key="left_off", name="off"),
+            Column(key="blocked", name="blocked"),
             *error_columns("mm", ".2f"),
         ),
         rows=tuple(rows),
-        caption="off: number of lasers left off; U: expanded uncertainty (k = 2) of the error",
+        caption="off, blocked: number of lasers; U: expanded uncertainty (k = 2) of the error",
     )
 
 
 def summary_table(name: str, summaries: Sequence[MissingSummary]) -> Table:
     """Table of the errors over all placements, relative to those of all lasers."""
     columns = (
-        Column(key="left_off", name="off"),
         Column(key="readings", name="n"),
         Column(key="without_range", name="missing"),
         Column(
@@ -104,26 +123,35 @@ def summary_table(name: str, summaries: Sequence[MissingSummary]) -> Table:
         Column(key="coverage", name="in interval", unit="%", scale=PERCENT, format=".0f"),
         Column(key="coverage_low", name="low", unit="%", scale=PERCENT, format=".0f"),
         Column(key="coverage_high", name="high", unit="%", scale=PERCENT, format=".0f"),
+        Column(key="lost_high", name="lost, at most", unit="%", scale=PERCENT, format=".0f"),
     )
-    rows = tuple(tuple(getattr(one, column.key) for column in columns) for one in summaries)
+    rows = tuple(
+        (*_counts(one.condition), *(getattr(one, column.key) for column in columns)) for one in summaries
+    )
     return Table(
         name=f"{name}-summary",
         title="Missing spots: compared with all lasers",
-        columns=columns,
+        columns=(Column(key="left_off", name="off"), Column(key="blocked", name="blocked"), *columns),
         rows=rows,
-        caption="low, high: 95 % interval of the share in their interval (Clopper-Pearson, by placement)",
+        caption="low, high: 95 % interval of the share in their interval; lost, at most: one-sided 95 % bound"
+        " of the share without a range (Clopper-Pearson, by placement)",
     )
 
 
-def missing_chart(name: str, taken: Sequence[ByNumber]) -> Chart:
-    """Chart of the relative error of every reading, one series for each number of lasers left off."""
+def missing_chart(name: str, taken: Sequence[ByCondition]) -> Chart:
+    """Chart of the relative error of every reading, one series for each condition."""
     points: dict[str, list[ErrorPoint]] = {}
     for of in taken:
-        for n, readings in of.items():
-            series = points.setdefault(f"{n} off" if n else "all lasers", [])
+        for condition, readings in of.items():
+            series = points.setdefault(condition.name, [])
             series += [_point(r, r.error_mm) for r in readings if r.error_mm is not None]
     y = Axis(label="error", unit="%")
     return quantity_chart(f"{name}-errors", "Error of every reading, bars stated u", y, points)
+
+
+def _counts(condition: Condition) -> tuple[int, int]:
+    """Numbers of lasers left off and blocked."""
+    return (0, condition.number) if condition.cause == "blocked" else (condition.number, 0)
 
 
 def _point(reading: ReadingTaken, error_mm: float) -> ErrorPoint:
@@ -139,14 +167,17 @@ def _readings(
     name: str,
     placed: Placement,
     closest: ClosestRange,
-    left_off: int,
+    condition: Condition,
     count: int,
 ) -> list[ReadingTaken]:
-    """Readings with `left_off` lasers off; every set of that size in turn."""
-    sets = list(combinations(ranger.sensor.ids, left_off))
-    return [
-        take_reading(
-            context, ranger, name, placed, number, replace(closest, left_off=sets[number % len(sets)])
-        )
-        for number in range(count)
-    ]
+    """Readings under one condition, with every set of lasers in turn."""
+    found: list[ReadingTaken] = []
+    before: tuple[str, ...] = ()
+    for number, ids in enumerate(missing_sets(ranger.sensor.ids, condition, count)):
+        if condition.cause == "blocked" and ids != before:
+            block(context, placed, ids)
+            before = ids
+        is_blocked = condition.cause == "blocked"
+        missing = replace(closest, left_off=() if is_blocked else ids, blocked=ids if is_blocked else ())
+        found.append(take_reading(context, ranger, name, placed, number, missing))
+    return found

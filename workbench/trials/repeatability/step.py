@@ -3,34 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from workbench.model.fields import Standoffs, require_different
+from workbench.model.limit import Limit
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel, flat_placement
+from workbench.procedure.engine.step import flat_placement
 from workbench.trials.dither import dither_prompts
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
 
 MOST = 1000
 """Largest number of placements or repeats."""
 
 
+class RepeatabilityLimits(ResultLimits):
+    """Limits on the standard deviations at every standoff, decided by their 95 % intervals."""
+
+    repeatability_sd_mm: Limit | None = None
+    reproducibility_sd_mm: Limit | None = None
+
+
 @register
-class RepeatabilityTrialStep(StepModel):
+class RepeatabilityTrialStep(TrialStepModel):
     """Separate the scatter of repeats from that of re-placements of a flat target."""
 
-    needs: ClassVar[str | None] = "calibration"
     step: Literal["repeatability_trial"]
     standoffs_mm: Standoffs
     placements_each: Annotated[int, Field(ge=2, le=MOST, alias="placements")] = 8
     repeats: Annotated[int, Field(ge=2, le=MOST)] = 3
     dither_mm: Annotated[float, Field(gt=0, le=100)] | None = None
     """Sideways displacement of the target between repeats, which changes the speckle; None: none."""
+    limits: RepeatabilityLimits = RepeatabilityLimits()
 
     @model_validator(mode="after")
     def _standoffs_differ(self) -> RepeatabilityTrialStep:
@@ -61,7 +70,7 @@ class RepeatabilityTrialStep(StepModel):
         return len(self.standoffs_mm) * self.placements_each * self.repeats
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Prompts of the placements, and of the displacements between repeats."""
+        """Prompts of the placements, of the displacements between repeats, and of limits."""
         moves = [
             prompt
             for placement in self.placements(name, rig)
@@ -74,6 +83,7 @@ class RepeatabilityTrialStep(StepModel):
 
         Raises:
             BadInputError: there is no calibration.
+            LimitFailedError: a limit failed, or a standoff has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.

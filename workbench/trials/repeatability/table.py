@@ -19,6 +19,7 @@ from workbench.trials.statistics.repeatability import (
     grubbs,
     repeatability,
 )
+from workbench.trials.statistics.resolution import coarse_step
 
 OUTLIER_PROBABILITY = 0.01
 """A placement is reported as an outlier below this probability (ISO 5725-2, section 7.3)."""
@@ -75,6 +76,9 @@ def _row(standoff_mm: float, readings: pd.DataFrame, repeats: Autocorrelation) -
     except TooFewReadingsError as error:
         return row | {"note": f"no statistics: {error}"}
     notes = [f"repeats autocorrelated ({repeats.lag1:.2f}), intervals widened"] if repeats.lag1 > 0 else []
+    if (step_mm := coarse_step(used)) is not None:
+        notes.append(f"resolution {step_mm:.3g} mm: too coarse for tests of outliers")
+        return row | _precision(found) | {"note": "; ".join(notes)}
     tests: dict[str, Cell] = {}
     for key, test in _outlier_tests(used.assign(placement=cell)):
         tests[key] = test.probability

@@ -8,25 +8,35 @@ from typing import ClassVar, Literal
 from pydantic import model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.limit import Limit
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel
 from workbench.trials.targets import CylinderSpec, target_placement
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
+
+
+class RoundLimits(ResultLimits):
+    """Limits on the mean errors at every range, with guard bands."""
+
+    range_error_mm: Limit | None = None
+    relative_range_error: Limit | None = None
+    cylinder_error_mm: Limit | None = None
+    radius_error_mm: Limit | None = None
 
 
 @register
-class RoundTrialStep(StepModel):
+class RoundTrialStep(TrialStepModel):
     """Range a cylinder; give tables of the errors of range and radius. The prompts warn of reflections."""
 
-    needs: ClassVar[str | None] = "calibration"
     gives: ClassVar[str | None] = "readings"
     step: Literal["round_trial"]
     ranges_mm: Standoffs
     """Closest ranges over the front: of the cylinder's nearest line, if it faces the front."""
     target: CylinderSpec
     readings: Count
+    limits: RoundLimits = RoundLimits()
 
     @model_validator(mode="after")
     def _ranges_differ(self) -> RoundTrialStep:
@@ -61,9 +71,10 @@ class RoundTrialStep(StepModel):
 
         Raises:
             BadInputError: there is no calibration.
+            LimitFailedError: a limit failed, or a placement has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.
         from workbench.trials.round.trial import run_trial
 
-        return run_trial(context, name, self.target, self.placements(name, context.rig), self.readings)
+        return run_trial(context, name, self, self.placements(name, context.rig))

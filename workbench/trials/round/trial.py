@@ -10,7 +10,6 @@ from workbench.model.reading_chart import error_chart
 from workbench.model.table import Cell, Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.placements import visit_placements
 from workbench.trials.errors import (
     ErrorPoint,
     ErrorStatistics,
@@ -21,29 +20,31 @@ from workbench.trials.errors import (
     quantity_chart,
     range_statistics,
 )
-from workbench.trials.readings import ClosestRange, session_ranger, take_readings
-from workbench.trials.results import finish_trial
+from workbench.trials.limits import Result, check_results, error_result, range_results, require_readings
+from workbench.trials.readings import ClosestRange, take_readings
+from workbench.trials.round.step import RoundTrialStep
 from workbench.trials.targets import CylinderSpec
+from workbench.trials.trial_run import TrialRun
 
 CAPTION = "U: expanded uncertainty (k = 2) of the error, by sensor and reference"
 
 
-def run_trial(
-    context: Context, name: str, target: CylinderSpec, placements: Sequence[Placement], count: int
-) -> str:
-    """Take `count` readings at each placement; returns the outcome in one line.
+def run_trial(context: Context, name: str, step: RoundTrialStep, placements: Sequence[Placement]) -> str:
+    """Take the readings at each placement; returns the outcome in one line.
 
     Raises:
         BadInputError: there is no calibration.
-        WorkbenchError: see `visit_placements`.
+        LimitFailedError: a limit failed, or a placement has no range.
+        WorkbenchError: see `TrialRun.visit`.
     """
-    ranger = session_ranger(context, name)
+    run = TrialRun(context, name)
+    ranger, target = run.ranger, step.target
 
     def work(placed: Placement) -> list[ReadingTaken]:
         closest = ClosestRange.of(target, placed, ranger.sensor, context.rig)
-        return take_readings(context, ranger, name, placed, count, closest)
+        return take_readings(context, ranger, name, placed, step.readings, closest)
 
-    taken = visit_placements(context, placements, work)
+    taken = run.visit(placements, work)
     readings = [reading for of in taken for reading in of]
     tables = [
         *round_tables(name, target, taken),
@@ -51,7 +52,9 @@ def run_trial(
         *missing_table(name, readings, "radius", "radius_mm"),
     ]
     charts = [error_chart(f"{name}-errors", readings), radius_chart(name, target, readings)]
-    finish_trial(context, name, tables, charts)
+    run.finish(tables, charts)
+    require_readings(name, taken)
+    check_results(context, name, [one for of in taken for one in round_results(target, of)], step.limits)
     radii = sum(reading.radius_mm is not None for reading in readings)
     return f"{len(readings)} readings, {radii} with a radius, tables in {name}.csv and {name}-radius.csv"
 
@@ -93,6 +96,16 @@ def round_tables(name: str, target: CylinderSpec, taken: Sequence[Sequence[Readi
                 radii,
             ),
         )
+    ]
+
+
+def round_results(target: CylinderSpec, readings: Sequence[ReadingTaken]) -> list[Result]:
+    """Mean errors at one placement, for limits."""
+    of = f"{readings[0].reference_mm:.6g} mm"
+    return [
+        *range_results(of, readings),
+        error_result("cylinder_error_mm", of, cylinder_statistics(readings)),
+        error_result("radius_error_mm", of, radius_statistics(target, readings)),
     ]
 
 

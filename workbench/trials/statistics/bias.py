@@ -33,12 +33,15 @@ class ErrorSources:
     """(p,) number of readings at all placements."""
     scale: float = 0.0
     """Relative standard uncertainty of the reference scale (ruler)."""
+    common_mm: FloatArray | None = None
+    """(p, m) standard uncertainties by m further sources, each common to all standoffs, mm; None: none."""
 
     def covariance(self) -> FloatArray:
         """(p, p) covariance of the mean errors, mm2."""
         own = self.placement_mm**2 / self.placements + self.repeatability_mm**2 / self.readings
         ruler = self.scale * self.standoffs_mm
-        return np.asarray(self.calibration + np.diag(own) + np.outer(ruler, ruler), np.float64)
+        common = 0.0 if self.common_mm is None else self.common_mm @ self.common_mm.T
+        return np.asarray(self.calibration + np.diag(own) + np.outer(ruler, ruler) + common, np.float64)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import beta
 
+from workbench.model.arrays import FloatArray
 from workbench.trials.statistics.estimate import CONFIDENCE, Estimate, require
 
 
@@ -30,6 +31,17 @@ def clopper_pearson(successes: float, n: float, confidence: float = CONFIDENCE) 
 def upper_bound(successes: float, n: float, confidence: float = CONFIDENCE) -> float:
     """One-sided upper bound of a probability from `successes` of n independent trials."""
     return 1.0 if successes == n else float(beta.ppf(confidence, successes + 1, n - successes))
+
+
+def effective_number(correlation: FloatArray) -> float:
+    """Number of independent trials that hold as much information on a variance as n correlated normal ones.
+
+    n^2 / sum(rho_ij^2): squares of normal values have the correlations rho^2.
+
+    Args:
+        correlation: (n, n) correlation matrix of the values, n at least 1.
+    """
+    return max(1.0, float(len(correlation) ** 2 / np.square(correlation).sum()))
 
 
 def interval_coverage(readings: pd.DataFrame) -> Estimate:

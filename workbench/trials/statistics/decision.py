@@ -1,44 +1,31 @@
-"""Decision against a maximum permissible error with guard bands (ISO 14253-1), and tolerance factors."""
+"""Decision against limits with guard bands (ISO 14253-1)."""
 
 from __future__ import annotations
 
+from math import inf, isnan
 from typing import Literal
-
-import numpy as np
-from scipy.stats import chi2, norm
 
 Decision = Literal["pass", "fail", "neither"]
 
 
-def decide(error_mm: float, mpe_mm: float, expanded_mm: float) -> Decision:
-    """Decision about one error, mm: conformity, non-conformity or neither.
+def decide(bounds: tuple[float | None, float | None], low: float, high: float) -> Decision:
+    """Decision about a value by its 95 % interval: conformity, non-conformity or neither.
 
-    `pass` if abs(error) <= MPE - U, `fail` if abs(error) >= MPE + U, else `neither`.
+    `pass` if the interval lies inside the bounds, `fail` if it lies outside, else `neither`. With an interval
+    error +- U and bounds +- MPE this is ISO 14253-1: abs(error) <= MPE - U, abs(error) >= MPE + U.
 
     Args:
-        error_mm: measured - true, mm.
-        mpe_mm: maximum permissible error, mm.
-        expanded_mm: expanded uncertainty U of the error, mm, with the k that the report states.
+        bounds: lowest and highest permissible value, in the unit of the value; None: no bound.
+        low: lower end of the interval.
+        high: upper end of the interval, possibly infinite; equal to `low` for a value without uncertainty.
 
     Raises:
-        ValueError: the limit is not above 0, or the uncertainty is negative or not a number.
+        ValueError: the ends of the interval are in the wrong order or not numbers.
     """
-    if not (mpe_mm > 0 and expanded_mm >= 0 and np.isfinite([error_mm, mpe_mm, expanded_mm]).all()):
-        raise ValueError(f"expected finite numbers, MPE > 0, U >= 0, got {error_mm}, {mpe_mm}, {expanded_mm}")
-    if abs(error_mm) <= mpe_mm - expanded_mm:
+    if not low <= high or isnan(low) or isnan(high):
+        raise ValueError(f"expected low <= high, got {low} and {high}")
+    least = -inf if bounds[0] is None else bounds[0]
+    most = inf if bounds[1] is None else bounds[1]
+    if least <= low and high <= most:
         return "pass"
-    return "fail" if abs(error_mm) >= mpe_mm + expanded_mm else "neither"
-
-
-def tolerance_factor(n: int, share: float, confidence: float) -> float:
-    """Factor k of the two-sided tolerance interval mean +- k s of n normal values, without unit.
-
-    Source: Howe, Two-sided tolerance limits for normal populations, JASA 64 (1969); NIST/SEMATECH 7.2.6.3.
-
-    Args:
-        n: number of values, at least 2.
-        share: share of the population inside the interval.
-        confidence: confidence that at least this share is inside.
-    """
-    spread = (n - 1) * (1 + 1 / n) / chi2.ppf(1 - confidence, n - 1)
-    return float(norm.ppf(0.5 + share / 2) * np.sqrt(spread))
+    return "fail" if high <= least or low >= most else "neither"

@@ -155,7 +155,8 @@ def _missing_row(left_off: int, readings: Sequence[ReadingTaken]) -> Row:
     both = [key for key in without if key in full]
     errors = [[_relative(group) for group in (without[key], full[key])] for key in both]
     pairs = [(own, whole) for own, whole in errors if own is not None and whole is not None]
-    ours = fmean(own for own, _ in pairs) / fmean(whole for _, whole in pairs) if pairs else None
+    whole_error = fmean(whole for _, whole in pairs) if pairs else 0.0
+    ours = fmean(own for own, _ in pairs) / whole_error if whole_error else None
     return Row("", f"{left_off} off", "error / that of all", "", None, None, ours, RATIO_GOAL)
 
 

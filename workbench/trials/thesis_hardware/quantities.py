@@ -90,7 +90,7 @@ def is_mean(reading: ReadingTaken) -> bool:
 
 def is_without(left_off: int) -> Select:
     """Whether the closest range is that of a flat and square target with this number of lasers left off."""
-    return lambda reading: len(reading.left_off) == left_off and _is_square(reading)
+    return lambda r: len(r.left_off) == left_off and not r.blocked and _is_square(r)
 
 
 def is_incline(*angles_deg: float) -> Select:
@@ -123,4 +123,7 @@ def _is_square(reading: ReadingTaken) -> bool:
 
 
 def _true_angle(reading: ReadingTaken) -> float | None:
-    return None if reading.true is None or reading.true.angle_deg is None else abs(reading.true.angle_deg)
+    """Angle as set, without its sign; None for a target that is no incline."""
+    if reading.true is None or reading.true.angle_deg is None:
+        return None
+    return abs(reading.true.angle_deg if reading.true.set_deg is None else reading.true.set_deg)

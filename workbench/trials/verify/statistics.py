@@ -11,10 +11,10 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 from workbench.model.event import LaserRange, ReadingTaken
 from workbench.model.stats import norm_cdf
-from workbench.ranging.lines import fit_line
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.errors import EXPANSION
 from workbench.trials.statistics.bias import bias_test
+from workbench.trials.target_check import Points, fit_plane
 
 LASERS_ALARM = 0.02
 SCALE_ALARM = 0.02
@@ -22,8 +22,6 @@ RANGES_ALARM = 0.01
 """Probabilities that a valid calibration is refused, 5 % together. The tests are the lasers against each
 other (all placements), the scale of the ranges, and any other error of the ranges."""
 MEASURE_AGAIN = "measure the target's standoffs again; if they are right, calibrate again"
-PLANES = frozenset({"degree 0", "degree 1"})
-"""Shapes of a flat target, square or turned."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +38,37 @@ class PlacementCheck:
     own_sd_mm: float
     """1 sigma by noise and speckle of the spots, and by the placement."""
     lasers_p: float | None
-    """P value of the lasers' agreement with a plane; None with fewer than three lasers on every line."""
+    """P value of the lasers' agreement with a plane; None with too few lasers."""
+    reference_sd_mm: float = 0.0
+    """1 sigma of the standoff."""
+    points: Points | None = None
+    """Mean ranges of the lasers; None with fewer than two."""
 
     @property
     def error_mm(self) -> float | None:
         """Measured - true."""
         return None if self.range_mm is None else self.range_mm - self.standoff_mm
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change of the sensor, and its support by the errors."""
+
+    name: str
+    parameters: tuple[str, ...]
+    amount: float
+    """Of the first parameter."""
+    sd: float
+    unit: str
+    gain: float
+    """Reduction of chi-square, less a penalty for a second parameter."""
+    remaining_p: float
+    """P value of the errors that the change leaves."""
+
+    @property
+    def text(self) -> str:
+        """Change with its amount."""
+        return f"{self.name} by {self.amount:+.2g} +- {self.sd:.1g} {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -55,6 +78,8 @@ class Verdict:
     valid: bool
     text: str
     action: str
+    changes: tuple[Change, ...] = ()
+    """Changes of the sensor that explain the errors, each alone, best supported first."""
 
 
 def check_placement(
@@ -81,22 +106,16 @@ def check_placement(
     ranges = sensor.ranges(ids, position, sd)
     weight = 1.0 / ranges.spot_sd_mm**2
     weight /= weight.sum()
-    lines = [
-        fit_line(sensor, axis, ids, ranges, own)
-        for axis in ("u", "v")
-        if len(own := [ids.index(i) for i in ids if sensor.ids.index(i) in sensor.lasers_on(axis)]) > 2
-    ]
-    p_values = [
-        max((t.probability or 0.0 for t in line.shape.tried if t.name in PLANES), default=0.0)
-        for line in lines
-    ]
+    points = Points.of(sensor, readings)
     return PlacementCheck(
         standoff_mm,
         counted,
         float(weight @ ranges.range_mm),
         weight @ ranges.by_parameter,
         hypot(float(np.linalg.norm(weight * ranges.spot_sd_mm)), reference_sd_mm),
-        min(1.0, len(p_values) * min(p_values)) if p_values else None,
+        None if points is None else fit_plane(points).probability,
+        reference_sd_mm,
+        points,
     )
 
 

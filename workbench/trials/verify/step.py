@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from workbench.model.fields import Count, Standoff, Standoffs, require_different
+from workbench.model.limit import Limit
 from workbench.model.rig import NonNegativeFloat, Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
-from workbench.procedure.engine.step import StepModel, flat_placement
+from workbench.procedure.engine.step import flat_placement
+from workbench.trials.trial_step import ResultLimits, TrialStepModel
+
+
+class VerifyLimits(ResultLimits):
+    """Limits on the mean error at every standoff, with guard bands."""
+
+    error_mm: Limit | None = None
+    relative_error: Limit | None = None
 
 
 @register
-class VerifyTrialStep(StepModel):
+class VerifyTrialStep(TrialStepModel):
     """Check a calibration: the lasers against each other, then ranges of a measured flat target."""
 
-    needs: ClassVar[str | None] = "calibration"
     gives: ClassVar[str | None] = "readings"
     step: Literal["verify_trial"]
     unmeasured_mm: Standoff = 600.0
@@ -28,6 +37,9 @@ class VerifyTrialStep(StepModel):
     readings: Count
     reference_sd_mm: NonNegativeFloat | None = None
     """Standard uncertainty of the standoffs; None: the rig's `placement_sd_mm`."""
+    compare_with: Path | None = None
+    """Another calibration of the sensor, an old or a new one, whose errors stand beside; None: none."""
+    limits: VerifyLimits = VerifyLimits()
 
     @model_validator(mode="after")
     def _standoffs_differ(self) -> VerifyTrialStep:
@@ -53,15 +65,14 @@ class VerifyTrialStep(StepModel):
         """Check the lasers, take the readings, write the tables; returns the verdict.
 
         Raises:
-            BadInputError: there is no calibration.
-            LimitFailedError: the calibration is not valid any more.
+            BadInputError: there is no calibration, or the one to compare with is wrong.
+            LimitFailedError: the calibration is not valid, a limit failed, or a standoff has no range.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the ranger.
         from workbench.trials.verify.trial import run_trial
 
-        first, *measured = self.placements(name, context.rig)
-        return run_trial(context, name, first, measured, self.readings)
+        return run_trial(context, name, self)
 
     def _unmeasured(self, name: str) -> Placement:
         key = f"{name}/unmeasured-{self.unmeasured_mm:.12g}mm"

@@ -106,6 +106,8 @@ def test_the_prompt_of_an_incline_names_the_nearer_side_and_its_uncertainty(
     prompt = placement_prompt(placement, None)
     assert f"{nearer} side is nearer" in prompt.do
     assert {"30", "0.15", "0.35"} <= set(prompt.do.split())
+    assert "square" not in prompt.expect
+    assert "square" in placement_prompt(Placement(key="a", standoff_mm=400.0), None).expect
 
 
 def test_the_prompt_of_a_cylinder_warns_of_reflections_and_names_its_axis() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from workbench.model.event import ReadingTaken
 from workbench.trials.accuracy.statistics import accuracy_row
-from workbench.trials.accuracy.trial import accuracy_table
+from workbench.trials.accuracy.tables import accuracy_table
 
 
 def empty(standoff_mm: float = 400.0) -> ReadingTaken:

@@ -30,5 +30,6 @@ def test_it_takes_one_capture_a_reading_with_a_calibration() -> None:
         ("p.1/700mm", 700.0),
     ]
     assert step.captures(rig) == 10
-    assert [prompt.key for prompt in step.prompts("p.1", rig)] == ["p.1/300mm", "p.1/700mm"]
+    keys = ["p.1/300mm", "p.1/700mm"]
+    assert [prompt.key for prompt in step.prompts("p.1", rig)] == [*keys, *(f"{key}/outside" for key in keys)]
     assert step.default_duration_s == COMPUTING_S

@@ -60,6 +60,9 @@ def test_readings_of_a_trial_are_such_a_file(tmp_path: Path) -> None:
         ("true_mm,measured_mm\n,2\n", ["row 2", "true_mm"]),
         ("true_mm,measured_mm,repeat\n1,2,-1\n1,2,1.5\n", ["row 2, column repeat", "row 3, column repeat"]),
         ("true_mm,measured_mm\n1,1e99\n", ["row 2, column measured_mm"]),
+        ('true_mm,measured_mm\n"2,200","2,201"\n', ["2200", "2.200", "row 2, column measured_mm"]),
+        ("true_mm,measured_mm\n2,200\n3,300\n", ["ratio"]),
+        ("true_mm,measured_mm\n1000,100.2\n3000,299.9\n", ["ratio"]),
     ],
 )
 def test_mistakes_are_refused_with_row_and_column(tmp_path: Path, text: str, words: list[str]) -> None:

@@ -39,7 +39,9 @@ def test_every_operator_visits_every_standoff_in_each_trial() -> None:
 def test_each_change_of_operator_is_a_prompt() -> None:
     step = parse_step(DESIGN)
     keys = [prompt.key for prompt in step.prompts("p.1", two_laser_rig())]
-    assert keys[8:] == [f"p.1/operator-0{number}" for number in (1, 2, 3, 4)]
+    assert [key for key in keys if "operator" in key] == [
+        f"p.1/operator-0{number}" for number in (1, 2, 3, 4)
+    ]
     assert "Bob" in list(step.rounds("p.1"))[1].prompt.do
 
 

@@ -46,5 +46,6 @@ def test_one_placement_for_each_angle_and_range() -> None:
     keys = [placement.key for placement in step.placements("p.1", rig)]
     assert keys == ["p.1/v30deg-200mm", "p.1/v30deg-400mm", "p.1/v60deg-200mm", "p.1/v60deg-400mm"]
     assert step.captures(rig) == 12
-    assert [prompt.key for prompt in step.prompts("p.1", rig)] == keys
+    expected = [*keys, *(f"{key}/outside" for key in keys)]
+    assert [prompt.key for prompt in step.prompts("p.1", rig)] == expected
     assert (step.needs, step.gives) == ("calibration", "readings")

@@ -31,7 +31,7 @@ def test_range_and_angle_are_those_of_the_target(tmp_path: Path) -> None:
         event = finished(session)
         taken = [one for one in session.events if isinstance(one, ReadingTaken)]
     assert ranges["angle_deg"].tolist() == [30.0, 30.0, -50.0]
-    assert ranges["true_mm"].tolist() == pytest.approx([300.0, 400.0, 300.0])
+    assert ranges["true_mm"].tolist() == pytest.approx([300.0, 400.0, 300.0], abs=0.05)
     # The centroid of a spot on an inclined target is off by some hundredths of a pixel.
     assert ranges["mean_error_mm"].abs().max() < 0.5
     assert angles["mean_error_deg"].abs().max() < 0.25

@@ -6,8 +6,9 @@ import pytest
 
 from tests.support.four_lasers import reading
 from workbench.model.event import ReadingTaken, TrueValues
+from workbench.trials.missing_spots.sets import ALL, Condition
 from workbench.trials.missing_spots.statistics import missing_summary
-from workbench.trials.statistics.coverage import clopper_pearson
+from workbench.trials.statistics.coverage import clopper_pearson, upper_bound
 
 
 def errors(true_mm: float, *errors_mm: float | None) -> list[ReadingTaken]:
@@ -18,8 +19,8 @@ def errors(true_mm: float, *errors_mm: float | None) -> list[ReadingTaken]:
 def test_errors_are_compared_at_the_same_placements() -> None:
     full = [errors(400.0, 0.4, -0.4), errors(800.0, 0.8), errors(1000.0, None)]
     own = [errors(400.0, -0.8), errors(800.0, 0.8, None), errors(1000.0, 50.0)]
-    found = missing_summary(1, own, full)
-    assert (found.left_off, found.readings, found.without_range) == (1, 3, 1)
+    found = missing_summary(Condition(1), own, full)
+    assert (found.condition, found.readings, found.without_range) == (Condition(1), 3, 1)
     assert found.ratio == pytest.approx((0.8 / 400 + 0.8 / 800) / (0.4 / 400 + 0.8 / 800))
     assert found.mean_absolute_relative_error == pytest.approx((0.8 / 400 + 0.8 / 800 + 50 / 1000) / 3)
 
@@ -27,12 +28,27 @@ def test_errors_are_compared_at_the_same_placements() -> None:
 def test_coverage_counts_placements_not_readings() -> None:
     """The interval of a reading is +-1.14 mm."""
     own = [errors(400.0, 0.1, 0.2, 0.3, 2.0), errors(800.0, 0.0)]
-    found = missing_summary(0, own, own)
+    found = missing_summary(ALL, own, own)
     assert found.coverage == pytest.approx((0.75 + 1.0) / 2)
     assert (found.coverage_low, found.coverage_high) == clopper_pearson(1.75, 2)
 
 
 def test_without_any_range_there_is_no_error() -> None:
     own = [errors(400.0, None)]
-    found = missing_summary(3, own, own)
+    found = missing_summary(Condition(3), own, own)
     assert (found.readings, found.ratio, found.coverage, found.coverage_low) == (0, None, None, None)
+
+
+def test_a_full_set_without_error_has_no_ratio() -> None:
+    full, own = [errors(400.0, 0.0)], [errors(400.0, 0.4)]
+    found = missing_summary(Condition(1), own, full)
+    assert found.ratio is None
+    assert found.mean_absolute_relative_error == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize("lost", [0, 1])
+def test_lost_readings_have_an_upper_bound_by_placement(lost: int) -> None:
+    own = [errors(400.0, *([None] * lost), *([0.1] * (2 - lost))), *([errors(800.0, 0.1, 0.2)] * 9)]
+    found = missing_summary(Condition(1), own, own)
+    assert found.lost == pytest.approx(lost / 20)
+    assert found.lost_high == pytest.approx(upper_bound(lost / 2, 10))

@@ -15,7 +15,9 @@ STEP = "step: missing_spots_trial, ranges_mm: [300, 600], readings: 4"
 @pytest.mark.parametrize(
     ("text", "keys"),
     [
-        ("missing: []", ["steps[0].missing"]),
+        ("missing: []", ["steps[0]"]),
+        ("blocked: [2, 2]", ["steps[0]"]),
+        ("blocked: [0]", ["steps[0].blocked[0]"]),
         ("missing: [0]", ["steps[0].missing[0]"]),
         ("missing: [1, 1]", ["steps[0]"]),
         ("missing: [1], target: {kind: egg}", ["steps[0].target.kind"]),

@@ -36,7 +36,7 @@ def test_the_target_leaves_each_standoff_between_its_placements() -> None:
         "p.1/02-700mm",
     ]
     assert step.captures(rig) == 2 * 2 * 3
-    assert len(step.prompts("p.1", rig)) == 4
+    assert len(step.prompts("p.1", rig)) == 2 * 4
 
 
 def test_default_design_is_that_of_iso_5725() -> None:
@@ -58,6 +58,6 @@ def test_dither_prompts_can_be_answered_in_advance() -> None:
         "step: repeatability_trial, standoffs_mm: [300], placements: 2, repeats: 3, dither_mm: 2"
     )
     keys = [prompt.key for prompt in step.prompts("p.1", two_laser_rig())]
-    assert keys[2:] == [
+    assert [key for key in keys if "dither" in key] == [
         f"p.1/0{placement}-300mm/dither-0{number}" for placement in (1, 2) for number in (1, 2)
     ]

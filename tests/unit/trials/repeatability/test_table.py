@@ -101,3 +101,14 @@ def test_chart_has_the_statistics_of_the_table() -> None:
     assert chart.series[0].x == (300.0, 600.0, 1000.0)
     assert chart.series[1].y == tuple(row["reproducibility_sd_mm"] for row in table.records()[1:])
     assert precision_chart("empty", precision_table("t", drawn_levels(1, [50.0], (1, 1, 3)))).is_empty
+
+
+def test_coarse_readings_have_no_tests_of_outliers() -> None:
+    """Three equal readings at most placements: a variance of 0, and p = 0 for the first that differs."""
+    drawn = drawn_levels(2, (500.0,), (1, 8, 3), (0.0, 0.3, 0.3))
+    rounded = drawn.assign(measured_mm=drawn["measured_mm"].round(), error_mm=drawn["error_mm"].round())
+    (row,) = precision_table("t", rounded).records()
+    assert (row["cochran_p"], row["grubbs_p"]) == (None, None)
+    assert isinstance(row["note"], str)
+    assert "1 mm" in row["note"]
+    assert row["reproducibility_sd_mm"] is not None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
@@ -72,3 +74,9 @@ def test_en_score_compares_expanded_uncertainties() -> None:
     assert en_score(500.8, 500.0, 0.6, 0.8) == pytest.approx(0.8)
     with pytest.raises(ValueError, match="uncertainty"):
         en_score(1.0, 0.0, 0.0, 0.0)
+
+
+def test_a_further_common_source_is_correlated_over_standoffs() -> None:
+    tilt_mm = np.array([[0.5], [-0.2], [0.0], [0.1]])
+    with_tilt = replace(sources(), common_mm=tilt_mm).covariance()
+    assert with_tilt - sources().covariance() == pytest.approx(tilt_mm @ tilt_mm.T)

@@ -8,7 +8,12 @@ import pytest
 from scipy.stats import binomtest
 from statsmodels.stats.proportion import proportion_confint
 
-from workbench.trials.statistics.coverage import clopper_pearson, interval_coverage, upper_bound
+from workbench.trials.statistics.coverage import (
+    clopper_pearson,
+    effective_number,
+    interval_coverage,
+    upper_bound,
+)
 from workbench.trials.statistics.estimate import TooFewReadingsError
 
 
@@ -50,3 +55,13 @@ def test_readings_without_an_error_are_left_out() -> None:
     assert interval_coverage(readings([0.5, np.nan], [0, 1])).degrees_of_freedom == 1
     with pytest.raises(TooFewReadingsError):
         interval_coverage(readings([np.nan], [0]))
+
+
+def test_effective_number_is_that_of_independent_squares() -> None:
+    assert effective_number(np.eye(5)) == pytest.approx(5)
+    assert effective_number(np.ones((5, 5))) == 1
+    # The mean square of correlated normal values scatters as that of fewer independent ones.
+    correlation = 0.5 + 0.5 * np.eye(6)
+    values = np.random.default_rng(3).multivariate_normal(np.zeros(6), correlation, 20_000)
+    variance = (values**2).mean(axis=1).var()
+    assert 2 / variance == pytest.approx(effective_number(correlation), rel=0.06)

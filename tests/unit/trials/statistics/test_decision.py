@@ -1,13 +1,15 @@
-"""Decision with guard bands, and tolerance factors."""
+"""Decision with guard bands."""
 
 from __future__ import annotations
 
+from math import inf, nan
+
 import numpy as np
 import pytest
-from scipy.stats import norm
 
-from tests.support.statistics import spread
-from workbench.trials.statistics.decision import decide, tolerance_factor
+from workbench.trials.statistics.decision import decide
+
+U = 0.25
 
 
 @pytest.mark.parametrize(
@@ -23,26 +25,28 @@ from workbench.trials.statistics.decision import decide, tolerance_factor
     ],
 )
 def test_guard_bands_leave_neither_between_pass_and_fail(error_mm: float, decision: str) -> None:
-    assert decide(error_mm, 1.0, 0.25) == decision
+    assert decide((-1.0, 1.0), error_mm - U, error_mm + U) == decision
 
 
 def test_an_uncertainty_above_the_limit_never_passes() -> None:
-    assert {decide(error, 1.0, 1.5) for error in np.linspace(-2.4, 2.4, 9)} == {"neither"}
+    found = {decide((-1.0, 1.0), error - 1.5, error + 1.5) for error in np.linspace(-2.4, 2.4, 9)}
+    assert found == {"neither"}
 
 
-@pytest.mark.parametrize(("mpe_mm", "expanded_mm"), [(0.0, 0.1), (1.0, -0.1), (1.0, np.nan), (np.inf, 0.1)])
-def test_limits_that_decide_nothing_are_refused(mpe_mm: float, expanded_mm: float) -> None:
-    with pytest.raises(ValueError, match="MPE"):
-        decide(0.0, mpe_mm, expanded_mm)
+@pytest.mark.parametrize(
+    ("value", "decision"), [(0.99, "pass"), (1.0, "pass"), (1.01, "fail"), (-5.0, "pass")]
+)
+def test_a_value_without_uncertainty_passes_or_fails(value: float, decision: str) -> None:
+    assert decide((None, 1.0), value, value) == decision
 
 
-def test_tolerance_factor_of_the_nist_handbook() -> None:
-    assert tolerance_factor(43, 0.90, 0.99) == pytest.approx(2.217, abs=5e-4)
+def test_an_infinite_interval_is_decided_by_its_finite_end() -> None:
+    assert decide((None, 1.0), 1.5, inf) == "fail"
+    assert decide((None, 1.0), 0.5, inf) == "neither"
+    assert decide((0.0, None), 0.5, inf) == "pass"
 
 
-def test_tolerance_interval_holds_its_share_with_its_confidence() -> None:
-    random, trials, n = np.random.default_rng(2), 4000, 12
-    values = random.normal(0, 1, (trials, n))
-    mean, half = values.mean(axis=1), tolerance_factor(n, 0.9, 0.95) * values.std(axis=1, ddof=1)
-    held = norm.cdf(mean + half) - norm.cdf(mean - half) >= 0.9
-    assert held.mean() == pytest.approx(0.95, abs=spread(0.95, trials))
+@pytest.mark.parametrize(("low", "high"), [(1.0, 0.0), (nan, 1.0), (0.0, nan)])
+def test_an_interval_that_is_none_is_refused(low: float, high: float) -> None:
+    with pytest.raises(ValueError, match="low"):
+        decide((0.0, 1.0), low, high)

@@ -1,0 +1,50 @@
+"""Verdict of the accuracy trial."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.support.accuracy_runs import accuracy_run
+from tests.support.rangers import thesis_ranger
+from tests.support.rigs import thesis_rig
+from tests.support.simulated_trials import SimulatedBench
+from workbench.trials.accuracy.limits import AccuracyLimits
+from workbench.trials.accuracy.ranges import MEAN
+from workbench.trials.accuracy.verdict import error_results, results_of, verdict_of
+
+RANGES = accuracy_run(SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1))
+
+
+@pytest.mark.parametrize(("bound", "decision"), [(None, None), (0.5, "pass"), (0.003, "neither")])
+def test_the_decision_is_that_of_the_limits(bound: float | None, decision: str | None) -> None:
+    stated = {} if bound is None else {"mean_relative_error": {"in": [-bound, bound]}}
+    assert verdict_of(RANGES, AccuracyLimits.model_validate(stated)).decision == decision
+
+
+def test_a_sensor_that_has_changed_is_biased() -> None:
+    changed = SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1, {"f_px": 0.02 * 533.3})
+    limits = AccuracyLimits.model_validate(
+        {"mean_relative_error": {"in": [-0.005, 0.005]}, "bias_p": {"in": [0.05, None]}}
+    )
+    verdict = verdict_of(accuracy_run(changed), limits)
+    assert verdict.is_biased
+    assert verdict.decision == "fail"
+    assert not verdict_of(RANGES, limits).is_biased
+
+
+def test_each_placement_is_a_result_in_mm_and_relative() -> None:
+    (mean,) = [one for one in RANGES if one.name == MEAN]
+    found = error_results(mean)
+    assert [one.quantity for one in found] == ["mean_error_mm", "mean_relative_error"] * len(mean.placements)
+    first, relative = found[:2]
+    assert first.value == pytest.approx(mean.errors_mm[0])
+    assert relative.value == pytest.approx(mean.errors_mm[0] / mean.true_mm[0])
+    assert first.high is not None
+    assert first.low is not None
+    assert (first.high - first.low) / 2 == pytest.approx(mean.uncertainty[0].expanded)
+
+
+def test_results_of_lasers_share_one_limit() -> None:
+    limits = AccuracyLimits.model_validate({"laser_error_mm": {"in": [-1, 1]}})
+    lasers = [one for one in results_of(RANGES, limits) if one.quantity == "laser_error_mm"]
+    assert len({one.of.split()[0] for one in lasers}) == 4
