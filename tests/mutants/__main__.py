@@ -4,9 +4,9 @@
     python -m tests.mutants --within workbench/calibration workbench/model/rig.py
 
 Each mutant is one change (`tests.mutants.mutation`) in a copy of the project. It is killed where a test of
-`tests/unit/<package>` fails or does not end. The test file of the module's name runs first, then the files
-that execute the changed function (`tests.mutants.executed`). All files run where the change is outside
-functions, or no file executes the function in its own process.
+`tests/unit/<package>` fails or does not end. First each mutant meets the test file of the module's name. The
+survivors then meet the files that execute the changed function (`tests.mutants.executed`), or all files where
+the change is outside functions, or no file executes the function in its own process.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +29,7 @@ CORE = ("ranging", "calibration", "session", "devices", "spots", "model")
 GOAL = 0.9
 """Least share of mutants that the tests kill."""
 SPARE_TIME = 3.0
-"""Factor on the time of the unchanged package's tests after which a mutant counts as killed."""
+"""Factor on the time of the unchanged module's tests after which a mutant counts as killed."""
 
 
 @dataclass(frozen=True)
@@ -64,25 +64,53 @@ def drawn(packages: Sequence[str], count: int, seed: int) -> list[Mutant]:
     return [every[n] for n in chosen]
 
 
-def selected_runs(mutant: Mutant, files: Sequence[UnitTestFile]) -> list[list[Path]]:
-    """Test files that may kill a mutant, in two runs: the module's own, then the others, fast ones first.
+def other_tests(mutant: Mutant, files: Sequence[UnitTestFile]) -> list[UnitTestFile]:
+    """Test files that may kill a mutant beside the module's own, fast ones first.
 
     Args:
         mutant: the mutant.
         files: test files of its package.
     """
     function = f"{mutant.module}:{first_line_of_function(mutant.mutation)}"
-    executing = [file for file in files if function in file.executed]
-    others = sorted(executing or files, key=lambda file: file.time_s)
-    own = [file.path for file in files if file.path == mutant.own_test]
-    return [paths for paths in (own, [f.path for f in others if f.path not in own]) if paths]
+    selected = [file for file in files if function in file.executed] or files
+    others = [file for file in selected if file.path != mutant.own_test]
+    return sorted(others, key=lambda file: file.time_s)
 
 
-def survives(mutant: Mutant, project: Project, files: Sequence[UnitTestFile], patience: float) -> bool:
-    """Whether no test of the mutant's package fails or exceeds its time by the factor `patience`."""
-    limit_s = patience * sum(file.time_s for file in files)
-    with project.changed(mutant.module, mutant.mutation.source):
-        return all(project.passes(tests, limit_s) for tests in selected_runs(mutant, files))
+@dataclass(frozen=True)
+class Workers:
+    """Copies of the project, each for one mutant at a time."""
+
+    projects: SimpleQueue[Project]
+    jobs: int
+
+    @classmethod
+    def of(cls, jobs: int, folder: Path) -> Workers:
+        """Copies in a folder."""
+        projects: SimpleQueue[Project] = SimpleQueue()
+        for job in range(jobs):
+            projects.put(Project(folder / str(job)))
+        return cls(projects, jobs)
+
+    def survivors(
+        self, mutants: Sequence[Mutant], tests: Callable[[Project, Mutant], Sequence[UnitTestFile]]
+    ) -> list[Mutant]:
+        """The mutants that `tests` do not kill; progress on standard error."""
+        with ThreadPoolExecutor(self.jobs) as pool:
+            survived = list(pool.map(lambda mutant: self._survives(mutant, tests), mutants))
+        return [mutant for mutant, alive in zip(mutants, survived, strict=True) if alive]
+
+    def _survives(self, mutant: Mutant, tests: Callable[[Project, Mutant], Sequence[UnitTestFile]]) -> bool:
+        project = self.projects.get()
+        try:
+            files = tests(project, mutant)
+            limit_s = SPARE_TIME * self.jobs * sum(file.time_s for file in files)
+            with project.changed(mutant.module, mutant.mutation.source):
+                survived = not files or project.passes([file.path for file in files], limit_s)
+        finally:
+            self.projects.put(project)
+        print(f"{'survives' if survived else 'killed  '} {mutant}", file=sys.stderr, flush=True)
+        return survived
 
 
 def main() -> int:
@@ -91,29 +119,13 @@ def main() -> int:
     mutants = drawn(asked.packages, asked.mutants, asked.seed)
     mutants = [m for m in mutants if any(m.module.is_relative_to(path) for path in asked.within)]
     with tempfile.TemporaryDirectory() as folder:
-        projects: SimpleQueue[Project] = SimpleQueue()
-        for job in range(asked.jobs):
-            projects.put(Project(Path(folder) / str(job)))
-        first = projects.get()
-        files = {package: first.test_files(package) for package in sorted({m.package for m in mutants})}
-        projects.put(first)
-        survivors: list[Mutant] = []
-        done = 0
-
-        def test(mutant: Mutant) -> None:
-            nonlocal done
-            project = projects.get()
-            try:
-                survived = survives(mutant, project, files[mutant.package], SPARE_TIME * asked.jobs)
-            finally:
-                projects.put(project)
-            done += 1
-            if survived:
-                survivors.append(mutant)
-            print(f"{done:4} {'SURVIVED' if survived else 'killed  '} {mutant}", file=sys.stderr, flush=True)
-
-        with ThreadPoolExecutor(asked.jobs) as pool:
-            list(pool.map(test, mutants))
+        workers = Workers.of(asked.jobs, Path(folder))
+        print("tests of the module's name", file=sys.stderr)
+        left = workers.survivors(mutants, lambda project, m: project.test_files(m.own_test))
+        print("other tests of the package", file=sys.stderr)
+        survivors = workers.survivors(
+            left, lambda project, m: other_tests(m, project.test_files(Path("tests/unit") / m.package))
+        )
     killed = 1.0 - len(survivors) / max(len(mutants), 1)
     print(f"{len(mutants)} mutants of {', '.join(asked.packages)}, seed {asked.seed}: {killed:.1%} killed")
     for mutant in sorted(survivors, key=str):

@@ -39,6 +39,7 @@ class Project:
     caches: Path = field(init=False)
     machine_code: Path = field(init=False)
     """Functions that numba has compiled."""
+    records: dict[Path, UnitTestFile] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         listed = subprocess.run(
@@ -50,6 +51,7 @@ class Project:
             shutil.copy2(ROOT / name, target)
         self.caches = self.folder / ".caches"
         self.machine_code = self.caches / "numba"
+        self.machine_code.mkdir(parents=True)
 
     def passes(self, tests: Sequence[Path], timeout_s: float) -> bool:
         """Whether the tests pass in time."""
@@ -58,14 +60,14 @@ class Project:
         except subprocess.TimeoutExpired:
             return False
 
-    def test_files(self, package: str) -> list[UnitTestFile]:
-        """Test files of a package, each run alone.
+    def test_files(self, path: Path) -> list[UnitTestFile]:
+        """The test file, or those in a folder; each was run alone in the unchanged project.
 
         Raises:
             SystemExit: a file fails.
         """
-        found = sorted((self.folder / "tests/unit" / package).rglob("test_*.py"))
-        return [self._test_file(path.relative_to(self.folder)) for path in found]
+        found = sorted((self.folder / path).rglob("test_*.py")) or [self.folder / path]
+        return [self._recorded(file.relative_to(self.folder)) for file in found if file.is_file()]
 
     @contextmanager
     def changed(self, module: Path, source: str) -> Iterator[None]:
@@ -84,7 +86,12 @@ class Project:
                 os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
                 self.machine_code = usual
 
-    def _test_file(self, path: Path) -> UnitTestFile:
+    def _recorded(self, path: Path) -> UnitTestFile:
+        if path not in self.records:
+            self.records[path] = self._record(path)
+        return self.records[path]
+
+    def _record(self, path: Path) -> UnitTestFile:
         # A program that another file has traced would be loaded, and its functions not executed.
         shutil.rmtree(self.caches / PROGRAMS, ignore_errors=True)
         functions = self.folder / ".executed"

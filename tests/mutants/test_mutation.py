@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-from tests.mutants.__main__ import CORE, drawn, selected_runs
+from tests.mutants.__main__ import CORE, drawn, other_tests
 from tests.mutants.mutation import first_line_of_function, mutations
 from tests.mutants.project import UnitTestFile
 
@@ -58,8 +58,8 @@ def test_a_change_inside_a_function_is_tested_by_the_files_that_execute_it() -> 
     slow, fast = (UnitTestFile(Path(f"{t}.py"), t, frozenset({function})) for t in (2.0, 1.0))
     other = UnitTestFile(Path("other.py"), 0.1, frozenset())
     own = UnitTestFile(mutant.own_test, 9.0, frozenset())
-    assert selected_runs(mutant, [slow, other, own, fast]) == [[own.path], [fast.path, slow.path]]
-    assert selected_runs(mutant, [other, own]) == [[own.path], [other.path]]
+    assert other_tests(mutant, [slow, other, own, fast]) == [fast, slow]
+    assert other_tests(mutant, [other, own]) == [other]
 
 
 def test_the_function_of_a_change_begins_at_its_first_decorator() -> None:
