@@ -11,6 +11,9 @@ from workbench.model.errors import BadInputError
 from workbench.model.problems import short
 from workbench.model.rig import Rig, load_rig
 
+MOST = 1_000_000
+"""Largest accepted whole number."""
+
 
 def path_of(name: str, given: object, expected: str) -> Path:
     """Path from a string or a path.
@@ -59,14 +62,14 @@ def millimetres_of(name: str, given: object) -> tuple[float, ...]:
 
 
 def whole_of(name: str, given: object, least: int = 1) -> int:
-    """A whole number of at least `least`.
+    """A whole number from `least` to `MOST`.
 
     Raises:
         BadInputError: it is none.
     """
-    if isinstance(given, int | np.integer) and not isinstance(given, bool) and given >= least:
+    if isinstance(given, int | np.integer) and not isinstance(given, bool) and least <= given <= MOST:
         return int(given)
-    raise BadInputError(f"{name}: expected a whole number of at least {least}, got {_shown(given)}")
+    raise BadInputError(f"{name}: expected a whole number from {least} to {MOST}, got {_shown(given)}")
 
 
 def words_of(name: str, given: object, expected: str) -> str:

@@ -140,6 +140,8 @@ class CalibrationComparison:
     """Parameters whose change alone explains the difference, the most probable first."""
     identical: bool
     """Whether both have the same numbers."""
+    notes: tuple[str, ...]
+    """Reservations about the verdict, such as different serial numbers."""
 
 
 def load_calibration(path: str | Path) -> Calibration:
@@ -210,6 +212,7 @@ def compare(a: Calibration | str | Path, b: Calibration | str | Path) -> Calibra
         same=not found.moved,
         explanations=found.explanations,
         identical=found.identical,
+        notes=found.notes,
     )
 
 

@@ -16,6 +16,7 @@ from rich.text import Text
 
 from workbench.devices.protocols import Operator
 from workbench.model.errors import AnswerNeededError, StoppedError
+from workbench.model.problems import THOUSANDS
 from workbench.model.prompt import Answer, Prompt
 from workbench.procedure.engine.operator import NoOperator
 
@@ -140,6 +141,8 @@ def _answer(prompt: Prompt, typed: str) -> Answer:
     if prompt.quantity is not None:
         if not typed and prompt.quantity.usual is not None:
             return Answer(value=prompt.quantity.usual)
+        if THOUSANDS.match(typed):  # 2,200 may be 2200 or 2.2: no number, which the prompt refuses
+            return Answer(value=typed)
         try:
             return Answer(value=float(typed.removesuffix(prompt.quantity.unit).replace(",", ".")))
         except ValueError:
