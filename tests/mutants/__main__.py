@@ -1,22 +1,20 @@
 """`make mutants`: draw mutants of the core, run the tests of their package, list those that survive.
 
     python -m tests.mutants --mutants 200 --seed 1
-    python -m tests.mutants --packages ranging model --mutants 20
+    python -m tests.mutants --within workbench/calibration workbench/model/rig.py
 
 Each mutant is one change (`tests.mutants.mutation`) in a copy of the project. It is killed where a test of
-`tests/unit/<package>` fails or does not end. The test file of the module's name runs first.
+`tests/unit/<package>` fails or does not end. First each mutant meets the test file of the module's name. The
+survivors then meet the files that execute the changed function (`tests.mutants.executed`), or all files where
+the change is outside functions, or no file executes the function in its own process.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
-import shutil
-import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,14 +22,14 @@ from queue import SimpleQueue
 
 import numpy as np
 
-from tests.mutants.mutation import Mutation, mutations
+from tests.mutants.mutation import Mutation, first_line_of_function, mutations
+from tests.mutants.project import ROOT, Project, UnitTestFile
 
-ROOT = Path(__file__).parents[2]
 CORE = ("ranging", "calibration", "session", "devices", "spots", "model")
 GOAL = 0.9
 """Least share of mutants that the tests kill."""
 SPARE_TIME = 3.0
-"""Factor on the time of the unchanged package's tests after which a mutant counts as killed."""
+"""Factor on the time of the unchanged module's tests after which a mutant counts as killed."""
 
 
 @dataclass(frozen=True)
@@ -66,93 +64,85 @@ def drawn(packages: Sequence[str], count: int, seed: int) -> list[Mutant]:
     return [every[n] for n in chosen]
 
 
-def copy_of_project(folder: Path) -> Path:
-    """A copy of the files under version control, with the present content."""
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True)
-    for name in filter(None, listed.stdout.split("\0")):
-        target = folder / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / name, target)
-    return folder
+def other_tests(mutant: Mutant, files: Sequence[UnitTestFile]) -> list[UnitTestFile]:
+    """Test files that may kill a mutant beside the module's own, fast ones first.
+
+    Args:
+        mutant: the mutant.
+        files: test files of its package.
+    """
+    function = f"{mutant.module}:{first_line_of_function(mutant.mutation)}"
+    selected = [file for file in files if function in file.executed] or files
+    others = [file for file in selected if file.path != mutant.own_test]
+    return sorted(others, key=lambda file: file.time_s)
 
 
-def tests_pass(project: Path, tests: Sequence[Path], timeout_s: float | None) -> bool:
-    """Whether the tests pass in time in a copy of the project."""
-    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-p", "no:cacheprovider"]
-    env = os.environ | {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"}
-    try:
-        done = subprocess.run(
-            [*command, *map(str, tests)], cwd=project, env=env, capture_output=True, timeout=timeout_s
-        )
-    except subprocess.TimeoutExpired:
-        return False
-    return done.returncode == 0
+@dataclass(frozen=True)
+class Workers:
+    """Copies of the project, each for one mutant at a time."""
 
+    projects: SimpleQueue[Project]
+    jobs: int
 
-def survives(mutant: Mutant, project: Path, timeout_s: float) -> bool:
-    """Whether no test of the mutant's package fails."""
-    path = project / mutant.module
-    original = path.read_text()
-    path.write_text(mutant.mutation.source)
-    try:
-        whole = Path("tests/unit") / mutant.package
-        first = [mutant.own_test] if (project / mutant.own_test).is_file() else []
-        return all(tests_pass(project, [tests], timeout_s) for tests in (*first, whole))
-    finally:
-        path.write_text(original)
+    @classmethod
+    def of(cls, jobs: int, folder: Path) -> Workers:
+        """Copies in a folder."""
+        projects: SimpleQueue[Project] = SimpleQueue()
+        for job in range(jobs):
+            projects.put(Project(folder / str(job)))
+        return cls(projects, jobs)
+
+    def survivors(
+        self, mutants: Sequence[Mutant], tests: Callable[[Project, Mutant], Sequence[UnitTestFile]]
+    ) -> list[Mutant]:
+        """The mutants that `tests` do not kill; progress on standard error."""
+        with ThreadPoolExecutor(self.jobs) as pool:
+            survived = list(pool.map(lambda mutant: self._survives(mutant, tests), mutants))
+        return [mutant for mutant, alive in zip(mutants, survived, strict=True) if alive]
+
+    def _survives(self, mutant: Mutant, tests: Callable[[Project, Mutant], Sequence[UnitTestFile]]) -> bool:
+        project = self.projects.get()
+        try:
+            files = tests(project, mutant)
+            limit_s = SPARE_TIME * self.jobs * sum(file.time_s for file in files)
+            with project.changed(mutant.module, mutant.mutation.source):
+                survived = not files or project.passes([file.path for file in files], limit_s)
+        finally:
+            self.projects.put(project)
+        print(f"{'survives' if survived else 'killed  '} {mutant}", file=sys.stderr, flush=True)
+        return survived
 
 
 def main() -> int:
     """Run and print; 1 if fewer than 90 % are killed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--mutants", type=int, default=200, help="number of mutants")
-    parser.add_argument("--seed", type=int, default=1, help="of the draw")
-    parser.add_argument("--packages", nargs="+", default=CORE, choices=CORE, help="packages to change")
-    parser.add_argument("--jobs", type=int, default=2, help="mutants tested at a time")
-    asked = parser.parse_args()
+    asked = _arguments()
     mutants = drawn(asked.packages, asked.mutants, asked.seed)
+    mutants = [m for m in mutants if any(m.module.is_relative_to(path) for path in asked.within)]
     with tempfile.TemporaryDirectory() as folder:
-        projects: SimpleQueue[Path] = SimpleQueue()
-        for job in range(asked.jobs):
-            projects.put(copy_of_project(Path(folder) / str(job)))
-        limit_s = {package: _time_of_tests(package, projects) for package in {m.package for m in mutants}}
-        survivors: list[Mutant] = []
-        done = 0
-
-        def test(mutant: Mutant) -> None:
-            nonlocal done
-            project = projects.get()
-            try:
-                survived = survives(mutant, project, SPARE_TIME * asked.jobs * limit_s[mutant.package])
-            finally:
-                projects.put(project)
-            done += 1
-            if survived:
-                survivors.append(mutant)
-            print(f"{done:4} {'SURVIVED' if survived else 'killed  '} {mutant}", file=sys.stderr, flush=True)
-
-        with ThreadPoolExecutor(asked.jobs) as pool:
-            list(pool.map(test, mutants))
-    killed = 1.0 - len(survivors) / len(mutants)
+        workers = Workers.of(asked.jobs, Path(folder))
+        print("tests of the module's name", file=sys.stderr)
+        left = workers.survivors(mutants, lambda project, m: project.test_files(m.own_test))
+        print("other tests of the package", file=sys.stderr)
+        survivors = workers.survivors(
+            left, lambda project, m: other_tests(m, project.test_files(Path("tests/unit") / m.package))
+        )
+    killed = 1.0 - len(survivors) / max(len(mutants), 1)
     print(f"{len(mutants)} mutants of {', '.join(asked.packages)}, seed {asked.seed}: {killed:.1%} killed")
     for mutant in sorted(survivors, key=str):
         print(f"survived: {mutant}")
     return 0 if killed >= GOAL else 1
 
 
-def _time_of_tests(package: str, projects: SimpleQueue[Path]) -> float:
-    """Duration of the unchanged package's tests, s.
-
-    Raises:
-        SystemExit: they fail.
-    """
-    project = projects.get()
-    start = time.monotonic()
-    passed = tests_pass(project, [Path("tests/unit") / package], None)
-    projects.put(project)
-    if not passed:
-        raise SystemExit(f"tests/unit/{package} fails without any change: mend it first")
-    return time.monotonic() - start
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--mutants", type=int, default=200, help="number of mutants")
+    parser.add_argument("--seed", type=int, default=1, help="of the draw")
+    parser.add_argument("--packages", nargs="+", default=CORE, choices=CORE, help="packages to change")
+    parser.add_argument(
+        "--within", nargs="+", type=Path, default=[Path("workbench")], help="test only those in these folders"
+    )
+    parser.add_argument("--jobs", type=int, default=2, help="mutants tested at a time")
+    return parser.parse_args()
 
 
 if __name__ == "__main__":

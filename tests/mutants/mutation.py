@@ -68,6 +68,16 @@ def mutations(source: str) -> Iterator[Mutation]:
             yield Mutation(node.lineno, ast.unparse(node), ast.unparse(changed), tree, node, changed)
 
 
+def first_line_of_function(mutation: Mutation) -> int | None:
+    """First line of the innermost function around a change, decorators included; None outside functions."""
+    lines = [
+        min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
+        for node in ast.walk(mutation.tree)
+        if isinstance(node, ast.FunctionDef) and node.lineno <= mutation.line <= (node.end_lineno or 0)
+    ]
+    return max(lines, default=None)
+
+
 class _Replace(ast.NodeTransformer):
     """Replace one node by another."""
 

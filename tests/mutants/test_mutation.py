@@ -5,8 +5,9 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-from tests.mutants.__main__ import CORE, drawn
-from tests.mutants.mutation import mutations
+from tests.mutants.__main__ import CORE, drawn, other_tests
+from tests.mutants.mutation import first_line_of_function, mutations
+from tests.mutants.project import UnitTestFile
 
 SOURCE = '''"""Docstring 1."""
 LIMIT: int = 3
@@ -49,3 +50,19 @@ def test_the_draw_depends_on_its_seed_alone() -> None:
 def test_every_package_of_the_core_has_tests_of_its_own() -> None:
     root = Path(__file__).parents[2]
     assert all((root / "tests/unit" / package).is_dir() for package in CORE)
+
+
+def test_a_change_inside_a_function_is_tested_by_the_files_that_execute_it() -> None:
+    mutant = next(m for m in drawn(["model"], 40, 1) if first_line_of_function(m.mutation) is not None)
+    function = f"{mutant.module}:{first_line_of_function(mutant.mutation)}"
+    slow, fast = (UnitTestFile(Path(f"{t}.py"), t, frozenset({function})) for t in (2.0, 1.0))
+    other = UnitTestFile(Path("other.py"), 0.1, frozenset())
+    own = UnitTestFile(mutant.own_test, 9.0, frozenset())
+    assert other_tests(mutant, [slow, other, own, fast]) == [fast, slow]
+    assert other_tests(mutant, [other, own]) == [other]
+
+
+def test_the_function_of_a_change_begins_at_its_first_decorator() -> None:
+    source = "A = 1\n\n@cache\ndef f(x):\n    def g():\n        return x + 2\n    return g() + 3\n"
+    lines = {m.before: first_line_of_function(m) for m in mutations(source)}
+    assert lines == {"1": None, "x + 2": 5, "2": 5, "g() + 3": 3, "3": 3}

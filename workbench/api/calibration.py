@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from workbench.api.arguments import millimetres_of, names_of, path_of, rig_of, words_of
 from workbench.api.frames import DIFFERENCE_COLUMNS, PARAMETER_COLUMNS, UNCERTAINTY_COLUMNS, frame_of
-from workbench.api.rigs import rig_of
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict import comparison
@@ -75,16 +75,20 @@ class Calibration:
         """Reasons for a refusal."""
         return self.file.laser_ranger.fit.reasons
 
-    def range_uncertainty(self, ranges_mm: Sequence[float]) -> pd.DataFrame:
+    def range_uncertainty(self, ranges_mm: float | Collection[float]) -> pd.DataFrame:
         """Standard uncertainty of a single range by each laser, for spots of typical noise.
 
         Args:
-            ranges_mm: ranges from the reference plane.
+            ranges_mm: range from the reference plane, or several.
 
         Returns:
             One row per laser and range; `sd_mm` is 1 sigma, NaN where the spot is outside the image.
+
+        Raises:
+            BadInputError: a range is no finite number.
         """
-        sensor, at = CalibratedSensor(self.file), np.array(ranges_mm, float)
+        at = np.array(millimetres_of("ranges_mm", ranges_mm))
+        sensor = CalibratedSensor(self.file)
         rows = []
         for laser_id in sensor.ids:
             sd = np.where(sensor.in_frame(laser_id, at), sensor.typical_ranges(laser_id, at).sigma_mm, np.nan)
@@ -98,11 +102,10 @@ class Calibration:
         """The calibration, accepted in spite of a refusal; the file records the reason.
 
         Raises:
-            BadInputError: the reason is blank.
+            BadInputError: the reason is blank, or no text.
         """
-        if not reason.strip():
-            raise BadInputError("reason: expected a reason in words, got a blank")
-        return replace(self, file=accept_with_reason(self.file, reason))
+        words = words_of("reason", reason, "a reason in words")
+        return replace(self, file=accept_with_reason(self.file, words))
 
     def save(self, path: str | Path) -> None:
         """Write the calibration file.
@@ -111,9 +114,10 @@ class Calibration:
             LimitFailedError: the calibration is refused, and was not accepted with a reason.
             BadInputError: the file cannot be written.
         """
+        file = path_of("path", path, "the path of a file to write")
         if not self.file.laser_ranger.fit.usable:
-            raise LimitFailedError(f"{path}: the calibration is refused: {'; '.join(self.reasons)}")
-        write_calibration(Path(path), self.file)
+            raise LimitFailedError(f"{file}: the calibration is refused: {'; '.join(self.reasons)}")
+        write_calibration(file, self.file)
 
     @property
     def _names(self) -> pd.Index[str]:
@@ -136,6 +140,8 @@ class CalibrationComparison:
     """Parameters whose change alone explains the difference, the most probable first."""
     identical: bool
     """Whether both have the same numbers."""
+    notes: tuple[str, ...]
+    """Reservations about the verdict, such as different serial numbers."""
 
 
 def load_calibration(path: str | Path) -> Calibration:
@@ -144,22 +150,39 @@ def load_calibration(path: str | Path) -> Calibration:
     Raises:
         BadInputError: the file is missing or wrong.
     """
-    return Calibration(load_calibration_file(Path(path)))
+    return Calibration(load_calibration_file(path_of("path", path, "the path of a calibration file")))
 
 
-def fit(captures: str | Path | pd.DataFrame, rig: str | Path | Rig, fix: Sequence[str] = ()) -> Calibration:
+def calibration_of(name: str, given: object) -> Calibration:
+    """The calibration itself, or the contents of its file.
+
+    Args:
+        name: name of the argument, for messages.
+        given: its value.
+
+    Raises:
+        BadInputError: it is no calibration, or the file is missing or wrong.
+    """
+    if isinstance(given, Calibration):
+        return given
+    return Calibration(load_calibration_file(path_of(name, given, "a calibration, or the path of its file")))
+
+
+def fit(
+    captures: str | Path | pd.DataFrame, rig: str | Path | Rig, fix: str | Collection[str] = ()
+) -> Calibration:
     """Fit a calibration, as `workbench fit` does; the result may be refused (`Calibration.verdict`).
 
     Args:
         captures: a captures file, or a data frame with its columns (docs/captures-format.md).
         rig: a rig file, or its contents.
-        fix: parameters that keep the values of the rig file.
+        fix: parameter, or several, that keep the values of the rig file.
 
     Raises:
         BadInputError: captures or rig are wrong, or no observation is left.
         LimitFailedError: the fit determines no range.
     """
-    model = fix_parameters(rig_of(rig), fix)
+    model = fix_parameters(rig_of(rig), names_of("fix", fix))
     content, rows = _rows(captures)
     observations, rejected, boards = observations_of_rows(model, rows)
     if not observations:
@@ -169,8 +192,8 @@ def fit(captures: str | Path | pd.DataFrame, rig: str | Path | Rig, fix: Sequenc
     return Calibration(calibration)
 
 
-def compare(a: Calibration, b: Calibration) -> CalibrationComparison:
-    """Compare two calibrations of one sensor, over the ranges and lasers that both have.
+def compare(a: Calibration | str | Path, b: Calibration | str | Path) -> CalibrationComparison:
+    """Compare two calibrations of one sensor, or their files, over the ranges and lasers that both have.
 
     >>> import workbench as wb
     >>> calibration = wb.load_calibration("data/session-0.1.0/calibration.yaml")
@@ -180,7 +203,7 @@ def compare(a: Calibration, b: Calibration) -> CalibrationComparison:
     Raises:
         BadInputError: image size, lasers or standoffs differ.
     """
-    found = comparison.compare(a.file, b.file)
+    found = comparison.compare(calibration_of("a", a).file, calibration_of("b", b).file)
     return CalibrationComparison(
         differences=frame_of(map(asdict, found.differences), DIFFERENCE_COLUMNS),
         chi2=found.chi2,
@@ -189,6 +212,7 @@ def compare(a: Calibration, b: Calibration) -> CalibrationComparison:
         same=not found.moved,
         explanations=found.explanations,
         identical=found.identical,
+        notes=found.notes,
     )
 
 
@@ -197,7 +221,8 @@ def _rows(captures: str | Path | pd.DataFrame) -> tuple[bytes, tuple[CaptureRow,
     if isinstance(captures, pd.DataFrame):
         path, content = Path("captures"), captures.to_csv(index=False).encode()
     else:
-        path, content = Path(captures), read_captures_file(Path(captures))
+        path = path_of("captures", captures, "a data frame, or the path of a captures file")
+        content = read_captures_file(path)
     rows = parse_captures(path, content)
     check_images(path, rows)
     return content, rows

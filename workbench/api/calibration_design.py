@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import pandas as pd
 
+from workbench.api.arguments import millimetres_of, rig_of, whole_of
 from workbench.api.frames import DESIGN_PARAMETER_COLUMNS, DESIGN_RANGE_COLUMNS, frame_of
-from workbench.api.rigs import rig_of
 from workbench.calibration.design.forecast import forecast
 from workbench.calibration.design.standoffs import best_standoffs
+from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 
 
@@ -32,7 +33,10 @@ class CalibrationDesign:
 
 
 def design(
-    rig: str | Path | Rig, standoffs: Sequence[float] | None = None, count: int = 11, repeats: int = 10
+    rig: str | Path | Rig,
+    standoffs: float | Collection[float] | None = None,
+    count: int = 11,
+    repeats: int = 10,
 ) -> CalibrationDesign:
     """Predict what a calibration will determine, as `workbench design` does.
 
@@ -43,11 +47,16 @@ def design(
         repeats: captures of each laser at each standoff.
 
     Raises:
-        BadInputError: the rig is wrong, or no laser has its spot in the image at a standoff.
+        BadInputError: an argument is wrong, or no laser has its spot in the image at a standoff.
     """
-    model = rig_of(rig)
-    chosen = best_standoffs(model, count, repeats) if standoffs is None else tuple(standoffs)
-    found = forecast(model, chosen, repeats)
+    model, captures = rig_of(rig), whole_of("repeats", repeats)
+    if standoffs is None:
+        chosen = best_standoffs(model, whole_of("count", count), captures)
+    else:
+        chosen = millimetres_of("standoffs", standoffs)
+    if not chosen or min(chosen) <= 0:
+        raise BadInputError(f"standoffs: expected at least one, and positive numbers in mm, got {chosen}")
+    found = forecast(model, chosen, captures)
     parameters = [asdict(parameter) for parameter in found.parameters]
     index = pd.Index([parameter["name"] for parameter in parameters], name="parameter")
     return CalibrationDesign(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
-from workbench.api.calibration import Calibration
+from workbench.api.calibration import Calibration, calibration_of
 from workbench.model.arrays import Image
 from workbench.model.errors import BadInputError
 from workbench.ranging.ranger import Ranger as SpotRanger
@@ -13,7 +13,6 @@ from workbench.ranging.ranger import Reading
 from workbench.spots import SpotFinder
 
 
-@dataclass(frozen=True)
 class Ranger:
     """Ranges and shape from pairs of frames; needs a calibration and nothing else.
 
@@ -26,13 +25,16 @@ class Ranger:
     >>> reading.status, round(reading.closest_mm)
     ('done', 800)
 
+    Args:
+        calibration: a calibration, or the path of its file.
+
     Raises:
-        BadInputError: the calibration is refused and was not accepted with a reason.
+        BadInputError: the file is missing or wrong, or the calibration is refused and was not accepted with a
+            reason.
     """
 
-    calibration: Calibration
-
-    def __post_init__(self) -> None:
+    def __init__(self, calibration: Calibration | str | Path) -> None:
+        self.calibration = calibration_of("calibration", calibration)
         if not self.calibration.file.laser_ranger.fit.usable:
             reasons = "; ".join(self.calibration.reasons)
             raise BadInputError(f"calibration: expected an accepted one, got one refused: {reasons}")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from workbench.api.arguments import millimetres_of, path_of, whole_of, words_of
 from workbench.api.calibration import Calibration, load_calibration
 from workbench.api.frames import (
     CAPTURE_COLUMNS,
@@ -133,19 +134,20 @@ class Session:
             raise BadInputError(f"{self.folder}: expected a calibration, the session has none")
         return load_calibration(self.folder / exported[-1].path)
 
-    def captures_for_fit(self, without: Collection[float] = ()) -> pd.DataFrame:
+    def captures_for_fit(self, without: float | Collection[float] = ()) -> pd.DataFrame:
         """Captures of the calibration, as columns of a captures file, for `fit`.
 
         Args:
-            without: standoffs to leave out, mm.
+            without: standoff to leave out, or several, mm.
 
         Raises:
-            BadInputError: a standoff in `without` has no capture.
+            BadInputError: a standoff in `without` has no capture, or is no number.
         """
+        excluded = millimetres_of("without", without)
         captures = self.captures[self.captures["purpose"] == "calibration"]
-        if unknown := set(without) - set(captures["standoff_mm"]):
+        if unknown := set(excluded) - set(captures["standoff_mm"]):
             raise BadInputError(f"without: no capture has the standoff {min(unknown):g} mm")
-        kept = captures[~captures["standoff_mm"].isin(list(without))]
+        kept = captures[~captures["standoff_mm"].isin(excluded)]
         scene = kept["scene"].where(kept["scene"] != "", kept["placement"])
         columns = ["laser_id", "standoff_mm", "repeat", "on", "off", "scene", "standoff_sd_mm"]
         return kept.assign(scene=scene)[columns].reset_index(drop=True)
@@ -160,7 +162,7 @@ class Session:
         Raises:
             BadInputError: the session has no such capture or frame, or the file is damaged.
         """
-        event = self._captures.get(capture)
+        event = self._captures.get(words_of("capture", capture, "the key of a capture"))
         reference = None if event is None else event.off if off else event.on
         if reference is None:
             raise BadInputError(f"{self.folder}: expected a capture of the session, got {capture!r}")
@@ -175,10 +177,19 @@ class Session:
 
         Returns:
             (height, width), at most 2 half_px + 1 each; uint8 or uint16.
+
+        Raises:
+            BadInputError: this is no row of `spots`, or `half_px` no number of pixels.
         """
-        image = self.frame(str(spot["capture"]))
-        u, v = round(float(spot["u_px"])), round(float(spot["v_px"]))
-        return image[max(v - half_px, 0) : v + half_px + 1, max(u - half_px, 0) : u + half_px + 1]
+        half = whole_of("half_px", half_px, least=0)
+        try:
+            image = self.frame(spot["capture"])
+            u, v = round(float(spot["u_px"])), round(float(spot["v_px"]))
+        except (LookupError, TypeError, ValueError, OverflowError):
+            raise BadInputError(
+                "spot: expected a row of Session.spots, such as session.spots.iloc[0]"
+            ) from None
+        return image[max(v - half, 0) : v + half + 1, max(u - half, 0) : u + half + 1]
 
     @cached_property
     def _events(self) -> list[object]:
@@ -242,7 +253,7 @@ def open_session(folder: str | Path) -> Session:
     Raises:
         BadInputError: this is no session folder, or its manifest is damaged.
     """
-    path = Path(folder)
+    path = path_of("folder", folder, "the path of a session folder")
     load_manifest(path)
     return Session(path)
 
@@ -262,6 +273,6 @@ def sessions(folder: str | Path = "sessions") -> pd.DataFrame:
             "captures": status.captures,
             "reason": status.why,
         }
-        for status in session_statuses(Path(folder))
+        for status in session_statuses(path_of("folder", folder, "the path of a folder of sessions"))
     )
     return frame_of(rows, SESSION_COLUMNS)

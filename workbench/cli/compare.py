@@ -10,7 +10,7 @@ from rich.console import Console
 
 from workbench.calibration.verdict.comparison import Comparison, compare
 from workbench.calibration.verdict.tables import difference_table
-from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.calibration import load_calibration
 from workbench.report.terminal_table import TerminalTable
 
 
@@ -20,32 +20,14 @@ def compare_calibrations(a: Path, b: Path, as_json: bool) -> None:
     Raises:
         BadInputError: a file is wrong, or the calibrations have no parameter in common.
     """
-    of_a, of_b = load_calibration(a), load_calibration(b)
-    result = compare(of_a, of_b)
+    result = compare(load_calibration(a), load_calibration(b))
     if as_json:
         print(json.dumps(asdict(result)))
     console = Console(stderr=True, markup=False)
     console.print(TerminalTable(difference_table(result.differences)))
     console.print(verdict(result), highlight=False)
-    for note in _notes(of_a, of_b, result.identical):
+    for note in result.notes:
         console.print(f"note: {note}", highlight=False)
-
-
-def _notes(a: Calibration, b: Calibration, identical: bool) -> list[str]:
-    """Reservations about the verdict."""
-    notes = []
-    of_a, of_b = a.laser_ranger, b.laser_ranger
-    same_captures = of_a.provenance.captures_sha256 == of_b.provenance.captures_sha256
-    if same_captures and not identical:
-        notes.append(
-            "both calibrations use the same captures; the test assumes independent ones and is too lenient"
-        )
-    notes += [
-        f"{name} failed its limits and was accepted because: {c.fit.accepted_because or 'no reason given'}"
-        for name, c in (("A", of_a), ("B", of_b))
-        if c.fit.verdict == "refused"
-    ]
-    return notes
 
 
 def verdict(result: Comparison) -> str:

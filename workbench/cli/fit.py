@@ -21,6 +21,7 @@ from workbench.calibration.verdict.assessment import Assessment, derive
 from workbench.calibration.verdict.export import accept_with_reason, calibrate, write_calibration
 from workbench.calibration.verdict.records import fit_finished, parameter_records
 from workbench.calibration.verdict.tables import derived_table
+from workbench.cli.captures_source import calibration_table
 from workbench.cli.invocation import command_line
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Calibration, Provenance
@@ -35,11 +36,11 @@ from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.fit_event import Rejected
 from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
 from workbench.model.nested import fix_parameters
+from workbench.model.number_text import counted
 from workbench.model.rig import Rig, load_rig
 from workbench.report.rejected_lines import rejected_lines
 from workbench.report.terminal_table import TerminalTable
 from workbench.session.caller import now, operator
-from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.files import check_output
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
 
@@ -89,7 +90,7 @@ def fit_source(request: Request) -> FittedSource:
     rig = fix_parameters(_rig(request), request.fixed)
     if request.source.suffix == ".rrd":
         return _fit_recording(rig, request)
-    captures = request.source / CALIBRATION_TABLE if request.source.is_dir() else request.source
+    captures = calibration_table(request.source)
     content = read_captures_file(captures)
     rows = parse_captures(captures, content)
     check_images(captures, rows)
@@ -270,10 +271,13 @@ def _print_tables(fitted: CalibrationFit, assessment: Assessment) -> None:
     console.print(TerminalTable(derived_table(derive(fitted))))
     if fitted.terms:
         console.print(TerminalTable(term_table(fitted.terms)))
-    console.print(f"residual rms {fitted.rms_px:.2f} px over {len(fitted.used)} observations")
+    console.print(f"residual rms {fitted.rms_px:.2f} px over {counted(len(fitted.used), 'observation')}")
     if fitted.boards:
         count, views = len(fitted.corner_residual_px), len(fitted.boards)
-        console.print(f"board: {fitted.corner_rms_px:.3f} px over {count} corners in {views} views")
+        console.print(
+            f"board: {fitted.corner_rms_px:.3f} px over {counted(count, 'corner')} in"
+            f" {counted(views, 'view')}"
+        )
     if assessment.cross_validation:
         console.print(TerminalTable(cross_validation_table(assessment.cross_validation)))
     for line in rejected_lines(fitted.rejected):

@@ -130,11 +130,17 @@ def resume(
 
 
 @app.command(name="sessions")
-def sessions_(sessions: Sessions = Path("sessions"), json: Json = False) -> None:
+def sessions_(
+    folder: Annotated[
+        Path | None, typer.Argument(help="Folder of sessions, or one session. Default: as --sessions.")
+    ] = None,
+    sessions: Sessions = Path("sessions"),
+    json: Json = False,
+) -> None:
     """List sessions with their states."""
     from workbench.cli.sessions import list_sessions
 
-    list_sessions(sessions, json)
+    list_sessions(sessions if folder is None else folder, json)
 
 
 @app.command()

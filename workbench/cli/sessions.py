@@ -13,7 +13,7 @@ from rich.text import Text
 
 from workbench.model.errors import BadInputError
 from workbench.session.manifest import MANIFEST
-from workbench.session.state import SessionStatus, session_statuses
+from workbench.session.state import SessionStatus, session_status, session_statuses
 
 SHOWN = 20
 """Number of latest sessions that are listed."""
@@ -26,10 +26,15 @@ CUT_AT = 20
 def list_sessions(sessions: Path, as_json: bool) -> None:
     """Print the status of every session, and the command that resumes the last unfinished one.
 
+    Args:
+        sessions: folder of sessions, or the folder of one session.
+        as_json: whether to print JSON.
+
     Raises:
         BadInputError: there is no such folder.
     """
-    found = session_statuses(sessions)
+    single = (sessions / MANIFEST).is_file()
+    found = [session_status(find_session(sessions, sessions))] if single else session_statuses(sessions)
     if as_json:
         for each in found:
             print(json.dumps(asdict(each) | {"session_dir": str(each.session_dir)}))

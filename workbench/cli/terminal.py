@@ -15,6 +15,7 @@ from rich.text import Text
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.model.fit_tables import fit_tables
+from workbench.model.number_text import counted
 from workbench.model.reading_text import reading_remark
 from workbench.model.spot import Spot
 from workbench.procedure.capture.quality import Quality, quality_of
@@ -91,7 +92,9 @@ class Terminal:
             case ev.SetAside() as e:
                 self._print(e.text, style="yellow")
             case ev.SessionResumed() as e:
-                self._print(f"resumed, {len(e.changes)} changes accepted" if e.changes else "resumed", 2)
+                self._print(
+                    f"resumed, {counted(len(e.changes), 'change')} accepted" if e.changes else "resumed", 2
+                )
             case ev.StandoffAdvised() as e:
                 self._print(e.text)
             case ev.StepFinished() as e:
@@ -189,7 +192,7 @@ def _summary(spots: dict[str, list[Sequence[Spot]]]) -> str:
     """Summary of a placement: worst quality over the lasers; for all lasers together the number of spots."""
     if "all" in spots:
         each = spots["all"]
-        return f"{len(each)} readings, {min(map(len, each))} spots or more"
+        return f"{counted(len(each), 'reading')}, at least {counted(min(map(len, each)), 'spot')}"
     found = {name: quality_of(each) for name, each in spots.items()}
     snr = [q.snr for q in found.values() if q.snr is not None]
     scatter = [q.scatter_px for q in found.values() if q.scatter_px is not None]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import select
 import sys
 import termios
@@ -17,14 +16,13 @@ from rich.text import Text
 
 from workbench.devices.protocols import Operator
 from workbench.model.errors import AnswerNeededError, StoppedError
+from workbench.model.problems import THOUSANDS
 from workbench.model.prompt import Answer, Prompt
 from workbench.procedure.engine.operator import NoOperator
 
 LOOK_S = 0.1
 """Interval at which stop requests are checked while waiting for input, s."""
 ACTIONS = ("redo", "skip", "abort")
-THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
-"""Number such as `2,200`, in which the comma may separate thousands or decimals: it is refused."""
 
 
 def choose_operator(
@@ -143,7 +141,7 @@ def _answer(prompt: Prompt, typed: str) -> Answer:
     if prompt.quantity is not None:
         if not typed and prompt.quantity.usual is not None:
             return Answer(value=prompt.quantity.usual)
-        if THOUSANDS.match(typed):
+        if THOUSANDS.match(typed):  # 2,200 may be 2200 or 2.2: no number, which the prompt refuses
             return Answer(value=typed)
         try:
             return Answer(value=float(typed.removesuffix(prompt.quantity.unit).replace(",", ".")))

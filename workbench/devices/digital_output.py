@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError
+from workbench.model.number_text import counted
 
 PACKAGE = "nidaqmx"
 
@@ -65,7 +66,7 @@ class DigitalOutputLine:
         """
         with self._asked("return its name"):
             boards = [f"{device.product_type} {device.name}" for device in self._task.devices]
-        return f"{', '.join(boards)}, {self._count} lines"
+        return f"{', '.join(boards)}, {counted(self._count, 'line')}"
 
     def light(self, mask: int, lease_ms: int) -> None:
         """Switch the lasers of `mask` on and the others off; the lease is the guardian's.

@@ -108,10 +108,7 @@ def read_captures_file(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise BadInputError(
-            f"{path}: no such file; expected a captures file. A session writes it at its first fit step;"
-            " resume a session that ended before that step with `workbench resume`"
-        ) from None
+        raise BadInputError(f"{path}: no such file; expected a captures file") from None
     except (OSError, ValueError) as error:
         raise BadInputError(f"{path}: expected a captures file: {error}") from None
 

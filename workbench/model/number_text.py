@@ -27,6 +27,11 @@ def two_digits(sd: float) -> str:
     return f"{float(f'{sd:.2g}'):g}"
 
 
+def counted(number: int, thing: str) -> str:
+    """Text of a number of things whose plural ends with s: `1 spot`, `2 spots`."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
 def duration(seconds: float) -> str:
     """Text of a duration: seconds below two minutes, minutes below two hours, else hours (`3.5 h`)."""
     if seconds < SECONDS_BELOW_S:

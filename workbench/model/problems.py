@@ -65,6 +65,8 @@ SPELLED = {
     " calibration-night.yaml, of letters (A to z), digits, _, . and -",
 }
 """Descriptions of the models' patterns."""
+THOUSANDS = re.compile(r"\s*([+-]?[1-9]\d{0,2}(?:[, ]\d{3})+)(?!\d)")
+"""Number whose thousands are separated, such as 2,200."""
 STATEMENTS = {"missing", "extra_forbidden", "invalid_key", "unexpected_keyword_argument"}
 """Error types whose text is a statement, not an expectation."""
 WITHOUT_GOT = STATEMENTS | {"too_short", "too_long"}
@@ -218,14 +220,11 @@ def _plain(value: object) -> bool:
 def _number_in(value: object, kind: str) -> str:
     """Number meant by a text with a unit or a decimal comma; an example number if there is none.
 
-    `2,200` may mean either number: both are named.
+    A comma before three digits may separate thousands: both meanings are given.
     """
-    if found := re.match(r"\s*([+-]?[1-9]\d{0,2}),(\d{3})(?!\d)", str(value)):
-        return (
-            f"{found[1]}{found[2]}"
-            if kind.startswith("int")
-            else f"{found[1]}{found[2]} or {found[1]}.{found[2]}"
-        )
+    if _plain(value) and (grouped := THOUSANDS.match(str(value))) is not None:
+        whole, decimal = re.sub("[, ]", "", grouped[1]), grouped[1].replace(",", ".")
+        return f"{whole} or {decimal}" if kind.startswith("float") and decimal.count(".") == 1 else whole
     found = re.match(r"\s*([+-]?\d+)(?:[.,](\d+))?", str(value)) if _plain(value) else None
     if kind.startswith("int"):
         return found[1] if found else "10"

@@ -12,6 +12,7 @@ from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.devices.protocols import Bench, Operator, StreamingCamera
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError
 from workbench.model.exposure import CLIPPED
+from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.rig import LaserSpec, Rig
 from workbench.model.target import Placement
@@ -113,7 +114,7 @@ def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:
     off = bench.camera.grab().image
     found = find_spots(on, off, scanlines=[prior_scanline(rig, laser)], expected=1)
     if len(found.spots) != 1:
-        got = ", ".join(found.failures) or f"{len(found.spots)} spots"
+        got = ", ".join(found.failures) or counted(len(found.spots), "spot")
         raise RigNotReadyError(
             f"expected one spot, got {got}; check that the beam hits the target at {STANDOFF_MM:g} mm and"
             " that the laser is connected to this line of the controller"

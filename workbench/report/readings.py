@@ -13,7 +13,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from workbench.model.number_text import with_sd
+from workbench.model.number_text import counted, with_sd
 
 if TYPE_CHECKING:  # rendering needs none of the ranging code
     from workbench.ranging.ranger import Reading
@@ -93,5 +93,5 @@ def _status(status: str) -> str:
 
 def _counted(readings: Sequence[Reading]) -> str:
     counts = Counter(_status(r.status) for r in readings)
-    scenes = "1 scene" if len(readings) == 1 else f"{len(readings)} scenes"
+    scenes = counted(len(readings), "scene")
     return f"{scenes}: {', '.join(f'{n} {status}' for status, n in counts.items())}; ranges of lasers: --json"

@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from workbench.model.fields import Count, Standoff
+from workbench.model.number_text import counted
 from workbench.model.rig import NonNegativeFloat, Rig
 from workbench.model.target import BoardTarget, Placement
 from workbench.model.yamlfile import FileModel
@@ -44,7 +45,7 @@ class CaptureBoardStep(StepModel):
     @property
     def title(self) -> str:
         """Number of placements."""
-        return f"Capture the board in {len(self.placings)} placements"
+        return f"Capture the board in {counted(len(self.placings), 'placement')}"
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
         """Placements, numbered from 1 because the board may have several tilts at one standoff."""
@@ -85,5 +86,5 @@ class CaptureBoardStep(StepModel):
         views = [seen for key, seen in context.boards.items() if key.startswith(f"{name}/")]
         corners = sum(len(seen.corners.ids) for seen in views if isinstance(seen, BoardView))
         missed = [seen.reason for seen in views if isinstance(seen, Rejected)]
-        found = f"{corners} corners in {len(views) - len(missed)} of {len(views)} placements"
-        return "; ".join([found, *missed])
+        placements = f"{len(views) - len(missed)} of {counted(len(views), 'placement')}"
+        return "; ".join([f"{counted(corners, 'corner')} in {placements}", *missed])

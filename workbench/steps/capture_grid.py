@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from workbench.model.event import StandoffAdvised
 from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
@@ -47,7 +48,8 @@ class CaptureGridStep(StepModel):
     def title(self) -> str:
         """Number of standoffs and of pairs."""
         again = f" and {len(self.visits_mm) - len(self.standoffs_mm)} again" if self.returns else ""
-        return f"Capture at {len(self.standoffs_mm)} standoffs{again}, {self.repeats} pairs per laser"
+        standoffs = counted(len(self.standoffs_mm), "standoff")
+        return f"Capture at {standoffs}{again}, {counted(self.repeats, 'pair')} per laser"
 
     @property
     def visits_mm(self) -> tuple[float, ...]:
@@ -81,7 +83,7 @@ class CaptureGridStep(StepModel):
             _advise(context)
             return pairs
 
-        return f"{sum(visit_placements(context, self.placements(name, context.rig), work))} pairs"
+        return counted(sum(visit_placements(context, self.placements(name, context.rig), work)), "pair")
 
 
 def _advise(context: Context) -> None:

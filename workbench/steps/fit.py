@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 from workbench.model.acceptance import Acceptance
 from workbench.model.captures import BOARD
 from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.model.event import CaptureTaken
+from workbench.model.number_text import counted
+from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
@@ -53,13 +57,51 @@ class FitStep(StepModel):
         boards = [b for b in context.boards.values() if isinstance(b, BoardView)]
         fitted = fit_calibration(context.rig, observations, rejected, boards)
         provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
-        calibration, assessment = calibrate(fitted, self.limits, provenance)
+        notes = _skipped_notes(_planned(context, name), captures, [one.standoff_mm for one in fitted.used])
+        calibration, assessment = calibrate(fitted, self.limits, provenance, notes)
         context.emit(fit_finished(fitted, assessment))
         if assessment.verdict == "refused":
             raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
         context.accepted, context.cross_validation = calibration, assessment.cross_validation
         worst = calibration.laser_ranger.validity.max_relative_range_sd
         return (
-            f"accepted: rms {fitted.rms_px:.3f} px over {len(observations)} spots, {len(fitted.rejected)}"
-            f" rejected; range uncertainty at most {100 * worst:.2g} % (1 sigma)"
+            f"accepted: rms {fitted.rms_px:.3f} px over {counted(len(observations), 'spot')},"
+            f" {len(fitted.rejected)} rejected; range uncertainty at most {100 * worst:.2g} % (1 sigma)"
+            + "".join(f"; {note}" for note in notes)
         )
+
+
+def _planned(context: Context, name: str) -> list[Placement]:
+    """Placements of the procedure's steps that give captures, before the step `name`."""
+    procedure = name.rpartition(".")[0]
+    steps = enumerate(context.steps[: context.step_index], start=1)
+    return [
+        placement
+        for number, step in steps
+        if step.gives == "captures"
+        for placement in step.placements(f"{procedure}.{number}", context.rig)
+    ]
+
+
+def _skipped_notes(
+    planned: Sequence[Placement], captures: Sequence[CaptureTaken], used_mm: Sequence[float]
+) -> list[str]:
+    """Note on skipped placements and on the validity without them.
+
+    Args:
+        planned: placements of the procedure.
+        captures: captures of the calibration.
+        used_mm: standoffs of the observations in the fit.
+    """
+    visited = {capture.placement_key for capture in captures}
+    skipped = [placement.standoff_mm for placement in planned if placement.key not in visited]
+    if not skipped:
+        return []
+    at = ", ".join(f"{standoff:g}" for standoff in skipped)
+    valid, all_mm = (min(used_mm), max(used_mm)), [placement.standoff_mm for placement in planned]
+    narrowed = valid[0] > min(all_mm) or valid[1] < max(all_mm)
+    instead = f", the procedure's placements from {min(all_mm):g} to {max(all_mm):g} mm" if narrowed else ""
+    return [
+        f"{counted(len(skipped), 'placement')} skipped (at {at} mm): the calibration is valid from"
+        f" {valid[0]:g} to {valid[1]:g} mm{instead}"
+    ]

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from workbench.model.number_text import counted
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
@@ -26,4 +27,5 @@ class MeasureLatencyStep(StepModel):
 
     def run(self, context: Context, name: str) -> str:
         """Measure the latency and set the camera to discard as many frames."""
-        return f"{context.measure_latency(name, self.most_frames)} frames, discarded before each capture"
+        frames = context.measure_latency(name, self.most_frames)
+        return f"{counted(frames, 'frame')}, discarded before each capture"

@@ -9,6 +9,7 @@ from pydantic import model_validator
 
 from workbench.model.errors import BadInputError
 from workbench.model.limit import Limit
+from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.yamlfile import FileModel
@@ -61,6 +62,6 @@ class ValidateStep(StepModel):
         values = {"worst_relative_error": worst_error, "worst_z": worst_z}
         verdict = check_fit(context, name, values, self.limits)
         return (
-            f"{len(placements)} placements, each ranged by the fit without it: error at most"
+            f"{counted(len(placements), 'placement')}, each ranged by the fit without it: error at most"
             f" {100 * worst_error:.2g} % and {worst_z:.2g} stated sd; {verdict}"
         )

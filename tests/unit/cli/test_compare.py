@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from tests.support.command_line import Run
+from tests.support.command_line import Run, refused
 
 ROOT = Path(__file__).parents[3]
 WEBCAM = ROOT / "data/webcam-laser-rows.csv"
@@ -30,3 +30,25 @@ def test_compare(workbench: Run, tmp_path: Path) -> None:
     assert result["moved"]
     assert {"cy_px", "1.ty"} <= set(result["explanations"])
     assert "explained by" in outcome.err
+
+
+def test_other_rigs_and_serial_numbers_are_noted(workbench: Run, tmp_path: Path) -> None:
+    a, b = tmp_path / "a.yaml", tmp_path / "b.yaml"
+    text = (ROOT / "data/session-0.1.0/calibration.yaml").read_text()
+    a.write_text(text)
+    b.write_text(text.replace('"emulated-1"', '"emulated-2"'))
+    assert json.loads(workbench("compare", a, a, "--json").out)["notes"] == []
+    outcome = workbench("compare", a, b, "--json")
+    (note,) = json.loads(outcome.out)["notes"]
+    assert outcome.code == 0
+    assert "emulated-1" in note
+    assert "emulated-2" in note
+    b.write_text(text.replace('"thesis-emulated"', '"another"'))
+    (note,) = json.loads(workbench("compare", a, b, "--json").out)["notes"]
+    assert "another" in note
+
+
+def test_other_image_sizes_are_refused(workbench: Run, tmp_path: Path) -> None:
+    a, b = ROOT / "data/session-0.1.0/calibration.yaml", tmp_path / "b.yaml"
+    workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", b)
+    refused(workbench("compare", a, b), 2)

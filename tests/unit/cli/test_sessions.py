@@ -83,3 +83,20 @@ def test_the_only_session_is_running(workbench: Run, tmp_path: Path) -> None:
     (tmp_path / "s/session.yaml").write_text("format: 1\n")
     with Journal(tmp_path / "s"):
         refused(workbench("resume", "--sessions", tmp_path), 2, tmp_path / "s", "is running")
+
+
+def test_a_folder_of_sessions_or_one_session_is_named_directly(
+    workbench: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = Path(__file__).parents[3] / "data"
+    for folder, names in (
+        (data, ["session-0.1.0", "simulation-0.1.0"]),
+        (data / "session-0.1.0", ["session-0.1.0"]),
+    ):
+        outcome = workbench("sessions", folder, "--json")
+        assert outcome.code == 0
+        assert [Path(json.loads(line)["session_dir"]).name for line in outcome.out.splitlines()] == names
+    monkeypatch.chdir(data / "session-0.1.0")
+    (line,) = workbench("sessions", ".", "--json").out.splitlines()
+    assert Path(json.loads(line)["session_dir"]) == data / "session-0.1.0"
+    refused(workbench("sessions", data / "nowhere"), 2, data / "nowhere")

@@ -74,6 +74,7 @@ def test_what_fits_is_the_answer(
     ("prompt", "wrong", "right"),
     [
         (NUMBER, "5000", "500"),
+        (Prompt("p", "Read it.", quantity=Quantity("mm", 0.0, 5000.0)), "2,200", "2200"),
         (NUMBER, "half", "500"),
         (STANDOFF, "2,200", "2200"),
         (CONFIRM, "", "yes"),

@@ -22,6 +22,19 @@ def load(tmp_path: Path, text: str) -> tuple[CaptureRow, ...]:
     return load_captures(path)
 
 
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [("2,200", "2200 or 2.200"), ("2 200", "2200"), ("1,5", "1.5"), ("12,345,678", "12345678")],
+)
+def test_a_number_with_a_comma_or_a_space_is_refused_with_its_meanings(
+    tmp_path: Path, written: str, meant: str
+) -> None:
+    path = tmp_path / "c.csv"
+    path.write_text(f'laser_id,standoff_mm,repeat,v_px\nL1,"{written}",0,120\n')
+    with pytest.raises(BadInputError, match=f"row 2, column standoff_mm: .* {meant}, got '{written}'"):
+        load_captures(path)
+
+
 def test_positions(tmp_path: Path) -> None:
     path = tmp_path / "c.csv"
     path.write_text(f"\ufeff{HEADER}\n1,200,0,,42\nL2,300.5,1,17.25,\n", encoding="utf-8")

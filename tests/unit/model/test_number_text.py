@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from workbench.model.number_text import duration, significant, two_digits, with_sd
+from workbench.model.number_text import counted, duration, significant, two_digits, with_sd
 
 
 @pytest.mark.parametrize(
@@ -45,3 +45,7 @@ def test_value_and_sd_together() -> None:
 )
 def test_durations_get_coarser(seconds: float, text: str) -> None:
     assert duration(seconds) == text
+
+
+def test_one_thing_is_singular() -> None:
+    assert [counted(number, "spot") for number in (0, 1, 2)] == ["0 spots", "1 spot", "2 spots"]

@@ -66,8 +66,8 @@ def drift_test(fitted: CalibrationFit) -> DriftTest:
 def score_test(information: FloatArray, score: FloatArray) -> DriftTest:
     """The test by the information on a drift (2, 2), 1/px^2, and its score (2,), 1/px.
 
-    An axis is estimated only where the data constrain it by itself. Where u and v are known only in
-    combination, the estimate of least norm would share the combination between them.
+    An axis is estimated only where the data constrain it completely. Where they determine one combination of
+    u and v alone, the estimate of least norm would share it between them.
     """
     values, vectors = np.linalg.eigh(information)
     known = values > LEAST_INFORMATION

@@ -21,6 +21,7 @@ from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import DeterminedBy
 from workbench.model.fit_event import CrossValidatedPlacement, Fault, ResidualTest
+from workbench.model.number_text import counted
 
 WARNED_P = 0.01
 """P value of the placement errors below which their scatter is a warning."""
@@ -193,8 +194,8 @@ def _too_few_standoffs(fit: CalibrationFit, limits: Acceptance) -> list[str]:
     for s in fit.used:
         seen[s.laser_id].add(s.standoff_mm)
     return [
-        f"laser {i} was seen at {len(seen[i])} standoffs, expected at least {limits.min_standoffs}."
-        " Do: capture it at more standoffs"
+        f"laser {i} was seen at {counted(len(seen[i]), 'standoff')}, expected at least"
+        f" {limits.min_standoffs}. Do: capture it at more standoffs"
         for i in fit.rig.laser_ids
         if len(seen[i]) < limits.min_standoffs and (seen[i] or i in captured)  # else the fault never_lit
     ]

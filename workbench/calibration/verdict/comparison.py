@@ -54,6 +54,8 @@ class Comparison:
     """Parameters each of which explains the differences alone, the most likely first; empty: none does."""
     identical: bool = False
     """Whether both have the same numbers to the last digit, as copies of one calibration have."""
+    notes: tuple[str, ...] = ()
+    """Reservations about the verdict."""
 
 
 def compare(a: Calibration, b: Calibration) -> Comparison:
@@ -75,6 +77,7 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
     chi2 = float(white @ white)
     probability = float(chi2_sf(chi2, len(white)))
     moved = probability < SIGNIFICANCE
+    identical = _numbers(a) == _numbers(b)
     return Comparison(
         differences=_differences(sensor_a, sensor_b, pairs),
         chi2=chi2,
@@ -82,8 +85,39 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
         probability=probability,
         moved=moved,
         explanations=_explanations(sensor_a, b, pairs, whiten) if moved else (),
-        identical=_numbers(a) == _numbers(b),
+        identical=identical,
+        notes=(*_other_sensor(a, b), *_reservations(a, b, identical)),
     )
+
+
+def _other_sensor(a: Calibration, b: Calibration) -> list[str]:
+    """Signs that the calibrations are of two sensors."""
+    of_a, of_b = a.laser_ranger.provenance, b.laser_ranger.provenance
+    return [
+        f"{what} differ: A is of {name_a}, B of {name_b}. The test assumes one sensor; check that both files"
+        " belong to it"
+        for what, name_a, name_b in (
+            ("rigs", of_a.rig, of_b.rig),
+            ("serial numbers", of_a.serial, of_b.serial),
+        )
+        if name_a != name_b
+    ]
+
+
+def _reservations(a: Calibration, b: Calibration, identical: bool) -> list[str]:
+    """Common captures, and limits that failed."""
+    notes = []
+    of_a, of_b = a.laser_ranger, b.laser_ranger
+    if of_a.provenance.captures_sha256 == of_b.provenance.captures_sha256 and not identical:
+        notes.append(
+            "both calibrations use the same captures; the test assumes independent ones and is too lenient"
+        )
+    notes += [
+        f"{name} failed its limits and was accepted because: {c.fit.accepted_because or 'no reason given'}"
+        for name, c in (("A", of_a), ("B", of_b))
+        if c.fit.verdict == "refused"
+    ]
+    return notes
 
 
 def _numbers(calibration: Calibration) -> tuple[object, ...]:

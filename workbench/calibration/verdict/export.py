@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,9 +34,15 @@ from workbench.session.files import write_output
 
 
 def calibrate(
-    fit: CalibrationFit, limits: Acceptance, provenance: Provenance
+    fit: CalibrationFit, limits: Acceptance, provenance: Provenance, notes: Sequence[str] = ()
 ) -> tuple[Calibration, Assessment]:
     """Make the calibration of a fit, and assess it.
+
+    Args:
+        fit: the fit.
+        limits: limits of the calibration.
+        provenance: source of the data.
+        notes: warnings about the captures, which come before those of the fit.
 
     Raises:
         LimitFailedError: no spot in the image has a range with a finite standard deviation.
@@ -60,6 +68,7 @@ def calibrate(
         ranges,
     )
     assessment = assess(fit, limits, worst, placements, directions)
+    assessment = replace(assessment, warnings=(*notes, *assessment.warnings))
     return _calibration(fit, values, provenance, assessment, worst), assessment
 
 

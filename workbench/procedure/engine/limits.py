@@ -8,6 +8,7 @@ from typing import TypeVar
 from workbench.model import event as ev
 from workbench.model.errors import LimitFailedError
 from workbench.model.limit import Limit
+from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
@@ -143,7 +144,7 @@ def why_not_measured(quantity: str, laser_id: str, spots: Sequence[int]) -> str:
         laser_id: laser of the captures.
         spots: number of spots in each capture.
     """
-    captures = "1 capture" if len(spots) == 1 else f"{len(spots)} captures"
+    captures = counted(len(spots), "capture")
     if 1 in spots:
         return f"{quantity} requires a spot of {laser_id} in at least two captures"
     if any(spots):
