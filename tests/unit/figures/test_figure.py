@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from tests.viewer.session import a_fit
-from workbench.model.chart import PALETTE, Axis, Band, Chart, LimitLine, Series, laser_colors
-from workbench.model.fit_charts import residual_chart
 from workbench.figures.figure import draw, svg
 from workbench.figures.plot_style import own_style
+from workbench.model.chart import PALETTE, Axis, Band, Chart, LimitLine, Series, laser_colors
+from workbench.model.fit_charts import residual_chart
 
 LINE = Series(name="a & b", x=(0.0, 5.0, 6.0, 10.0), y=(1.0, None, -1.0, 0.0), style="line", color="#112233")
 CHART = Chart(

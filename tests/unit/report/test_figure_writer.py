@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from workbench.figures.figure import svg
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.event import Event, Record, TrialFinished, TrialProgress
-from workbench.figures.figure import svg
 from workbench.report.figure_writer import FigureWriter
 
 COLORS = {"a": "#112233"}
