@@ -21,7 +21,7 @@ import pytest
 
 from tests.crash.short import ROOT, results, write_files
 from tests.support.killed_session import wait_for_capture
-from tests.viewer.readback import Contents
+from tests.viewer.readback import Contents, layout_views
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.event import TrialFinished
 from workbench.model.fields import Standoff
@@ -235,10 +235,11 @@ def test_the_recording_shows_table_and_chart(bench: Bench, session: tuple[Path, 
     folder, _ = session
     event = finished(folder)
     contents = Contents(folder / "recording.rrd")
-    text = contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
+    trial = f"/trials/{escape_entity_path_part(event.trial)}"
+    (text,) = contents.static(f"{trial}/tables", "TextDocument:text")[-1]
     assert event.tables[0].title in text
-    drawn = [entity for entity in contents.entities if event.charts[0].series[0].name in entity]
-    assert drawn
+    assert f"{trial}/pictures/{event.charts[0].name}/image" in contents.entities
+    assert event.charts[0].title in {view.name for view in layout_views(folder / "recording.rrd")}
 
 
 def test_killed_and_resumed_it_ends_the_same(bench: Bench, session: tuple[Path, str]) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import pi
 from pathlib import Path
 
 import cv2
@@ -12,6 +13,7 @@ import numpy as np
 
 from workbench.model import event as ev
 from workbench.model.calibration import TermSummary
+from workbench.model.reading_chart import error_chart
 from workbench.model.rig import CameraSpec, LaserSpec, Prior, Rig
 from workbench.model.spot import Spot
 from workbench.model.target import FlatTarget, Placement
@@ -28,6 +30,10 @@ F_PX, CX_PX, CY_PX = 541.0, 358.2, 239.5
 START_NS = 1_790_000_000_000_000_000
 BAD = ("L3", 1250.0)
 """The residual that is made too large for its standard deviation."""
+PLACEMENTS = {standoff_mm: f"p{n}" for n, standoff_mm in enumerate(STANDOFFS, start=1)}
+"""Keys of the placements of the calibration."""
+TRIAL = "accuracy-flat"
+WIDTH_PX = 1.3
 
 
 def a_rig() -> Rig:
@@ -60,6 +66,8 @@ class MadeUpSession:
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(3))
     n: int = 0
     captures: int = 0
+    spots: dict[str, Spot] = field(default_factory=dict)
+    """Spots of the last capture by their lasers, which a capture of all does not know yet."""
 
     def records(self) -> Iterator[ev.Record]:
         """The whole session, first record to last."""
@@ -75,10 +83,11 @@ class MadeUpSession:
         yield self._record(ev.ProcedureStarted(procedure=name, title="Calibrate on a flat target", steps=6))
         for i, standoff in enumerate(STANDOFFS, start=1):
             yield from self._step(name, i, f"Capture at {standoff:g} mm", len(LASERS) * REPEATS)
-            yield from self._placed(f"p{i}", standoff)
+            yield from self._placed(PLACEMENTS[standoff], standoff)
             for laser in LASERS:
                 for repeat in range(REPEATS):
-                    yield from self._capture("calibration", (laser,), f"p{i}", standoff, repeat)
+                    yield from self._capture("calibration", (laser,), PLACEMENTS[standoff], standoff, repeat)
+            yield self._record(ev.PlacementFinished(key=PLACEMENTS[standoff]))
             yield self._record(ev.StepFinished(procedure=name, index=i, outcome="8 captures"))
         yield self._record(
             ev.StandoffAdvised(
@@ -97,17 +106,20 @@ class MadeUpSession:
         yield self._record(ev.StepFinished(procedure=name, index=6, outcome="calibration.yaml"))
 
     def _accuracy(self) -> Iterator[ev.Record]:
-        name = "accuracy-flat"
+        name = TRIAL
+        readings = []
         yield self._record(ev.ProcedureStarted(procedure=name, title="Accuracy on a flat target", steps=3))
         for i, standoff in enumerate(TRIAL_STANDOFFS, start=1):
             yield from self._step(name, i, f"Range at {standoff:g} mm", READINGS)
             yield from self._placed(f"t{i}", standoff)
             for reading in range(READINGS):
                 yield from self._capture("trial", tuple(LASERS), f"t{i}", standoff, reading)
-                yield self._record(self._reading(standoff, reading))
+                readings.append(self._reading(standoff, reading))
+                yield self._record(readings[-1])
             yield self._record(ev.StepFinished(procedure=name, index=i, outcome="3 readings"))
         table = accuracy_table(name, [_row(standoff) for standoff in TRIAL_STANDOFFS])
-        yield self._record(ev.TrialFinished(trial=name, tables=(table,)))
+        chart = error_chart(f"{name}-errors", readings)
+        yield self._record(ev.TrialFinished(trial=name, tables=(table,), charts=(chart,)))
 
     def _record(self, event: ev.Event) -> ev.Record:
         self.n += 1
@@ -121,13 +133,19 @@ class MadeUpSession:
     def _placed(self, key: str, standoff: float) -> Iterator[ev.Record]:
         placement = Placement(key=key, standoff_mm=standoff, target=FlatTarget(yaw_deg=2.0))
         yield self._record(ev.TargetPlaced(placement=placement))
+        yield self._record(
+            ev.ExposureSet(key=key, exposure=standoff, unit="us", peak=0.7, verdict="good", trials=2)
+        )
 
     def _capture(
         self, purpose: str, lasers: tuple[str, ...], placement: str, standoff: float, repeat: int
     ) -> Iterator[ev.Record]:
         self.captures += 1
         key = f"c{self.captures:04d}"
-        spots = tuple(self._spot(laser, standoff) for laser in lasers)
+        self.spots = {laser: self._spot(laser, standoff) for laser in lasers}
+        spots = tuple(self.spots.values())
+        if len(lasers) > 1:
+            spots = tuple(replace(spot, laser_id=None) for spot in spots)
         yield self._record(
             ev.CaptureTaken(
                 key=key,
@@ -144,15 +162,16 @@ class MadeUpSession:
 
     def _spot(self, laser: str, standoff: float) -> Spot:
         du, dv = self.random.normal(0.0, 0.05, 2)
+        peak_dn = 210.0 - standoff / 40
         return Spot(
             laser_id=laser,
             u_px=CX_PX + F_PX * LASERS[laser] / standoff + du,
             v_px=CY_PX + dv,
             u_sd_px=0.05,
             v_sd_px=0.05,
-            flux_dn=3000.0,
-            width_px=1.3,
-            peak_dn=210.0 - standoff / 40,
+            flux_dn=peak_dn * 2 * pi * WIDTH_PX**2,
+            width_px=WIDTH_PX,
+            peak_dn=peak_dn,
         )
 
     def _frame(self, name: str, spots: tuple[Spot, ...]) -> ev.FrameRef:
@@ -177,13 +196,15 @@ class MadeUpSession:
         for laser, x in LASERS.items():
             sigma = 0.05 * standoff**2 / (F_PX * abs(x))
             measured = standoff + float(self.random.normal(0.0, sigma))
-            u = CX_PX + F_PX * x / measured
+            spot = self.spots[laser]
             ranges.append(
-                ev.LaserRange(laser_id=laser, range_mm=measured, sigma_mm=sigma, u_px=u, v_px=CY_PX)
+                ev.LaserRange(
+                    laser_id=laser, range_mm=measured, sigma_mm=sigma, u_px=spot.u_px, v_px=spot.v_px
+                )
             )
         nearest = min(ranges, key=lambda one: one.range_mm)
         return ev.ReadingTaken(
-            trial="accuracy-flat",
+            trial=TRIAL,
             scene=f"flat-{standoff:g}",
             standoff_mm=standoff,
             reading=reading,
@@ -212,7 +233,7 @@ def a_fit() -> ev.FitFinished:
         ),
         left_out=(
             ev.CrossValidatedPlacement(
-                placement="P2",
+                placement=PLACEMENTS[BAD[1]],
                 standoff_mm=BAD[1],
                 error_mm=2.5,
                 sd_mm=0.5,
@@ -261,6 +282,7 @@ def _residuals() -> Iterator[ev.ResidualRecord]:
                 v_px=dv,
                 u_sd_px=0.05,
                 v_sd_px=0.05,
+                placement=PLACEMENTS[standoff],
             )
 
 

@@ -15,6 +15,7 @@ import pytest
 
 from tests.viewer.readback import Contents
 from tests.viewer.session import a_fit, a_rig
+from workbench.figures.picture import note
 from workbench.model import event as ev
 from workbench.model.spot import Failure, Spot
 from workbench.model.target import (
@@ -28,6 +29,7 @@ from workbench.model.target import (
 from workbench.trials.accuracy.statistics import AccuracyRow
 from workbench.trials.accuracy.tables import accuracy_table
 from workbench.viewer.recording import RecordingConsumer
+from workbench.viewer.scene import DRAWN_DEPTH_MM
 from workbench.viewer.window import viewer_environment, viewer_executable
 
 STARTED = ev.SessionStarted(session="odd", rig="made-up", procedures=("p",))
@@ -95,7 +97,7 @@ def test_capture_without_spots_says_why_and_clears_the_picture(tmp_path: Path) -
         ev.SpotsFound(key="a", spots=(), failures=("L1: too dim",)),
     ]
     contents = record(tmp_path, events)
-    assert contents.values("/bench/camera/spots", "Points2D:positions") == [(1, [])]
+    assert contents.values("/frame/spots", "Points2D:positions") == [(1, [])]
     assert contents.values("/steps/log", "TextLog:text")[-1] == (1, ["Capture a: L1: too dim"])
     assert contents.values("/steps/log", "TextLog:level")[-1] == (1, ["WARN"])
 
@@ -112,8 +114,8 @@ def test_spots_without_a_laser_are_kept_together(tmp_path: Path) -> None:
         ],
     )
     assert contents.values("/spots/unassigned/u_px", "Scalars:scalars") == [(1, [100.0, 300.0])]
-    (labels,) = contents.values("/bench/camera/spots", "Points2D:labels")
-    assert labels[1][:2] == ["? (saturated)", "? (saturated)"]
+    (labels,) = contents.values("/frame/spots", "Points2D:labels")
+    assert labels[1][1:] == ["? (saturated)", "? (saturated)"]
     (dots,) = contents.values("/bench/spots/unassigned", "Points3D:positions")
     assert len(dots[1]) == 2
 
@@ -124,7 +126,7 @@ def test_reading_names_the_spots_of_its_picture(tmp_path: Path) -> None:
     seen = unseen.model_copy(update={"laser_id": "L2", "u_px": 300.0, "v_px": 240.0})
     reading = a_reading(500.0, "not_enough_points", unseen, seen)
     contents = record(tmp_path, [STARTED, a_capture(tmp_path, "a"), spots, reading])
-    labels = contents.values("/bench/camera/spots", "Points2D:labels", "time")
+    labels = contents.values("/frame/spots", "Points2D:labels", "time")
     assert [label for _, label in labels] == [
         ["? (saturated)", "? (saturated)"],
         ["? (saturated)", "L2 (saturated)"],
@@ -157,7 +159,7 @@ def test_every_target_is_drawn(tmp_path: Path, target: TargetShape, strips: int)
     assert len(outline) == strips
     nearest = min((point[2] for strip in outline for point in strip), default=None)
     if isinstance(target, CylinderTarget):
-        assert nearest == pytest.approx(500.0)
+        assert nearest == pytest.approx(DRAWN_DEPTH_MM)
 
 
 def test_refused_fit_of_one_axis_and_readings_without_range(tmp_path: Path) -> None:
@@ -171,11 +173,11 @@ def test_refused_fit_of_one_axis_and_readings_without_range(tmp_path: Path) -> N
     row = AccuracyRow(standoff_mm=4500.0, readings=0, missing=1, reference_sd_mm=2.0)
     table = ev.TrialFinished(trial="t", tables=(accuracy_table("t", [row]),))
     contents = record(tmp_path, [STARTED, refused, reading, table, finished])
-    assert contents.values("/fit/chart/v/note", "Points2D:labels")[-1][1] == ["v was not measured"]
+    assert contents.static("/fit/picture/v/image", "EncodedImage:blob")[-1] == note("v was not measured")
     assert "/fit/residuals/v_px/L1" not in contents.entities
     log = dict(enumerate(contents.values("/steps/log", "TextLog:level")))
     assert [level for _, (level,) in log.values()] == ["INFO", "ERROR", "WARN", "INFO", "ERROR"]
-    text = contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
+    (text,) = contents.static("/trials/t/tables", "TextDocument:text")[-1]
     assert "4500 mm, reading 1: no spot was seen" in text
     assert "4500  0" in text
     assert text.rstrip().count("2.00") == 1
@@ -188,7 +190,7 @@ def test_frames_survive_a_kill(tmp_path: Path) -> None:
     command = [str(viewer_executable()), "rrd", "merge", str(tmp_path / "recording.rrd"), "-o", str(whole)]
     environment = {**viewer_environment(), "HOME": str(tmp_path)}
     subprocess.run(command, check=True, timeout=60, env=environment, capture_output=True)
-    frames = Contents(whole).values("/bench/camera/image", "EncodedImage:blob")
+    frames = Contents(whole).values("/frame/image", "EncodedDepthImage:blob")
     stored = [path.read_bytes() for path in sorted((tmp_path / "frames").glob("*-on.png"))]
     assert len(stored) == 8
     assert [png for _, png in frames] == stored

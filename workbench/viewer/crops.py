@@ -178,7 +178,7 @@ def profile(spot: Spot, left_px: int, top_px: int) -> FloatArray:
 
 
 def marks(crop: Crop) -> list[FloatArray]:
-    """Cross with a gap and ellipse at the centre of a crop's spot, in pixels of the square."""
+    """Cross with a gap and ellipse at a spot's centre, in pixels of the square, cut at its edge."""
     if crop.spot is None:
         return []
     spot = crop.spot
@@ -190,7 +190,8 @@ def marks(crop: Crop) -> list[FloatArray]:
     ]
     turn = np.linspace(0.0, 2.0 * np.pi, 25)
     axes = ELLIPSE_SD * np.array([spot.u_sd_px, spot.v_sd_px])
-    return [*arms, centre + axes * np.column_stack([np.cos(turn), np.sin(turn)])]
+    ellipse = centre + axes * np.column_stack([np.cos(turn), np.sin(turn)])
+    return [np.clip(strip, -0.5, SIDE_PX - 0.5) for strip in (*arms, ellipse)]
 
 
 def _crop(on: Image, off: Image | None, centre: FloatArray, spot: Spot | None) -> Crop:

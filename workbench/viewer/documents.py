@@ -12,7 +12,7 @@ MOST_LINES = 6
 
 
 def capture_line(number: int, capture: CaptureTaken, step: str) -> str:
-    """Subject of a capture in Markdown: the text at the time cursor."""
+    """Number, standoff, laser and exposure of a capture in Markdown: the text at the time cursor."""
     laser = "all lasers" if capture.laser_id == "all" else capture.laser_id
     off = f" without {', '.join(capture.left_off)}" if capture.left_off else ""
     exposure = (

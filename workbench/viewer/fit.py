@@ -89,10 +89,12 @@ def _log_residuals(
     if drawn is None:
         return
     seen = dict.fromkeys((one.placement, one.standoff_mm) for one in fit.residuals)
-    for placement, standoff_mm in seen:
-        if (first := captures.first_of(placement, standoff_mm)) is not None:
-            stream.at(first)
-            log_cursor(stream, entity, drawn, standoff_mm)
+    visits = [(captures.first_of(*one), one[1]) for one in seen]
+    captured = [(first, standoff_mm) for first, standoff_mm in visits if first is not None]
+    # In order: of several placements in one step, the timeline of steps shows the last.
+    for first, standoff_mm in sorted(captured, key=lambda one: one[0].capture):
+        stream.at(first)
+        log_cursor(stream, entity, drawn, standoff_mm)
     stream.at(moment)
     log_cursor(stream, entity, drawn, None)
 

@@ -98,6 +98,12 @@ def log_predicted(stream: Stream, spots: Mapping[str, FloatArray], colors: Mappi
 def log_spots(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
     """Log the spots of one capture, as marks in the picture and as numbers for curves."""
     _draw(stream, spots, colors)
+    _log_curves(stream, spots)
+    if spots:
+        stream.log(at.SPOTS_RECORD, rr.AnyValues(drop_untyped_nones=True, **_record(spots)))
+
+
+def _log_curves(stream: Stream, spots: Sequence[Spot]) -> None:
     by_laser: dict[str | None, list[Spot]] = defaultdict(list)
     for spot in spots:
         by_laser[spot.laser_id].append(spot)
@@ -105,8 +111,6 @@ def log_spots(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb
         for quantity in QUANTITIES:
             values = [getattr(spot, quantity) for spot in found]
             stream.log(_curve(quantity, laser), rr.Scalars(values))
-    if spots:
-        stream.log(at.SPOTS_RECORD, rr.AnyValues(drop_untyped_nones=True, **_record(spots)))
 
 
 def _record(spots: Sequence[Spot]) -> dict[str, list[float] | list[str]]:
@@ -119,9 +123,19 @@ def _record(spots: Sequence[Spot]) -> dict[str, list[float] | list[str]]:
     }
 
 
-def log_assigned(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
-    """Draw the spots of a frame again, with the lasers that a reading has assigned to them."""
+def log_assigned(
+    stream: Stream, found: Sequence[Spot], spots: Sequence[Spot], colors: Mapping[str, at.Rgb]
+) -> None:
+    """Draw the spots of a frame again, and log the curves of those that a reading has assigned to lasers.
+
+    Args:
+        stream: recording.
+        found: spots as found, already logged.
+        spots: the same spots with the lasers of the reading.
+        colors: colours by laser.
+    """
     _draw(stream, spots, colors)
+    _log_curves(stream, [new for old, new in zip(found, spots, strict=True) if new != old])
 
 
 def assigned(spots: Sequence[Spot], lasers: Sequence[LaserRange]) -> list[Spot]:

@@ -36,6 +36,15 @@ from workbench.viewer.window import free_port
 
 RECORDING_FILE = "recording.rrd"
 PNG_SIGNATURE = b"\x89PNG"
+OF_NO_STANDOFF = (
+    ev.ProcedureStarted,
+    ev.StepStarted,
+    ev.FitFinished,
+    ev.CalibrationExported,
+    ev.CalibrationLoaded,
+    ev.SessionFinished,
+)
+"""Events between placements. At the standoff of the last one they would cover what was captured there."""
 
 
 class RecordingConsumer:
@@ -162,14 +171,15 @@ class _OpenRecording:
         self._frames: tuple[Image, Image | None] | None = None
         self._spots: tuple[Spot, ...] = ()
         self._title = ""
-        self._capture = 0
-        self._step = 0
+        self._capture = 1
+        self._steps = 0
 
     def take(self, record: ev.Record) -> None:
         """Log one record at its position on the timelines."""
         self._advance(record.event)
-        standoff_mm = None if self._placement is None else self._placement.standoff_mm
-        moment = Moment(self._capture, self._step, record.time_ns, standoff_mm)
+        placement = None if isinstance(record.event, OF_NO_STANDOFF) else self._placement
+        standoff_mm = None if placement is None else placement.standoff_mm
+        moment = Moment(self._capture, max(self._steps, 1), record.time_ns, standoff_mm)
         self.stream.at(moment)
         self._log(record.event, moment)
 
@@ -181,7 +191,7 @@ class _OpenRecording:
         """
         taken = len(self._captures.numbers)
         if isinstance(event, ev.StepStarted):
-            self._step += 1
+            self._steps += 1
         if isinstance(event, ev.TargetPlaced):
             self._placement = event.placement
         if isinstance(event, ev.CaptureTaken | ev.StepStarted | ev.TargetPlaced):
@@ -223,7 +233,7 @@ class _OpenRecording:
 
     @_log.register
     def _(self, event: ev.TargetPlaced, moment: Moment) -> None:
-        scene.log_placement(self.stream, event.placement, self._geometry, self._colors)
+        self._show_sensor()
         self._crops.log_none()
         frame.log_predicted(self.stream, self._expected(), self._colors)
         steps.log_text(self.stream, f"Target placed at {event.placement.standoff_mm:g} mm")
@@ -324,7 +334,7 @@ class _OpenRecording:
     def _(self, event: ev.ReadingTaken, moment: Moment) -> None:
         self.stream.at(self._exposure)
         spots = frame.assigned(self._spots, event.lasers)
-        frame.log_assigned(self.stream, spots, self._colors)
+        frame.log_assigned(self.stream, self._spots, spots, self._colors)
         self._show_crops(spots, [laser for laser in self._colors if laser not in event.left_off])
         if self._placement is not None:
             scene.log_ranged(self.stream, event.lasers, self._placement, self._geometry, self._colors)
@@ -338,8 +348,7 @@ class _OpenRecording:
         trial = self._trial(event.trial)
         trial.finish(event)
         self.stream.at(moment)
-        if trial.charts:
-            self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "trial"))
+        self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "trial"))
         steps.log_text(self.stream, f"Trial {event.trial} finished, {len(event.tables)} tables")
 
     @_log.register

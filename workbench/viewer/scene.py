@@ -1,7 +1,7 @@
 """3D view of the bench: camera, laser rays, target and spots, in the camera frame.
 
-x and y are millimetres. Depth is drawn relative to the standoff of the placement: the target is always at
-`DRAWN_DEPTH_MM`. A target at 140 mm and one at 4 m are then seen equally well from one place.
+x and y are millimetres. Depth is drawn relative to that of the target, which always lies at `DRAWN_DEPTH_MM`:
+a target at 140 mm and one at 4 m are then seen equally well from one place.
 """
 
 from __future__ import annotations
@@ -30,11 +30,13 @@ from workbench.viewer.geometry import Geometry
 from workbench.viewer.stream import Stream
 
 DRAWN_DEPTH_MM = 600.0
-"""Depth at which the target is drawn, for every standoff."""
+"""Depth at which the target is drawn at every standoff."""
 BEYOND = 1.15
 """Length of the drawn rays, relative to the depth of the target."""
 TARGET_HALF_MM = 150.0
 """Half side of the drawn target, whose real size is unknown."""
+LEAST_DEPTH_MM = 1.0
+"""Least depth of a target, for a standoff that the offset of the pinhole makes 0 or negative."""
 _FRUSTUM_MM = 90.0
 _TARGET_COLOR = (235, 235, 235, 60)
 _LINE = rr.Radius.ui_points(1.5)
@@ -64,7 +66,7 @@ def log_placement(
     stream: Stream, placement: Placement, geometry: Geometry, colors: Mapping[str, at.Rgb]
 ) -> None:
     """Log rays and target at a placement, and clear the points of the previous one."""
-    scale = depth_scale(placement)
+    scale = depth_scale(placement, geometry)
     for n, (laser, color) in enumerate(colors.items()):
         far_mm = BEYOND * DRAWN_DEPTH_MM / scale
         ray = _drawn([geometry.ray_at(laser, 0.0), geometry.ray_at(laser, far_mm)], scale)
@@ -84,9 +86,9 @@ def log_placement(
         stream.log(entity, rr.Clear(recursive=True))
 
 
-def depth_scale(placement: Placement) -> float:
+def depth_scale(placement: Placement, geometry: Geometry) -> float:
     """Drawn over true depth at a placement."""
-    return DRAWN_DEPTH_MM / placement.standoff_mm
+    return DRAWN_DEPTH_MM / max(placement.standoff_mm + geometry.offset_mm, LEAST_DEPTH_MM)
 
 
 def log_spots_on_target(
@@ -101,7 +103,7 @@ def log_spots_on_target(
         return
     pixels = np.array([(spot.u_px, spot.v_px) for spot in spots])
     points = geometry.seen_on(placement.target, placement.standoff_mm, pixels)
-    points[:, 2] *= depth_scale(placement)
+    points[:, 2] *= depth_scale(placement, geometry)
     by_laser: dict[str, list[int]] = defaultdict(list)
     for i, spot in enumerate(spots):
         by_laser[spot.laser_id or at.UNASSIGNED].append(i)
@@ -118,7 +120,7 @@ def log_ranged(
     colors: Mapping[str, at.Rgb],
 ) -> None:
     """Log ranged points on their rays, and their 95 % intervals along them."""
-    scale = depth_scale(placement)
+    scale = depth_scale(placement, geometry)
     known = [one for one in lasers if one.laser_id in geometry.rays]
     points = _drawn([geometry.ray_at(o.laser_id, o.range_mm + geometry.offset_mm) for o in known], scale)
     drawn_colors = [colors[one.laser_id] for one in known]

@@ -57,9 +57,9 @@ class TrialView:
         log_errors(self.stream, at.trial_errors(self.trial), reading, self.colors)
 
     def finish(self, results: TrialFinished) -> None:
-        """Log tables, readings without a range, and charts."""
-        self.charts = results.charts
-        for chart in results.charts:
+        """Log tables, readings without a range, and charts; without charts the errors of all readings."""
+        self.charts = results.charts or (error_chart(LIVE_CHART, self.readings),)
+        for chart in self.charts:
             self._draw(chart)
         parts = [*map(table_text, results.tables), documents.without_range(self.readings)]
         self._document("\n\n".join(part for part in parts if part))

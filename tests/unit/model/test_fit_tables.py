@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from tests.viewer.session import BAD, a_fit
-from workbench.model.fit_event import ParameterRecord
-from workbench.model.fit_tables import cross_validation_table, fit_tables, parameter_table, term_table
+from workbench.model.fit_event import CrossValidatedPlacement, ParameterRecord
+from workbench.model.fit_tables import (
+    cross_validation_table,
+    fit_tables,
+    parameter_table,
+    term_table,
+    worst_placements_table,
+)
 
 
 def test_parameters_have_values_priors_and_information_share() -> None:
@@ -57,3 +63,23 @@ def test_only_tables_with_rows_are_shown() -> None:
     assert [table.name for table in fit_tables(fit)] == ["parameters", "terms", "cross_validation"]
     bare = fit.model_copy(update={"terms": (), "left_out": ()})
     assert [table.name for table in fit_tables(bare)] == ["parameters"]
+
+
+def placement(key: str, error_mm: float, chi2: float = 0.0) -> CrossValidatedPlacement:
+    return CrossValidatedPlacement(
+        placement=key, standoff_mm=900.0, error_mm=error_mm, sd_mm=1.0, lasers=(), chi2=chi2, coordinates=8
+    )
+
+
+def test_the_least_probable_placements_are_first_by_range_or_by_spots() -> None:
+    """Range errors of 1 to 4 sd; one placement with spots that the fit does not explain."""
+    errors = {"a": 1.0, "b": -3.0, "c": 4.0, "d": 2.0, "e": -1.5, "f": 0.5}
+    left_out = (*(placement(key, error) for key, error in errors.items()), placement("g", 0.1, chi2=60.0))
+    fit = a_fit().model_copy(update={"left_out": left_out})
+    table = worst_placements_table(fit, {"g": "81-120", "c": "1-40"})
+    records = table.records()
+    assert [one["error_mm"] for one in records] == [0.1, 4.0, -3.0, 2.0, -1.5]
+    assert [one["captures"] for one in records] == ["81-120", "1-40", "", "", ""]
+    p_values = [one["p"] for one in records]
+    assert p_values == sorted(p_values, key=lambda p: p if isinstance(p, float) else 1.0)
+    assert len(worst_placements_table(fit, {}, most=2).rows) == 2

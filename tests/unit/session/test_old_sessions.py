@@ -61,8 +61,9 @@ def test_the_recording_is_made_again(tmp_path: Path) -> None:
     shutil.copytree(SESSION, session)
     rebuild(session, load_session_rig(session), read_journal(session), session / "recording.rrd")
     contents = Contents(session / "recording.rrd")
-    assert len(contents.values("/bench/camera/image", "EncodedImage:blob")) == 7
-    assert "800" in contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
+    assert len(contents.values("/frame/image", "EncodedDepthImage:blob")) == 7
+    (trial,) = {entity.split("/")[2] for entity in contents.entities if entity.startswith("/trials/")}
+    assert "800" in contents.static(f"/trials/{trial}/tables", "TextDocument:text")[-1][0]
 
 
 def test_the_fit_of_its_captures_is_its_calibration() -> None:

@@ -1,68 +1,137 @@
-"""The layout: every view looks at something that a session's recording has, in the rig's own measures."""
+"""The layout: a screen for each phase, every view with a part of the recording, in the rig's own measures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+import pytest
 import rerun.blueprint as rrb
 
 from tests.support.rigs import prior
 from tests.viewer.conftest import Recorded
-from tests.viewer.readback import Contents
-from tests.viewer.session import a_rig
+from tests.viewer.readback import Contents, front_tab, layout_views
+from tests.viewer.session import TRIAL, a_rig
+from workbench.figures.picture import SIZE_PX
 from workbench.model.rig import Rig
-from workbench.viewer.blueprint import PICTURE_VIEW, blueprint
+from workbench.viewer.blueprint import CROPS_VIEW, FRAME_VIEW, Phase, TrialTab, blueprint
+from workbench.viewer.crops import mosaic_size
+
+TRIALS = (
+    TrialTab("accuracy", (("errors", "Errors so far"),)),
+    TrialTab("round", (("one", "First"), ("two", "Second"))),
+)
+SCREENS = ["Captures", "Calibration: which standoff?", "Calibration: details"]
 
 
-def views(rig: Rig) -> dict[str, rrb.View]:
-    def below(container: rrb.Container) -> Iterator[rrb.View]:
-        for part in container.contents:
-            if isinstance(part, rrb.Container):
-                yield from below(part)
-            elif isinstance(part, rrb.View):
-                yield part
-
-    return {str(view.name): view for view in below(blueprint(rig).root_container)}
+def screens(rig: Rig, trials: tuple[TrialTab, ...] = (), phase: Phase = "capture") -> rrb.Tabs:
+    root = blueprint(rig, trials, phase).root_container
+    assert isinstance(root, rrb.Tabs)
+    return root
 
 
-def test_every_view_shows_what_a_session_has_recorded(recorded: Recorded) -> None:
-    entities = Contents(recorded.recording).entities
-    found = views(recorded.rig)
-    assert len(found) > 10
-    for name, view in found.items():
-        origin = f"/{view.origin}"
-        assert any(f"{entity}/".startswith(f"{origin}/") for entity in entities), name
+def views_below(container: rrb.Container) -> Iterator[rrb.View]:
+    for part in container.contents:
+        if isinstance(part, rrb.Container):
+            yield from views_below(part)
+        elif isinstance(part, rrb.View):
+            yield part
 
 
-def test_the_picture_has_the_size_of_the_camera_s() -> None:
+def by_screen(root: rrb.Tabs) -> dict[str, list[rrb.View]]:
+    return {
+        str(screen.name): list(views_below(screen))
+        for screen in root.contents
+        if isinstance(screen, rrb.Container)
+    }
+
+
+def bounds(view: rrb.View) -> tuple[float, float]:
+    """Width and height that a view shows, from 0."""
+    shown = view.properties["VisualBounds2D"]
+    assert isinstance(shown, rrb.VisualBounds2D)
+    assert shown.range is not None
+    (found,) = shown.range.as_arrow_array().to_pylist()
+    (left, right), (top, bottom) = found["x_range"], found["y_range"]
+    assert (left, top) == (0.0, 0.0)
+    return right, bottom
+
+
+def test_every_view_has_a_part_of_the_recording_of_a_session(recorded: Recorded) -> None:
+    contents = Contents(recorded.recording)
+    found = layout_views(recorded.recording)
+    assert len(found) > 20
+    for view in found:
+        assert contents.below(view.origin), view.name
+
+
+def test_a_session_opens_with_the_screen_of_its_last_phase(recorded: Recorded) -> None:
+    assert front_tab(recorded.recording) == TRIAL
+
+
+@pytest.mark.parametrize(
+    ("phase", "front"), [("capture", "Captures"), ("fit", "Calibration: which standoff?"), ("trial", "round")]
+)
+def test_the_screen_in_front_is_that_of_the_phase(phase: Phase, front: str) -> None:
+    root = screens(a_rig(), TRIALS, phase)
+    assert isinstance(root.active_tab, int)
+    screen = root.contents[root.active_tab]
+    assert isinstance(screen, rrb.Container)
+    assert screen.name == front
+
+
+def test_there_is_a_screen_for_each_trial_between_the_fit_and_the_bench() -> None:
+    assert list(by_screen(screens(a_rig()))) == [*SCREENS, "3D"]
+    assert list(by_screen(screens(a_rig(), TRIALS))) == [*SCREENS, "accuracy", "round", "3D"]
+
+
+def test_frame_spots_and_text_of_the_cursor_are_on_every_screen_with_charts_over_standoffs() -> None:
+    found = by_screen(screens(a_rig(), TRIALS))
+    for name in ("Captures", "Calibration: which standoff?", "accuracy", "round"):
+        assert {view.origin for view in found[name]} >= {"frame", "crops", "now"}
+
+
+def test_every_chart_of_a_trial_has_a_view_named_by_its_title() -> None:
+    origins = {view.name: view.origin for view in by_screen(screens(a_rig(), TRIALS))["round"]}
+    assert origins["First"] == "trials/round/pictures/one"
+    assert origins["Second"] == "trials/round/pictures/two"
+
+
+def test_views_of_pictures_show_all_of_them() -> None:
     rig = a_rig()
     camera = rig.camera.model_copy(update={"width_px": 1024, "height_px": 768})
-    picture = views(rig.model_copy(update={"camera": camera}))[PICTURE_VIEW]
-    bounds = picture.properties["VisualBounds2D"]
-    assert isinstance(bounds, rrb.VisualBounds2D)
-    assert bounds.range is not None
-    (seen,) = bounds.range.as_arrow_array().to_pylist()
-    assert seen == {"x_range": [0.0, 1024.0], "y_range": [0.0, 768.0]}
+    lasers = (*rig.lasers, rig.lasers[0].model_copy(update={"id": "L5"}))
+    found = by_screen(screens(rig.model_copy(update={"camera": camera, "lasers": lasers}), TRIALS))
+    for views in found.values():
+        for view in views:
+            if view.name == FRAME_VIEW:
+                assert bounds(view) == (1024.0, 768.0)
+            elif view.name == CROPS_VIEW:
+                assert bounds(view) == tuple(map(float, mosaic_size(5)))
+            elif "picture" in view.origin:
+                assert bounds(view) == tuple(map(float, SIZE_PX))
 
 
-def test_the_curve_of_spots_is_along_the_lasers_line() -> None:
+def test_curves_and_residuals_are_along_the_lasers_line() -> None:
     rig = a_rig()
     upright = tuple(
         laser.model_copy(update={"axis": "v", "x_mm": prior(0.0, 0.2), "y_mm": laser.x_mm})
         for laser in rig.lasers
     )
-    origins = [
-        {view.origin for view in views(one).values()}
+    level, vertical = (
+        {view.origin for view in views}
         for one in (rig, rig.model_copy(update={"lasers": upright}))
-    ]
-    assert "spots/u_px" in origins[0] - origins[1]
-    assert "spots/v_px" in origins[1] - origins[0]
+        for name, views in by_screen(screens(one)).items()
+        if name == SCREENS[1]
+    )
+    assert {"fit/picture/u", "fit/residuals_in_sd/u"} <= level - vertical
+    assert {"fit/picture/v", "fit/residuals_in_sd/v"} <= vertical - level
 
 
-def test_the_technician_s_tab_is_in_front() -> None:
-    tabs = blueprint(a_rig()).root_container
-    assert isinstance(tabs, rrb.Tabs)
-    assert tabs.active_tab == 0
-    front, *_ = tabs.contents
-    assert isinstance(front, rrb.Container)
-    assert front.name == "Live"
+def test_the_peaks_are_shown_up_to_full_scale() -> None:
+    rig = a_rig()
+    wide = rig.model_copy(update={"camera": rig.camera.model_copy(update={"bits": 12})})
+    (peaks,) = (view for view in by_screen(screens(wide))["Captures"] if view.origin == "spots/peak_dn")
+    axis = peaks.properties["ScalarAxis"]
+    assert isinstance(axis, rrb.ScalarAxis)
+    assert axis.range is not None
+    assert axis.range.as_arrow_array().to_pylist() == [[0.0, 4096.0]]

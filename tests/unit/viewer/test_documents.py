@@ -1,25 +1,75 @@
-"""Documents about a fit and a trial: what is listed, and what is left out where there is nothing."""
+"""Documents about a capture, a fit and a trial: what is listed, and what is left out."""
 
 from __future__ import annotations
 
 from tests.support.viewer_stream import a_reading
 from tests.viewer.session import a_fit
-from workbench.viewer.documents import fit_summary, without_range
+from workbench.model.event import CaptureTaken, Fault, FrameRef
+from workbench.viewer.documents import MOST_LINES, capture_line, fit_summary, without_range
+
+
+def items(markdown: str) -> list[str]:
+    """Items of the lists."""
+    return [line.removeprefix("- ") for line in markdown.splitlines() if line.startswith("- ")]
+
+
+def a_capture() -> CaptureTaken:
+    return CaptureTaken(
+        key="c",
+        purpose="calibration",
+        laser_id="L2",
+        placement_key="p",
+        standoff_mm=1250.0,
+        repeat=3,
+        on=FrameRef(path="x.png", sha256="0" * 64, time_ns=0),
+        exposure=1850.0,
+        exposure_unit="us",
+    )
 
 
 def test_the_verdict_comes_first_and_every_reason_and_warning_is_an_item() -> None:
     fit = a_fit().model_copy(update={"reasons": ("one", "two"), "warnings": ("three",)})
     lines = fit_summary(fit).splitlines()
     assert fit.verdict in lines[0]
-    assert [line for line in lines if line.startswith("- ")] == ["- one", "- two", "- three"]
+    assert f"{fit.rms_px:.3f} px" in lines[0]
+    assert f"{fit.observations}" in lines[0]
+    assert items(fit_summary(fit)) == ["one", "two", "three"]
 
 
-def test_without_reasons_there_is_no_list_of_them() -> None:
+def test_without_reasons_the_verdict_is_all() -> None:
     bare = a_fit().model_copy(update={"reasons": (), "warnings": ()})
-    blocks = fit_summary(bare).split("\n\n")
-    assert len(blocks) == 2
-    assert f"{bare.rms_px:.3f} px" in blocks[1]
-    assert f"{bare.observations}" in blocks[1]
+    assert len(fit_summary(bare).splitlines()) == 1
+
+
+def test_named_faults_come_before_reasons_and_are_not_repeated() -> None:
+    fault = Fault(name="placement_off", message="900 mm is off")
+    fit = a_fit().model_copy(update={"faults": (fault,), "reasons": ("rms", fault.message), "warnings": ()})
+    assert items(fit_summary(fit)) == ["900 mm is off", "rms"]
+
+
+def test_a_long_list_ends_with_the_number_of_the_others() -> None:
+    reasons = tuple(f"reason {n}" for n in range(MOST_LINES + 3))
+    fit = a_fit().model_copy(update={"reasons": reasons, "warnings": ()})
+    *shown, last = items(fit_summary(fit))
+    assert shown == list(reasons[:MOST_LINES])
+    assert "3" in last
+
+
+def test_the_line_of_a_capture_has_number_standoff_laser_and_exposure() -> None:
+    line, _, step = capture_line(17, a_capture(), "Capture").partition("\n\n")
+    for part in ("17", "1250 mm", "L2", "repeat 3", "1850 us"):
+        assert part in line
+    assert step == "Capture"
+
+
+def test_the_line_of_a_capture_of_all_lasers_names_those_left_off() -> None:
+    every = a_capture().model_copy(
+        update={"laser_id": "all", "left_off": ("L1", "L3"), "exposure": None, "exposure_unit": None}
+    )
+    line = capture_line(1, every, "")
+    for part in ("all lasers", "L1, L3"):
+        assert part in line
+    assert "exposure" not in line
 
 
 def test_readings_without_a_range_are_listed_with_standoff_and_cause() -> None:

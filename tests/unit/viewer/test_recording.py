@@ -10,7 +10,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from tests.viewer.conftest import Recorded
-from tests.viewer.readback import Contents
+from tests.viewer.readback import TIMELINES, Contents, LaidOut, layout_views
 from tests.viewer.session import (
     BAD,
     LASERS,
@@ -18,15 +18,20 @@ from tests.viewer.session import (
     REPEATS,
     SESSION,
     STANDOFFS,
+    TRIAL,
     TRIAL_STANDOFFS,
     a_fit,
 )
+from workbench.figures.picture import note, picture
+from workbench.model import chart
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
-from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
+from workbench.model.fit_charts import residual_chart
 from workbench.viewer.recording import RecordingConsumer, _OpenRecording, rebuild
+from workbench.viewer.scene import BEYOND, DRAWN_DEPTH_MM
 from workbench.viewer.table_text import table_text
 
+IMAGE, FRAME = "/frame/image", "EncodedDepthImage:blob"
 CAPTURES = len(LASERS) * len(STANDOFFS) * REPEATS + len(TRIAL_STANDOFFS) * READINGS
 
 
@@ -35,151 +40,207 @@ def contents(recorded: Recorded) -> Contents:
     return Contents(recorded.recording)
 
 
+@pytest.fixture(scope="module")
+def taken(recorded: Recorded) -> list[ev.CaptureTaken]:
+    return [record.event for record in recorded.records if isinstance(record.event, ev.CaptureTaken)]
+
+
 def test_names_the_session_and_brings_its_layout(recorded: Recorded) -> None:
     reader = RrdReader(str(recorded.recording))
     (recording,) = reader.recordings()
     assert (recording.application_id, recording.recording_id) == ("workbench", SESSION)
-    (layout,) = reader.blueprints()
-    assert layout.application_id == "workbench"
+    assert {layout.application_id for layout in reader.blueprints()} == {"workbench"}
 
 
-def test_holds_every_frame_with_lasers_on_byte_for_byte(recorded: Recorded, contents: Contents) -> None:
-    taken = [r.event for r in recorded.records if isinstance(r.event, ev.CaptureTaken)]
-    frames = contents.values("/bench/camera/image", "EncodedImage:blob")
+def test_holds_every_frame_with_lasers_on_byte_for_byte(
+    recorded: Recorded, contents: Contents, taken: list[ev.CaptureTaken]
+) -> None:
+    frames = contents.values(IMAGE, FRAME)
     assert [number for number, _ in frames] == list(range(1, CAPTURES + 1))
     assert [png for _, png in frames] == [(recorded.folder / one.on.path).read_bytes() for one in taken]
 
 
-def test_frames_and_spots_stand_at_the_exposure(recorded: Recorded, contents: Contents) -> None:
-    taken = [r.event for r in recorded.records if isinstance(r.event, ev.CaptureTaken)]
+def test_frames_and_spots_are_at_the_exposure(contents: Contents, taken: list[ev.CaptureTaken]) -> None:
     exposures = [np.datetime64(one.on.time_ns, "ns") for one in taken]
     for entity, component in (
-        ("/bench/camera/image", "EncodedImage:media_type"),
-        ("/bench/camera/spots", "Points2D:positions"),
+        (IMAGE, "EncodedDepthImage:media_type"),
+        ("/frame/spots", "Points2D:positions"),
+        ("/spots/record", "u_px"),
     ):
         times = dict(contents.values(entity, component, "time"))
         assert [np.datetime64(time) for time in times] == exposures
 
 
-@pytest.mark.parametrize("laser", LASERS)
 @pytest.mark.parametrize("quantity", ["u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "peak_dn"])
-def test_spots_are_logged_to_the_last_bit(
-    recorded: Recorded, contents: Contents, laser: str, quantity: str
-) -> None:
+def test_spots_are_logged_to_the_last_bit(recorded: Recorded, contents: Contents, quantity: str) -> None:
     found = [r.event for r in recorded.records if isinstance(r.event, ev.SpotsFound)]
     expected = [
-        (number, [getattr(spot, quantity)])
+        (number, [getattr(spot, quantity) for spot in event.spots])
         for number, event in enumerate(found, start=1)
-        for spot in event.spots
-        if spot.laser_id == laser
     ]
-    assert contents.values(f"/spots/{quantity}/{laser}", "Scalars:scalars") == expected
+    assert contents.values("/spots/record", quantity) == expected
 
 
-def test_spots_are_drawn_where_they_are_in_reruns_pixels(recorded: Recorded, contents: Contents) -> None:
-    found = [r.event for r in recorded.records if isinstance(r.event, ev.SpotsFound)]
-    drawn: dict[int, list[list[float]]] = {}
-    for number, positions in contents.values("/bench/camera/spots", "Points2D:positions"):
-        drawn.setdefault(number, positions)
-    for positions, event in zip(drawn.values(), found, strict=True):
-        expected = [(spot.u_px + 0.5, spot.v_px + 0.5) for spot in event.spots]
-        np.testing.assert_allclose(positions, expected, atol=1e-4)
-    labels = contents.values("/bench/camera/spots", "Points2D:labels")
-    assert labels[0][1] == ["L1"]
-    assert labels[-1][1] == list(LASERS)
-
-
-def test_target_moves_with_the_capture_that_it_is_placed_for(contents: Contents) -> None:
-    first = [1 + i * len(LASERS) * REPEATS for i in range(len(STANDOFFS))]
-    first += [33 + i * READINGS for i in range(len(TRIAL_STANDOFFS))]
-    expected = [(n, [s]) for n, s in zip(first, (*STANDOFFS, *TRIAL_STANDOFFS), strict=True)]
-    assert contents.values("/target/standoff_mm", "Scalars:scalars") == expected
-
-
-def test_parameters_carry_what_determined_them(contents: Contents) -> None:
-    for one in a_fit().parameters:
-        entity = "/fit/parameters/" + one.name
-        logged = {
-            name: contents.values(entity, component)[0][1]
-            for name, component in {
-                "value": "Measurements:values",
-                "variance": "Measurements:variances",
-                "prior_sd": "prior_sd",
-                "data_share": "data_share",
-                "by": "determined_by",
-            }.items()
-        }
-        assert logged == {
-            "value": [one.value],
-            "variance": [one.sd**2],
-            "prior_sd": [one.prior_sd],
-            "data_share": [one.data_share],
-            "by": [one.determined_by],
-        }
-
-
-def test_residuals_have_a_standoff_timeline_and_the_bad_one_is_named(contents: Contents) -> None:
-    for laser in LASERS:
-        expected = [(round(r.standoff_mm), [r.u_px]) for r in a_fit().residuals if r.laser_id == laser]
-        entity = f"/fit/residuals/u_px/{laser}"
-        assert contents.values(entity, "Scalars:scalars", "standoff_mm") == expected
-    ((_, labels),) = contents.values("/fit/chart/u/outliers", "Points2D:labels")
-    assert labels == [f"{BAD[0]} at {BAD[1]:g} mm: 4.8 sigma"]
-    assert "/fit/chart/v/outliers" not in contents.entities
-
-
-def test_the_fit_is_summed_up_in_words(contents: Contents) -> None:
-    texts = [text for _, (text,) in contents.values("/fit/summary", "TextDocument:text")]
-    assert texts[0] == "No fit yet"
-    assert texts[-1].startswith("**Calibration accepted**")
-    assert "f_px is determined by the prior" in texts[-1]
-    table = contents.values("/fit/parameter_table", "TextDocument:text")[-1][1][0]
-    assert table == table_text(parameter_table(a_fit().parameters))
-    checks = contents.values("/fit/checks", "TextDocument:text")[-1][1][0]
-    fit = a_fit()
-    for part in (cross_validation_table(fit.left_out), term_table(fit.terms)):
-        assert table_text(part) in checks
-
-
-@pytest.mark.parametrize(
-    ("entity", "standoffs", "unit"), [("fit/chart/u", STANDOFFS, "px"), ("trial/chart", TRIAL_STANDOFFS, "%")]
-)
-def test_a_chart_labels_every_standoff_and_says_its_units(
-    contents: Contents, entity: str, standoffs: tuple[float, ...], unit: str
+@pytest.mark.parametrize("laser", LASERS)
+def test_curves_have_the_spots_of_captures_and_of_readings(
+    recorded: Recorded, contents: Contents, laser: str
 ) -> None:
-    labels = contents.values(f"/{entity}/ticks", "Points2D:labels")[-1][1]
-    assert {f"{standoff:g}" for standoff in standoffs} <= set(labels)
-    assert sum(label.endswith(f" {unit}") for label in labels) >= 4
-    (title,) = [label for label in labels if "against" in label]
-    assert f"[{unit}] against standoff [mm]" in title
+    """Spots of a capture of all lasers get their lasers by the reading."""
+    numbered = enumerate((r.event for r in recorded.records if isinstance(r.event, ev.SpotsFound)), start=1)
+    expected = []
+    for number, event in numbered:
+        mine = event.spots[list(LASERS).index(laser)] if len(event.spots) > 1 else event.spots[0]
+        if len(event.spots) > 1 or mine.laser_id == laser:
+            expected.append((number, [mine.peak_dn]))
+    assert contents.values(f"/spots/peak_dn/{laser}", "Scalars:scalars") == expected
+
+
+def test_spots_have_their_lasers_as_labels(contents: Contents) -> None:
+    labels = contents.values("/frame/spots", "Points2D:labels")
+    assert labels[0][1] == ["L1"]
+    assert [texts for number, texts in labels if number == CAPTURES] == [["?"] * 4, list(LASERS)]
+
+
+SPATIAL = (FRAME, "EncodedImage:blob", "Pinhole:image_from_camera")
+
+
+def has_content(contents: Contents, view: LaidOut, timeline: str, at: object) -> bool:
+    """Whether a view shows something with the cursor at a place of a timeline.
+
+    Documents, pictures and the bench show what is latest; curves, lanes and the log show all times.
+    """
+    entities = contents.below(view.origin)
+    if view.kind in {"TimeSeries", "StateTimeline", "TextLog"}:
+        component = {
+            "TimeSeries": ("Scalars:scalars", "Measurements:values"),
+            "StateTimeline": ("StateChange:state",),
+            "TextLog": ("TextLog:text",),
+        }[view.kind]
+        return any(contents.values(entity, one, timeline) for entity in entities for one in component)
+    components = ("TextDocument:text",) if view.kind == "TextDocument" else SPATIAL
+    return any(contents.shown(entity, one, timeline, at) for entity in entities for one in components)
+
+
+@pytest.mark.parametrize("timeline", TIMELINES)
+def test_every_view_has_content_on_every_timeline(
+    recorded: Recorded, contents: Contents, timeline: str
+) -> None:
+    """At every place of a counting timeline, and at every exposure by the wall clock."""
+    positions = contents.positions(timeline)
+    if timeline == "time":
+        positions = [at for at, _ in contents.values(IMAGE, FRAME, "time")] + positions[-1:]
+    assert len(positions) >= len(STANDOFFS) + len(TRIAL_STANDOFFS)
+    for view in layout_views(recorded.recording):
+        for at in positions:
+            assert has_content(contents, view, timeline, at), (view.name, at)
+
+
+FIT_TEXTS = ("/fit/verdict", "/fit/worst", "/fit/checks", "/fit/parameter_table")
+
+
+@pytest.mark.parametrize("timeline", TIMELINES)
+def test_nothing_of_a_fit_disappears_at_earlier_places(contents: Contents, timeline: str) -> None:
+    for at in contents.positions(timeline):
+        for entity in FIT_TEXTS:
+            assert "No fit yet" not in contents.shown(entity, "TextDocument:text", timeline, at)[0]
+        for axis in "uv":
+            shown = contents.shown(f"/fit/picture/{axis}/image", "EncodedImage:blob", timeline, at)
+            assert shown != note("no fit yet")
+
+
+FIRST = {standoff: 1 + visit * len(LASERS) * REPEATS for visit, standoff in enumerate(STANDOFFS)} | {
+    standoff: 1 + len(STANDOFFS) * len(LASERS) * REPEATS + visit * READINGS
+    for visit, standoff in enumerate(TRIAL_STANDOFFS)
+}
+"""First capture at each standoff."""
+LAST = {
+    standoff: first + (len(LASERS) * REPEATS if standoff in STANDOFFS else READINGS) - 1
+    for standoff, first in FIRST.items()
+}
+
+
+@pytest.mark.parametrize("standoff_mm", FIRST)
+def test_at_a_standoff_everything_is_of_the_last_capture_there(
+    recorded: Recorded, contents: Contents, taken: list[ev.CaptureTaken], standoff_mm: float
+) -> None:
+    """What comes between placements, as a fit, does not cover it."""
+    here = round(standoff_mm)
+    last = LAST[standoff_mm]
+    png = (recorded.folder / taken[last - 1].on.path).read_bytes()
+    assert contents.shown(IMAGE, FRAME, "standoff_mm", here) == png
+    (now,) = contents.shown("/now", "TextDocument:text", "standoff_mm", here)
+    assert f"{last}: {standoff_mm:g} mm" in now
+    (label,) = contents.shown("/bench/target/label", "Points3D:labels", "standoff_mm", here)
+    assert f"{standoff_mm:g} mm" in label
+    laser = "L4" if standoff_mm in STANDOFFS else "unassigned"
+    assert contents.shown(f"/bench/spots/{laser}", "Points3D:positions", "standoff_mm", here)
+    texts = contents.shown("/crops/labels", "Points2D:labels", "standoff_mm", here)
+    assert all("peak" in text for text in texts)
+    assert contents.shown("/frame/scanlines", "LineStrips2D:strips", "standoff_mm", here)
+
+
+@pytest.mark.parametrize("standoff_mm", STANDOFFS)
+def test_the_frame_in_the_residuals_is_at_the_standoff_of_the_cursor(
+    contents: Contents, standoff_mm: float
+) -> None:
+    colors = chart.laser_colors(list(LASERS))
+    column = picture(residual_chart(a_fit(), "u"), colors).x_px[standoff_mm]
+    for timeline, at in (
+        ("capture", FIRST[standoff_mm]),
+        ("capture", LAST[standoff_mm]),
+        ("standoff_mm", round(standoff_mm)),
+    ):
+        (strip,) = contents.shown("/fit/picture/u/cursor", "LineStrips2D:strips", timeline, at)
+        assert np.mean([min(strip)[0], max(strip)[0]]) == pytest.approx(column, abs=1e-3)
+
+
+def test_the_target_moves_with_the_capture_that_it_is_placed_for(contents: Contents) -> None:
+    labels = contents.values("/bench/target/label", "Points3D:labels")
+    placed = {number: text for number, (text,) in labels}
+    for standoff, first in FIRST.items():
+        assert f"{standoff:g} mm" in placed[first]
+
+
+def test_the_worst_placement_is_listed_with_its_captures(contents: Contents) -> None:
+    (text,) = contents.static("/fit/worst", "TextDocument:text")[-1]
+    row = text.partition("─\n")[2].splitlines()[0].split()
+    assert row[0] == f"{BAD[1]:g}"
+    assert row[-1] == f"{FIRST[BAD[1]]}-{LAST[BAD[1]]}"
 
 
 def test_readings_and_the_trial_table(recorded: Recorded, contents: Contents) -> None:
     readings = [r.event for r in recorded.records if isinstance(r.event, ev.ReadingTaken)]
-    errors = contents.values("/trial/errors/sensor", "Measurements:values")
+    errors = contents.values(f"/trials/{TRIAL}/errors/sensor", "Measurements:values")
     assert [value for _, (value,) in errors] == [(one.range_mm or 0.0) - one.standoff_mm for one in readings]
-    bands = contents.values("/trial/errors/L2", "Measurements:variances")
+    bands = contents.values(f"/trials/{TRIAL}/errors/L2", "Measurements:variances")
     assert [value for _, (value,) in bands] == [one.lasers[1].sigma_mm ** 2 for one in readings]
-    table = contents.values("/trial/summary", "TextDocument:text")[-1][1][0]
+    (table,) = contents.static(f"/trials/{TRIAL}/tables", "TextDocument:text")[-1]
     (finished,) = [r.event for r in recorded.records if isinstance(r.event, ev.TrialFinished)]
-    assert table.startswith("Trial accuracy-flat")
     assert all(table_text(one) in table for one in finished.tables)
+    drawn = contents.static(f"/trials/{TRIAL}/pictures/{TRIAL}-errors/image", "EncodedImage:blob")
+    assert len(drawn) == 1
 
 
 def test_lanes_and_log_follow_the_steps(contents: Contents) -> None:
     steps = contents.values("/steps/lanes/step", "StateChange:state", "step")
     assert [number for number, _ in steps] == [*range(1, 10), 9]
     assert [state for _, (state,) in steps][:2] == ["Capture at 200 mm", "Capture at 500 mm"]
+    lasers = contents.values("/steps/lanes/laser", "StateChange:state")
+    on = [state for number, (state,) in lasers if number == FIRST[500.0]]
+    assert on == ["L1"]
     log = [text for _, (text,) in contents.values("/steps/log", "TextLog:text", "time")]
     assert log[0].startswith(f"Session {SESSION} on made-up")
     assert log[-1] == "Session ended (0): done"
 
 
-def test_rays_are_drawn_from_the_priors_and_again_from_the_fit(contents: Contents) -> None:
-    before, after = contents.values("/bench/rays/L1", "LineStrips3D:strips")
-    assert before[1][0][0] == [-60.0, 0.0, 0.0]
-    np.testing.assert_allclose(after[1][0][0], [-59.95, 0.0, 0.0], atol=1e-4)
-    np.testing.assert_allclose(after[1][0][1], [-59.95 + 0.0011 * 5000, 0.0, 5000.0], atol=1e-2)
+def test_rays_are_of_the_priors_before_the_fit_and_of_the_fit_afterwards(contents: Contents) -> None:
+    entity, component = "/bench/rays/L1", "LineStrips3D:strips"
+    ((before, _),) = contents.shown(entity, component, "capture", LAST[STANDOFFS[-1]])
+    ((after, end),) = contents.shown(entity, component, "capture", CAPTURES)
+    assert before == [-60.0, 0.0, 0.0]
+    np.testing.assert_allclose(after, [-59.95, 0.0, 0.0], atol=1e-4)
+    far_mm = BEYOND * TRIAL_STANDOFFS[-1]
+    np.testing.assert_allclose(end, [-59.95 + 0.0011 * far_mm, 0.0, BEYOND * DRAWN_DEPTH_MM], atol=1e-2)
 
 
 def test_rebuilt_recording_has_the_same_data(recorded: Recorded, tmp_path: Path) -> None:

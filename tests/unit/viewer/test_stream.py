@@ -9,6 +9,9 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from tests.support.viewer_stream import START_NS, logged
+from tests.viewer.readback import front_tab, layout_views
+from tests.viewer.session import a_rig
+from workbench.viewer.blueprint import TrialTab, blueprint
 from workbench.viewer.stream import Moment, Stream
 
 SCALARS = "Scalars:scalars"
@@ -56,3 +59,20 @@ def test_the_recording_is_named_after_the_session_and_has_its_properties(tmp_pat
     (recording,) = RrdReader(str(tmp_path / "part.rrd")).recordings()
     assert (recording.application_id, recording.recording_id) == ("workbench", "part")
     assert contents.everything()["/__properties/session"] == ["[('captures', [3]), ('id', ['x'])]"]
+
+
+def test_a_static_text_is_shown_at_every_time_and_the_last_one_wins(tmp_path: Path) -> None:
+    def log(stream: Stream) -> None:
+        stream.log_static_text("a", "first")
+        stream.log_static_text("a", "*second*", rr.MediaType.MARKDOWN)
+
+    contents = logged(tmp_path, log)
+    assert contents.static("/a", "TextDocument:text") == [["first"], ["*second*"]]
+    assert contents.static("/a", "TextDocument:media_type") == [["text/plain"], ["text/markdown"]]
+
+
+def test_the_last_layout_is_the_one_that_the_file_opens_with(tmp_path: Path) -> None:
+    trial = TrialTab("t", (("errors", "Errors so far"),))
+    logged(tmp_path, lambda stream: stream.lay_out(blueprint(a_rig(), [trial], "trial")))
+    assert front_tab(tmp_path / "part.rrd") == "t"
+    assert "Errors so far" in {view.name for view in layout_views(tmp_path / "part.rrd")}
