@@ -16,7 +16,7 @@ help:
 	@echo "make test   lint, type check and test everything; PYTHON=python3.13 with another interpreter"
 	@echo "make quick  lint, type check and the fast unit tests (a minute and a half)"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
-	@echo "make prove  stated uncertainties compared with 12 000 simulated calibrations (a few minutes)"
+	@echo "make prove  stated uncertainties compared with simulated calibrations, shapes and trials (an hour)"
 	@echo "make mutants  200 wrong versions of the core; the tests must find nine of ten (hours)"
 	@echo "make crash  a session of 10 000 captures with random faults; none may be lost (a quarter of an hour)"
 	@echo "make wheel  build the wheel, install it with the run-time dependencies only, run a session (two minutes)"
@@ -42,6 +42,7 @@ demo: $(RUNNABLE)
 
 prove: $(INSTALLED)
 	$(BIN)/python -m tests.proofs
+	$(BIN)/python -m tests.proofs.situations
 
 mutants: $(INSTALLED)
 	$(BIN)/python -m tests.mutants

@@ -174,7 +174,7 @@ def run(situation: Situation, calibrations: int, first_seed: int = 0) -> Row:
             named += 1
             continue
         accepted += assessment.verdict == "accepted"
-        best.append(_best_power(fitted, world, situation.misstated))
+        best.append(best_power(fitted, world, situation.misstated))
         inside.append(_inside(world, CalibratedSensor(calibration)))
         if situation.named(fitted, assessment):
             named += 1
@@ -210,7 +210,7 @@ def _inside(world: World, sensor: CalibratedSensor) -> FloatArray:
     return found
 
 
-def _best_power(fitted: CalibrationFit, world: World, names: Sequence[str]) -> float:
+def best_power(fitted: CalibrationFit, world: World, names: Sequence[str]) -> float:
     """Power of the most powerful test for the parameters' true values against the rig file's; 1 without any.
 
     A constant parameter is made free by a prior of its true offset: C is then its posterior variance in these
