@@ -13,6 +13,8 @@ from workbench.figures.plot_style import own_style
 from workbench.model.chart import Chart
 
 SIZE_PX = (1100, 400)
+SMALL_PX = (700, 400)
+"""For a narrow panel."""
 DPI = 100.0
 
 

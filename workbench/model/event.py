@@ -261,6 +261,12 @@ class StandoffAdvised(FileModel):
     worst_residual_sd: float | None = None
     worst_laser_id: str = ""
     worst_standoff_mm: float | None = None
+    ranges_mm: tuple[float, ...] = ()
+    """Ranges whose uncertainty is shown; empty in sessions of versions that did not record it."""
+    range_sd: tuple[float, ...] = ()
+    """Relative standard deviation of a single range at each of them, the largest of any laser."""
+    parameter_sd: dict[str, float] = Field(default_factory=dict)
+    """Standard deviation of each free parameter of the sensor, relative to its prior's."""
 
     @property
     def text(self) -> str:

@@ -14,7 +14,7 @@ from typing import Literal
 import rerun as rr
 import rerun.blueprint as rrb
 
-from workbench.figures.picture import SIZE_PX
+from workbench.figures.picture import SIZE_PX, SMALL_PX
 from workbench.model.rig import Rig
 from workbench.viewer import entities as at
 from workbench.viewer.crops import mosaic_size
@@ -108,9 +108,14 @@ def _captures(rig: Rig) -> rrb.Container:
     curves = rrb.Horizontal(
         _series(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
         _series(f"{at.SPOTS}/{axis}", f"Spot position {axis[0]} [px]"),
-        _series(at.ADVICE, "Largest range uncertainty so far [%]"),
+        rrb.Tabs(
+            picture_view(at.UNCERTAINTY, "Range uncertainty", SMALL_PX),
+            picture_view(at.NARROWING, "Parameters", SMALL_PX),
+            _series(at.ADVICE, "Largest range uncertainty so far [%]"),
+            active_tab=0,
+        ),
         rrb.StateTimelineView(origin=at.LANES, name="Steps"),
-        column_shares=[3, 3, 3, 4],
+        column_shares=[3, 3, 5, 4],
     )
     return rrb.Vertical(_seen(rig, texts), curves, row_shares=[5, 4], name="Captures")
 
@@ -192,9 +197,9 @@ def crops_view(rig: Rig, prefix: str = "", name: str = CROPS_VIEW) -> rrb.View:
     return rrb.Spatial2DView(origin=f"{prefix}{at.CROPS}", name=name, visual_bounds=bounds, background=DARK)
 
 
-def picture_view(origin: str, name: str) -> rrb.View:
+def picture_view(origin: str, name: str, size_px: tuple[int, int] = SIZE_PX) -> rrb.View:
     """View of the picture of a chart."""
-    return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=_bounds(*SIZE_PX), background=DARK)
+    return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=_bounds(*size_px), background=DARK)
 
 
 def _series(

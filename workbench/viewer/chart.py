@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import rerun as rr
 
-from workbench.figures.picture import Picture, note, picture
+from workbench.figures.picture import SIZE_PX, Picture, note, picture
 from workbench.model.chart import Chart
 from workbench.viewer import entities as at
 from workbench.viewer.stream import Stream
@@ -20,7 +20,12 @@ _FRAME = rr.Radius.ui_points(1.0)
 
 
 def log_chart(
-    stream: Stream, entity: str, chart: Chart, colors: Mapping[str, at.Rgb], empty: str
+    stream: Stream,
+    entity: str,
+    chart: Chart,
+    colors: Mapping[str, at.Rgb],
+    empty: str,
+    size_px: tuple[int, int] = SIZE_PX,
 ) -> Picture | None:
     """Log the picture of a chart, or a note where it has no points; returns the picture of a chart.
 
@@ -30,18 +35,19 @@ def log_chart(
         chart: the chart.
         colors: colours by name of series.
         empty: note for a chart without points.
+        size_px: width and height of the picture.
     """
     if chart.is_empty:
-        log_note(stream, entity, empty)
+        log_note(stream, entity, empty, size_px)
         return None
-    drawn = picture(chart, {name: at.to_hex(color) for name, color in colors.items()})
+    drawn = picture(chart, {name: at.to_hex(color) for name, color in colors.items()}, size_px)
     _log(stream, entity, drawn.png)
     return drawn
 
 
-def log_note(stream: Stream, entity: str, text: str) -> None:
+def log_note(stream: Stream, entity: str, text: str, size_px: tuple[int, int] = SIZE_PX) -> None:
     """Log a text in place of a chart."""
-    _log(stream, entity, note(text))
+    _log(stream, entity, note(text, size_px))
 
 
 def log_cursor(stream: Stream, entity: str, drawn: Picture, x: float | None) -> None:

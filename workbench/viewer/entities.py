@@ -58,6 +58,8 @@ LANE_DARK = f"{LANES}/dark_frame"
 ADVICE = "advice"
 RANGE_SD = f"{ADVICE}/largest_range_sd"
 RANGE_SD_LIMIT = f"{ADVICE}/limit"
+UNCERTAINTY = "progress/uncertainty"
+NARROWING = "progress/narrowing"
 
 FIT_VERDICT = "fit/verdict"
 FIT_WORST = "fit/worst"

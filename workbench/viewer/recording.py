@@ -26,6 +26,7 @@ from workbench.model.spot import Failure, Spot
 from workbench.model.target import BoardTarget, FlatTarget, Placement
 from workbench.viewer import documents, fit, frame, scene, steps
 from workbench.viewer import entities as at
+from workbench.viewer.advice import AdviceView
 from workbench.viewer.blueprint import blueprint, comparison
 from workbench.viewer.captures import CaptureLog
 from workbench.viewer.crops import Crops
@@ -164,6 +165,7 @@ class _OpenRecording:
         self._colors = at.laser_colors(rig.laser_ids)
         self._geometry = Geometry.of_rig(rig)
         self._crops = Crops(stream, self._colors)
+        self._advice = AdviceView(stream)
         self._trials: list[TrialView] = []
         self._placement: Placement | None = None
         self._captures = CaptureLog()
@@ -207,7 +209,7 @@ class _OpenRecording:
         self.stream.describe("session", id=event.session, rig=event.rig, serial=rig.serial)
         self._show_sensor()
         frame.log_series_styles(self.stream, self._colors)
-        steps.log_styles(self.stream)
+        self._advice.start()
         fit.log_series_styles(self.stream, self._colors)
         fit.log_no_fit_yet(self.stream)
         self._crops.log_none()
@@ -302,7 +304,7 @@ class _OpenRecording:
     @_log.register
     def _(self, event: ev.StandoffAdvised, moment: Moment) -> None:
         steps.log_text(self.stream, f"After {event.placements} placements, {event.text}")
-        steps.log_advice(self.stream, event)
+        self._advice.take(event)
 
     @_log.register
     def _(self, event: ev.FitFinished, moment: Moment) -> None:

@@ -33,6 +33,8 @@ FEWEST = 2
 """Least number of placements for advice."""
 RANGES = 18
 """Number of ranges over the planned span."""
+SHOWN_MM = np.geomspace(100.0, 5000.0, 40)
+"""Ranges whose uncertainty is shown, planned or not."""
 SCALE_ROUNDS = 10
 SCALE_TOLERANCE = 1.001
 
@@ -53,6 +55,12 @@ class Advice:
     """The same in standard deviations of the scaled noise."""
     worst_laser_id: str
     worst_standoff_mm: float
+    ranges_mm: tuple[float, ...]
+    """Ranges within the image of some laser, of SHOWN_MM."""
+    range_sd: tuple[float, ...]
+    """Relative sd at each of them, the largest of any laser that sees it."""
+    parameter_sd: dict[str, float]
+    """Standard deviation of each free parameter of the sensor, relative to its prior's."""
 
 
 def advise(rig: Rig, observations: Sequence[Observation], planned_mm: Sequence[float]) -> Advice | None:
@@ -85,6 +93,7 @@ def advise(rig: Rig, observations: Sequence[Observation], planned_mm: Sequence[f
         next_standoff_mm=float(candidates.standoff_mm[best]),
         then_relative_range_sd=_worst(goals, then),
         **_worst_residual(rig, fitted),
+        **_uncertainty(now, noise, fitted.covariance),
     )
 
 
@@ -131,6 +140,22 @@ def _fit(rig: Rig, cells: MeanObservations, planned: int) -> _Fitted | None:
         residual_sd * found.scale * np.nan_to_num(whole.sd_px),
         whole,
     )
+
+
+def _uncertainty(now: Expectation, noise: NoiseSpec, covariance: FloatArray) -> dict[str, Any]:
+    """Uncertainty of ranges and parameters as fields of `Advice`, rounded to three digits as in `_worst`."""
+    goals = RangeGoals.of(now, SHOWN_MM, noise)
+    sd = np.sqrt(goals.total(goals.variance(covariance))).reshape(len(SHOWN_MM), -1).max(axis=1)
+    seen = sd > 0
+    names = [p.name for p in now.table.parameters]
+    relative = np.sqrt(np.diag(covariance[0])).tolist()
+    return {
+        "ranges_mm": tuple(float(f"{mm:.4g}") for mm in SHOWN_MM[seen]),
+        "range_sd": tuple(float(f"{one:.3g}") for one in sd[seen]),
+        "parameter_sd": {
+            names[i]: float(f"{one:.3g}") for i, one in zip(now.table.free.tolist(), relative, strict=True)
+        },
+    }
 
 
 def _worst_residual(rig: Rig, fitted: _Fitted) -> dict[str, Any]:
