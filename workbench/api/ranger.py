@@ -10,6 +10,8 @@ from workbench.model.arrays import Image
 from workbench.model.errors import BadInputError
 from workbench.ranging.ranger import Ranger as SpotRanger
 from workbench.ranging.ranger import Reading
+from workbench.ranging.shape import DEFAULT_PRIOR
+from workbench.ranging.shape_prior import ShapePrior
 from workbench.spots import SpotFinder
 
 
@@ -31,6 +33,8 @@ class Ranger:
     """
 
     calibration: Calibration
+    shape_prior: ShapePrior = DEFAULT_PRIOR
+    """Prior over the shapes in front of a line of lasers."""
 
     def __post_init__(self) -> None:
         if not self.calibration.file.laser_ranger.fit.usable:
@@ -56,7 +60,7 @@ class Ranger:
 
     @cached_property
     def _ranger(self) -> SpotRanger:
-        return SpotRanger(self.calibration.file)
+        return SpotRanger(self.calibration.file, shape_prior=self.shape_prior)
 
     @cached_property
     def _finder(self) -> SpotFinder:
