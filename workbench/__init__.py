@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from workbench.api import Reading as Reading
     from workbench.api import Rig as Rig
     from workbench.api import Session as Session
+    from workbench.api import ShapePrior as ShapePrior
     from workbench.api import Trial as Trial
     from workbench.api import WorkbenchError as WorkbenchError
     from workbench.api import compare as compare
@@ -36,6 +37,7 @@ __all__ = [
     "Reading",
     "Rig",
     "Session",
+    "ShapePrior",
     "Trial",
     "WorkbenchError",
     "compare",

@@ -1,14 +1,17 @@
-"""`python -m tests.proofs.shapes`: how often the ranger tells the right shape, and holds its closest point.
+"""`python -m tests.proofs.shapes`: shapes, angles and intervals of the ranger against simulated surfaces.
 
-Some seconds; the table goes to docs/benchmarks and from there to docs/ranging.md, where a test reads it.
+Minutes; the tables go to docs/benchmarks, and the first two to docs/ranging.md, where a test reads them.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 
+import numpy as np
+
+from tests.proofs.calibrated_surfaces import DrawnSensors
 from tests.proofs.tables import keep
 from tests.support.surfaces import (
     F_PX,
@@ -17,17 +20,28 @@ from tests.support.surfaces import (
     X,
     cubic,
     cylinder,
+    drawn,
     flat,
     holds,
     incline,
     parabola,
     readings,
+    seen,
     share,
 )
-from workbench.ranging.shape import Shape
+from workbench.ranging.points import interval_mm
+from workbench.ranging.polynomial import fit_polynomial
+from workbench.ranging.shape import DEFAULT_PRIOR, Shape, fit_shape
 
 READINGS, SEED = 1000, 2001
+DRAWN_SHAPES, DRAWN_SENSORS = 20_000, 50
 CLOSEST_MM = (150, 300, 600, 1000, 1500, 2000, 3000, 4500)
+FLAT = "flat"
+ANGLES_DEG = {FLAT: 0.0, **{f"incline {angle} deg": float(angle) for angle in (5, 15, 30, 60)}}
+LARGER_NOISE = 1.22
+"""Noise where the speckle of 0.04 px is 1.5 times larger, relative to the stated one."""
+Read = Callable[[Surface, int, int], list[Shape]]
+"""Readings of a surface, their number, and a seed."""
 
 
 def _is(*kinds: str) -> Callable[[Shape], bool]:
@@ -35,45 +49,145 @@ def _is(*kinds: str) -> Callable[[Shape], bool]:
 
 
 ROWS: dict[str, tuple[Callable[[float], Surface], Callable[[Shape], bool]]] = {
-    "flat": (flat, _is("flat")),
+    FLAT: (flat, _is("flat")),
     **{
-        f"incline {angle} deg": (partial(incline, angle_deg=angle), _is("incline"))
-        for angle in (5, 15, 30, 60)
+        name: (partial(incline, angle_deg=angle), _is("incline"))
+        for name, angle in ANGLES_DEG.items()
+        if name != FLAT
     },
     "parabola 0.02 x^2": (parabola, _is("round")),
     "cubic 0.0003 (x + 60)^3": (cubic, lambda shape: shape.degree == 3),
     "cylinder, radius 89, axis at 20: cylinder": (lambda r: cylinder(r, 20.0), _is("cylinder")),
     "the same: cylinder or round": (lambda r: cylinder(r, 20.0), _is("cylinder", "round")),
-    "cylinder on the axis: round": (cylinder, _is("round")),
+    "cylinder on the axis: round": (cylinder, _is("cylinder", "round")),
 }
 
 
-def table(closest_mm: Sequence[int] = CLOSEST_MM) -> Iterator[str]:
-    """The rows as Markdown: right shape / interval that holds, % of the readings."""
+def shape_table(read: Read, closest_mm: Sequence[int] = CLOSEST_MM, n: int = READINGS) -> Iterator[str]:
+    """Rows as Markdown: right shape / interval with the true closest range, % of n readings."""
+    yield from _head(closest_mm)
+    for name, (surface, is_right) in ROWS.items():
+        cells = [_shape_cell(read, surface, is_right, float(at), n) for at in closest_mm]
+        yield f"| {name} | " + " | ".join(cells) + " |"
+
+
+def _shape_cell(
+    read: Read, surface: Callable[[float], Surface], is_right: Callable[[Shape], bool], at: float, n: int
+) -> str:
+    shapes = read(surface(at), n, SEED + int(at))  # noise of its own in each column
+    right, held = share(shapes, is_right), share(shapes, lambda shape: holds(shape, at))
+    return f"{100 * right:.0f}/{100 * held:.0f}"
+
+
+def angle_table(read: Read, closest_mm: Sequence[int] = CLOSEST_MM, n: int = READINGS) -> Iterator[str]:
+    """Rows as Markdown: coverage of the 95 % interval of the angle, % / bias, deg."""
+    yield from _head(closest_mm)
+    for name, angle in ANGLES_DEG.items():
+        surface, _ = ROWS[name]
+        cells = [_angle_cell(read(surface(float(at)), n, SEED + at), angle) for at in closest_mm]
+        yield f"| {name} | " + " | ".join(cells) + " |"
+
+
+def _angle_cell(shapes: Sequence[Shape], angle_deg: float) -> str:
+    intervals = [np.degrees(s.angle_interval_rad) for s in shapes if s.angle_interval_rad is not None]
+    angles = [np.degrees(s.angle_rad) for s in shapes if s.angle_rad is not None]
+    held = np.mean([low <= angle_deg <= high for low, high in intervals])
+    return f"{100 * held:.0f}/{np.mean(angles) - angle_deg:+.1f}"
+
+
+def flat_table(closest_mm: Sequence[int] = CLOSEST_MM, n: int = READINGS) -> Iterator[str]:
+    """Rows as Markdown about flats: length of the interval, other shapes, and larger noise."""
+    yield from _head(closest_mm)
+    stated = {at: readings(flat(at), n, SEED + at) for at in closest_mm}
+    larger = {at: readings(flat(at), n, SEED + at, noise_scale=LARGER_NOISE) for at in closest_mm}
+    lengths = {at: _lengths(shapes, at) for at, shapes in stated.items()}
+    yield _row("interval / that of the flat fit, mean", [f"{of.mean():.2f}" for of in lengths.values()])
+    yield _row("the same, median", [f"{np.median(of):.2f}" for of in lengths.values()])
+    yield _row("another shape reported, %", [_others(shapes) for shapes in stated.values()])
+    yield _row("the same, speckle 1.5 times the stated, %", [_others(shapes) for shapes in larger.values()])
+    yield _row("largest error there, %", [_largest(shapes, at) for at, shapes in larger.items()])
+
+
+def _row(name: str, cells: Sequence[str]) -> str:
+    return f"| {name} | " + " | ".join(cells) + " |"
+
+
+def _lengths(shapes: Sequence[Shape], at: float) -> np.ndarray:
+    low, high = flat_interval(at)
+    return np.array([(s.closest_interval_mm[1] - s.closest_interval_mm[0]) / (high - low) for s in shapes])
+
+
+@cache
+def flat_interval(at: float) -> tuple[float, float]:
+    """95 % interval of a flat at `at`, if it is known to be one."""
+    fit = fit_polynomial(seen(X, flat(at)(X)), 0)
+    assert fit is not None
+    return interval_mm(at, fit.closest((float(X[0]), float(X[-1]))).sigma_mm)
+
+
+def _others(shapes: Sequence[Shape]) -> str:
+    return f"{100 * share(list(shapes), lambda s: s.kind != 'flat'):.1f}"
+
+
+def _largest(shapes: Sequence[Shape], at: float) -> str:
+    return f"{100 * max(abs(s.closest_mm / at - 1.0) for s in shapes):.1f}"
+
+
+def others_coverage(closest_mm: Sequence[int] = CLOSEST_MM, n: int = 10 * READINGS) -> tuple[float, int]:
+    """Coverage of the intervals of flats that are reported as another shape, and their number."""
+    held = [
+        holds(shape, at)
+        for at in closest_mm
+        for shape in readings(flat(at), n, SEED + at)
+        if shape.kind != "flat"
+    ]
+    return float(np.mean(held)), len(held)
+
+
+def drawn_coverage(n: int = DRAWN_SHAPES, seed: int = SEED) -> float:
+    """Coverage of the interval over shapes from the prior, their closest ranges log-uniform."""
+    rng = np.random.default_rng(seed)
+    at = np.exp(rng.uniform(np.log(CLOSEST_MM[0]), np.log(CLOSEST_MM[-1]), n))
+    return float(np.mean([_drawn_holds(mm, rng) for mm in at.tolist()]))
+
+
+def _drawn_holds(closest_mm: float, rng: np.random.Generator) -> bool:
+    surface = drawn(DEFAULT_PRIOR, closest_mm, rng)
+    noise = rng.normal(0.0, 1.0, len(X)) * SD_PX / (F_PX * np.abs(X))
+    return holds(fit_shape(seen(X, 1.0 / (1.0 / surface(X) + noise))), closest_mm)
+
+
+def _head(closest_mm: Sequence[int]) -> Iterator[str]:
     yield "| | " + " | ".join(str(at) for at in closest_mm) + " |"
     yield "|---" * (len(closest_mm) + 1) + "|"
-    for name, (surface, is_right) in ROWS.items():
-        yield f"| {name} | " + " | ".join(_cell(surface, is_right, float(at)) for at in closest_mm) + " |"
-
-
-def _cell(surface: Callable[[float], Surface], is_right: Callable[[Shape], bool], closest_mm: float) -> str:
-    shapes = readings(
-        surface(closest_mm), READINGS, SEED + int(closest_mm)
-    )  # noise of its own in each column
-    told, held = share(shapes, is_right), share(shapes, lambda shape: holds(shape, closest_mm))
-    return f"{100 * told:.0f}/{100 * held:.0f}"
 
 
 def main() -> int:
     """Run, print, write."""
+    sensors = DrawnSensors(DRAWN_SENSORS, SEED)
+    covered, others = others_coverage()
     lines = [
         f"seed {SEED} + mm, {READINGS} readings each",
-        f"Lasers at {', '.join(f'{x:g}' for x in X)} mm, f = {F_PX:g} px, spots of {SD_PX} px,",
-        "calibration exact.",
-        "How often the right shape is told / the 95 % interval of the closest range holds it, %;",
+        f"Lasers at {', '.join(f'{x:g}' for x in X)} mm, f = {F_PX:g} px, spots of {SD_PX} px;",
         "columns: distance of the closest point, mm.",
         "",
-        *table(),
+        "Calibration exact: right shape / 95 % interval with the closest range, %",
+        *shape_table(readings),
+        "",
+        f"Calibration with the stated errors, {DRAWN_SENSORS} sensors: the same",
+        *shape_table(sensors.readings),
+        "",
+        "Angle, calibration exact: 95 % interval with the angle, % / mean error, deg",
+        *angle_table(readings),
+        "",
+        "Angle, calibration with the stated errors: the same",
+        *angle_table(sensors.readings),
+        "",
+        "Flats, calibration exact",
+        *flat_table(),
+        "",
+        f"flats reported as another shape: {others}, of these {100 * covered:.0f} % in the interval",
+        f"shapes drawn from the prior ({DRAWN_SHAPES}): {100 * drawn_coverage():.1f} % in the interval",
     ]
     keep("shapes", "Shapes", lines)
     return 0

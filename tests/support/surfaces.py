@@ -9,6 +9,7 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 from workbench.ranging.points import Points
 from workbench.ranging.shape import Shape, fit_shape
+from workbench.ranging.shape_prior import ShapePrior, prior_components
 
 Surface = Callable[[FloatArray], FloatArray]
 X = np.array([-60.0, -30.0, 30.0, 60.0])
@@ -42,11 +43,36 @@ def seen(x: FloatArray, range_mm: FloatArray, sd_px: float = SD_PX) -> Points:
     return Points(x, range_mm, np.diag((sd_px * range_mm**2 / (F_PX * np.abs(x))) ** 2))
 
 
-def readings(surface: Surface, n: int, seed: int, x: FloatArray = X, sd_px: float = SD_PX) -> list[Shape]:
-    """n noisy readings: Gaussian in pixels, that is in the inverse of the range."""
+def readings(
+    surface: Surface, n: int, seed: int, x: FloatArray = X, sd_px: float = SD_PX, noise_scale: float = 1.0
+) -> list[Shape]:
+    """n noisy readings: Gaussian in pixels, that is in the inverse of the range.
+
+    The noise is `noise_scale` times the stated one.
+    """
     rng = np.random.default_rng(seed)
-    noise = rng.normal(0.0, 1.0, (n, len(x))) * sd_px / (F_PX * np.abs(x))
+    noise = noise_scale * rng.normal(0.0, 1.0, (n, len(x))) * sd_px / (F_PX * np.abs(x))
     return [fit_shape(seen(x, 1.0 / (1.0 / surface(x) + e), sd_px)) for e in noise]
+
+
+def drawn(prior: ShapePrior, closest_mm: float, rng: np.random.Generator) -> Surface:
+    """A surface from the prior, `closest_mm` from the front of X; circles only where they reach past it."""
+    components = prior_components(prior, (float(X[0]), float(X[-1])))
+    i = rng.choice(len(components.degree), p=np.exp(components.log_mass))
+    amplitudes = rng.normal(components.mean_mm[i], components.sd_mm[i])[: components.degree[i]]
+    half, convex = components.half_mm, components.circle_mass[i] > 0
+    if convex and amplitudes[1] > 0 and rng.random() < prior.circle:
+        radius = 0.5 * half**2 / amplitudes[1]
+        axis = -0.5 * half * amplitudes[0] / amplitudes[1]
+        if np.abs(X - axis).max() < 0.99 * radius:
+            return _before(cylinder(0.0, axis, radius), closest_mm)
+    return _before(lambda x: np.polynomial.polynomial.polyval(x / half, [0.0, *amplitudes]), closest_mm)
+
+
+def _before(shape: Surface, closest_mm: float) -> Surface:
+    """The shape, moved so that its closest point over the front of X is at `closest_mm`."""
+    lowest = float(shape(np.linspace(X[0], X[-1], 4001)).min())
+    return lambda x: closest_mm - lowest + shape(x)
 
 
 def share(shapes: list[Shape], is_so: Callable[[Shape], bool]) -> float:

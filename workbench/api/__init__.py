@@ -10,6 +10,7 @@ from workbench.api.session import Session, Trial, open_session, sessions
 from workbench.model.errors import BadInputError, LimitFailedError, WorkbenchError
 from workbench.model.rig import Rig
 from workbench.ranging.ranger import Reading
+from workbench.ranging.shape_prior import ShapePrior
 
 __all__ = [
     "BadInputError",
@@ -21,6 +22,7 @@ __all__ = [
     "Reading",
     "Rig",
     "Session",
+    "ShapePrior",
     "Trial",
     "WorkbenchError",
     "compare",

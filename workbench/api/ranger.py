@@ -10,6 +10,8 @@ from workbench.model.arrays import Image
 from workbench.model.errors import BadInputError
 from workbench.ranging.ranger import Ranger as SpotRanger
 from workbench.ranging.ranger import Reading
+from workbench.ranging.shape import DEFAULT_PRIOR
+from workbench.ranging.shape_prior import ShapePrior
 from workbench.spots import SpotFinder
 
 
@@ -27,14 +29,18 @@ class Ranger:
 
     Args:
         calibration: a calibration, or the path of its file.
+        shape_prior: prior over the shapes in front of a line of lasers.
 
     Raises:
         BadInputError: the file is missing or wrong, or the calibration is refused and was not accepted with a
             reason.
     """
 
-    def __init__(self, calibration: Calibration | str | Path) -> None:
+    def __init__(
+        self, calibration: Calibration | str | Path, shape_prior: ShapePrior = DEFAULT_PRIOR
+    ) -> None:
         self.calibration = calibration_of("calibration", calibration)
+        self.shape_prior = shape_prior
         if not self.calibration.file.laser_ranger.fit.usable:
             reasons = "; ".join(self.calibration.reasons)
             raise BadInputError(f"calibration: expected an accepted one, got one refused: {reasons}")
@@ -58,7 +64,7 @@ class Ranger:
 
     @cached_property
     def _ranger(self) -> SpotRanger:
-        return SpotRanger(self.calibration.file)
+        return SpotRanger(self.calibration.file, shape_prior=self.shape_prior)
 
     @cached_property
     def _finder(self) -> SpotFinder:

@@ -54,6 +54,7 @@ def _shape(shape: Shape) -> dict[str, Any]:
     data: dict[str, Any] = {"kind": shape.kind}
     if shape.kind != "unknown":
         data["probability"] = shape.probability
+        data["probabilities"] = dict(shape.probabilities)
     if shape.degree is not None:
         data |= {"degree": shape.degree, "coefficients": list(shape.coefficients)}
     if shape.angle_rad is not None and shape.angle_sigma_rad is not None:
@@ -61,6 +62,8 @@ def _shape(shape: Shape) -> dict[str, Any]:
             "angle_deg": math.degrees(shape.angle_rad),
             "angle_sigma_deg": math.degrees(shape.angle_sigma_rad),
         }
+    if shape.angle_interval_rad is not None:
+        data["angle_interval_deg"] = [math.degrees(end) for end in shape.angle_interval_rad]
     if shape.cylinder is not None:
         data["cylinder"] = {
             "radius_mm": shape.cylinder.radius_mm,

@@ -35,6 +35,8 @@ class CylinderFit:
     """(3, n) derivatives by the positions: an error dx is equivalent to a range error -slope dx."""
     chi2: float
     freedom: int
+    log_density: float
+    """Log density of the ranges without `chi2` and powers of 2 pi."""
 
     @property
     def radius_sigma_mm(self) -> float:
@@ -67,12 +69,13 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
         found = circle(start, points.x_mm, points.range_mm, *points.covariances(), STEPS, GRAZING, LARGEST_MM)
     except np.linalg.LinAlgError:  # nearly a line: the three parameters are degenerate
         return None
-    (x, z, radius), covariance, by_range, chi2 = found
+    (x, z, radius), covariance, by_range, chi2, log_density = found
     if not (math.isfinite(chi2) and (np.diag(covariance) > 0).all()):
         return None
     by_place = by_range * ((points.x_mm - x) / (points.range_mm - z))
-    freedom = len(points) - 3
-    fit = CylinderFit(float(x), float(z), float(radius), covariance, by_range, by_place, chi2, freedom)
+    fit = CylinderFit(
+        float(x), float(z), float(radius), covariance, by_range, by_place, chi2, len(points) - 3, log_density
+    )
     return fit if 0 < fit.radius_sigma_mm < MOST_RELATIVE_SIGMA * radius else None
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import ImageAxis
 from workbench.ranging.points import Points
-from workbench.ranging.shape import Shape, fit_shape
+from workbench.ranging.shape import DEFAULT_PRIOR, Shape, fit_shape
+from workbench.ranging.shape_prior import ShapePrior
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 
 NAMES: dict[ImageAxis, str] = {"u": "horizontal", "v": "vertical"}
@@ -28,9 +29,10 @@ class LineShape:
     indices: tuple[int, ...]
     """Indices of the line's ranges among those of the reading."""
     closest_by_parameter: FloatArray
-    """(P,) derivatives of the closest range by the calibration's parameters, through ranges and places."""
+    """(P,) derivatives of the reported shape's closest range by the calibration's parameters, through ranges
+    and places."""
     closest_spot_sd_mm: FloatArray
-    """(n,) 1 sigma of the closest range by the noise of each spot."""
+    """(n,) 1 sigma of the reported shape's closest range by the noise of each spot."""
 
 
 def fit_line(
@@ -39,6 +41,7 @@ def fit_line(
     ids: Sequence[str],
     ranges: RangeEstimates,
     indices: Sequence[int],
+    prior: ShapePrior = DEFAULT_PRIOR,
 ) -> LineShape:
     """Fit the shape in front of one line.
 
@@ -52,6 +55,7 @@ def fit_line(
         ids: lasers of all ranges of the reading.
         ranges: all ranges of the reading.
         indices: indices of the line's ranges.
+        prior: prior over shapes.
     """
     own = ranges.only(np.asarray(indices, np.intp))
     place, by_parameter, tangent = sensor.places([ids[i] for i in indices], axis, own)
@@ -64,10 +68,17 @@ def fit_line(
         by_parameter @ c @ by_parameter.T + np.diag(tangent**2 * spot),
         own.by_parameter @ c @ by_parameter.T + np.diag(tangent * spot),
     )
-    shape = fit_shape(points, sensor.front_mm(axis))
+    shape = fit_shape(points, sensor.front_mm(axis), prior, len(sensor.lasers_on(axis)))
     by_parameter = shape.closest_by_range @ own.by_parameter + shape.closest_by_place @ by_parameter
     spot_sd = (shape.closest_by_range + shape.closest_by_place * tangent) * own.spot_sd_mm
     return LineShape(axis, shape, tuple(indices), by_parameter, spot_sd)
+
+
+def _shape_variance(line: LineShape, covariance: FloatArray) -> float:
+    """Variance of the closest range beyond that by spots and calibration, given the reported shape, mm2."""
+    by_calibration = line.closest_by_parameter @ covariance @ line.closest_by_parameter
+    by_spots = line.closest_spot_sd_mm @ line.closest_spot_sd_mm
+    return max(0.0, line.shape.closest_sigma_mm**2 - float(by_calibration + by_spots))
 
 
 def mean_of_lines(
@@ -77,7 +88,7 @@ def mean_of_lines(
 
     `information` weights by 1 / sigma^2, `pixels` by the pixels along each line, as the thesis does. The
     lines share the error of the calibration, which averaging does not reduce; `covariance` (P, P) is that of
-    its parameters.
+    its parameters. The rest of a line's sigma, by its shape, is its own.
     """
     by_information = [1.0 / line.shape.closest_sigma_mm**2 for line in lines]
     by_pixels = [float(size_px[0] if line.axis == "u" else size_px[1]) for line in lines]
@@ -85,6 +96,7 @@ def mean_of_lines(
     weight /= weight.sum()
     by_parameter = weight @ np.array([line.closest_by_parameter for line in lines])
     by_spot = [share * line.closest_spot_sd_mm for share, line in zip(weight, lines, strict=True)]
-    variance = by_parameter @ covariance @ by_parameter + sum(float(sd @ sd) for sd in by_spot)
+    by_shape = weight**2 @ [_shape_variance(line, covariance) for line in lines]
+    variance = by_parameter @ covariance @ by_parameter + sum(float(sd @ sd) for sd in by_spot) + by_shape
     mean = float(weight @ [line.shape.closest_mm for line in lines])
     return mean, float(np.sqrt(variance))

@@ -30,6 +30,10 @@ class PolynomialFit:
     scale_mm: float
     chi2: float
     freedom: int
+    depth_mm: FloatArray
+    """(n,) fitted depths."""
+    weight: FloatArray
+    """(n, n) inverse covariance of the inverse depths, errors of the positions included."""
 
     @property
     def degree(self) -> int:
@@ -75,14 +79,16 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
     scale = float(np.abs(points.x_mm).max()) or 1.0
     measured = points.x_mm, degree, scale, points.range_mm, points.offset_mm
     try:
-        coefficients, covariance, by_range, by_place, chi2 = polynomial(
+        coefficients, covariance, by_range, by_place, chi2, weight = polynomial(
             *measured, *points.covariances(), STEPS
         )
     except np.linalg.LinAlgError:  # ranges so different that all but a few weights vanish
         return None
     if not math.isfinite(chi2):
         return None
-    return PolynomialFit(coefficients, covariance, by_range, by_place, scale, chi2, len(points) - degree - 1)
+    freedom = len(points) - degree - 1
+    depth = _powers(points.x_mm / scale, degree) @ coefficients + points.offset_mm
+    return PolynomialFit(coefficients, covariance, by_range, by_place, scale, chi2, freedom, depth, weight)
 
 
 def _powers(t: FloatArray, degree: int) -> FloatArray:

@@ -17,6 +17,8 @@ from workbench.ranging.assignment import MOST_MISFIT_SD, LaserSpotPairs, assign,
 from workbench.ranging.lines import NAMES, LineShape, Weights, fit_line, mean_of_lines
 from workbench.ranging.records import flag_notes, flat_range, laser_ranges
 from workbench.ranging.search_band import band
+from workbench.ranging.shape import DEFAULT_PRIOR
+from workbench.ranging.shape_prior import ShapePrior
 from workbench.ranging.validity_checks import failed_checks, outside_validity
 from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
 from workbench.spots import Scanline, Spot
@@ -36,10 +38,10 @@ class Reading:
     scene: str
     status: Status
     closest_mm: float | None = None
-    """Smallest range over the front, by the shapes in front of the lines."""
+    """Smallest range over the front, of the line with the smaller one."""
     sigma_mm: float | None = None
     interval_mm: tuple[float, float] | None = None
-    """95 % interval, given the shape."""
+    """95 % interval over all shapes."""
     mean_mm: float | None = None
     """Mean of the closest ranges of all lines."""
     mean_sigma_mm: float | None = None
@@ -78,6 +80,8 @@ class Ranger:
     calibration: Calibration
     weights: Weights = "information"
     """Weights of the mean of two lines."""
+    shape_prior: ShapePrior = DEFAULT_PRIOR
+    """Prior over the shapes in front of a line."""
 
     @cached_property
     def sensor(self) -> CalibratedSensor:
@@ -307,7 +311,7 @@ class Ranger:
         for axis, lasers in self._axes.items():
             names = {self.sensor.ids[i] for i in lasers}
             if own := [n for n, i in enumerate(ids) if i in names]:
-                lines.append(fit_line(self.sensor, axis, ids, ranges, own))
+                lines.append(fit_line(self.sensor, axis, ids, ranges, own, self.shape_prior))
         return tuple(lines)
 
     def _scanline(self, laser_id: str, nearest_mm: float) -> Scanline:

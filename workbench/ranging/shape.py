@@ -1,35 +1,46 @@
-"""Selection of the shape in front of one line of lasers: the simplest that its ranges do not reject."""
+"""Shape in front of one line of lasers: the simplest that no other one clearly exceeds in probability."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from workbench.model.arrays import FloatArray
 from workbench.ranging.cylinder import CylinderFit, fit_cylinder
-from workbench.ranging.points import Closest, Points, interval_mm, probability
+from workbench.ranging.mixture import Candidate, ShapePosterior, shape_posterior
+from workbench.ranging.points import COVERAGE_FACTOR, Points, interval_mm, probability
 from workbench.ranging.polynomial import PolynomialFit, fit_polynomial
+from workbench.ranging.shape_prior import CUBIC, ShapePrior
 
 ShapeKind = Literal["flat", "incline", "round", "cylinder", "unknown"]
+KINDS: tuple[ShapeKind, ...] = ("flat", "incline", "round", "cylinder")
 SIGNIFICANCE = 0.01
-"""P value of the residuals below which a shape is rejected; 1 of 100 flat targets is."""
+"""P value of the residuals of every degree up to 3 below which higher degrees are tried."""
 CLEAR_ODDS = 10.0
-"""Likelihood ratio from which a cylinder is preferred to a parabola."""
+"""Ratio of probabilities from which a shape is reported instead of a simpler one."""
+EXCLUDING_ODDS = 300.0
+"""Ratio of probabilities from which the interval of another shape need not include that of a flat."""
+DEFAULT_PRIOR = ShapePrior()
 
 
 @dataclass(frozen=True)
 class ShapeTest:
-    """Test of one candidate shape."""
+    """Test of the residuals of one candidate shape."""
 
     name: str
     chi2: float
     freedom: int
     probability: float | None
     """P value of `chi2`; None without degrees of freedom."""
+
+    @property
+    def is_rejected(self) -> bool:
+        """Whether the residuals are less likely than `SIGNIFICANCE`."""
+        return self.probability is not None and self.probability < SIGNIFICANCE
 
 
 @dataclass(frozen=True)
@@ -38,124 +49,169 @@ class Shape:
 
     kind: ShapeKind
     closest_mm: float
-    """Smallest range over the front; of an unknown shape, the smallest measured range."""
+    """Median of the smallest range over the front, over all shapes; of an unknown one, the smallest range."""
     closest_sigma_mm: float
     closest_interval_mm: tuple[float, float]
-    """95 % interval, given the kind; the upper end may be infinite. Where parabola and circle are not
-    distinguished, it covers the intervals of both."""
+    """95 % interval over all shapes; the upper end may be infinite. Where another shape than a flat is
+    reported and does not exclude a flat, it includes the flat's interval."""
     closest_x_mm: float
-    """Position of the smallest range along the front."""
+    """Position of the smallest range along the front, by the reported shape."""
     closest_by_range: FloatArray
-    """(n,) derivatives of `closest_mm` by the ranges."""
+    """(n,) derivatives of the reported shape's smallest range by the ranges."""
     closest_by_place: FloatArray
-    """(n,) derivatives of `closest_mm` by the positions of the spots along the front."""
+    """(n,) derivatives of the reported shape's smallest range by the positions of the spots."""
+    probabilities: Mapping[ShapeKind, float] = field(default_factory=dict)
+    """Posterior probability of each kind; empty for a single spot."""
     degree: int | None = None
     """Degree of the polynomial; 0 for a flat, 1 for an incline."""
     coefficients: tuple[float, ...] = ()
     """range = sum of coefficients[k] x^k, x and range in mm."""
     angle_rad: float | None = None
-    """Angle of an incline; positive where the surface recedes towards greater x."""
+    """Angle of the incline through the spots, whatever the kind; positive where the surface recedes towards
+    greater x; None for a single spot."""
     angle_sigma_rad: float | None = None
+    angle_interval_rad: tuple[float, float] | None = None
+    """95 % interval of the angle, if the surface is plane."""
     cylinder: CylinderFit | None = None
     """Circle where one fits the points, also where a parabola fits as well."""
     probability: float | None = None
-    """P value of the residuals; None without degrees of freedom."""
+    """P value of the reported shape's residuals; None without degrees of freedom."""
     tried: tuple[ShapeTest, ...] = ()
-    """Tests in the order made; the last is that of the selected shape, or of its rival with as many
-    parameters."""
+    """Tests of the polynomials by degree, and of the circle."""
 
 
-def fit_shape(points: Points, front_mm: tuple[float, float] | None = None) -> Shape:
+class _Angle(NamedTuple):
+    angle_rad: float | None = None
+    sigma_rad: float | None = None
+    interval_rad: tuple[float, float] | None = None
+
+
+def fit_shape(
+    points: Points,
+    front_mm: tuple[float, float] | None = None,
+    prior: ShapePrior = DEFAULT_PRIOR,
+    lasers: int | None = None,
+) -> Shape:
     """Shape of n spots, n at least 1.
 
-    Candidates are flat, incline, and polynomials of degree 2 (or a circle, which has as many parameters) to
-    n - 1; the first that is not rejected is selected. A polynomial of degree n - 1 passes through every point
-    and cannot be rejected. The shape is unknown for a single point, and where it reaches back to the sensor.
+    Candidates are flat, incline, parabola, circle, cubic, and polynomials to degree n - 1 where these are
+    rejected. The reported shape is the simplest with at least 1 / `CLEAR_ODDS` of the largest probability.
+    The closest range and its interval are those of the mixture of all shapes. The shape is unknown for a
+    single spot, and where the reported one reaches back to the sensor.
 
     Args:
         points: the spots of one line.
         front_mm: ends of the front, over which the closest range is sought; the outermost spots if None.
+        prior: prior over shapes and sizes.
+        lasers: number of lasers of the line, with or without a spot; None: as many as spots. Shapes that so
+            many spots would not determine are left out.
     """
     front = front_mm or (float(points.x_mm.min()), float(points.x_mm.max()))
-    tried: list[ShapeTest] = []
-    shape = next(_not_rejected(points, front, tried), None) if len(points) > 1 else None
-    if shape is None or shape.closest_mm <= max(0.0, -points.offset_mm):
-        return _unknown(points, tuple(tried))
-    return replace(shape, tried=tuple(tried))
-
-
-def _not_rejected(points: Points, front: tuple[float, float], tried: list[ShapeTest]) -> Iterator[Shape]:
-    """Shapes that the data do not reject, simplest first; each test is appended to `tried`."""
-    for degree in range(len(points)):
-        fit = fit_polynomial(points, degree)
-        passes = fit is not None and _passes(f"degree {degree}", fit, tried)
-        circle = fit_cylinder(points) if degree == 2 else None
-        if circle is not None and not _passes("cylinder", circle, tried):
-            circle = None
-        if circle is not None and (fit is None or not passes or _is_clear(circle, fit)):
-            yield _of_cylinder(points, circle, front)
-        elif fit is not None and passes:
-            yield _of_polynomial(points, fit, circle, front)
-
-
-def _passes(name: str, fit: PolynomialFit | CylinderFit, tried: list[ShapeTest]) -> bool:
-    p = probability(fit.chi2, fit.freedom)
-    tried.append(ShapeTest(name, fit.chi2, fit.freedom, p))
-    return p is None or p >= SIGNIFICANCE
-
-
-def _is_clear(circle: CylinderFit, parabola: PolynomialFit) -> bool:
-    """Whether the likelihood ratio prefers the circle; both have three parameters, so that it is the odds."""
-    return parabola.chi2 - circle.chi2 > 2.0 * math.log(CLEAR_ODDS)
-
-
-def _of_polynomial(
-    points: Points, fit: PolynomialFit, circle: CylinderFit | None, front: tuple[float, float]
-) -> Shape:
-    kinds: dict[int, ShapeKind] = {0: "flat", 1: "incline"}
-    shape = _shape(kinds.get(fit.degree, "round"), fit.closest(front), points)
-    if circle is not None:
-        nearest, farthest = shape.closest_interval_mm
-        rival = _shape("cylinder", circle.closest(front), points).closest_interval_mm
-        shape = replace(shape, closest_interval_mm=(min(nearest, rival[0]), max(farthest, rival[1])))
-    shape = replace(
-        shape,
-        degree=fit.degree,
-        coefficients=fit.per_mm(),
-        cylinder=circle,
-        probability=probability(fit.chi2, fit.freedom),
-    )
-    if fit.degree != 1:
-        return shape
-    slope = fit.coefficients[1] / fit.scale_mm
-    slope_sigma = math.sqrt(fit.covariance[1, 1]) / fit.scale_mm
-    return replace(shape, angle_rad=math.atan(slope), angle_sigma_rad=slope_sigma / (1.0 + slope**2))
-
-
-def _of_cylinder(points: Points, circle: CylinderFit, front: tuple[float, float]) -> Shape:
-    shape = _shape("cylinder", circle.closest(front), points)
-    return replace(shape, cylinder=circle, probability=probability(circle.chi2, circle.freedom))
-
-
-def _unknown(points: Points, tried: tuple[ShapeTest, ...]) -> Shape:
-    nearest = int(np.argmin(points.range_mm))
-    closest = Closest(
-        float(points.range_mm[nearest]),
-        math.sqrt(points.covariance_mm2[nearest, nearest]),
-        float(points.x_mm[nearest]),
-        np.eye(len(points))[nearest],
-        np.zeros(len(points)),
-    )
-    return replace(_shape("unknown", closest, points), tried=tried)
-
-
-def _shape(kind: ShapeKind, closest: Closest, points: Points) -> Shape:
+    if not front[1] > front[0]:
+        return _unknown(points, None, _Angle(), ())
+    fits, circle, tried = _fits(points)
+    highest = max(len(fits) - 1, min(CUBIC, (lasers or len(points)) - 1))
+    posterior = shape_posterior(points, front, fits, circle, prior, highest) if highest else None
+    angle = _angle(fits[1] if len(fits) > 1 else None)
+    if posterior is None or len(points) == 1:
+        return _unknown(points, posterior, angle, tried)
+    kind, degree = _reported(posterior, fits)
+    fit = circle if kind == "cylinder" else fits[degree]
+    if fit is None or (closest := fit.closest(front)).range_mm <= max(0.0, -points.offset_mm):
+        return _unknown(points, posterior, angle, tried)
     return Shape(
         kind=kind,
-        closest_mm=closest.range_mm,
-        closest_sigma_mm=closest.sigma_mm,
-        closest_interval_mm=interval_mm(closest.range_mm, closest.sigma_mm, points.offset_mm),
+        closest_mm=posterior.closest_mm,
+        closest_sigma_mm=posterior.sigma_mm,
+        closest_interval_mm=_interval_mm(points, posterior, kind, fits[0]),
         closest_x_mm=closest.x_mm,
         closest_by_range=closest.by_range,
         closest_by_place=closest.by_place,
+        probabilities=_by_kind(posterior),
+        degree=None if isinstance(fit, CylinderFit) else degree,
+        coefficients=() if isinstance(fit, CylinderFit) else fit.per_mm(),
+        angle_rad=angle.angle_rad,
+        angle_sigma_rad=angle.sigma_rad,
+        angle_interval_rad=angle.interval_rad,
+        cylinder=circle,
+        probability=probability(fit.chi2, fit.freedom),
+        tried=tried,
+    )
+
+
+def _fits(points: Points) -> tuple[list[PolynomialFit | None], CylinderFit | None, tuple[ShapeTest, ...]]:
+    """Polynomials by degree, circle, and their tests; degrees above 3 where all others are rejected."""
+    degrees = min(len(points), CUBIC + 1)
+    fits = [fit_polynomial(points, degree) for degree in range(degrees)]
+    circle = fit_cylinder(points) if len(points) > 2 else None
+    if len(points) > degrees and all(test.is_rejected for test in _tests(fits, circle)):
+        fits += [fit_polynomial(points, degree) for degree in range(degrees, len(points))]
+    return fits, circle, tuple(_tests(fits, circle))
+
+
+def _tests(fits: Sequence[PolynomialFit | None], circle: CylinderFit | None) -> list[ShapeTest]:
+    found = [_test(f"degree {fit.degree}", fit) for fit in fits if fit is not None]
+    return found if circle is None else [*found, _test("cylinder", circle)]
+
+
+def _test(name: str, fit: PolynomialFit | CylinderFit) -> ShapeTest:
+    return ShapeTest(name, fit.chi2, fit.freedom, probability(fit.chi2, fit.freedom))
+
+
+def _reported(posterior: ShapePosterior, fits: Sequence[PolynomialFit | None]) -> Candidate:
+    """Simplest candidate that no other exceeds by `CLEAR_ODDS`, of those that the spots determine."""
+    known = {one: p for one, p in posterior.probabilities.items() if one[1] < len(fits)}
+    least = max(known.values()) / CLEAR_ODDS
+    return next(one for one, p in known.items() if p >= least)
+
+
+def _interval_mm(
+    points: Points, posterior: ShapePosterior, kind: ShapeKind, flat: PolynomialFit | None
+) -> tuple[float, float]:
+    """Interval over all shapes, with that of a flat where another shape is reported and may be wrong."""
+    low, high = posterior.interval_mm
+    odds = EXCLUDING_ODDS * posterior.probabilities["flat", 0]
+    if flat is None or kind == "flat" or odds < _by_kind(posterior)[kind]:
+        return low, high
+    at, sigma = float(flat.coefficients[0]), math.sqrt(flat.covariance[0, 0])
+    flat_low, flat_high = interval_mm(at, sigma, points.offset_mm)
+    return min(low, flat_low), max(high, flat_high)
+
+
+def _by_kind(posterior: ShapePosterior) -> dict[ShapeKind, float]:
+    found = posterior.probabilities.items()
+    return {kind: sum(p for (of, _), p in found if of == kind) for kind in KINDS}
+
+
+def _angle(incline: PolynomialFit | None) -> _Angle:
+    """Angle of an incline; its interval is that of the slope, which is Gaussian."""
+    if incline is None:
+        return _Angle()
+    _, slope = incline.per_mm()
+    sd = math.sqrt(incline.covariance[1, 1]) / incline.scale_mm
+    low, high = (math.atan(slope + side * COVERAGE_FACTOR * sd) for side in (-1.0, 1.0))
+    return _Angle(math.atan(slope), 0.5 * (math.atan(slope + sd) - math.atan(slope - sd)), (low, high))
+
+
+def _unknown(
+    points: Points, posterior: ShapePosterior | None, angle: _Angle, tried: tuple[ShapeTest, ...]
+) -> Shape:
+    """The smallest measured range; its interval includes that over all shapes, if there is one."""
+    nearest = int(np.argmin(points.range_mm))
+    at, sigma = float(points.range_mm[nearest]), math.sqrt(points.covariance_mm2[nearest, nearest])
+    low, high = interval_mm(at, sigma, points.offset_mm)
+    if posterior is not None:
+        low, high = min(low, posterior.interval_mm[0]), max(high, posterior.interval_mm[1])
+    return Shape(
+        kind="unknown",
+        closest_mm=at,
+        closest_sigma_mm=sigma,
+        closest_interval_mm=(low, high),
+        closest_x_mm=float(points.x_mm[nearest]),
+        closest_by_range=np.eye(len(points))[nearest],
+        closest_by_place=np.zeros(len(points)),
+        angle_rad=angle.angle_rad,
+        angle_sigma_rad=angle.sigma_rad,
+        angle_interval_rad=angle.interval_rad,
+        tried=tried,
     )

@@ -58,12 +58,13 @@ def polynomial(
     places: FloatArray,
     cross: FloatArray,
     steps: int,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float, FloatArray]:
     """Fit range = sum of coefficients[k] (x / scale)^k; see `fit_polynomial`.
 
     Returns:
         coefficients (p,), covariance (p, p), derivatives by the ranges (p, n) and by the positions (p, n),
-        chi2 (NaN where the polynomial passes behind the pinhole at a point).
+        chi2 (NaN where the polynomial passes behind the pinhole at a point), and (n, n) inverse covariance of
+        the inverse depths.
     """
     powers, slopes = np.ones((len(x_mm), degree + 1)), np.zeros((len(x_mm), degree + 1))
     for k in range(1, degree + 1):
@@ -86,7 +87,7 @@ def polynomial(
     residual = 1.0 / depth - measured
     chi2 = float(np.sum(residual * (weight @ residual))) if depth.min() > 0.0 else math.nan
     by_coefficient = gain * by_range
-    return coefficients, covariance, by_coefficient, -by_coefficient * (slopes @ coefficients), chi2
+    return coefficients, covariance, by_coefficient, -by_coefficient * (slopes @ coefficients), chi2, weight
 
 
 @compiled
@@ -100,19 +101,20 @@ def circle(
     steps: int,
     grazing: float,
     largest: float,
-) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
     """Fit the circle (axis x, axis range, radius) from `start` (3,); see `fit_cylinder`.
 
     Returns:
         the circle (3,), covariance (3, 3), derivatives by the ranges (3, n), chi2 (NaN where a point lies on
-        the far side or at grazing incidence, or the circle diverges).
+        the far side or at grazing incidence, or the circle diverges), log density of the ranges
+        without chi2 and powers of 2 pi.
     """
     n = len(x_mm)
     at = start.copy()
     by, residual = np.empty((n, 3)), np.empty(n)
     along, cosine = np.empty(n), np.empty(n)
     covariance, gain = np.zeros((3, 3)), np.zeros((3, n))
-    chi2 = math.nan
+    chi2, log_density = math.nan, math.nan
     for _ in range(steps):
         for i in range(n):
             across, ahead = x_mm[i] - at[0], range_mm[i] - at[1]
@@ -121,16 +123,17 @@ def circle(
             residual[i] = distance - at[2]
             by[i, 0], by[i, 1], by[i, 2] = -along[i], -cosine[i], -1.0
         if not cosine.max() < -grazing:
-            return at, covariance, gain, math.nan
+            return at, covariance, gain, math.nan, math.nan
         weight = _weight(cosine, along, ranges, places, cross)
         covariance, gain = _step(by, weight)
         chi2 = float(np.sum(residual * (weight @ residual)))
+        log_density = 0.5 * np.linalg.slogdet(weight)[1] + np.sum(np.log(-cosine))
         step = gain @ residual
         if np.all(np.abs(step) < 1e-6 * np.sqrt(np.diag(covariance))):
             break
         at = at - step
         if not np.abs(at).max() < largest:
-            return at, covariance, gain, math.nan
+            return at, covariance, gain, math.nan, math.nan
     for i in range(n):
         gain[:, i] *= -cosine[i]
-    return at, covariance, gain, chi2
+    return at, covariance, gain, chi2, log_density

@@ -47,7 +47,7 @@ def reading_line(r: Reading) -> str:
 
 def shape_words(shape: Shape) -> str:
     """Description of a shape in a few words, 1 sigma."""
-    if shape.angle_rad is not None and shape.angle_sigma_rad is not None:
+    if shape.kind == "incline" and shape.angle_rad is not None and shape.angle_sigma_rad is not None:
         return f"incline {with_sd(degrees(shape.angle_rad), degrees(shape.angle_sigma_rad))} deg"
     if shape.kind == "cylinder" and shape.cylinder is not None:
         return f"cylinder, radius {with_sd(shape.cylinder.radius_mm, shape.cylinder.radius_sigma_mm)}"

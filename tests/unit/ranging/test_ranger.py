@@ -22,11 +22,12 @@ def test_a_flat(ranger: Ranger) -> None:
     reading = ranger.read_lit("s", spots(ranger, dict.fromkeys(IDS, 800.0)))
     assert reading.status == "done"
     assert [laser.laser_id for laser in reading.lasers] == list(IDS)
-    assert reading.closest_mm == pytest.approx(800.0)
+    assert reading.closest_mm == pytest.approx(800.0, abs=0.1)
     assert reading.flat_mm == pytest.approx(800.0)
     assert reading.flat_sigma_mm is not None
     assert reading.sigma_mm is not None
-    assert reading.sigma_mm <= reading.flat_sigma_mm < min(laser.sigma_mm for laser in reading.lasers)
+    assert reading.flat_sigma_mm < min(laser.sigma_mm for laser in reading.lasers)
+    assert reading.flat_sigma_mm == pytest.approx(reading.sigma_mm, rel=0.1)
     (line,) = reading.lines
     assert (line.axis, line.shape.kind) == ("u", "flat")
     assert reading.mean_mm == reading.closest_mm
@@ -63,7 +64,9 @@ def test_lasers_fired_alone_with_one_missing(ranger: Ranger) -> None:
     pixels = positions(ranger, {"L1": 800.0, "L4": 805.0})
     reading = ranger.read_known("s", 3, ["L1", "L4"], pixels, np.full((2, 2), np.nan))
     assert reading.status == "not_enough_points"
-    assert reading.closest_mm == pytest.approx(800.0, abs=0.5)
+    assert reading.interval_mm is not None
+    assert reading.interval_mm[0] < 750.0, "a round surface between the two may be closer"
+    assert 800.0 < reading.interval_mm[1] < 810.0
     assert reading.lasers[0].range_mm == pytest.approx(800.0)
 
 

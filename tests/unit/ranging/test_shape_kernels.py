@@ -25,7 +25,7 @@ def covariances(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def fitted(
     x: FloatArray, ranges: FloatArray, degree: int, seed: int
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float, FloatArray]:
     return polynomial(x, degree, 60.0, ranges, OFFSET_MM, *covariances(seed), 12)
 
 
@@ -34,7 +34,7 @@ def fitted(
 def test_the_gradient_of_a_polynomial_s_misfit_vanishes(degree: int, seed: int) -> None:
     """With the weights of the whole covariance, through the slope where a place errs."""
     ranges = parabola(500.0)(X) + np.random.default_rng(seed).normal(0.0, 0.3, 5)
-    coefficients, covariance, _, _, chi2 = fitted(X, ranges, degree, seed)
+    coefficients, covariance, _, _, chi2, stated_weight = fitted(X, ranges, degree, seed)
     powers = np.vander(X / 60.0, degree + 1, increasing=True)
     depth, measured = powers @ coefficients + OFFSET_MM, ranges + OFFSET_MM
     slope = powers[:, :-1] @ (coefficients[1:] * np.arange(1, degree + 1)) / 60.0
@@ -48,12 +48,13 @@ def test_the_gradient_of_a_polynomial_s_misfit_vanishes(degree: int, seed: int) 
     assert np.abs(gradient * sd).max() < 1e-4
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), sd, rtol=1e-5)
     assert chi2 == pytest.approx(residual @ weight @ residual, rel=1e-4)
+    np.testing.assert_allclose(stated_weight, weight, rtol=1e-3)
 
 
 def test_derivatives_of_a_polynomial_are_those_of_differences() -> None:
     """Of exact points: where the residuals vanish the weights, which move as well, do not matter."""
     ranges, step = parabola(500.0)(X), 1e-3
-    _, _, by_range, by_place, chi2 = fitted(X, ranges, 2, 1)
+    _, _, by_range, by_place, chi2, _ = fitted(X, ranges, 2, 1)
     assert chi2 < 1e-12
     for n, change in enumerate(step * np.eye(5)):
         ahead, back = (fitted(X, ranges + sign * change, 2, 1)[0] for sign in (1, -1))
@@ -62,13 +63,13 @@ def test_derivatives_of_a_polynomial_are_those_of_differences() -> None:
         np.testing.assert_allclose(by_place[:, n], (ahead - back) / (2 * step), atol=1e-4)
 
 
-def circled(ranges: FloatArray, x: FloatArray = X) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+def circled(ranges: FloatArray, x: FloatArray = X) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
     start = np.array([3.0, 400.0, 90.0])
     return circle(start, x, ranges, *covariances(1), 30, 0.1, 1e5)
 
 
 def test_a_circle_through_exact_points_is_the_one_that_made_them() -> None:
-    found, covariance, by_range, chi2 = circled(cylinder(300.0, 12.0)(X))
+    found, covariance, by_range, chi2, _ = circled(cylinder(300.0, 12.0)(X))
     assert found == pytest.approx([12.0, 389.0, 89.0], abs=1e-6)
     assert chi2 == pytest.approx(0.0, abs=1e-9)
     assert (np.linalg.eigvalsh(covariance) > 0).all()

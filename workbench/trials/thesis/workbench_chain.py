@@ -73,7 +73,7 @@ def _outcome(reading: Reading) -> Outcome:
     if not reading.lines:
         return Outcome(None, "none")
     shape = reading.lines[0].shape
-    angle = None if shape.angle_rad is None else degrees(shape.angle_rad)
+    angle = degrees(shape.angle_rad) if shape.kind == "incline" and shape.angle_rad is not None else None
     return Outcome(shape.closest_mm, _name(shape), angle, shape.closest_sigma_mm)
 
 

@@ -1,0 +1,59 @@
+"""The prior over shapes as Gaussian components."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+
+from workbench.ranging.shape_prior import ShapePrior, prior_components
+
+FRONT_MM = (-60.0, 60.0)
+PRIOR = ShapePrior()
+
+
+def test_the_probabilities_of_four_lasers_sum_to_1() -> None:
+    assert np.exp(prior_components(PRIOR, FRONT_MM).log_mass).sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("highest", "degrees"), [(1, {0, 1}), (2, {0, 1, 2}), (3, {0, 1, 2, 3})])
+def test_components_of_higher_degrees_are_left_out(highest: int, degrees: set[int]) -> None:
+    components = prior_components(PRIOR, FRONT_MM, highest)
+    assert set(components.degree.tolist()) == degrees
+    assert components.mean_mm.shape == (len(components.degree), highest)
+
+
+def test_amplitudes_are_sizes_times_powers_of_half_the_front() -> None:
+    prior = replace(PRIOR, slope_sds=(0.5,), curvatures_per_mm=(0.01,), concave=0.0)
+    narrow, wide = (prior_components(prior, (-half, half)) for half in (10.0, 30.0))
+    for components, half in ((narrow, 10.0), (wide, 30.0)):
+        incline, parabola = (int(np.flatnonzero(components.degree == d)[0]) for d in (1, 2))
+        assert components.sd_mm[incline, 0] == pytest.approx(0.5 * half)
+        assert components.mean_mm[parabola, 1] == pytest.approx(0.01 * half**2)
+        # The apex lies at -half slope / (2 curvature).
+        sd = components.sd_mm[parabola, 0] / (2.0 * components.mean_mm[parabola, 1])
+        assert sd == pytest.approx(prior.apex_sd)
+
+
+def test_higher_degrees_have_the_size_of_the_cubic_one() -> None:
+    components = prior_components(PRIOR, FRONT_MM, 5)
+    highest = components.sd_mm[components.degree == 5]
+    np.testing.assert_allclose(highest[:, 3:], np.repeat(highest[:, 2:3], 2, axis=1))
+
+
+@pytest.mark.parametrize("middle_mm", [0.0, 25.0])
+def test_the_density_of_circles_has_their_probability_in_total(middle_mm: float) -> None:
+    """Over radii and positions of the axis; curvatures below 0 (2 in 1000) have no circle."""
+    components = prior_components(PRIOR, (middle_mm - 60.0, middle_mm + 60.0))
+
+    def density(axis_mm: float, log_radius: float) -> float:
+        radius = np.exp(log_radius)
+        return float(np.exp(components.circle_log_density(axis_mm, radius)) * radius)
+
+    total, _ = dblquad(
+        density, np.log(2.0), np.log(20_000.0), middle_mm - 300.0, middle_mm + 300.0, epsabs=1e-4
+    )
+    assert total == pytest.approx(components.circle_mass.sum(), rel=0.01)
+    assert total == pytest.approx(PRIOR.circle * (1.0 - PRIOR.concave) * PRIOR.round, rel=0.01)
