@@ -41,9 +41,11 @@ demo: $(RUNNABLE)
 
 prove: $(INSTALLED)
 	$(BIN)/python -m tests.proofs
+	$(BIN)/python -m tests.proofs.trials
 
 crash: $(INSTALLED)
 	$(BIN)/python -m tests.crash.long
+	$(BIN)/python -m tests.crash.trials
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .
