@@ -43,12 +43,15 @@ demo: $(RUNNABLE)
 prove: $(INSTALLED)
 	$(BIN)/python -m tests.proofs
 	$(BIN)/python -m tests.proofs.situations
+	$(BIN)/python -m tests.proofs.shapes
+	$(BIN)/python -m tests.proofs.trials
 
 mutants: $(INSTALLED)
 	$(BIN)/python -m tests.mutants
 
 crash: $(INSTALLED)
 	$(BIN)/python -m tests.crash.long
+	$(BIN)/python -m tests.crash.trials
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -9,17 +9,53 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 from unittest.mock import patch
 
 import numpy as np
 
-from tests.crash.short import begin, go_on
+from tests.crash.short import ROOT, begin, go_on
 from workbench.model import event as ev
 from workbench.session.journal import Journal
 from workbench.spots import find_spots
+
+
+@dataclass(frozen=True)
+class Killer:
+    """The process that runs sessions which kill themselves."""
+
+    files: Path
+    requests: IO[str]
+    replies: IO[str]
+
+    def run(self, session: Path, how: str, n: int) -> int:
+        """Run or resume a session that dies; the signal that it died of, 0 where it did not."""
+        request = {"files": str(self.files), "session": str(session), "how": how, "n": n}
+        self.requests.write(json.dumps(request) + "\n")
+        self.requests.flush()
+        return int(self.replies.readline())
+
+
+@contextmanager
+def serving(files: Path) -> Iterator[Killer]:
+    """The process for sessions of the files in a folder."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.crash.killer"],
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    with process:
+        yield Killer(files, process.stdin, process.stdout)
 
 
 def die() -> None:

@@ -47,8 +47,9 @@ def write_files(folder: Path, procedure: str = PROCEDURE) -> tuple[Path, Path]:
 
 
 def begin(files: Path, session: Path, consumers: Sequence[ev.Consumer] = ()) -> None:
-    """Run it in a new session."""
-    plan = Plan.load(files / "rig.yaml", [files / "p.yaml"])
+    """Run it in a new session, with the calibration in the folder if there is one."""
+    calibration = files / "c.yaml"
+    plan = Plan.load(files / "rig.yaml", [files / "p.yaml"], calibration if calibration.exists() else None)
     run(plan, session, consumers, CALLER, lambda: None)
 
 

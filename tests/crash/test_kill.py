@@ -2,40 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import signal
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 import pytest
 
-from tests.crash.short import GROUP, ROOT, begin, go_on, results, story, write_files
+from tests.crash.killer import Killer, serving
+from tests.crash.short import GROUP, begin, go_on, results, story, write_files
 from workbench.model import event as ev
 from workbench.session.journal import read_journal
 
 RECORDS = 46
 """Of the short procedure; a test holds this number to it."""
-
-
-@dataclass(frozen=True)
-class Killer:
-    """The process that runs sessions which kill themselves."""
-
-    files: Path
-    requests: IO[str]
-    replies: IO[str]
-
-    def run(self, session: Path, how: str, n: int) -> int:
-        """Run or resume a session that dies; the signal that it died of, 0 where it did not."""
-        request = {"files": str(self.files), "session": str(session), "how": how, "n": n}
-        self.requests.write(json.dumps(request) + "\n")
-        self.requests.flush()
-        return int(self.replies.readline())
 
 
 @pytest.fixture(scope="module")
@@ -49,17 +29,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def killer(whole: Path) -> Iterator[Killer]:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tests.crash.killer"],
-        cwd=ROOT,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stdin is not None
-    assert process.stdout is not None
-    with process:
-        yield Killer(whole.parent, process.stdin, process.stdout)
+    with serving(whole.parent) as found:
+        yield found
 
 
 def captures(session: Path) -> Counter[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, radians, tan
 
@@ -56,9 +56,17 @@ class SimulatedBench:
         return replace(self, unknown_placement_sd_mm=placement_sd_mm, unknown_noise_px=noise_px)
 
     def readings(
-        self, name: str, placement: Placement, count: int, closest: ClosestRange | None = None
+        self,
+        name: str,
+        placement: Placement,
+        count: int,
+        closest: ClosestRange | None = None,
+        without: Sequence[str] = (),
     ) -> list[tuple[ReadingTaken, Reading]]:
-        """Readings of a target at one placement: placement, tilt and speckle drawn once, noise for each."""
+        """Readings of a target at one placement: placement, tilt and speckle drawn once, noise for each.
+
+        The spots of the lasers in `without` are missing.
+        """
         still = self._still_px(placement)
         noise = self.ranger.calibration.laser_ranger.noise
         found = []
@@ -66,8 +74,9 @@ class SimulatedBench:
             sd = np.full_like(still, noise.spot_sd_px)
             px = still + self.random.normal(0.0, hypot(noise.spot_sd_px, self.unknown_noise_px), still.shape)
             scene = f"{placement.key}/{number:02d}"
-            ids = self.true.ids
-            reading = self.ranger.read_known(scene, len(ids), ids, px, sd)
+            seen = [n for n, i in enumerate(self.true.ids) if i not in without]
+            ids = [self.true.ids[n] for n in seen]
+            reading = self.ranger.read_known(scene, len(self.true.ids), ids, px[seen], sd[seen])
             found.append((reading_taken(self.rig, name, placement, number, reading, closest), reading))
         return found
 

@@ -8,9 +8,16 @@ from itertools import combinations
 from math import hypot, sqrt
 from statistics import fmean
 
+import numpy as np
+from scipy.stats import chi2
+
 from workbench.model.event import ReadingTaken
 from workbench.trials.errors import EXPANSION, ErrorStatistics, error_statistics, range_statistics
+from workbench.trials.statistics.line import fit_line
 from workbench.trials.targets import InclineSpec
+
+FEWEST_ANGLES = 3
+"""Smallest number of set angles through which a line is fitted."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +50,43 @@ class AngleDifference:
     expanded_deg: float
     """Expanded uncertainty U (k = 2), with the sensor's errors at both angles taken as independent. It is too
     large where the calibration turns both alike, too small where it turns them against each other."""
+
+
+@dataclass(frozen=True)
+class AngleLine:
+    """Line measured = intercept + slope x set angle, at one closest range about one axis; 1 sigma."""
+
+    axis: str
+    asked_mm: float
+    angles: int
+    slope: float
+    slope_sd: float
+    intercept_deg: float
+    """Measured angle of a target set square: the tilt common to all placements, and the sensor's own."""
+    intercept_sd_deg: float
+    probability: float
+    """P value of the deviations from the line."""
+
+
+def angle_lines(rows: Sequence[InclineRow]) -> list[AngleLine]:
+    """Lines through three angles or more at one range about one axis, with errors in both coordinates."""
+    groups: dict[tuple[str, float], list[InclineRow]] = {}
+    for row in rows:
+        if row.angle.mean is not None and row.angle_sd_deg:
+            groups.setdefault((row.target.axis, row.asked_mm), []).append(row)
+    return [_line(*key, of) for key, of in groups.items() if len(of) >= FEWEST_ANGLES]
+
+
+def _line(axis: str, asked_mm: float, rows: Sequence[InclineRow]) -> AngleLine:
+    found = fit_line(
+        np.array([row.true_deg for row in rows]),
+        np.array([row.true_deg + (row.angle.mean or 0.0) for row in rows]),
+        np.array([row.target.reference_sd_deg for row in rows]),
+        np.array([row.angle_sd_deg for row in rows], np.float64),
+    )
+    slope_sd, intercept_sd_deg = np.sqrt(np.diag(found.covariance)).tolist()
+    p = float(chi2.sf(found.chi2, found.degrees_of_freedom))
+    return AngleLine(axis, asked_mm, len(rows), found.slope, slope_sd, found.intercept, intercept_sd_deg, p)
 
 
 def incline_row(target: InclineSpec, asked_mm: float, readings: Sequence[ReadingTaken]) -> InclineRow:

@@ -18,7 +18,14 @@ from workbench.trials.errors import (
     quantity_chart,
 )
 from workbench.trials.incline.set_up import SetUp
-from workbench.trials.incline.statistics import AngleDifference, InclineRow, angle_differences, incline_row
+from workbench.trials.incline.statistics import (
+    AngleDifference,
+    AngleLine,
+    InclineRow,
+    angle_differences,
+    angle_lines,
+    incline_row,
+)
 from workbench.trials.incline.step import InclineLimits
 from workbench.trials.limits import Result, check_results, error_result, range_results, require_readings
 from workbench.trials.readings import ClosestRange, take_readings
@@ -57,6 +64,7 @@ def run_trial(
     readings = [reading for _, of in taken for reading in of]
     tables = [
         *incline_tables(name, rows, angle_differences(rows)),
+        *line_table(name, angle_lines(rows)),
         *missing_table(name, readings),
         *missing_table(name, readings, "angle", "angle_deg"),
     ]
@@ -102,6 +110,31 @@ def difference_table(name: str, differences: Sequence[AngleDifference]) -> Table
         rows=tuple((d.asked_mm, *d.angles_deg, d.error_deg, d.expanded_deg) for d in differences),
         caption="a tilt common to both angles cancels; U (k = 2): errors of both taken as independent",
     )
+
+
+def line_table(name: str, lines: Sequence[AngleLine]) -> list[Table]:
+    """Table of the lines through the angles; empty list without any."""
+    if not lines:
+        return []
+    columns = (
+        Column(key="axis", name="axis"),
+        Column(key="asked_mm", name="range", unit="mm", format=".1f"),
+        Column(key="angles", name="angles"),
+        Column(key="slope", name="slope", format="digits of slope_sd"),
+        Column(key="slope_sd", name="sd", format="sd"),
+        Column(key="intercept_deg", name="intercept", unit="deg", format="digits of intercept_sd_deg"),
+        Column(key="intercept_sd_deg", name="sd", unit="deg", format="sd"),
+        Column(key="probability", name="p", format=".2g"),
+    )
+    return [
+        Table(
+            name=f"{name}-line",
+            title="Incline: line through the measured angles over the set ones",
+            columns=columns,
+            rows=tuple(tuple(getattr(one, column.key) for column in columns) for one in lines),
+            caption="errors in both angles; intercept: common tilt; p: deviations from the line",
+        )
+    ]
 
 
 def angle_chart(name: str, taken: Sequence[tuple[InclineRow, Sequence[ReadingTaken]]]) -> Chart:

@@ -98,13 +98,14 @@ def _errors(
     Errors of inverse depths are multiplied by the squared true depth, so that they are in mm.
     """
     tilt_sd = radians(hypot(bench.tilt_sd_deg, bench.target_tilt_sd_deg))
-    errors, gradients, owns = [], [], []
+    errors, gradients, owns, standoffs = [], [], [], []
     for check in checks:
         points = check.points
         assert points is not None  # noqa: S101 - the caller has selected these placements
         count = len(points.range_mm)
         depth_mm = points.range_mm + sensor.offset_mm
         ratio = (check.standoff_mm + sensor.offset_mm) / depth_mm
+        standoffs.append(np.full(count, check.standoff_mm))
         errors.append(ratio * (points.range_mm - check.standoff_mm))
         gradients.append(ratio[:, None] ** 2 * points.by_parameter)
         own = np.diag((ratio**2 * points.spot_sd_mm) ** 2) + check.reference_sd_mm**2 * np.ones(
@@ -118,7 +119,8 @@ def _errors(
         end = start + len(own)
         covariance[start:end, start:end] += own
         start = end
-    return np.concatenate(errors), gradient, covariance
+    ruler = bench.ruler_scale.sd * np.concatenate(standoffs)
+    return np.concatenate(errors), gradient, covariance + np.outer(ruler, ruler)
 
 
 def _candidates(sensor: CalibratedSensor) -> list[_Candidate]:

@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.four_lasers import reading
 from workbench.model.event import ReadingTaken, TrueValues
-from workbench.trials.incline.statistics import angle_differences, incline_row
+from workbench.trials.incline.statistics import angle_differences, angle_lines, incline_row
 from workbench.trials.targets import InclineSpec
 
 
@@ -62,3 +62,19 @@ def test_only_angles_at_the_same_range_and_axis_are_compared() -> None:
         incline_row(spec(60.0), 400.0, angles(60.0, None)),
     ]
     assert [angle_differences([first, other]) for other in others] == [[], [], []]
+
+
+def test_a_line_through_three_angles_separates_scale_and_common_tilt() -> None:
+    rows = [incline_row(spec(deg), 400.0, angles(deg, 0.7 + 1.02 * deg)) for deg in (-40.0, 20.0, 60.0)]
+    (line,) = angle_lines(rows)
+    assert (line.slope, line.intercept_deg) == pytest.approx((1.02, 0.7))
+    assert (line.angles, line.asked_mm, line.axis) == (3, 400.0, "vertical")
+    assert line.probability == pytest.approx(1.0)
+    # The intercept of a line through n points has at least the uncertainty of their mean.
+    assert line.intercept_sd_deg > np.hypot(0.2, 0.1) / np.sqrt(3)
+
+
+def test_two_angles_have_a_difference_but_no_line() -> None:
+    rows = [incline_row(spec(deg), 400.0, angles(deg, deg)) for deg in (30.0, 60.0)]
+    missing = incline_row(spec(10.0), 400.0, angles(10.0, None))
+    assert angle_lines([*rows, missing]) == []

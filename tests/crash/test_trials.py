@@ -1,0 +1,39 @@
+"""A short trial that is killed at any record ends, resumed, with the same files, byte for byte."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.crash.killer import Killer, serving
+from tests.crash.trials import differs, undisturbed
+from workbench.session.journal import read_journal
+
+TRIAL = "missing_spots"
+RECORDS = 21
+"""Of the short trial; a test compares this number with the journal."""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Session without a kill."""
+    return undisturbed(tmp_path_factory.mktemp("whole"), TRIAL)
+
+
+@pytest.fixture(scope="module")
+def killer(whole: Path) -> Iterator[Killer]:
+    with serving(whole.parent) as found:
+        yield found
+
+
+def test_number_of_records(whole: Path) -> None:
+    assert len(list(read_journal(whole))) == RECORDS
+
+
+@pytest.mark.parametrize("record", range(RECORDS))
+def test_a_trial_killed_at_a_record_gives_the_same_files(
+    tmp_path: Path, whole: Path, killer: Killer, record: int
+) -> None:
+    assert differs(killer, whole, tmp_path, record) == ""

@@ -1,0 +1,365 @@
+"""Statistics of the trials on simulated sensors: `python -m tests.proofs.trials`, part of `make prove`.
+
+Each run draws a sensor from a calibration's covariance, a ruler and a rail, then placements, speckle and
+noise. Spots are computed by numpy, nothing is rendered. Figures outside their bounds are missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime as dt
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from tests.support.accuracy_runs import accuracy_run
+from tests.support.rangers import thesis_ranger
+from tests.support.rigs import thesis_rig
+from tests.support.simulated_trials import SimulatedBench
+from tests.support.trial_readings import drawn_readings
+from workbench.model.event import ReadingTaken
+from workbench.model.target import Placement
+from workbench.procedure.engine.step import flat_placement
+from workbench.trials.accuracy.agreement import Agreement
+from workbench.trials.accuracy.limits import AccuracyLimits
+from workbench.trials.accuracy.ranges import CLOSEST, MEAN
+from workbench.trials.accuracy.verdict import verdict_of
+from workbench.trials.errors import range_statistics
+from workbench.trials.incline.statistics import incline_row
+from workbench.trials.missing_spots.sets import Condition, missing_sets
+from workbench.trials.reading_frame import reading_frame, reading_rows
+from workbench.trials.readings import ClosestRange
+from workbench.trials.repeatability.budget import budget_table
+from workbench.trials.round.trial import cylinder_statistics, radius_statistics
+from workbench.trials.statistics.gauge_rr import gauge_rr
+from workbench.trials.statistics.repeatability import repeatability
+from workbench.trials.target_check import other_target
+from workbench.trials.targets import CylinderSpec, FlatTargetSpec, InclineSpec, TargetSpec, target_placement
+from workbench.trials.verify.changes import changes, named
+from workbench.trials.verify.statistics import check_placement, lasers_verdict, range_verdict
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "docs" / "benchmarks"
+COVERAGE = (0.93, 0.97)
+STANDOFFS_MM = (140.0, 180.0, 250.0, 350.0, 500.0, 750.0, 1100.0, 1700.0, 2000.0, 2700.0, 3800.0)
+VERIFIED_MM = (200.0, 300.0, 500.0, 800.0, 1200.0, 2000.0)
+CHANGES: dict[str, tuple[dict[str, float], str]] = {
+    "one laser turned by 1 mrad": ({"L2.tx": 0.001}, "L2 turned"),
+    "focal length 0.3 %": ({"f_px": 0.003 * 533.3}, "focal length"),
+    "one baseline 0.3 mm": ({"L3.x_mm": 0.3}, "L3 displaced"),
+    "camera turned by 2 mrad": ({"cx_px": 1.07}, "camera turned"),
+    "lens refocused: 0.5 %, pinhole 2 mm": ({"f_px": 0.005 * 533.3, "offset_mm": 2.0}, "refocused"),
+}
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure of the proof with its bounds."""
+
+    trial: str
+    quantity: str
+    value: float
+    bounds: tuple[float, float]
+    runs: int
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether the figure lies outside its bounds by more than two standard deviations of its runs."""
+        low, high = self.bounds
+        return not low - self.margin <= self.value <= high + self.margin
+
+    @property
+    def margin(self) -> float:
+        """Two standard deviations of a share, or of a mean z, of the runs."""
+        share = min(max(self.value, 0.02), 0.98) if 0 <= self.value <= 1 else 0.5
+        sd = (share * (1 - share)) ** 0.5 if self.bounds[0] >= 0 else 1.0
+        return float(2 * sd / self.runs**0.5)
+
+    def line(self) -> str:
+        """A line of the table."""
+        low, high = self.bounds
+        missed = "  MISSED" if self.is_missed else ""
+        figure = f"{self.trial:<14}{self.quantity:<58}{self.value:>8.3f}"
+        return f"{figure}  {low:g} to {high:g} ({self.runs}){missed}"
+
+
+Proof = Callable[[int], Iterator[Figure]]
+
+
+def bench(seed: int, change: Mapping[str, float] | None = None) -> SimulatedBench:
+    """Bench of one run, with a sensor that has changed since its calibration."""
+    return SimulatedBench.draw(thesis_ranger(), thesis_rig(), seed, change)
+
+
+def accuracy(runs: int) -> Iterator[Figure]:
+    """Bias, verdict and coverage of the accuracy trial."""
+    found = [{one.name: one for one in accuracy_run(bench(seed), STANDOFFS_MM)} for seed in range(runs)]
+    for name in (CLOSEST, MEAN, "L1", "L4"):
+        z = np.array([run[name].bias.z.mean() for run in found])
+        even = (-0.3, 0.1) if name == CLOSEST else (-0.1, 0.1)
+        yield Figure("accuracy", f"mean z of the {name} range over standoffs", float(z.mean()), even, runs)
+        inside = np.mean([run[name].coverage.value for run in found])
+        yield Figure("accuracy", f"coverage of the {name} range", float(inside), COVERAGE, runs)
+    decided = [_decided(list(run.values())) for run in found]
+    yield Figure("accuracy", "good sensors called biased", _mean(one[0] for one in decided), (0, 0.05), runs)
+    yield Figure(
+        "accuracy", "good sensors failed by MPE = U", _mean(one[1] for one in decided), (0, 0.05), runs
+    )
+    raised = [_decided([_raised(run[MEAN])]) for run in found]
+    yield Figure("accuracy", "bias of 3 U called biased", _mean(one[0] for one in raised), (0.95, 1), runs)
+    yield Figure(
+        "accuracy", "bias of 3 U failed by MPE = U", _mean(one[1] for one in raised), (0.95, 1), runs
+    )
+    alarms = [_alarm(run[MEAN]) for run in found]
+    yield Figure("accuracy", "alarm of a complete budget", _mean(alarms), (0, 0.05), runs)
+    noise = thesis_ranger().calibration.laser_ranger.noise.spot_sd_px
+    noisy = [
+        {one.name: one for one in accuracy_run(bench(seed).with_unknown(noise_px=noise), STANDOFFS_MM)}[MEAN]
+        for seed in range(runs)
+    ]
+    yield Figure(
+        "accuracy", "alarm with noise of equal size left out", _mean(map(_alarm, noisy)), (0.8, 1), runs
+    )
+
+
+def precision(runs: int) -> Iterator[Figure]:
+    """Intervals of s_r and s_R: 8 placements x 3 repeats, drawn as numbers."""
+    random, trials = np.random.default_rng(5), 10 * runs
+    for sds in ((0.0, 0.5, 0.3), (0.0, 0.1, 0.4)):
+        found = [repeatability(drawn_readings(random, (1, 8, 3), sds)) for _ in range(trials)]
+        true = {"s_r": sds[2], "s_R": hypot(sds[1], sds[2])}
+        for name, sd in true.items():
+            of = [one.repeatability if name == "s_r" else one.reproducibility for one in found]
+            share = _mean(one.low <= sd <= one.high for one in of)
+            quantity = f"95 % interval of {name}, placements {sds[1]:g}, repeats {sds[2]:g} mm"
+            yield Figure("repeatability", quantity, share, COVERAGE, trials)
+
+
+def budget(runs: int) -> Iterator[Figure]:
+    """Alarm of the repeatability trial's budget, three standoffs together, and coverage."""
+    placement_mm = thesis_rig().bench.placement_sd_mm
+    for placements in (8, 12):
+        for unknown in (0.0, 1.0):
+            alarms, inside = [], []
+            for seed in range(runs):
+                one = bench(seed).with_unknown(placement_sd_mm=unknown * placement_mm)
+                rows = budget_table("b", _precision_frame(one, placements)).records()
+                alarms.append(bool(rows[-1]["alarm"]))
+                inside += [row["coverage"] for row in rows[:-1]]
+            text = "with a placement error of equal size left out" if unknown else "of a complete budget"
+            bounds = (0.8, 1.0) if unknown and placements == 12 else (0.5, 1.0) if unknown else (0.0, 0.05)
+            yield Figure(
+                "repeatability", f"alarm {text}, {placements} placements", _mean(alarms), bounds, runs
+            )
+            if not unknown:
+                share = float(np.mean(np.array(inside, np.float64)))
+                yield Figure("repeatability", f"coverage, {placements} placements", share, COVERAGE, runs)
+
+
+def gauge(runs: int) -> Iterator[Figure]:
+    """Intervals of EV and GRR: 5 standoffs x 3 operators x 3 trials, drawn as numbers."""
+    random, trials, inside = np.random.default_rng(6), 5 * runs, {"EV": 0, "GRR": 0}
+    for _ in range(trials):
+        shape = (5, 3, 3)
+        operator = random.normal(0, 0.2, (1, 3, 1))
+        values = random.normal(0, 5, (5, 1, 1)) + operator + random.normal(0, 0.4, shape)
+        index = np.indices(shape).reshape(3, -1)
+        frame = pd.DataFrame({"part": index[0], "operator": index[1], "measured_mm": values.ravel()})
+        study = gauge_rr(frame)
+        inside["EV"] += study.equipment.low <= 0.4 <= study.equipment.high
+        inside["GRR"] += study.gauge.low <= hypot(0.2, 0.4) <= study.gauge.high
+    for name, count in inside.items():
+        yield Figure("gauge R&R", f"95 % interval of {name}", count / trials, (0.93, 0.99), trials)
+
+
+def incline(runs: int) -> Iterator[Figure]:
+    """Angle and range of inclines."""
+    for angle_deg in (30.0, 60.0):
+        spec = InclineSpec(kind="incline", angle_deg=angle_deg)
+        for range_mm in (200.0, 500.0):
+            z_angle, z_range = [], []
+            for seed in range(runs):
+                row = incline_row(spec, range_mm, _closest(bench(seed), spec, range_mm))
+                z_angle.append(_z(row.angle.mean, row.angle.expanded))
+                z_range.append(_z(row.range.mean, row.range.expanded))
+            where = f"{angle_deg:g} deg at {range_mm:g} mm"
+            yield from _scores("incline", f"angle, {where}", z_angle)
+            yield from _scores("incline", f"range, {where}", z_range)
+
+
+def cylinder(runs: int) -> Iterator[Figure]:
+    """Radius and range of a cylinder of 178 mm diameter."""
+    spec = CylinderSpec(kind="cylinder", diameter_mm=178.0)
+    for range_mm in (200.0, 500.0):
+        z_radius, z_range = [], []
+        for seed in range(runs):
+            readings = _closest(bench(seed), spec, range_mm)
+            radius, closest = radius_statistics(spec, readings), cylinder_statistics(readings)
+            z_radius.append(_z(radius.mean, radius.expanded))
+            z_range.append(_z(closest.mean, closest.expanded))
+        yield from _scores("round", f"radius at {range_mm:g} mm", z_radius)
+        yield from _scores("round", f"range by the cylinder at {range_mm:g} mm", z_range)
+
+
+def missing_spots(runs: int) -> Iterator[Figure]:
+    """Range with lasers left off."""
+    spec = FlatTargetSpec()
+    for number in (0, 1, 3):
+        inside, z = [], []
+        for seed in range(runs):
+            ids = missing_sets(thesis_ranger().sensor.ids, Condition(number), runs)[seed]
+            readings = _closest(bench(seed), spec, 500.0, without=ids)
+            inside += [not one.is_outside for one in readings[:1]]
+            found = range_statistics(readings)
+            z.append(_z(found.mean, found.expanded))
+        yield Figure("missing spots", f"coverage, {number} off", _mean(inside), (0.92, 0.99), runs)
+        yield Figure("missing spots", f"mean z, {number} off", float(np.nanmean(z)), (-0.4, 0.1), runs)
+
+
+def verify(runs: int) -> Iterator[Figure]:
+    """Refusals of valid calibrations and of changed sensors, and the changes that are named."""
+    refused = _mean(_refused(bench(seed))[0] for seed in range(runs))
+    yield Figure("verify", "valid calibrations refused", refused, (0, 0.05), runs)
+    for text, (change, name) in CHANGES.items():
+        found = [_refused(bench(seed, change)) for seed in range(runs)]
+        yield Figure("verify", f"refused: {text}", _mean(one for one, _ in found), (0.9, 1), runs)
+        right = _mean(name in named_as for one, named_as in found if one)
+        yield Figure("verify", f"named where refused: {text}", right, (0.7, 1), runs)
+
+
+def target_check(runs: int) -> Iterator[Figure]:
+    """False alarms about the target asked for, over all kinds of targets and ranges."""
+    specs: tuple[TargetSpec, ...] = (
+        FlatTargetSpec(),
+        InclineSpec(kind="incline", angle_deg=30.0),
+        CylinderSpec(kind="cylinder", diameter_mm=178.0),
+    )
+    false, count = 0, 0
+    for seed in range(runs):
+        for spec in specs:
+            for range_mm in (200.0, 1000.0, 3000.0):
+                one, placement = bench(seed), _placement(spec, range_mm)
+                readings = [taken for taken, _ in one.readings("t", placement, 3)]
+                false += bool(other_target(thesis_ranger().sensor, readings, placement, one.rig.bench))
+                count += 1
+    yield Figure("target", "right targets called others", false / count, (0, 0.001), count)
+
+
+PROOFS: tuple[Proof, ...] = (
+    accuracy,
+    precision,
+    budget,
+    gauge,
+    incline,
+    cylinder,
+    missing_spots,
+    verify,
+    target_check,
+)
+
+
+def main() -> int:
+    """Run, print, write; 1 if a figure is missed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=200, help="simulated runs of each trial")
+    runs = parser.parse_args().runs
+    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
+    lines, missed = [f"Trials, {today}: `python -m tests.proofs.trials --runs {runs}`"], 0
+    for proof in PROOFS:
+        for figure in proof(runs):
+            lines.append(figure.line())
+            missed += figure.is_missed
+            print(lines[-1], flush=True)
+    lines.append(f"{missed} figures missed" if missed else "Every figure is reached.")
+    print(lines[-1])
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    (RESULTS / f"{today}-trials.txt").write_text("\n".join(lines) + "\n")
+    return 1 if missed else 0
+
+
+def _mean(values: Iterable[float]) -> float:
+    return float(np.mean([float(one) for one in values]))
+
+
+def _decided(ranges: Sequence[Agreement]) -> tuple[bool, bool]:
+    """Whether the ranges are called biased, and whether the mean range fails a limit of its largest U."""
+    (mean,) = [one for one in ranges if one.name == MEAN]
+    bound = max(u.expanded / mm for u, mm in zip(mean.uncertainty, mean.true_mm.tolist(), strict=True))
+    limits = AccuracyLimits.model_validate({"mean_relative_error": {"in": [-bound, bound]}})
+    verdict = verdict_of(ranges, limits)
+    return verdict.is_biased, verdict.decision == "fail"
+
+
+def _raised(one: Agreement) -> Agreement:
+    """The same errors, each larger by 3 U."""
+    raised = tuple(
+        placed.__class__(
+            placed.reference,
+            placed.errors_mm + 3 * known.expanded,
+            placed.share_inside,
+            placed.sensitivities,
+        )
+        for placed, known in zip(one.placements, one.uncertainty, strict=True)
+    )
+    return Agreement(one.name, one.bench, raised, one.missing)
+
+
+def _alarm(one: Agreement) -> bool:
+    """Alarm of the repeats or of all standoffs."""
+    assert one.repeats is not None
+    return one.repeats.alarm or one.bias.probability < 0.025
+
+
+def _precision_frame(one: SimulatedBench, placements: int) -> pd.DataFrame:
+    rows: list[dict[str, object]] = []
+    for standoff_mm in (300.0, 800.0, 2000.0):
+        for number in range(1, placements + 1):
+            placement = flat_placement("r", standoff_mm, number)
+            taken = [reading for reading, _ in one.readings("r", placement, 3)]
+            rows += reading_rows(taken, standoff_mm, number)
+    return reading_frame(rows)
+
+
+def _placement(spec: TargetSpec, range_mm: float) -> Placement:
+    return target_placement(spec, f"t/{range_mm:g}", range_mm, thesis_rig())
+
+
+def _closest(
+    one: SimulatedBench, spec: TargetSpec, range_mm: float, without: Sequence[str] = ()
+) -> list[ReadingTaken]:
+    placement = _placement(spec, range_mm)
+    closest = ClosestRange.of(spec, placement, one.ranger.sensor, one.rig)
+    return [taken for taken, _ in one.readings("t", placement, 3, closest, without)]
+
+
+def _z(error: float | None, expanded: float | None) -> float:
+    return np.nan if error is None or not expanded else 2 * error / expanded
+
+
+def _scores(trial: str, quantity: str, z: Sequence[float]) -> Iterator[Figure]:
+    found = np.array(z)[np.isfinite(z)]
+    yield Figure(
+        trial, f"coverage of the {quantity}", float((np.abs(found) <= 1.96).mean()), COVERAGE, len(found)
+    )
+    yield Figure(trial, f"mean z of the {quantity}", float(found.mean()), (-0.15, 0.15), len(found))
+
+
+def _refused(one: SimulatedBench) -> tuple[bool, str]:
+    """Whether a verification refuses the sensor, and the change that it names."""
+    sensor, reference_mm = one.ranger.sensor, one.rig.bench.placement_sd_mm
+    checks = []
+    for standoff_mm in (600.0, *VERIFIED_MM):
+        taken = [reading for reading, _ in one.readings("v", flat_placement("v", standoff_mm), 5)]
+        checks.append(check_placement(sensor, taken, reference_mm))
+    lasers = [lasers_verdict(check, len(checks)).valid for check in checks]
+    refused = not (all(lasers) and range_verdict(sensor, checks[1:], one.rig.bench.ruler_scale.sd).valid)
+    return refused, named(changes(sensor, checks[1:], one.rig.bench)) if refused else ""
+
+
+if __name__ == "__main__":
+    sys.exit(main())
