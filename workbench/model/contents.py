@@ -25,19 +25,24 @@ TEXT = {"text in UTF-16"}
 
 def not_text(content: bytes) -> str | None:
     """Kind of a file's `content` and a remedy, for messages; None for text in UTF-8."""
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-    else:
-        if b"\0" not in content:
-            return None
-        line = content[: content.index(b"\0")].count(b"\n") + 1
+    foreign = _first_foreign(content)
+    if foreign is None and b"\0" not in content:
+        return None
     kind = next((name for start, name in BEGINNINGS.items() if content.startswith(start)), None)
     if kind is not None and kind not in TEXT:
         return kind
     if kind is not None:
         return f"{kind}; save it as UTF-8"
-    if any(byte < 32 and byte not in b"\t\n\r\f" for byte in content):
+    if foreign is None or any(byte < 32 and byte not in b"\t\n\r\f" for byte in content):
         return "binary data"
+    line = content[:foreign].count(b"\n") + 1
     return f"text in another encoding (line {line}); save it as UTF-8"
+
+
+def _first_foreign(content: bytes) -> int | None:
+    """Index of the first byte that is not UTF-8; None without one."""
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        return error.start
+    return None

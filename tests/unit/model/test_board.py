@@ -41,6 +41,11 @@ def test_the_band_is_blank_and_the_origin_in_its_middle() -> None:
     assert ((top >= 15.0) | (top + height <= -15.0)).all()
 
 
+def test_a_board_may_use_every_marker_of_its_dictionary() -> None:
+    board = Board(square_mm=10.0, marker_mm=7.0, columns=25, rows=4)
+    assert 2 * board.markers == 100
+
+
 @pytest.mark.parametrize(
     ("change", "reason"),
     [

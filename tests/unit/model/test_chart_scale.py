@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workbench.model.chart import Axis, Chart, LimitLine, Series
-from workbench.model.chart_scale import MOST_LABELLED, linear_ticks, x_scale, x_ticks, y_scale
+from workbench.model.chart_scale import MARGIN, MOST_LABELLED, linear_ticks, x_scale, x_ticks, y_scale
 
 
 def chart(
@@ -57,6 +57,13 @@ def test_many_values_have_round_ticks() -> None:
     assert x_ticks(one, x_scale(one), 0.05) == ([0, 1000, 2000, 3000, 4000, 5000], [])
     logarithmic = chart(x, x, "log")
     assert x_ticks(logarithmic, x_scale(logarithmic), 0.05) == ([50, 100, 200, 500, 1000, 2000, 5000], [])
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_the_first_and_the_last_value_keep_the_margin(scale: Literal["linear", "log"]) -> None:
+    x = x_scale(chart((10.0, 70.0, 1000.0), (1.0, 2.0, 3.0), scale))
+    assert x.share(10.0) == pytest.approx(MARGIN)
+    assert x.share(1000.0) == pytest.approx(1.0 - MARGIN)
 
 
 def test_a_single_value_stands_in_the_middle() -> None:

@@ -65,5 +65,6 @@ def test_text_in_another_encoding_is_told_apart_from_binary_data(encoding: str) 
     assert "UTF-8" not in binary
 
 
-def test_a_zero_byte_is_no_text() -> None:
-    assert not_text(b"a: 1\nb: 2\0\n") is not None
+@pytest.mark.parametrize("content", [b"a: 1\nb: 2\0\n", b"\0", b"a\x01\xff"])
+def test_a_zero_or_control_byte_is_no_text(content: bytes) -> None:
+    assert not_text(content) == "binary data"

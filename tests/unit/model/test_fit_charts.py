@@ -8,6 +8,8 @@ from workbench.model.fit_charts import residual_chart
 
 def test_residuals_have_a_series_for_each_laser() -> None:
     fit = a_fit()
+    residuals = tuple(one.model_copy(update={"v_sd_px": 0.5, "u_sd_px": 0.1}) for one in fit.residuals)
+    fit = fit.model_copy(update={"residuals": residuals})
     chart = residual_chart(fit, "v")
     assert (chart.x.unit, chart.x.scale, chart.y.unit) == ("mm", "log", "px")
     assert [series.name for series in chart.series] == list(LASERS)

@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 from pydantic import ValidationError
+from scipy import stats
 
 from tests.viewer.session import a_fit
-from workbench.model.fit_event import FitFinished
+from workbench.model.fit_event import CrossValidatedPlacement, FitFinished
 
 
 def test_a_fit_survives_json() -> None:
@@ -39,3 +40,20 @@ def test_a_parameter_is_determined_by_data_joint_or_prior() -> None:
     with pytest.raises(ValidationError) as caught:
         FitFinished.model_validate(fit)
     assert [error["loc"] for error in caught.value.errors()] == [("parameters", 0, "determined_by")]
+
+
+def placement(**change: Any) -> CrossValidatedPlacement:
+    values = {"placement": "p", "standoff_mm": 500.0, "error_mm": -3.0, "sd_mm": 1.5, "lasers": ()}
+    return CrossValidatedPlacement.model_validate(values | change)
+
+
+def test_range_errors_have_the_p_value_of_their_distribution() -> None:
+    assert placement().z == -2.0
+    assert placement().range_p == pytest.approx(2 * stats.norm.sf(2.0))
+    assert placement(freedom=5.0).range_p == pytest.approx(2 * stats.t.sf(2.0, 5))
+
+
+def test_spots_have_the_p_value_of_their_distribution() -> None:
+    assert placement(chi2=20.0).spots_p == 1.0
+    assert placement(chi2=20.0, coordinates=8).spots_p == pytest.approx(stats.chi2.sf(20.0, 8))
+    assert placement(chi2=20.0, coordinates=8, freedom=5.0).spots_p == pytest.approx(stats.f.sf(2.5, 8, 5))

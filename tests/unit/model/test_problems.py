@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 import workbench
 from workbench.model.errors import BadInputError
 from workbench.model.problems import EXPECTED, SPELLED, closest_first, problems
+from workbench.model.prompt import Answer
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 LIBRARY = re.compile(
@@ -149,3 +150,11 @@ def test_all_that_is_wrong_is_told_in_the_order_of_the_file(tmp_path: Path) -> N
 def test_the_nearest_name_comes_first() -> None:
     assert closest_first("repeat", ["step", "standoffs_mm", "repeats"]) == ["repeats", "step", "standoffs_mm"]
     assert closest_first("zzz", ["b", "a"]) == ["b", "a"]
+
+
+def test_a_value_that_fits_no_type_of_a_union_is_one_mistake_at_its_key() -> None:
+    with pytest.raises(ValidationError) as caught:
+        Answer.model_validate({"value": [1]})
+    assert caught.value.error_count() > 1
+    (found,) = problems(Answer, {"value": [1]}, caught.value.errors())
+    assert found.location == ("value",)

@@ -200,3 +200,11 @@ def test_a_rig_is_read_back_from_its_own_values(tmp_path: Path, lens: str, unset
     assert rig.camera.lens == lens
     assert Rig.model_validate(rig.model_dump(exclude_unset=unset)) == rig
     assert Rig.model_validate_json(rig.model_dump_json(exclude_unset=unset)) == rig
+
+
+def test_omitted_bench_values_are_those_of_the_documentation() -> None:
+    bench = BenchSpec()
+    assert bench.reach_mm == (100.0, 5000.0)
+    assert (bench.placement_sd_mm, bench.tilt_sd_deg, bench.target_tilt_sd_deg) == (0.0, 0.0, 0.5)
+    assert (bench.print_scale.value, bench.print_scale.sd, bench.board_flatness_sd_mm) == (0.0, 0.002, 0.1)
+    assert bench.drift_u_px == bench.drift_v_px == Prior(value=0.0, sd=0.0)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from math import hypot, inf
+
 import pytest
 from pydantic import ValidationError
 
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.table import Column, Table
+from workbench.model.trial_event import COVERAGE_FACTOR as K
 from workbench.model.trial_event import LaserRange, ReadingTaken, TrialFinished
 
 READING = {
@@ -53,3 +56,28 @@ def test_results_survive_json() -> None:
     table = Table(name="t", title="T", columns=(Column(key="a", name="a"),), rows=((1.5,), (None,)))
     finished = TrialFinished(trial="accuracy", tables=(table,), charts=(chart,))
     assert TrialFinished.model_validate_json(finished.model_dump_json()) == finished
+
+
+MEASURED = READING | {
+    "status": "done",
+    "range_mm": 500.0,
+    "sigma_mm": 2.0,
+    "reference_sd_mm": 1.5,
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "interval_mm"),
+    [
+        ({}, (500 - hypot(K * 2.0, K * 1.5), 500 + hypot(K * 2.0, K * 1.5))),
+        ({"low_mm": 497.0, "high_mm": 504.0}, (500 - hypot(3.0, K * 1.5), 500 + hypot(4.0, K * 1.5))),
+        ({"low_mm": 497.0, "high_mm": None}, (500 - hypot(3.0, K * 1.5), inf)),
+        ({"sigma_mm": None}, None),
+        ({"reference_sd_mm": None}, None),
+    ],
+)
+def test_the_interval_combines_sensor_and_reference(
+    change: dict[str, object], interval_mm: tuple[float, float] | None
+) -> None:
+    reading = ReadingTaken.model_validate(MEASURED | change)
+    assert reading.interval_mm == (None if interval_mm is None else pytest.approx(interval_mm))

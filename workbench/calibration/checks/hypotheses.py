@@ -132,8 +132,8 @@ def is_improbable(state: Refit) -> bool:
 
 
 def _excess(state: Refit) -> float:
-    """Cost above its expectation (one for each used row), at least 0."""
-    return max(state.cost - float(state.used.sum()), 0.0)
+    """Cost above its expectation (one for each used row)."""
+    return state.cost - float(state.used.sum())
 
 
 def _best(candidates: list[Hypothesis]) -> Hypothesis | None:

@@ -268,8 +268,7 @@ class _Repeats:
         value = positions(members)[:, axis]
         seen = np.isfinite(value)
         inverse = 1.0 / (fit.cells.repeat_scale * stated_sd(members, fit.rig.noise)[seen, axis])
-        norm = np.sqrt((inverse**2).sum()) if seen.any() else 1.0
-        direction = inverse / norm
+        direction = inverse / np.sqrt((inverse**2).sum())
         white = value[seen] * inverse
         return cls(cell, axis, white - direction * (direction @ white), direction)
 

@@ -57,7 +57,13 @@ def test_exchanged_lasers_are_the_only_account(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_mirrored_picture_is_the_only_account(seed: int) -> None:
     world = World(RIG, seed)
-    assert kinds(mirrored(world, world.observations())) == [("mirrored", ())]
+    sound = world.observations()
+    fitted = fit(RIG, mirrored(world, sound))
+    (found,) = explain_misfit(fitted)
+    assert (found.kind, found.subject) == ("mirrored", ())
+    np.testing.assert_allclose(
+        found.state.problem.data.position_px, fit(RIG, sound).cells.position_px, rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("seed", SEEDS)

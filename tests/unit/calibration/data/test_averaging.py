@@ -91,6 +91,12 @@ def test_the_usual_scale_is_what_most_spots_scatter(seed: int, factor: float) ->
     assert usual_scale(scatter) == pytest.approx(factor, rel=0.35)
 
 
+@pytest.mark.parametrize("free", [1, 2, 5])
+def test_two_repeats_are_enough_for_the_usual_scale(free: int) -> None:
+    median = 9.0 * float(chi2.isf(0.5, free))
+    assert usual_scale([(0.1, free), (median, free), (1e3, free)] * 3) == pytest.approx(3.0)
+
+
 def test_quiet_spots_have_scale_one_and_few_spots_none() -> None:
     quiet = [(1.0, 10)] * 20
     assert usual_scale(quiet) == 1.0

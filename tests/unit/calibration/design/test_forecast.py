@@ -91,3 +91,8 @@ def test_a_rig_of_constants_has_nothing_to_determine() -> None:
     assert found.parameters == ()
     assert found.directions == ()
     assert found.worst_relative_sd_of_calibration == 0.0
+
+
+def test_forecast_ranges_ascend_over_the_stated_span() -> None:
+    assert (RANGES_MM[0], RANGES_MM[-1]) == (100.0, 5000.0)
+    assert (np.diff(RANGES_MM) > 0).all()

@@ -24,6 +24,11 @@ def test_residuals_smaller_than_stated_do_not_shrink_the_noise() -> None:
     assert float(significant_scale(2.0, 50.0)) == 1.0
 
 
+@pytest.mark.parametrize("freedom", [0.3, 1.0, 2.0])
+def test_a_fraction_of_a_degree_of_freedom_counts(freedom: float) -> None:
+    assert float(significant_scale(100.0, freedom)) == pytest.approx(np.sqrt(100.0 / freedom))
+
+
 @pytest.mark.parametrize("freedom", [0.0, -1e-9])
 def test_without_a_degree_of_freedom_nothing_is_called_for(freedom: float) -> None:
     assert float(significant_scale(1e6, freedom)) == 1.0

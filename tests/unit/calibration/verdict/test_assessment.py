@@ -15,6 +15,7 @@ from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.selection.drift import with_drift
 from workbench.calibration.verdict.assessment import (
     Assessment,
+    _missed_limits,
     assess,
     basis,
     derive,
@@ -41,6 +42,23 @@ def test_limits_that_fail_are_named(fitted: CalibrationFit) -> None:
     assert [laser_ids(reason) for reason in few] == [["L1"], ["L2"], ["L3"], ["L4"]]
     assert [numbers(reason) for reason in few[1:3]] == [[11.0, 12.0]] * 2
     assert judged(fitted, worst=float("nan")).verdict == "refused"
+
+
+@pytest.mark.parametrize(("cell", "axis"), [(3, 0), (17, 1)])
+def test_the_largest_residual_is_that_of_most_standard_deviations(
+    fitted: CalibrationFit, cell: int, axis: int
+) -> None:
+    """0.2 px at 0.01 px, beside 0.9 px at 1 px."""
+    residual, sd = np.full_like(fitted.residual_px, 0.9), np.ones_like(fitted.residual_px)
+    residual[cell, axis], sd[cell, axis] = -0.2, 0.01
+    changed = replace(fitted, residual_px=residual, cells=replace(fitted.cells, sd_px=sd), rms_px=1.0)
+    (reason,) = _missed_limits(changed, Acceptance.model_validate({"max_rms_px": 0.5}), 0.01)
+    laser_id = fitted.rig.laser_ids[fitted.cells.laser[cell]]
+    standoff_mm = fitted.cells.placements[fitted.cells.placement[cell]].standoff_mm
+    assert laser_ids(reason) == [laser_id]
+    assert -0.2 in numbers(reason)
+    assert standoff_mm in numbers(reason)
+    assert f"in {'uv'[axis]} of" in reason
 
 
 def test_a_laser_that_never_lit_is_named() -> None:

@@ -114,6 +114,7 @@ def test_ranges_are_hurt_where_a_direction_moves_them(fitted: CalibrationFit) ->
 
 def test_words_and_remedies(fitted: CalibrationFit) -> None:
     found = by_first(directions_of(fitted))
+    assert all(one.change[name] > 0 for name, one in found.items()), "the first parameter grows"
     of_f = found["f_px"]
     percent = 100 * of_f.change["f_px"] / fitted.values[0]
     assert numbers(of_f.words) == pytest.approx([percent, -percent], rel=0.05)
