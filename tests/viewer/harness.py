@@ -22,7 +22,7 @@ from workbench.viewer.window import LOOPBACK, viewer_environment, viewer_executa
 REQUIRE = "WORKBENCH_REQUIRE_VIEWER"
 """Set to 1, a machine that cannot run the viewer fails the test instead of skipping it."""
 START_SECONDS = 30.0
-SETTLE_SECONDS = 20.0
+SETTLE_SECONDS = 60.0
 STOP_SECONDS = 5.0
 _ICD_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 
