@@ -9,7 +9,7 @@ INSTALLED := $(VENV)/.installed
 # The dependencies of the workbench alone, without those of its developers.
 RUNNABLE := $(VENV)/.runnable
 
-.PHONY: help demo test quick wheel lint bench prove mutants crash lock clean schema
+.PHONY: help demo test quick wheel lint bench prove mutants crash lock clean schema pictures
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
@@ -21,6 +21,7 @@ help:
 	@echo "make crash  a session of 10 000 captures with random faults; none may be lost (a quarter of an hour)"
 	@echo "make wheel  build the wheel, install it with the run-time dependencies only, run a session (two minutes)"
 	@echo "make lint   only the linters and the type checker"
+	@echo "make pictures  the viewer's screens in docs/images, of a new run of the demo (two minutes)"
 	@echo "make lock   update requirements.lock and requirements-run.lock from pyproject.toml"
 
 $(BIN)/python:
@@ -79,6 +80,9 @@ LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --fork-s
 lock:
 	$(LOCK) --extra dev --output-file requirements.lock
 	$(LOCK) --extra build --constraint requirements.lock --output-file requirements-run.lock
+
+pictures: $(INSTALLED)
+	$(BIN)/python -m tests.viewer.pictures docs/images
 
 schema: $(INSTALLED)
 	$(BIN)/python -c 'import json; from workbench.model.calibration import Calibration; print(json.dumps(Calibration.model_json_schema(), indent=2))' > docs/calibration.schema.json

@@ -47,6 +47,7 @@ SLOW = {
     "tests/unit/emulator/test_board.py",
     "tests/unit/emulator/test_camera.py",
     "tests/unit/emulator/test_spot.py",
+    "tests/unit/figures/test_picture.py",
     "tests/unit/optics/test_triangulate.py",
     "tests/unit/procedure/engine/test_resume.py",
     "tests/unit/ranging/test_lines.py",

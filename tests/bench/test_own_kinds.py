@@ -18,6 +18,7 @@ from typing import ClassVar, Literal
 
 import pandas as pd
 import pytest
+from rerun import escape_entity_path_part
 
 from tests.crash.short import ROOT, results, write_files
 from tests.support.killed_session import wait_for_capture

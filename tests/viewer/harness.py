@@ -22,7 +22,7 @@ from workbench.viewer.window import LOOPBACK, viewer_environment, viewer_executa
 REQUIRE = "WORKBENCH_REQUIRE_VIEWER"
 """Set to 1, a machine that cannot run the viewer fails the test instead of skipping it."""
 START_SECONDS = 30.0
-SETTLE_SECONDS = 20.0
+SETTLE_SECONDS = 60.0
 STOP_SECONDS = 5.0
 _ICD_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 
@@ -74,6 +74,12 @@ class Viewer:
         """Put the time cursor onto a place of a timeline that counts."""
         self.client.set_time(timeline, sequence=sequence, play_state="paused")
 
+    def tabs(self) -> list[str]:
+        """Names of the screens, from the left."""
+        layout = self.client.get_blueprint().blueprint
+        (root,) = (tabs for tabs in _tabs(layout) if tabs["contents"][0].startswith("container/"))
+        return [layout[f"/{screen}"]["ContainerBlueprint"]["display_name"] for screen in root["contents"]]
+
     def show_tab(self, name: str) -> None:
         """Bring a tab of the layout to the front: a view in a hidden tab cannot be photographed."""
         layout = self.client.get_blueprint().blueprint
@@ -83,12 +89,18 @@ class Viewer:
             for kind in ("ContainerBlueprint", "ViewBlueprint")
             if parts.get(kind, {}).get("display_name") == name
         }
-        for parts in layout.values():
-            container = parts.get("ContainerBlueprint", {})
-            if container.get("container_kind") == "Tabs":
-                for tab in named.intersection(container["contents"]):
-                    container["active_tab"] = tab
+        found = [(tabs, tab) for tabs in _tabs(layout) for tab in named.intersection(tabs["contents"])]
+        assert found, f"no tab {name}"
+        for tabs, tab in found:
+            tabs["active_tab"] = tab
         self.client.set_blueprint(layout, "recording")
+
+    def views_in_front(self) -> list[Any]:
+        """Views that no other tab hides."""
+        layout = self.client.get_blueprint().blueprint
+        root = layout["/viewport"]["ViewportBlueprint"]["root_container"]
+        front = set(_in_front(layout, f"container/{root}"))
+        return [view for view in self.state().views if f"view/{view.view_id}" in front]
 
     def shot(self, view_id: Any = None) -> Picture:
         """A screenshot (H, W, 3) BGR once two in a row are the same: what a recording holds is loaded lazily.
@@ -128,6 +140,24 @@ def headless_viewer(folder: Path, size: str = "1600x900") -> Iterator[Viewer]:
             yield Viewer(_connected(process, port, log_file), log_file)
         finally:
             _end(process)
+
+
+def _tabs(layout: Any) -> list[Any]:
+    """Containers of tabs in a layout."""
+    containers = (parts["ContainerBlueprint"] for parts in layout.values() if "ContainerBlueprint" in parts)
+    return [container for container in containers if container.get("container_kind") == "Tabs"]
+
+
+def _in_front(layout: Any, part: str) -> Iterator[str]:
+    """Views below a part of a layout that no other tab hides."""
+    if part.startswith("view/"):
+        yield part
+        return
+    container = layout[f"/{part}"]["ContainerBlueprint"]
+    contents = [container["contents"]] if isinstance(container["contents"], str) else container["contents"]
+    is_tabs = container.get("container_kind") == "Tabs"
+    for below in [container.get("active_tab", contents[0])] if is_tabs else contents:
+        yield from _in_front(layout, below)
 
 
 def distinct_colors(picture: Picture) -> int:

@@ -1,7 +1,8 @@
-"""The documentation's pictures: `python -m tests.viewer.pictures SESSION OUT`, one PNG for each tab."""
+"""Pictures of the documentation: `python -m tests.viewer.pictures OUT`, a PNG of each screen of the demo."""
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -10,17 +11,42 @@ import cv2
 
 from tests.viewer.harness import headless_viewer
 
-TABS = ("Live", "Fit", "Trial", "3D")
+COMMAND = [
+    "procedures/calibrate-flat.yaml",
+    "procedures/accuracy-flat.yaml",
+    "--rig",
+    "rigs/thesis-emulated.yaml",
+]
+CALIBRATION, TRIAL = 160, 550
+"""Captures that the pictures show: the last one at a placement, when the crops of all lasers are there."""
+SHOWN = {
+    "captures": CALIBRATION,
+    "fit": CALIBRATION,
+    "fit-details": CALIBRATION,
+    "trial": TRIAL,
+    "bench": TRIAL,
+}
+"""Capture of each picture, in the order of the screens from the left."""
 
 
 def take(session: Path, out: Path) -> None:
-    """Open the session's recording and take a picture of every tab."""
+    """Open the session's recording and take a picture of every screen."""
     with tempfile.TemporaryDirectory() as home, headless_viewer(Path(home), "1600x900") as viewer:
         viewer.open(session / "recording.rrd")
-        for tab in TABS:
+        for tab, (name, capture) in zip(viewer.tabs(), SHOWN.items(), strict=True):
             viewer.show_tab(tab)
-            cv2.imwrite(str(out / f"{tab.lower()}.png"), viewer.shot())
+            viewer.go_to("capture", capture)
+            cv2.imwrite(str(out / f"{name}.png"), viewer.shot())
+
+
+def main(out: Path) -> None:
+    """Run the demo in a temporary folder and take its pictures."""
+    workbench = Path(sys.executable).with_name("workbench")
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([workbench, "run", *COMMAND, "--sessions", folder], check=True)
+        (session,) = (path for path in Path(folder).iterdir() if path.is_dir())
+        take(session, out)
 
 
 if __name__ == "__main__":
-    take(Path(sys.argv[1]), Path(sys.argv[2]))
+    main(Path(sys.argv[1]))

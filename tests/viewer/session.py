@@ -33,6 +33,8 @@ BAD = ("L3", 1250.0)
 PLACEMENTS = {standoff_mm: f"p{n}" for n, standoff_mm in enumerate(STANDOFFS, start=1)}
 """Keys of the placements of the calibration."""
 TRIAL = "accuracy-flat"
+SENSOR_CHART = "Error of the sensor alone"
+"""Title of the second chart of the trial."""
 WIDTH_PX = 1.3
 
 
@@ -118,8 +120,11 @@ class MadeUpSession:
                 yield self._record(readings[-1])
             yield self._record(ev.StepFinished(procedure=name, index=i, outcome="3 readings"))
         table = accuracy_table(name, [_row(standoff) for standoff in TRIAL_STANDOFFS])
-        chart = error_chart(f"{name}-errors", readings)
-        yield self._record(ev.TrialFinished(trial=name, tables=(table,), charts=(chart,)))
+        errors = error_chart(f"{name}-errors", readings)
+        sensor = errors.model_copy(
+            update={"name": f"{name}-sensor", "title": SENSOR_CHART, "series": errors.series[-1:]}
+        )
+        yield self._record(ev.TrialFinished(trial=name, tables=(table,), charts=(errors, sensor)))
 
     def _record(self, event: ev.Event) -> ev.Record:
         self.n += 1

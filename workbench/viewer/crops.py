@@ -1,14 +1,14 @@
 """Crops of the frames around the spots of all lasers, magnified, in one picture.
 
 Each laser has a cell of two squares: the lit frame minus the dark frame, and beside it what remains after
-subtraction of the fitted profile. Brightness is the square root of the signal, each square relative to the
+subtraction of the fitted profiles. Brightness is the square root of the signal, each square relative to the
 peak of its spot. Squares of lasers that were lit earlier at the same placement stay, labelled "earlier".
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import ceil
 
 import cv2
@@ -49,6 +49,8 @@ class Crop:
     top_px: int
     spot: Spot | None
     """None: no spot; the square shows where it was expected."""
+    others: tuple[Spot, ...] = ()
+    """The other spots of the capture, which may lie in the square."""
     earlier: bool = False
     """Whether it is of an earlier capture at the same placement."""
 
@@ -78,14 +80,15 @@ class Crops:
             expected: (2,) expected position, px, of the spot of each laser that was on.
         """
         by_laser = {spot.laser_id: spot for spot in spots if spot.laser_id in self.colors}
-        self.latest = {laser: _as_earlier(crop) for laser, crop in self.latest.items()}
+        self.latest = {laser: replace(crop, earlier=True) for laser, crop in self.latest.items()}
         for laser in self.colors:
             if laser not in by_laser and laser not in expected:
                 continue
             spot = by_laser.get(laser)
             centre = expected[laser] if spot is None else np.array([spot.u_px, spot.v_px])
             if np.isfinite(centre).all():
-                self.latest[laser] = _crop(on, off, centre, spot)
+                others = tuple(one for one in spots if one is not spot)
+                self.latest[laser] = _crop(on, off, centre, spot, others)
         self._log()
 
     def _log(self) -> None:
@@ -162,7 +165,9 @@ def drawn(crop: Crop) -> tuple[Image, Image]:
     shown = 255.0 * np.sqrt(np.clip(crop.signal / peak, 0.0, 1.0))
     if crop.spot is None or not np.isfinite(crop.spot.flux_dn):
         return shown.astype(np.uint8), np.full((SIDE_PX, SIDE_PX), MIDDLE, np.uint8)
-    residual = crop.signal - profile(crop.spot, crop.left_px, crop.top_px)
+    known = [spot for spot in (crop.spot, *crop.others) if np.isfinite(spot.flux_dn)]
+    fitted = [profile(spot, crop.left_px, crop.top_px) for spot in known]
+    residual = crop.signal - np.sum(fitted, axis=0)
     scaled = MIDDLE + RESIDUAL_GAIN * MIDDLE * residual / max(crop.spot.peak_dn, 1.0)
     return shown.astype(np.uint8), np.clip(scaled, 0, 255).astype(np.uint8)
 
@@ -194,7 +199,9 @@ def marks(crop: Crop) -> list[FloatArray]:
     return [np.clip(strip, -0.5, SIDE_PX - 0.5) for strip in (*arms, ellipse)]
 
 
-def _crop(on: Image, off: Image | None, centre: FloatArray, spot: Spot | None) -> Crop:
+def _crop(
+    on: Image, off: Image | None, centre: FloatArray, spot: Spot | None, others: tuple[Spot, ...]
+) -> Crop:
     left, top = (round(float(c)) - SIDE_PX // 2 for c in centre)
     square = np.zeros((SIDE_PX, SIDE_PX))
     height, width = on.shape
@@ -207,8 +214,4 @@ def _crop(on: Image, off: Image | None, centre: FloatArray, spot: Spot | None) -
         inside -= off[rows, columns]
     if inside.size:
         square[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left] = inside
-    return Crop(square, left, top, spot)
-
-
-def _as_earlier(crop: Crop) -> Crop:
-    return Crop(crop.signal, crop.left_px, crop.top_px, crop.spot, earlier=True)
+    return Crop(square, left, top, spot, others)

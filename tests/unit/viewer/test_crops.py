@@ -97,12 +97,19 @@ def test_an_exact_profile_leaves_a_grey_residual(
     assert set(np.unique(inside)) <= {MIDDLE - 1, MIDDLE}
 
 
+def test_neighbouring_spots_are_subtracted_too(tmp_path: Path) -> None:
+    spots = [bright_spot("L3", 200.0, 100.0, 30_000.0), bright_spot(None, 208.5, 94.0, 20_000.0)]
+    on, off = drawn_frame(spots, 900.0, (240, 320)), drawn_frame([], 900.0, (240, 320))
+    _, residual = squares(picture(taken(tmp_path, on, off, *spots)), "L3")
+    assert set(np.unique(residual)) <= {MIDDLE - 1, MIDDLE}
+
+
 def test_a_second_peak_that_the_fit_ignores_is_bright_in_the_residual(tmp_path: Path) -> None:
     spot, ghost = bright_spot("L3", 200.0, 100.0, 3000.0), bright_spot(None, 208.0, 94.0, 600.0)
     on, off = drawn_frame([spot, ghost], 20.0, (240, 320)), drawn_frame([], 20.0, (240, 320))
     _, residual = squares(picture(taken(tmp_path, on, off, spot)), "L3")
-    brightest = np.unravel_index(residual.argmax(), residual.shape)
-    assert brightest == (HALF - 6, HALF + 8)
+    row, column = np.unravel_index(residual.argmax(), residual.shape)
+    assert (int(row), int(column)) == (HALF - 6, HALF + 8)
     assert residual.max() > 200
     assert abs(int(residual[HALF, HALF]) - MIDDLE) <= 2
 

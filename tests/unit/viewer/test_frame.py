@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.support.viewer_stream import COLORS, HERE, a_range, a_spot, logged, packed, png_of
+from workbench.model.arrays import Image
 from workbench.model.spot import Failure, Spot
 from workbench.viewer import frame
 from workbench.viewer.frame import LABEL_DISTANCE_PX, LEADER_PX, PREDICTED_PX, label, label_columns
@@ -20,10 +21,16 @@ SCALARS, STRIPS = "Scalars:scalars", "LineStrips2D:strips"
 COLUMNS = st.lists(st.floats(0.0, 2000.0), min_size=1, max_size=12).map(sorted)
 
 
+def grey(values: np.ndarray, full_scale: int) -> Image:
+    """Frame as a camera with this largest value delivers it."""
+    return values.astype(np.uint8) if full_scale <= 255 else values.astype(np.uint16)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize(("bits", "dtype"), [(8, np.uint8), (12, np.uint16), (16, np.uint16)])
-def test_a_frame_is_logged_as_stored(tmp_path: Path, seed: int, bits: int, dtype: type[np.uint8]) -> None:
-    pixels = np.random.default_rng(seed).integers(0, 2**bits, (48, 64)).astype(dtype)
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_a_frame_is_logged_as_stored(tmp_path: Path, seed: int, bits: int) -> None:
+    values = np.random.default_rng(seed).integers(0, 2**bits, (48, 64))
+    pixels = grey(values, 2**bits - 1)
     png = png_of(pixels)
     contents = logged(tmp_path, lambda stream: frame.log_frame(stream, png, pixels, 2**bits - 1))
     assert contents.values("/frame/image", "EncodedDepthImage:blob") == [(1, png)]
@@ -47,11 +54,10 @@ def test_white_is_a_multiple_of_the_room_light(
     tmp_path: Path, ambient_dn: int | None, full_scale: int, white: float
 ) -> None:
     """8 bits are scaled to 0..1 by the viewer, 16 bits are not."""
-    dtype = np.uint8 if full_scale <= 255 else np.uint16
-    off = None if ambient_dn is None else np.full((6, 8), ambient_dn, dtype)
+    off = None if ambient_dn is None else grey(np.full((6, 8), ambient_dn), full_scale)
     if off is not None:
         off[0, :3] = full_scale  # a window in the corner of the frame
-    png = png_of(np.zeros((6, 8), dtype))
+    png = png_of(grey(np.zeros((6, 8)), full_scale))
     contents = logged(tmp_path, lambda stream: frame.log_frame(stream, png, off, full_scale))
     ((_, ((low, high),)),) = contents.values("/frame/image", "EncodedDepthImage:depth_range")
     assert low == 0.0
@@ -116,8 +122,8 @@ def test_a_capture_without_spots_removes_the_marks_of_the_last_one(tmp_path: Pat
 
 
 def drawn_spot(random: np.random.Generator, laser: str | None, *flags: Failure) -> Spot:
-    values = [float(value) for value in random.uniform(0.01, 500.0, 7)]
-    return Spot(*values, flags=frozenset(flags), laser_id=laser)
+    u_px, v_px, u_sd_px, v_sd_px, flux_dn, width_px, peak_dn = map(float, random.uniform(0.01, 500.0, 7))
+    return Spot(u_px, v_px, u_sd_px, v_sd_px, flux_dn, width_px, peak_dn, frozenset(flags), laser)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import get_args
 
@@ -10,7 +11,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from tests.viewer.conftest import Recorded
-from tests.viewer.readback import TIMELINES, Contents, LaidOut, layout_views
+from tests.viewer.readback import TIMELINES, Contents, LaidOut, front_tab, layout_views
 from tests.viewer.session import (
     BAD,
     LASERS,
@@ -23,8 +24,8 @@ from tests.viewer.session import (
     a_fit,
 )
 from workbench.figures.picture import note, picture
-from workbench.model import chart
 from workbench.model import event as ev
+from workbench.model.chart import laser_colors
 from workbench.model.errors import BadInputError
 from workbench.model.fit_charts import residual_chart
 from workbench.viewer.recording import RecordingConsumer, _OpenRecording, rebuild
@@ -135,6 +136,46 @@ def test_every_view_has_content_on_every_timeline(
             assert has_content(contents, view, timeline, at), (view.name, at)
 
 
+def recording_of(recorded: Recorded, records: Iterable[ev.Record], out: Path) -> Path:
+    with RecordingConsumer(recorded.folder, recorded.rig, out) as consumer:
+        for record in records:
+            consumer(record)
+    return out
+
+
+def test_a_session_of_a_trial_alone_has_curves_of_its_spots(recorded: Recorded, tmp_path: Path) -> None:
+    """Its lasers are known by the readings only."""
+    first, *others = recorded.records
+    (start,) = (n for n, record in enumerate(others) if _starts_trial(record.event))
+    out = recording_of(recorded, [first, *others[start:]], tmp_path / "trial.rrd")
+    contents = Contents(out)
+    views = [view for view in layout_views(out) if view.origin.startswith(("/spots", "/trials", "/frame"))]
+    assert len(views) >= 6
+    for view in views:
+        assert has_content(contents, view, "capture", 1), view.name
+
+
+def _starts_trial(event: object) -> bool:
+    return isinstance(event, ev.ProcedureStarted) and event.procedure == TRIAL
+
+
+@pytest.mark.parametrize(
+    ("last", "front"),
+    [
+        (ev.CaptureTaken, "Captures"),
+        (ev.FitFinished, "Calibration: which standoff?"),
+        (ev.ReadingTaken, TRIAL),
+        (ev.TrialFinished, TRIAL),
+    ],
+)
+def test_the_screen_in_front_follows_the_session(
+    recorded: Recorded, tmp_path: Path, last: type, front: str
+) -> None:
+    end = next(n for n, record in enumerate(recorded.records) if isinstance(record.event, last))
+    out = recording_of(recorded, recorded.records[: end + 1], tmp_path / "part.rrd")
+    assert front_tab(out) == front
+
+
 FIT_TEXTS = ("/fit/verdict", "/fit/worst", "/fit/checks", "/fit/parameter_table")
 
 
@@ -183,7 +224,7 @@ def test_at_a_standoff_everything_is_of_the_last_capture_there(
 def test_the_frame_in_the_residuals_is_at_the_standoff_of_the_cursor(
     contents: Contents, standoff_mm: float
 ) -> None:
-    colors = chart.laser_colors(list(LASERS))
+    colors = laser_colors(list(LASERS))
     column = picture(residual_chart(a_fit(), "u"), colors).x_px[standoff_mm]
     for timeline, at in (
         ("capture", FIRST[standoff_mm]),
@@ -217,8 +258,9 @@ def test_readings_and_the_trial_table(recorded: Recorded, contents: Contents) ->
     (table,) = contents.static(f"/trials/{TRIAL}/tables", "TextDocument:text")[-1]
     (finished,) = [r.event for r in recorded.records if isinstance(r.event, ev.TrialFinished)]
     assert all(table_text(one) in table for one in finished.tables)
-    drawn = contents.static(f"/trials/{TRIAL}/pictures/{TRIAL}-errors/image", "EncodedImage:blob")
-    assert len(drawn) == 1
+    for chart in finished.charts:
+        entity = f"/trials/{TRIAL}/pictures/{chart.name}/image"
+        assert len(contents.static(entity, "EncodedImage:blob")) == 1
 
 
 def test_lanes_and_log_follow_the_steps(contents: Contents) -> None:

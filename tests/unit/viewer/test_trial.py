@@ -163,7 +163,7 @@ def cursor(contents: Contents, chart: str, capture: int) -> float | None:
         return None
     us = [point[0] for point in strips[0]]
     assert max(us) - min(us) == pytest.approx(2 * CURSOR_HALF_PX)
-    return (min(us) + max(us)) / 2
+    return float(min(us) + max(us)) / 2
 
 
 def test_a_frame_in_every_chart_is_at_the_standoff_of_the_reading(tmp_path: Path) -> None:
