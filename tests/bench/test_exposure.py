@@ -103,6 +103,7 @@ def test_live_ranging_says_that_it_sets_no_exposure(
             request,
             False,
             cast(StopAfterCapture, SimpleNamespace(reason=None)),
+            None,
         )
     assert ("exposure of the rig file" in " ".join(capsys.readouterr().err.split())) != virtual
 

@@ -57,6 +57,7 @@ def test_the_largest_uncertainty_and_its_limit_are_logged_and_the_pictures_are_s
     contents = logged(tmp_path, log)
     assert contents.values("/advice/largest_range_sd", "Scalars:scalars") == [(1, [8.0]), (1, [4.0])]
     assert contents.values("/advice/limit", "Scalars:scalars") == [(1, [3.0])] * 2
+    assert contents.static("/advice/limit", "SeriesLines:names") == [["limit"]]
     for picture in ("/progress/uncertainty/image", "/progress/narrowing/image"):
         assert len(contents.static(picture, "EncodedImage:blob")) >= 1
         assert not any("capture" in row for row in contents.everything()[picture])

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from tests.support.viewer_stream import a_reading
+from tests.support.viewer_stream import a_reading, a_spot
 from tests.viewer.session import a_fit
 from workbench.model.event import CaptureTaken, Fault, FrameRef
+from workbench.model.spot import Failure
+from workbench.viewer.captures import CaptureLog
 from workbench.viewer.documents import MOST_LINES, capture_line, fit_summary, without_range
+from workbench.viewer.stream import Moment
+
+SOUND = CaptureLog().defects()
+"""No capture has a defect."""
 
 
 def items(markdown: str) -> list[str]:
@@ -29,28 +35,41 @@ def a_capture() -> CaptureTaken:
 
 def test_the_verdict_comes_first_and_every_reason_and_warning_is_an_item() -> None:
     fit = a_fit().model_copy(update={"reasons": ("one", "two"), "warnings": ("three",)})
-    lines = fit_summary(fit).splitlines()
+    lines = fit_summary(fit, SOUND).splitlines()
     assert fit.verdict in lines[0]
     assert f"{fit.rms_px:.3f} px" in lines[0]
     assert f"{fit.observations}" in lines[0]
-    assert items(fit_summary(fit)) == ["one", "two", "three"]
+    assert items(fit_summary(fit, SOUND)) == ["one", "two", "three"]
 
 
 def test_without_reasons_the_verdict_is_all() -> None:
     bare = a_fit().model_copy(update={"reasons": (), "warnings": ()})
-    assert len(fit_summary(bare).splitlines()) == 1
+    assert len(fit_summary(bare, SOUND).splitlines()) == 1
 
 
 def test_named_faults_come_before_reasons_and_are_not_repeated() -> None:
     fault = Fault(name="placement_off", message="900 mm is off")
     fit = a_fit().model_copy(update={"faults": (fault,), "reasons": ("rms", fault.message), "warnings": ()})
-    assert items(fit_summary(fit)) == ["900 mm is off", "rms"]
+    assert items(fit_summary(fit, SOUND)) == ["900 mm is off", "rms"]
+
+
+def test_captures_with_a_defect_are_listed_after_the_causes() -> None:
+    log = CaptureLog()
+    for n, spots in enumerate(((), (a_spot("L2", 10.0),), (a_spot("L2", 10.0, 20.0, Failure.SATURATED),))):
+        capture = a_capture().model_copy(update={"key": f"c{n}"})
+        log.add(capture, None, Moment(n + 1, 1, 0))
+        log.spots[capture.key] = spots
+    fit = a_fit().model_copy(update={"reasons": ("one",), "warnings": ("last",)})
+    first, missing, saturated, last = items(fit_summary(fit, log.defects()))
+    assert (first, last) == ("one", "last")
+    for words, line in ((("L2", "1250 mm", "no spot", "1-1"), missing), (("saturated", "3-3"), saturated)):
+        assert all(word in line for word in words)
 
 
 def test_a_long_list_ends_with_the_number_of_the_others() -> None:
     reasons = tuple(f"reason {n}" for n in range(MOST_LINES + 3))
     fit = a_fit().model_copy(update={"reasons": reasons, "warnings": ()})
-    *shown, last = items(fit_summary(fit))
+    *shown, last = items(fit_summary(fit, SOUND))
     assert shown == list(reasons[:MOST_LINES])
     assert "3" in last
 

@@ -46,8 +46,8 @@ def test_observations_are_those_of_the_captures_table(rig: Rig, recording: Path)
             other.repeat,
             other.saturated,
         )
-        numbers = [[o.u_px, o.v_px, o.u_sd_px, o.v_sd_px] for o in (one, other)]
-        np.testing.assert_allclose(*numbers, rtol=1e-9)
+        numbers = np.array([(o.u_px, o.v_px, o.u_sd_px, o.v_sd_px) for o in (one, other)])
+        np.testing.assert_allclose(numbers[0], numbers[1], rtol=1e-9)
 
 
 @pytest.mark.filterwarnings("ignore:RRD file has no footer")

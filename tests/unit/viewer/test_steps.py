@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from tests.support.viewer_stream import HERE, logged
-from workbench.model.event import StandoffAdvised
 from workbench.viewer.steps import (
     ENDED,
     ERROR,
@@ -15,8 +12,6 @@ from workbench.viewer.steps import (
     WARN,
     end_all,
     lane,
-    log_advice,
-    log_styles,
     log_text,
 )
 from workbench.viewer.stream import Moment, Stream
@@ -51,24 +46,3 @@ def test_the_end_ends_every_lane(tmp_path: Path) -> None:
     assert lanes == {f"/steps/lanes/{name}" for name in names}
     for entity in lanes:
         assert contents.values(entity, "StateChange:state") == [(1, [ENDED])]
-
-
-def test_the_range_uncertainty_so_far_and_its_limit_are_per_cents(tmp_path: Path) -> None:
-    advice = StandoffAdvised(
-        placements=4,
-        relative_range_sd=0.021,
-        limit=0.03,
-        next_standoff_mm=4500.0,
-        then_relative_range_sd=0.018,
-    )
-
-    def log(stream: Stream) -> None:
-        log_styles(stream)
-        log_advice(stream, advice)
-
-    contents = logged(tmp_path, log)
-    for name, value in (("largest_range_sd", 2.1), ("limit", 3.0)):
-        ((_, (logged_value,)),) = contents.values(f"/advice/{name}", "Scalars:scalars")
-        assert logged_value == pytest.approx(value)
-    assert contents.static("/advice/limit", "SeriesLines:names") == [["limit"]]
-    assert contents.static("/advice/largest_range_sd", "SeriesPoints:names") == [["so far"]]
