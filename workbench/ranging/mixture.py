@@ -9,11 +9,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
-from workbench.model.arrays import BoolArray, FloatArray, IndexArray
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.stats import norm_ppf
 from workbench.ranging.cylinder import CylinderFit
 from workbench.ranging.points import LEVEL, Points
@@ -36,12 +36,18 @@ class ShapePosterior:
     """Posterior over shapes and sizes."""
 
     probabilities: Mapping[Candidate, float]
-    closest_mm: float
-    """Median of the closest range over the front, over the shapes that the spots determine."""
-    sigma_mm: float
-    """Root mean square deviation of the closest range from `closest_mm`."""
+    """Of each candidate, simplest first."""
+    median_mm: float
+    """Median of the closest range over the front."""
+    mean_mm: float
+    sd_mm: float
+    """Mean and standard deviation of the closest range."""
     interval_mm: tuple[float, float]
-    """95 % interval of the closest range over all shapes; the upper end may be infinite."""
+    """95 % interval of the closest range; the upper end may be infinite."""
+
+    def deviation_mm(self, range_mm: float) -> float:
+        """Root mean square deviation of the closest range from a range."""
+        return math.hypot(self.sd_mm, self.mean_mm - range_mm)
 
 
 def shape_posterior(
@@ -87,17 +93,10 @@ def shape_posterior(
     probability = np.exp(evidence - evidence.max())
     probability /= probability.sum()
     weight = share * probability[:, None]
-    mixture = _Mixture(closest + points.offset_mm, np.broadcast_to(own_sd[:, None], share.shape), weight)
-    low, median, high = mixture.quantiles_mm(QUANTILES)
-    known = np.ones(len(evidence), bool)
-    known[: len(components.degree)] = components.degree < len(fits)
-    if not known.all() and weight[known].any():
-        (median,) = mixture.of(known).quantiles_mm(QUANTILES[1:2])
-    return ShapePosterior(
-        _probabilities(components, probability),
-        median - points.offset_mm,
-        mixture.deviation_mm(median),
-        (low - points.offset_mm, high - points.offset_mm),
+    used = weight > 0.0
+    sd = np.broadcast_to(own_sd[:, None], share.shape)
+    return _summary(
+        _probabilities(components, probability), points, closest[used], sd[used], weight[used] / weight.sum()
     )
 
 
@@ -106,32 +105,21 @@ def _floor_mm(points: Points) -> float:
     return max(0.0, -points.offset_mm)
 
 
-class _Mixture(NamedTuple):
-    """Mixture of depths whose inverses are Gaussian, mm; (C, M) each."""
+def _summary(
+    probabilities: Mapping[Candidate, float],
+    points: Points,
+    closest_mm: FloatArray,
+    sd_mm: FloatArray,
+    weight: FloatArray,
+) -> ShapePosterior:
+    """Posterior from the nodes (m,) of the closest range, whose weights sum to 1."""
+    from workbench.ranging.mixture_kernels import quantiles  # loads the compiler
 
-    depth_mm: FloatArray
-    sd_mm: FloatArray
-    weight: FloatArray
-
-    def of(self, components: BoolArray) -> _Mixture:
-        """The mixture of some components."""
-        return _Mixture(self.depth_mm[components], self.sd_mm[components], self.weight[components])
-
-    def _nodes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        used = self.weight > 0.0
-        weight = self.weight[used]
-        return self.depth_mm[used], self.sd_mm[used], weight / weight.sum()
-
-    def quantiles_mm(self, probabilities: FloatArray) -> list[float]:
-        """Depths at probabilities; the largest may be infinite."""
-        from workbench.ranging.mixture_kernels import quantiles  # loads the compiler
-
-        return [float(depth) for depth in quantiles(*self._nodes(), probabilities)]
-
-    def deviation_mm(self, depth_mm: float) -> float:
-        """Root mean square deviation from a depth."""
-        depth, sd, weight = self._nodes()
-        return math.sqrt(float(weight @ ((depth - depth_mm) ** 2 + sd**2)))
+    depths = quantiles(closest_mm + points.offset_mm, sd_mm, weight, QUANTILES)
+    low, median, high = (depths - points.offset_mm).tolist()
+    mean = float(weight @ closest_mm)
+    variance = float(weight @ ((closest_mm - mean) ** 2 + sd_mm**2))
+    return ShapePosterior(probabilities, median, mean, math.sqrt(variance), (low, high))
 
 
 def _likelihoods(
