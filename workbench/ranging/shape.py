@@ -52,9 +52,9 @@ class Shape:
     """Median of the smallest range over the front, over all shapes; of an unknown one, the smallest range."""
     closest_sigma_mm: float
     closest_interval_mm: tuple[float, float]
-    """95 % interval over all shapes; the upper end may be infinite. Where another shape than a flat is
-    reported and does not exclude a flat, it includes the flat's interval; where a laser has no spot, that of
-    the smallest measured range."""
+    """95 % interval over all shapes; the upper end may be infinite. It includes that of a flat where another
+    shape is reported and does not exclude one. Where a laser has no spot, it includes that of the smallest
+    measured range."""
     closest_x_mm: float
     """Position of the smallest range along the front, by the reported shape."""
     closest_by_range: FloatArray
@@ -68,7 +68,7 @@ class Shape:
     coefficients: tuple[float, ...] = ()
     """range = sum of coefficients[k] x^k, x and range in mm."""
     angle_rad: float | None = None
-    """Angle of the incline through the spots, whatever the kind; positive where the surface recedes towards
+    """Angle of the incline through the spots, for every kind; positive where the surface recedes towards
     greater x; None for a single spot."""
     angle_sigma_rad: float | None = None
     angle_interval_rad: tuple[float, float] | None = None
@@ -104,8 +104,8 @@ def fit_shape(
         points: the spots of one line.
         front_mm: ends of the front, over which the closest range is sought; the outermost spots if None.
         prior: prior over shapes and sizes.
-        lasers: number of lasers of the line, with or without a spot; None: as many as spots. Shapes that so
-            many spots would not determine are left out.
+        lasers: number of lasers of the line, with or without a spot; None: as many as spots. Shapes that
+            this number of spots would not determine are left out.
     """
     front = front_mm or (float(points.x_mm.min()), float(points.x_mm.max()))
     if not front[1] > front[0]:

@@ -62,8 +62,8 @@ def polynomial(
     """Fit range = sum of coefficients[k] (x / scale)^k; see `fit_polynomial`.
 
     Returns:
-        coefficients (p,), covariance (p, p), derivatives by the ranges (p, n) and by the positions (p, n),
-        chi2 (NaN where the polynomial passes behind the pinhole at a point), depths (n,), and (n, n) inverse
+        coefficients (p,), covariance (p, p), derivatives by the ranges (p, n) and by the positions (p, n).
+        Chi2 (NaN where the polynomial passes behind the pinhole at a point), depths (n,), and (n, n) inverse
         covariance of the inverse depths.
     """
     powers, slopes = np.ones((len(x_mm), degree + 1)), np.zeros((len(x_mm), degree + 1))
@@ -107,8 +107,8 @@ def circle(
 
     Returns:
         the circle (3,), covariance (3, 3), derivatives by the ranges (3, n), chi2 (NaN where a point lies on
-        the far side or at grazing incidence, or the circle diverges), log density of the ranges
-        without chi2 and powers of 2 pi.
+        the far side or at grazing incidence, or the circle diverges).
+        Log density of the ranges without chi2 and powers of 2 pi.
     """
     n = len(x_mm)
     at = start.copy()
