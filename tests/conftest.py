@@ -52,6 +52,7 @@ SLOW = {
     "tests/unit/procedure/engine/test_resume.py",
     "tests/unit/ranging/test_lines.py",
     "tests/unit/ranging/test_live.py",
+    "tests/unit/ranging/test_mixture.py",
     "tests/unit/ranging/test_shape.py",
     "tests/unit/report/test_board_page.py",
     "tests/unit/sensor/test_calibrated.py",

@@ -12,6 +12,7 @@ from functools import cache, partial
 import numpy as np
 
 from tests.proofs.calibrated_surfaces import DrawnSensors
+from tests.proofs.shape_scores import angle_held, drawn_coverage
 from tests.proofs.tables import keep
 from tests.support.surfaces import (
     F_PX,
@@ -20,7 +21,6 @@ from tests.support.surfaces import (
     X,
     cubic,
     cylinder,
-    drawn,
     flat,
     holds,
     incline,
@@ -31,7 +31,7 @@ from tests.support.surfaces import (
 )
 from workbench.ranging.points import interval_mm
 from workbench.ranging.polynomial import fit_polynomial
-from workbench.ranging.shape import DEFAULT_PRIOR, Shape, fit_shape
+from workbench.ranging.shape import Shape
 
 READINGS, SEED = 1000, 2001
 DRAWN_SHAPES, DRAWN_SENSORS = 20_000, 50
@@ -88,10 +88,9 @@ def angle_table(read: Read, closest_mm: Sequence[int] = CLOSEST_MM, n: int = REA
         yield f"| {name} | " + " | ".join(cells) + " |"
 
 
-def _angle_cell(shapes: Sequence[Shape], angle_deg: float) -> str:
-    intervals = [np.degrees(s.angle_interval_rad) for s in shapes if s.angle_interval_rad is not None]
+def _angle_cell(shapes: list[Shape], angle_deg: float) -> str:
     angles = [np.degrees(s.angle_rad) for s in shapes if s.angle_rad is not None]
-    held = np.mean([low <= angle_deg <= high for low, high in intervals])
+    held = np.mean(list(angle_held(shapes, angle_deg)))
     return f"{100 * held:.0f}/{np.mean(angles) - angle_deg:+.1f}"
 
 
@@ -144,19 +143,6 @@ def others_coverage(closest_mm: Sequence[int] = CLOSEST_MM, n: int = 10 * READIN
     return float(np.mean(held)), len(held)
 
 
-def drawn_coverage(n: int = DRAWN_SHAPES, seed: int = SEED) -> float:
-    """Coverage of the interval over shapes from the prior, their closest ranges log-uniform."""
-    rng = np.random.default_rng(seed)
-    at = np.exp(rng.uniform(np.log(CLOSEST_MM[0]), np.log(CLOSEST_MM[-1]), n))
-    return float(np.mean([_drawn_holds(mm, rng) for mm in at.tolist()]))
-
-
-def _drawn_holds(closest_mm: float, rng: np.random.Generator) -> bool:
-    surface = drawn(DEFAULT_PRIOR, closest_mm, rng)
-    noise = rng.normal(0.0, 1.0, len(X)) * SD_PX / (F_PX * np.abs(X))
-    return holds(fit_shape(seen(X, 1.0 / (1.0 / surface(X) + noise))), closest_mm)
-
-
 def _head(closest_mm: Sequence[int]) -> Iterator[str]:
     yield "| | " + " | ".join(str(at) for at in closest_mm) + " |"
     yield "|---" * (len(closest_mm) + 1) + "|"
@@ -187,7 +173,8 @@ def main() -> int:
         *flat_table(),
         "",
         f"flats reported as another shape: {others}, of these {100 * covered:.0f} % in the interval",
-        f"shapes drawn from the prior ({DRAWN_SHAPES}): {100 * drawn_coverage():.1f} % in the interval",
+        f"{DRAWN_SHAPES} shapes drawn from the prior:"
+        f" {100 * drawn_coverage(DRAWN_SHAPES, SEED):.1f} % in the interval",
     ]
     keep("shapes", "Shapes", lines)
     return 0

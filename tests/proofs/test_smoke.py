@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.proofs import bound, fisheye, joint, report, sessions, shapes, simulate, study
+from tests.proofs import bound, fisheye, joint, report, sessions, shape_scores, shapes, simulate, study
 from tests.proofs.ranging import ranges
 from tests.proofs.solve import at_once, one_by_one
 from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, fisheye_rig, thesis_rig
@@ -154,6 +154,19 @@ def test_the_table_of_shapes_in_the_docs_is_what_comes_out() -> None:
     for name, cells in computed.items():
         told = [documented[name][shapes.CLOSEST_MM.index(at)] for at in (600, 2000)]
         np.testing.assert_allclose(told, cells, atol=1.0, err_msg=name)
+
+
+def test_a_small_proof_of_shapes_and_angles_meets_its_limits() -> None:
+    lines, misses = shape_scores.scores(400, 3)
+    assert len(lines) == 1 + len(shape_scores.FLATS_MM) + len(shape_scores.INCLINES)
+    assert misses == []
+
+
+def test_a_score_far_from_its_limits_is_missed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shape_scores, "COVERAGE", (0.2, 0.3))
+    lines, misses = shape_scores.scores(50, 3)
+    assert len(misses) == 1
+    assert lines[-1] == f"MISSED  {misses[0]}"
 
 
 def _cells(lines: list[str]) -> dict[str, list[tuple[float, ...]]]:

@@ -66,7 +66,7 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
     if start is None:
         return None
     try:
-        found = circle(start, points.x_mm, points.range_mm, *points.covariances(), STEPS, GRAZING, LARGEST_MM)
+        found = circle(start, points.x_mm, points.range_mm, *points.covariances, STEPS, GRAZING, LARGEST_MM)
     except np.linalg.LinAlgError:  # nearly a line: the three parameters are degenerate
         return None
     (x, z, radius), covariance, by_range, chi2, log_density = found

@@ -13,10 +13,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from workbench.model.arrays import BoolArray, FloatArray, IndexArray
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.stats import norm_ppf
 from workbench.ranging.cylinder import CylinderFit
-from workbench.ranging.points import LEVEL, Points
+from workbench.ranging.points import LEVEL, Closest, Points
 from workbench.ranging.polynomial import PolynomialFit
 from workbench.ranging.shape_prior import CUBIC, PriorComponents, ShapePrior, prior_components
 
@@ -36,12 +36,18 @@ class ShapePosterior:
     """Posterior over shapes and sizes."""
 
     probabilities: Mapping[Candidate, float]
-    closest_mm: float
-    """Median of the closest range over the front, over the shapes that the spots determine."""
-    sigma_mm: float
-    """Root mean square deviation of the closest range from `closest_mm`."""
+    """Of each candidate, simplest first."""
+    median_mm: float
+    """Median of the closest range over the front."""
+    mean_mm: float
+    sd_mm: float
+    """Mean and standard deviation of the closest range."""
     interval_mm: tuple[float, float]
-    """95 % interval of the closest range over all shapes; the upper end may be infinite."""
+    """95 % interval of the closest range; the upper end may be infinite."""
+
+    def deviation_mm(self, range_mm: float) -> float:
+        """Root mean square deviation of the closest range from a range."""
+        return math.hypot(self.sd_mm, self.mean_mm - range_mm)
 
 
 def shape_posterior(
@@ -65,40 +71,52 @@ def shape_posterior(
     from workbench.ranging.mixture_kernels import posterior  # loads the compiler
 
     components = prior_components(prior, front_mm, highest)
-    evidence, closest, share, own_sd = posterior(
-        (points.x_mm - components.middle_mm) / components.half_mm,
-        *_likelihoods(points, components, fits),
-        components.degree,
-        components.log_mass if circle is None else components.log_mass + components.log_parabola,
-        components.mean_mm,
-        components.sd_mm,
-        *_nodes(components.mean_mm.shape[1]),
-        _floor_mm(points),
+    nodes = _Nodes(
+        *posterior(
+            (points.x_mm - components.middle_mm) / components.half_mm,
+            *_likelihoods(points, components, fits),
+            components.degree,
+            components.log_mass if circle is None else components.log_mass + components.log_parabola,
+            components.mean_mm,
+            components.sd_mm,
+            *_nodes(components.mean_mm.shape[1]),
+            _floor_mm(points),
+        )
     )
     if circle is not None:
-        near = circle.closest(front_mm)
-        possible = near.range_mm > _floor_mm(points)
-        evidence = np.append(evidence, _circle_evidence(points, components, circle) if possible else -np.inf)
-        closest = np.vstack([closest, np.full_like(closest[0], near.range_mm)])
-        share = np.vstack([share, np.eye(1, share.shape[1])])
-        own_sd = np.append(own_sd, near.sigma_mm)
-    if not (share * np.exp(evidence - evidence.max())[:, None] > 0.0).any():
+        near, evidence = circle.closest(front_mm), _circle_evidence(points, components, circle)
+        nodes = nodes.and_one(near, evidence if near.range_mm > _floor_mm(points) else -np.inf)
+    best = float(nodes.log_evidence.max())
+    if not math.isfinite(best):
         return None
-    probability = np.exp(evidence - evidence.max())
-    probability /= probability.sum()
-    weight = share * probability[:, None]
-    mixture = _Mixture(closest + points.offset_mm, np.broadcast_to(own_sd[:, None], share.shape), weight)
-    low, median, high = mixture.quantiles_mm(QUANTILES)
-    known = np.ones(len(evidence), bool)
-    known[: len(components.degree)] = components.degree < len(fits)
-    if not known.all() and weight[known].any():
-        (median,) = mixture.of(known).quantiles_mm(QUANTILES[1:2])
-    return ShapePosterior(
-        _probabilities(components, probability),
-        median - points.offset_mm,
-        mixture.deviation_mm(median),
-        (low - points.offset_mm, high - points.offset_mm),
-    )
+    mass = np.exp(nodes.log_evidence - best)
+    return _summary(_probabilities(components, mass / mass.sum()), points, nodes.mixture(mass))
+
+
+class _Nodes(NamedTuple):
+    """Nodes of the closest range of C components, M each; see `mixture_kernels.posterior`."""
+
+    log_evidence: FloatArray
+    range_mm: FloatArray
+    share: FloatArray
+    sd_mm: FloatArray
+
+    def and_one(self, closest: Closest, log_evidence: float) -> _Nodes:
+        """The nodes, and a component with a single one."""
+        _, size = self.share.shape
+        return _Nodes(
+            np.append(self.log_evidence, log_evidence),
+            np.vstack([self.range_mm, np.full(size, closest.range_mm)]),
+            np.vstack([self.share, np.eye(1, size)]),
+            np.append(self.sd_mm, closest.sigma_mm),
+        )
+
+    def mixture(self, mass: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(m,) ranges, deviations and weights of the nodes, by the mass (C,) of the components."""
+        weight = self.share * mass[:, None]
+        used = weight > 0.0
+        sd = np.broadcast_to(self.sd_mm[:, None], used.shape)[used]
+        return self.range_mm[used], sd, weight[used] / weight.sum()
 
 
 def _floor_mm(points: Points) -> float:
@@ -106,32 +124,20 @@ def _floor_mm(points: Points) -> float:
     return max(0.0, -points.offset_mm)
 
 
-class _Mixture(NamedTuple):
-    """Mixture of depths whose inverses are Gaussian, mm; (C, M) each."""
+def _summary(
+    probabilities: Mapping[Candidate, float],
+    points: Points,
+    mixture: tuple[FloatArray, FloatArray, FloatArray],
+) -> ShapePosterior:
+    """Posterior from nodes (m,) of the closest range: range, deviation, and weight, 1 in total."""
+    from workbench.ranging.mixture_kernels import quantiles  # loads the compiler
 
-    depth_mm: FloatArray
-    sd_mm: FloatArray
-    weight: FloatArray
-
-    def of(self, components: BoolArray) -> _Mixture:
-        """The mixture of some components."""
-        return _Mixture(self.depth_mm[components], self.sd_mm[components], self.weight[components])
-
-    def _nodes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        used = self.weight > 0.0
-        weight = self.weight[used]
-        return self.depth_mm[used], self.sd_mm[used], weight / weight.sum()
-
-    def quantiles_mm(self, probabilities: FloatArray) -> list[float]:
-        """Depths at probabilities; the largest may be infinite."""
-        from workbench.ranging.mixture_kernels import quantiles  # loads the compiler
-
-        return [float(depth) for depth in quantiles(*self._nodes(), probabilities)]
-
-    def deviation_mm(self, depth_mm: float) -> float:
-        """Root mean square deviation from a depth."""
-        depth, sd, weight = self._nodes()
-        return math.sqrt(float(weight @ ((depth - depth_mm) ** 2 + sd**2)))
+    range_mm, sd_mm, weight = mixture
+    depths = quantiles(range_mm + points.offset_mm, sd_mm, weight, QUANTILES)
+    low, median, high = (depths - points.offset_mm).tolist()
+    mean = float(weight @ range_mm)
+    variance = float(weight @ ((range_mm - mean) ** 2 + sd_mm**2))
+    return ShapePosterior(probabilities, median, mean, math.sqrt(variance), (low, high))
 
 
 def _likelihoods(

@@ -125,10 +125,10 @@ def posterior(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Log evidence of C prior components, and nodes of the closest range.
 
-    The likelihood of degree d is Gaussian about its fit: -2 log = chi2[d] + (theta - estimate[d])^T H
-    (theta - estimate[d]), theta = (a, amplitudes), with H = J^T weight[d] J and J the derivatives of inverse
-    depth. Given the amplitudes, a is Gaussian with the deviation 1 / sqrt(H[0, 0]), and so is the closest
-    range; the amplitudes are nodes.
+    The parameters of degree d are theta = (a, amplitudes). Their likelihood is Gaussian about the fit:
+    -2 log = chi2[d] + (theta - estimate[d])^T H (theta - estimate[d]). H = J^T weight[d] J, J the derivatives
+    of the inverse depths. Given the amplitudes, a is Gaussian with the deviation 1 / sqrt(H[0, 0]), and so is
+    the closest range; the amplitudes are nodes.
 
     Args:
         t: (n,) positions of the spots, in half fronts from the middle.
@@ -145,8 +145,9 @@ def posterior(
         floor: smallest possible range, mm.
 
     Returns:
-        log evidence (C,), -inf where there is none; (C, M) range of each node, mm; (C, M) its weight, 0 below
-        the floor, of each component 1 in total without these; (C,) deviation given the amplitudes.
+        log evidence (C,), -inf where there is none; (C, M) range of each node, mm; (C, M) its weight.
+        (C,) Deviation given the amplitudes, mm. Nodes below the floor have weight 0; without these, the
+        weights of a component sum to 1.
     """
     components, size = len(degree), estimate.shape[1]
     evidence = np.full(components, -np.inf)

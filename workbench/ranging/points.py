@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -48,6 +49,7 @@ class Points:
     def __len__(self) -> int:
         return len(self.x_mm)
 
+    @cached_property
     def covariances(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(n, n) of ranges, of positions, and of range i with position j; zeros where None is stated."""
         none = np.zeros_like(self.covariance_mm2)

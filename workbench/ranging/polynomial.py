@@ -42,7 +42,7 @@ class PolynomialFit:
 
     def per_mm(self) -> tuple[float, ...]:
         """Coefficients of x^k, mm^(1 - k)."""
-        return tuple((self.coefficients / self.scale_mm ** np.arange(self.degree + 1)).tolist())
+        return tuple(c / self.scale_mm**k for k, c in enumerate(self.coefficients.tolist()))
 
     def closest(self, front_mm: tuple[float, float]) -> Closest:
         """Smallest range over the front.
@@ -79,15 +79,14 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
     scale = float(np.abs(points.x_mm).max()) or 1.0
     measured = points.x_mm, degree, scale, points.range_mm, points.offset_mm
     try:
-        coefficients, covariance, by_range, by_place, chi2, weight = polynomial(
-            *measured, *points.covariances(), STEPS
+        coefficients, covariance, by_range, by_place, chi2, depth, weight = polynomial(
+            *measured, *points.covariances, STEPS
         )
     except np.linalg.LinAlgError:  # ranges so different that all but a few weights vanish
         return None
     if not math.isfinite(chi2):
         return None
     freedom = len(points) - degree - 1
-    depth = _powers(points.x_mm / scale, degree) @ coefficients + points.offset_mm
     return PolynomialFit(coefficients, covariance, by_range, by_place, scale, chi2, freedom, depth, weight)
 
 

@@ -52,8 +52,9 @@ class Shape:
     """Median of the smallest range over the front, over all shapes; of an unknown one, the smallest range."""
     closest_sigma_mm: float
     closest_interval_mm: tuple[float, float]
-    """95 % interval over all shapes; the upper end may be infinite. Where another shape than a flat is
-    reported and does not exclude a flat, it includes the flat's interval."""
+    """95 % interval over all shapes; the upper end may be infinite. It includes that of a flat where another
+    shape is reported and does not exclude one. Where a laser has no spot, it includes that of the smallest
+    measured range."""
     closest_x_mm: float
     """Position of the smallest range along the front, by the reported shape."""
     closest_by_range: FloatArray
@@ -67,7 +68,7 @@ class Shape:
     coefficients: tuple[float, ...] = ()
     """range = sum of coefficients[k] x^k, x and range in mm."""
     angle_rad: float | None = None
-    """Angle of the incline through the spots, whatever the kind; positive where the surface recedes towards
+    """Angle of the incline through the spots, for every kind; positive where the surface recedes towards
     greater x; None for a single spot."""
     angle_sigma_rad: float | None = None
     angle_interval_rad: tuple[float, float] | None = None
@@ -103,31 +104,30 @@ def fit_shape(
         points: the spots of one line.
         front_mm: ends of the front, over which the closest range is sought; the outermost spots if None.
         prior: prior over shapes and sizes.
-        lasers: number of lasers of the line, with or without a spot; None: as many as spots. Shapes that so
-            many spots would not determine are left out.
+        lasers: number of lasers of the line, with or without a spot; None: as many as spots. Shapes that
+            this number of spots would not determine are left out.
     """
     front = front_mm or (float(points.x_mm.min()), float(points.x_mm.max()))
     if not front[1] > front[0]:
         return _unknown(points, None, _Angle(), ())
     fits, circle, tried = _fits(points)
-    highest = max(len(fits) - 1, min(CUBIC, (lasers or len(points)) - 1))
-    posterior = shape_posterior(points, front, fits, circle, prior, highest) if highest else None
     angle = _angle(fits[1] if len(fits) > 1 else None)
-    if posterior is None or len(points) == 1:
-        return _unknown(points, posterior, angle, tried)
-    kind, degree = _reported(posterior, fits)
+    seen, possible = _posteriors(points, front, (fits, circle), prior, lasers or len(points))
+    if seen is None or possible is None:
+        return _unknown(points, possible, angle, tried)
+    kind, degree = _reported(seen)
     fit = circle if kind == "cylinder" else fits[degree]
     if fit is None or (closest := fit.closest(front)).range_mm <= max(0.0, -points.offset_mm):
-        return _unknown(points, posterior, angle, tried)
+        return _unknown(points, possible, angle, tried)
     return Shape(
         kind=kind,
-        closest_mm=posterior.closest_mm,
-        closest_sigma_mm=posterior.sigma_mm,
-        closest_interval_mm=_interval_mm(points, posterior, kind, fits[0]),
+        closest_mm=seen.median_mm,
+        closest_sigma_mm=possible.deviation_mm(seen.median_mm),
+        closest_interval_mm=_interval_mm(points, (seen, possible), kind, fits[0]),
         closest_x_mm=closest.x_mm,
         closest_by_range=closest.by_range,
         closest_by_place=closest.by_place,
-        probabilities=_by_kind(posterior),
+        probabilities=_by_kind(seen),
         degree=None if isinstance(fit, CylinderFit) else degree,
         coefficients=() if isinstance(fit, CylinderFit) else fit.per_mm(),
         angle_rad=angle.angle_rad,
@@ -158,29 +158,57 @@ def _test(name: str, fit: PolynomialFit | CylinderFit) -> ShapeTest:
     return ShapeTest(name, fit.chi2, fit.freedom, probability(fit.chi2, fit.freedom))
 
 
-def _reported(posterior: ShapePosterior, fits: Sequence[PolynomialFit | None]) -> Candidate:
-    """Simplest candidate that no other exceeds by `CLEAR_ODDS`, of those that the spots determine."""
-    known = {one: p for one, p in posterior.probabilities.items() if one[1] < len(fits)}
-    least = max(known.values()) / CLEAR_ODDS
-    return next(one for one, p in known.items() if p >= least)
+def _posteriors(
+    points: Points,
+    front: tuple[float, float],
+    fits: tuple[Sequence[PolynomialFit | None], CylinderFit | None],
+    prior: ShapePrior,
+    lasers: int,
+) -> tuple[ShapePosterior | None, ShapePosterior | None]:
+    """Posteriors over the shapes that the spots determine, and over those that all lasers would determine."""
+    polynomials, circle = fits
+    known = len(polynomials) - 1
+    highest = max(known, min(CUBIC, lasers - 1))
+    seen = shape_posterior(points, front, polynomials, circle, prior, known) if known else None
+    if highest == known:
+        return seen, seen
+    return seen, shape_posterior(points, front, polynomials, circle, prior, highest)
+
+
+def _reported(posterior: ShapePosterior) -> Candidate:
+    """Simplest candidate that no other exceeds by `CLEAR_ODDS`."""
+    least = max(posterior.probabilities.values()) / CLEAR_ODDS
+    return next(one for one, p in posterior.probabilities.items() if p >= least)
 
 
 def _interval_mm(
-    points: Points, posterior: ShapePosterior, kind: ShapeKind, flat: PolynomialFit | None
+    points: Points,
+    posteriors: tuple[ShapePosterior, ShapePosterior],
+    kind: ShapeKind,
+    flat: PolynomialFit | None,
 ) -> tuple[float, float]:
-    """Interval over all shapes, with that of a flat where another shape is reported and may be wrong."""
-    low, high = posterior.interval_mm
-    odds = EXCLUDING_ODDS * posterior.probabilities["flat", 0]
-    if flat is None or kind == "flat" or odds < _by_kind(posterior)[kind]:
-        return low, high
-    at, sigma = float(flat.coefficients[0]), math.sqrt(flat.covariance[0, 0])
-    flat_low, flat_high = interval_mm(at, sigma, points.offset_mm)
-    return min(low, flat_low), max(high, flat_high)
+    """Interval over all shapes, see `Shape.closest_interval_mm`."""
+    seen, possible = posteriors
+    intervals = [possible.interval_mm]
+    if possible is not seen:
+        intervals.append(_nearest_interval_mm(points))
+    excluded = EXCLUDING_ODDS * seen.probabilities["flat", 0] < _by_kind(seen)[kind]
+    if flat is not None and kind != "flat" and not excluded:
+        at, sigma = float(flat.coefficients[0]), math.sqrt(flat.covariance[0, 0])
+        intervals.append(interval_mm(at, sigma, points.offset_mm))
+    return min(low for low, _ in intervals), max(high for _, high in intervals)
+
+
+def _nearest_interval_mm(points: Points) -> tuple[float, float]:
+    """Interval of the smallest measured range."""
+    nearest = int(np.argmin(points.range_mm))
+    at, sigma = points.range_mm[nearest], math.sqrt(points.covariance_mm2[nearest, nearest])
+    return interval_mm(float(at), sigma, points.offset_mm)
 
 
 def _by_kind(posterior: ShapePosterior) -> dict[ShapeKind, float]:
     found = posterior.probabilities.items()
-    return {kind: sum(p for (of, _), p in found if of == kind) for kind in KINDS}
+    return {kind: sum((p for (of, _), p in found if of == kind), 0.0) for kind in KINDS}
 
 
 def _angle(incline: PolynomialFit | None) -> _Angle:
@@ -199,7 +227,7 @@ def _unknown(
     """The smallest measured range; its interval includes that over all shapes, if there is one."""
     nearest = int(np.argmin(points.range_mm))
     at, sigma = float(points.range_mm[nearest]), math.sqrt(points.covariance_mm2[nearest, nearest])
-    low, high = interval_mm(at, sigma, points.offset_mm)
+    low, high = _nearest_interval_mm(points)
     if posterior is not None:
         low, high = min(low, posterior.interval_mm[0]), max(high, posterior.interval_mm[1])
     return Shape(

@@ -58,13 +58,13 @@ def polynomial(
     places: FloatArray,
     cross: FloatArray,
     steps: int,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float, FloatArray, FloatArray]:
     """Fit range = sum of coefficients[k] (x / scale)^k; see `fit_polynomial`.
 
     Returns:
-        coefficients (p,), covariance (p, p), derivatives by the ranges (p, n) and by the positions (p, n),
-        chi2 (NaN where the polynomial passes behind the pinhole at a point), and (n, n) inverse covariance of
-        the inverse depths.
+        coefficients (p,), covariance (p, p), derivatives by the ranges (p, n) and by the positions (p, n).
+        Chi2 (NaN where the polynomial passes behind the pinhole at a point), depths (n,), and (n, n) inverse
+        covariance of the inverse depths.
     """
     powers, slopes = np.ones((len(x_mm), degree + 1)), np.zeros((len(x_mm), degree + 1))
     for k in range(1, degree + 1):
@@ -87,7 +87,8 @@ def polynomial(
     residual = 1.0 / depth - measured
     chi2 = float(np.sum(residual * (weight @ residual))) if depth.min() > 0.0 else math.nan
     by_coefficient = gain * by_range
-    return coefficients, covariance, by_coefficient, -by_coefficient * (slopes @ coefficients), chi2, weight
+    by_place = -by_coefficient * (slopes @ coefficients)
+    return coefficients, covariance, by_coefficient, by_place, chi2, depth, weight
 
 
 @compiled
@@ -106,8 +107,8 @@ def circle(
 
     Returns:
         the circle (3,), covariance (3, 3), derivatives by the ranges (3, n), chi2 (NaN where a point lies on
-        the far side or at grazing incidence, or the circle diverges), log density of the ranges
-        without chi2 and powers of 2 pi.
+        the far side or at grazing incidence, or the circle diverges).
+        Log density of the ranges without chi2 and powers of 2 pi.
     """
     n = len(x_mm)
     at = start.copy()

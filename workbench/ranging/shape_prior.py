@@ -46,7 +46,8 @@ class ShapePrior:
     irregular_sds: tuple[float, float, float] = (2.0, 0.03, 8e-4)
     """Standard deviations of slope, curvature (1/mm) and third coefficient (1/mm^2) of an irregular one."""
     steep: float = 0.1
-    """Probability that these are `steep_factor` larger, given that the surface is irregular: steps."""
+    """Probability that these are `steep_factor` larger, given that the surface is irregular: steps. Half of
+    them are parabolas, half cubic."""
     steep_factor: float = 6.0
 
 
@@ -102,8 +103,8 @@ def prior_components(
     """
     half = 0.5 * (front_mm[1] - front_mm[0])
     rows = [(0, prior.flat, (), (), 0.0), *_inclines(prior, half), *_rounds(prior, half)]
-    rows += _irregular(prior, half, 1.0, 1.0 - prior.steep, highest)
-    rows += _irregular(prior, half, prior.steep_factor, prior.steep, highest)
+    rows += _irregular(prior, half, 1.0, 1.0 - prior.steep, range(CUBIC, highest + 1))
+    rows += _irregular(prior, half, prior.steep_factor, 0.5 * prior.steep, range(CUBIC - 1, highest + 1))
     rows = [row for row in rows if row[0] <= highest]
     mean, sd = np.zeros((len(rows), highest)), np.ones((len(rows), highest))
     mass, convex = np.array([row[1] for row in rows]), np.array([row[4] for row in rows])
@@ -139,11 +140,11 @@ def _rounds(prior: ShapePrior, half: float) -> list[_Row]:
     return rows
 
 
-def _irregular(prior: ShapePrior, half: float, factor: float, share: float, highest: int) -> list[_Row]:
+def _irregular(prior: ShapePrior, half: float, factor: float, share: float, degrees: range) -> list[_Row]:
     """Amplitudes beyond the cubic one have its deviation."""
     sds = [factor * sd * half**k for k, sd in enumerate(prior.irregular_sds, 1)]
     rows: list[_Row] = []
-    for degree in range(CUBIC, highest + 1):
-        sds_of = (*sds, *[sds[-1]] * (degree - CUBIC))
+    for degree in degrees:
+        sds_of = (*sds[:degree], *[sds[-1]] * (degree - CUBIC))
         rows.append((degree, share * prior.irregular, (0.0,) * degree, sds_of, 0.0))
     return rows

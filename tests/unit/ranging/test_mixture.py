@@ -55,9 +55,7 @@ def test_the_posterior_is_that_of_shapes_drawn_from_the_prior(surface: Surface) 
         closest[order][np.searchsorted(below, p)] for p in (TAIL_BELOW, 0.5, TAIL_BELOW + LEVEL)
     )
     length = high - low
-    np.testing.assert_allclose(
-        [*found.interval_mm, found.closest_mm], [low, high, median], atol=0.04 * length
-    )
+    np.testing.assert_allclose([*found.interval_mm, found.median_mm], [low, high, median], atol=0.04 * length)
     for (_, of), p in found.probabilities.items():
         if of in (0, 1, 3):
             assert p == pytest.approx(weight[degree == of].sum(), abs=0.03)
@@ -67,15 +65,14 @@ def test_a_flat_that_is_certain_has_the_interval_of_the_flat_fit() -> None:
     points = seen(X, flat(150.0)(X))
     found, fit = posterior_of(points), fit_polynomial(points, 0)
     assert fit is not None
-    assert found.closest_mm == pytest.approx(150.0, abs=1e-3)
-    assert found.sigma_mm == pytest.approx(fit.closest(FRONT_MM).sigma_mm, rel=0.05)
+    assert found.median_mm == pytest.approx(150.0, abs=1e-3)
+    assert found.deviation_mm(150.0) == pytest.approx(fit.closest(FRONT_MM).sigma_mm, rel=0.05)
     assert found.probabilities["flat", 0] > 0.99
 
 
-def test_shapes_that_the_spots_do_not_determine_are_in_the_interval_alone() -> None:
+def test_shapes_that_the_spots_do_not_determine_have_the_prior_s_sizes() -> None:
     points = seen(X[[0, 3]], np.array([800.0, 800.0]))
     all_shapes, planes = posterior_of(points), posterior_of(points, highest=1)
-    assert all_shapes.closest_mm == pytest.approx(planes.closest_mm, abs=0.05)
     assert all_shapes.interval_mm[0] < planes.interval_mm[0] - 20.0
     assert all_shapes.interval_mm[1] == pytest.approx(planes.interval_mm[1], abs=1.0)
 

@@ -58,7 +58,7 @@ def test_behind_the_pinhole_anything_before_it_is_possible() -> None:
 
 def test_what_is_exact_has_a_covariance_of_zeros() -> None:
     points = Points(np.arange(2.0), np.full(2, 500.0), np.eye(2))
-    ranges, places, cross = points.covariances()
+    ranges, places, cross = points.covariances
     np.testing.assert_array_equal(ranges, np.eye(2))
     np.testing.assert_array_equal(places, np.zeros((2, 2)))
     np.testing.assert_array_equal(cross, np.zeros((2, 2)))

@@ -25,7 +25,7 @@ def covariances(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def fitted(
     x: FloatArray, ranges: FloatArray, degree: int, seed: int
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float, FloatArray, FloatArray]:
     return polynomial(x, degree, 60.0, ranges, OFFSET_MM, *covariances(seed), 12)
 
 
@@ -34,7 +34,7 @@ def fitted(
 def test_the_gradient_of_a_polynomial_s_misfit_vanishes(degree: int, seed: int) -> None:
     """With the weights of the whole covariance, through the slope where a place errs."""
     ranges = parabola(500.0)(X) + np.random.default_rng(seed).normal(0.0, 0.3, 5)
-    coefficients, covariance, _, _, chi2, stated_weight = fitted(X, ranges, degree, seed)
+    coefficients, covariance, _, _, chi2, _, stated_weight = fitted(X, ranges, degree, seed)
     powers = np.vander(X / 60.0, degree + 1, increasing=True)
     depth, measured = powers @ coefficients + OFFSET_MM, ranges + OFFSET_MM
     slope = powers[:, :-1] @ (coefficients[1:] * np.arange(1, degree + 1)) / 60.0
@@ -54,7 +54,7 @@ def test_the_gradient_of_a_polynomial_s_misfit_vanishes(degree: int, seed: int) 
 def test_derivatives_of_a_polynomial_are_those_of_differences() -> None:
     """Of exact points: where the residuals vanish the weights, which move as well, do not matter."""
     ranges, step = parabola(500.0)(X), 1e-3
-    _, _, by_range, by_place, chi2, _ = fitted(X, ranges, 2, 1)
+    _, _, by_range, by_place, chi2, _, _ = fitted(X, ranges, 2, 1)
     assert chi2 < 1e-12
     for n, change in enumerate(step * np.eye(5)):
         ahead, back = (fitted(X, ranges + sign * change, 2, 1)[0] for sign in (1, -1))
