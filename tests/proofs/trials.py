@@ -91,9 +91,9 @@ class Figure:
 Proof = Callable[[int], Iterator[Figure]]
 
 
-def bench(seed: int, change: Mapping[str, float] | None = None) -> SimulatedBench:
+def bench(seed: int, change: Mapping[str, float] | None = None, same_bench: bool = False) -> SimulatedBench:
     """Bench of one run, with a sensor that has changed since its calibration."""
-    return SimulatedBench.draw(thesis_ranger(), thesis_rig(), seed, change)
+    return SimulatedBench.draw(thesis_ranger(), thesis_rig(), seed, change, same_bench)
 
 
 def accuracy(runs: int) -> Iterator[Figure]:
@@ -142,16 +142,14 @@ def precision(runs: int) -> Iterator[Figure]:
 
 def budget(runs: int) -> Iterator[Figure]:
     """Alarm of the repeatability trial's budget, three standoffs together, and coverage."""
-    placement_mm = thesis_rig().bench.placement_sd_mm
     for placements in (8, 12):
         for unknown in (0.0, 1.0):
             alarms, inside = [], []
             for seed in range(runs):
-                one = bench(seed).with_unknown(placement_sd_mm=unknown * placement_mm)
-                rows = budget_table("b", _precision_frame(one, placements)).records()
+                rows = budget_table("b", _precision_frame(bench(seed), placements, unknown)).records()
                 alarms.append(bool(rows[-1]["alarm"]))
                 inside += [row["coverage"] for row in rows[:-1]]
-            text = "with a placement error of equal size left out" if unknown else "of a complete budget"
+            text = "with as much left out" if unknown else "of a complete budget"
             bounds = (0.8, 1.0) if unknown and placements == 12 else (0.5, 1.0) if unknown else (0.0, 0.05)
             yield Figure(
                 "repeatability", f"alarm {text}, {placements} placements", _mean(alarms), bounds, runs
@@ -223,11 +221,14 @@ def missing_spots(runs: int) -> Iterator[Figure]:
 
 def verify(runs: int) -> Iterator[Figure]:
     """Refusals of valid calibrations and of changed sensors, and the changes that are named."""
-    refused = _mean(_refused(bench(seed))[0] for seed in range(runs))
+    refused = _mean(_refused(bench(seed, same_bench=True))[0] for seed in range(runs))
     yield Figure("verify", "valid calibrations refused", refused, (0, 0.05), runs)
     for text, (change, name) in CHANGES.items():
-        found = [_refused(bench(seed, change)) for seed in range(runs)]
-        yield Figure("verify", f"refused: {text}", _mean(one for one, _ in found), (0.9, 1), runs)
+        found = [_refused(bench(seed, change, same_bench=True)) for seed in range(runs)]
+        least = (
+            0.95 if "refocused" not in text else 0.8
+        )  # the pinhole's move hides half of the focal length's
+        yield Figure("verify", f"refused: {text}", _mean(one for one, _ in found), (least, 1), runs)
         right = _mean(name in named_as for one, named_as in found if one)
         yield Figure("verify", f"named where refused: {text}", right, (0.7, 1), runs)
 
@@ -315,12 +316,16 @@ def _alarm(one: Agreement) -> bool:
     return one.repeats.alarm or one.bias.probability < 0.025
 
 
-def _precision_frame(one: SimulatedBench, placements: int) -> pd.DataFrame:
+def _precision_frame(one: SimulatedBench, placements: int, unknown: float) -> pd.DataFrame:
+    """Readings of the repeatability trial; `unknown`: further error of a placement / the stated one."""
     rows: list[dict[str, object]] = []
     for standoff_mm in (300.0, 800.0, 2000.0):
+        ((first, _),) = one.readings("r", flat_placement("r", standoff_mm), 1)
+        stated_mm = hypot(first.spot_sd_mm or 0.0, one.rig.bench.placement_sd_mm)
+        loose = one.with_unknown(placement_sd_mm=unknown * stated_mm)
         for number in range(1, placements + 1):
             placement = flat_placement("r", standoff_mm, number)
-            taken = [reading for reading, _ in one.readings("r", placement, 3)]
+            taken = [reading for reading, _ in loose.readings("r", placement, 3)]
             rows += reading_rows(taken, standoff_mm, number)
     return reading_frame(rows)
 
@@ -357,7 +362,7 @@ def _refused(one: SimulatedBench) -> tuple[bool, str]:
         taken = [reading for reading, _ in one.readings("v", flat_placement("v", standoff_mm), 5)]
         checks.append(check_placement(sensor, taken, reference_mm))
     lasers = [lasers_verdict(check, len(checks)).valid for check in checks]
-    refused = not (all(lasers) and range_verdict(sensor, checks[1:], one.rig.bench.ruler_scale.sd).valid)
+    refused = not (all(lasers) and range_verdict(sensor, checks[1:]).valid)
     return refused, named(changes(sensor, checks[1:], one.rig.bench)) if refused else ""
 
 

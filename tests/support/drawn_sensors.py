@@ -16,10 +16,21 @@ def drawn_sensor(
     calibration: Calibration, random: np.random.Generator, change: Mapping[str, float]
 ) -> CalibratedSensor:
     """A true sensor that the calibration may have been made of, with parameters changed since, by name."""
+    return changed_sensor(calibration, drawn_values(calibration, random), change)
+
+
+def drawn_values(calibration: Calibration, random: np.random.Generator) -> dict[str, float]:
+    """Parameters by name, with those of the bench, drawn from the posterior of the calibration."""
     parameters = calibration.laser_ranger.parameters
     values = random.multivariate_normal(parameters.values, parameters.covariance_array, method="svd")
-    named = dict(zip(parameters.names, values.tolist(), strict=True))
-    true = {name: named[name] for name in calibration.geometry()}
+    return dict(zip(parameters.names, values.tolist(), strict=True))
+
+
+def changed_sensor(
+    calibration: Calibration, values: Mapping[str, float], change: Mapping[str, float]
+) -> CalibratedSensor:
+    """Sensor of the values, with parameters changed by name."""
+    true = {name: values[name] for name in calibration.geometry()}
     return CalibratedSensor(calibration, true | {name: true[name] + by for name, by in change.items()})
 
 

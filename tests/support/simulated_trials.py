@@ -8,7 +8,7 @@ from math import hypot, radians, tan
 
 import numpy as np
 
-from tests.support.drawn_sensors import drawn_sensor
+from tests.support.drawn_sensors import changed_sensor, drawn_values
 from workbench.model.arrays import FloatArray
 from workbench.model.event import ReadingTaken
 from workbench.model.rig import Rig
@@ -41,13 +41,30 @@ class SimulatedBench:
 
     @classmethod
     def draw(
-        cls, ranger: Ranger, rig: Rig, seed: int, change: Mapping[str, float] | None = None
+        cls,
+        ranger: Ranger,
+        rig: Rig,
+        seed: int,
+        change: Mapping[str, float] | None = None,
+        same_bench: bool = False,
     ) -> SimulatedBench:
-        """Bench of run `seed`; `change`: of the sensor's parameters since the calibration."""
+        """Bench of run `seed`.
+
+        Args:
+            ranger: ranger with the calibration.
+            rig: rig with the tolerances of the bench.
+            seed: number of the run.
+            change: changes of the sensor's parameters since the calibration.
+            same_bench: whether ruler and rail are those of the calibration, with their errors.
+        """
         random, bench = np.random.default_rng([2026, seed]), rig.bench
-        true = drawn_sensor(ranger.calibration, random, change or {})
-        slopes = np.tan(np.radians(random.normal(0.0, bench.target_tilt_sd_deg, 2))).tolist()
-        common = (slopes[0] + bench.target_slope_x.value, slopes[1] + bench.target_slope_y.value)
+        values = drawn_values(ranger.calibration, random)
+        true = changed_sensor(ranger.calibration, values, change or {})
+        if same_bench:
+            slopes = (values["target_slope_x"], values["target_slope_y"])
+            return cls(ranger, rig, true, random, values["ruler_scale"], slopes)
+        own = np.tan(np.radians(random.normal(0.0, bench.target_tilt_sd_deg, 2))).tolist()
+        common = (own[0] + bench.target_slope_x.value, own[1] + bench.target_slope_y.value)
         scale = random.normal(bench.ruler_scale.value, bench.ruler_scale.sd)
         return cls(ranger, rig, true, random, scale, common)
 

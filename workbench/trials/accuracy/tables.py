@@ -37,8 +37,8 @@ VERDICT = (
     Column(key="p", name="p", format=".2g"),
     Column(key="coverage", name="inside", unit="%", scale=100, format=".0f"),
     Column(key="coverage_low", name="low", unit="%", scale=100, format=".0f"),
-    Column(key="decision", name="decision"),
 )
+DECISION = Column(key="decision", name="decision")
 BIAS = (
     Column(key="range", name="range"),
     Column(key="standoff_mm", name="true", unit="mm", format=".1f"),
@@ -96,7 +96,8 @@ def verdict_table(name: str, ranges: Sequence[Agreement], verdict: Verdict, limi
         " 95 % interval, low: lower end of its own (Clopper-Pearson, by placement)"
     )
     rows = [_verdict_row(one, limits) for one in ranges]
-    return table_of(f"{name}-verdict", f"Accuracy: {verdict.text}", VERDICT, rows, caption)
+    columns = VERDICT if verdict.decision is None else (*VERDICT, DECISION)
+    return table_of(f"{name}-verdict", f"Accuracy: {verdict.text}", columns, rows, caption)
 
 
 def detail_tables(name: str, ranges: Sequence[Agreement]) -> list[Table]:

@@ -98,14 +98,13 @@ def _errors(
     Errors of inverse depths are multiplied by the squared true depth, so that they are in mm.
     """
     tilt_sd = radians(hypot(bench.tilt_sd_deg, bench.target_tilt_sd_deg))
-    errors, gradients, owns, standoffs = [], [], [], []
+    errors, gradients, owns = [], [], []
     for check in checks:
         points = check.points
         assert points is not None  # noqa: S101 - the caller has selected these placements
         count = len(points.range_mm)
         depth_mm = points.range_mm + sensor.offset_mm
         ratio = (check.standoff_mm + sensor.offset_mm) / depth_mm
-        standoffs.append(np.full(count, check.standoff_mm))
         errors.append(ratio * (points.range_mm - check.standoff_mm))
         gradients.append(ratio[:, None] ** 2 * points.by_parameter)
         own = np.diag((ratio**2 * points.spot_sd_mm) ** 2) + check.reference_sd_mm**2 * np.ones(
@@ -119,8 +118,7 @@ def _errors(
         end = start + len(own)
         covariance[start:end, start:end] += own
         start = end
-    ruler = bench.ruler_scale.sd * np.concatenate(standoffs)
-    return np.concatenate(errors), gradient, covariance + np.outer(ruler, ruler)
+    return np.concatenate(errors), gradient, covariance
 
 
 def _candidates(sensor: CalibratedSensor) -> list[_Candidate]:

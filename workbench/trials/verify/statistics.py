@@ -119,23 +119,16 @@ def check_placement(
     )
 
 
-def range_covariance(
-    sensor: CalibratedSensor, checks: Sequence[PlacementCheck], scale_sd: float = 0.0
-) -> FloatArray:
-    """(n, n) covariance of the errors at n placements, mm2.
-
-    They share the error of the calibration, and that of the ruler's scale (relative 1 sigma `scale_sd`). The
-    latter cancels in part where the calibration has used the same ruler.
-    """
+def range_covariance(sensor: CalibratedSensor, checks: Sequence[PlacementCheck]) -> FloatArray:
+    """(n, n) covariance of the errors at n placements, mm2; they share the error of the calibration."""
     gradient = np.array([check.by_parameter for check in checks])
     own = np.diag([check.own_sd_mm**2 for check in checks])
-    ruler = scale_sd * np.array([check.standoff_mm for check in checks])
-    return np.asarray(gradient @ sensor.covariance @ gradient.T + own + np.outer(ruler, ruler), np.float64)
+    return np.asarray(gradient @ sensor.covariance @ gradient.T + own, np.float64)
 
 
-def predicted_mm(sensor: CalibratedSensor, check: PlacementCheck, scale_sd: float = 0.0) -> float:
+def predicted_mm(sensor: CalibratedSensor, check: PlacementCheck) -> float:
     """Expanded uncertainty U (k = 2) of the error at one placement."""
-    return EXPANSION * float(np.sqrt(range_covariance(sensor, [check], scale_sd)[0, 0]))
+    return EXPANSION * float(np.sqrt(range_covariance(sensor, [check])[0, 0]))
 
 
 def scale_score(errors_mm: FloatArray, covariance: FloatArray, standoffs_mm: FloatArray) -> float:
@@ -165,15 +158,13 @@ def lasers_verdict(check: PlacementCheck, placements: int) -> Verdict:
     )
 
 
-def range_verdict(
-    sensor: CalibratedSensor, checks: Sequence[PlacementCheck], scale_sd: float = 0.0
-) -> Verdict:
-    """Verdict on the ranges at standoffs measured by a ruler with the relative uncertainty `scale_sd`."""
+def range_verdict(sensor: CalibratedSensor, checks: Sequence[PlacementCheck]) -> Verdict:
+    """Verdict on the ranges at measured standoffs."""
     found = [(check, error) for check in checks if (error := check.error_mm) is not None]
     if not found:
         return Verdict(False, "no range at any standoff", "check the target and the exposure; verify again")
     errors = np.array([error for _, error in found])
-    covariance = range_covariance(sensor, [check for check, _ in found], scale_sd)
+    covariance = range_covariance(sensor, [check for check, _ in found])
     standoffs_mm = np.array([check.standoff_mm for check, _ in found])
     scale_p = 2.0 * float(norm_cdf(-abs(scale_score(errors, covariance, standoffs_mm))))
     p = bias_test(errors, covariance).probability

@@ -37,7 +37,6 @@ def verify_tables(
     sensor: CalibratedSensor,
     checks: Sequence[PlacementCheck],
     verdict: Verdict,
-    scale_sd: float = 0.0,
     other: tuple[CalibratedSensor, Sequence[PlacementCheck]] | None = None,
 ) -> list[Table]:
     """Verdict with its action, and table of predicted, observed and cross-validated errors.
@@ -47,14 +46,13 @@ def verify_tables(
         sensor: sensor of the calibration.
         checks: measured placements.
         verdict: verdict on the calibration.
-        scale_sd: relative standard uncertainty of the ruler's scale.
         other: sensor of another calibration, and the same placements by that one.
     """
-    rows = [_row(sensor, check, scale_sd) for check in checks]
+    rows = [_row(sensor, check) for check in checks]
     if other is not None:
         for row, check in zip(rows, other[1], strict=True):
             row["other_error_mm"] = check.error_mm
-            row["other_expanded_mm"] = predicted_mm(other[0], check, scale_sd) if check.readings else None
+            row["other_expanded_mm"] = predicted_mm(other[0], check) if check.readings else None
     columns = (*COLUMNS, *OTHER) if other is not None else COLUMNS
     return [
         Table(
@@ -106,14 +104,14 @@ def nearest_cross_validation(calibration: Calibration, standoff_mm: float) -> Cr
     return min(placements, key=lambda one: abs(log(one.standoff_mm / standoff_mm)), default=None)
 
 
-def _row(sensor: CalibratedSensor, check: PlacementCheck, scale_sd: float) -> dict[str, Cell]:
+def _row(sensor: CalibratedSensor, check: PlacementCheck) -> dict[str, Cell]:
     row: dict[str, Cell] = {"standoff_mm": check.standoff_mm, "readings": check.readings}
     if (nearest := nearest_cross_validation(sensor.calibration, check.standoff_mm)) is not None:
         row |= {"cross_validated_mm": nearest.error_mm, "cross_validated_at_mm": nearest.standoff_mm}
     error_mm = check.error_mm
     if error_mm is None:
         return row
-    expanded_mm = predicted_mm(sensor, check, scale_sd)
+    expanded_mm = predicted_mm(sensor, check)
     return row | {
         "error_mm": error_mm,
         "expanded_mm": expanded_mm,

@@ -60,10 +60,7 @@ def run_trial(context: Context, name: str, step: VerifyTrialStep) -> str:
             return _finish(run, step, [], _explained(run, [one], verdict))
     checked = run.visit(measured, work)
     checks = [one.check for one in checked]
-    verdicts = [
-        *(lasers_verdict(check, visited) for check in checks),
-        range_verdict(sensor, checks, context.rig.bench.ruler_scale.sd),
-    ]
+    verdicts = [*(lasers_verdict(check, visited) for check in checks), range_verdict(sensor, checks)]
     verdict = next((one for one in verdicts if not one.valid), verdicts[-1])
     return _finish(run, step, checked, verdict if verdict.valid else _explained(run, checked, verdict))
 
@@ -73,11 +70,7 @@ def verify_results(run: TrialRun, checks: Sequence[PlacementCheck]) -> list[Resu
     found = []
     for check in checks:
         of, error_mm = f"{check.standoff_mm:g} mm", check.error_mm
-        expanded_mm = (
-            None
-            if error_mm is None
-            else predicted_mm(run.ranger.sensor, check, run.context.rig.bench.ruler_scale.sd)
-        )
+        expanded_mm = None if error_mm is None else predicted_mm(run.ranger.sensor, check)
         relative = [None if one is None else one / check.standoff_mm for one in (error_mm, expanded_mm)]
         found += [
             Result.of_error("error_mm", of, error_mm, expanded_mm),
@@ -96,13 +89,12 @@ def _explained(run: TrialRun, checked: Sequence[Checked], verdict: Verdict) -> V
 def _finish(run: TrialRun, step: VerifyTrialStep, checked: Sequence[Checked], verdict: Verdict) -> str:
     """Write the results; raises LimitFailedError if the calibration is not valid."""
     name, checks = run.name, [one.check for one in checked]
-    scale_sd = run.context.rig.bench.ruler_scale.sd
     other = compared_sensor(run.context, name, step.compare_with)
     beside = None
     if other is not None:
         by_other = [check_placement(other, one.readings, one.check.reference_sd_mm) for one in checked]
         beside = (other, by_other)
-    tables = verify_tables(name, run.ranger.sensor, checks, verdict, scale_sd, beside)
+    tables = verify_tables(name, run.ranger.sensor, checks, verdict, beside)
     if verdict.changes:
         tables.append(change_table(name, verdict.changes))
     own = [reading for one in checked for reading in one.readings]

@@ -32,6 +32,9 @@ def test_the_verdict_has_one_row_for_each_range_and_fits_80_columns() -> None:
     assert [row["range"] for row in rows] == [CLOSEST, MEAN, *IDS]
     assert [row["decision"] for row in rows] == ["-", "pass", *["-"] * 4]
     assert len(blocks(text_columns(table), 80)) == 1
+    without = AccuracyLimits()
+    free = verdict_table("p.1", RANGES, verdict_of(RANGES, without), without)
+    assert "decision" not in {column.key for column in free.columns}
 
 
 def test_details_are_left_to_the_files() -> None:

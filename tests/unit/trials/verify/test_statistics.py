@@ -16,7 +16,6 @@ from workbench.trials.verify.statistics import (
     check_placement,
     lasers_verdict,
     predicted_mm,
-    range_covariance,
     range_verdict,
     scale_score,
 )
@@ -75,16 +74,6 @@ def test_the_predicted_error_contains_calibration_spots_and_reference() -> None:
     assert predicted_mm(sensor, placed) ** 2 == pytest.approx(predicted_mm(sensor, exact) ** 2 + 16.0)
     calibration_mm = 2 * np.sqrt(exact.by_parameter @ sensor.covariance @ exact.by_parameter)
     assert predicted_mm(sensor, exact) > calibration_mm
-
-
-def test_the_scale_of_the_ruler_is_common_to_all_standoffs() -> None:
-    sensor, random = thesis_ranger().sensor, np.random.default_rng(4)
-    checks = [
-        check_placement(sensor, flat_readings(sensor, mm, READINGS, random, 0.3), 0.3)
-        for mm in (300.0, 900.0)
-    ]
-    added = range_covariance(sensor, checks, 0.001) - range_covariance(sensor, checks)
-    assert added == pytest.approx(np.outer([0.3, 0.9], [0.3, 0.9]))
 
 
 def test_an_error_in_proportion_to_the_range_is_a_change_of_scale() -> None:

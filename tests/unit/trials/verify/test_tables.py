@@ -29,7 +29,7 @@ def test_the_verdict_comes_first_and_errors_stand_beside_cross_validation() -> N
 
 
 def test_errors_by_another_calibration_stand_beside() -> None:
-    _, errors = verify_tables("v.1", SENSOR, CHECKS, VERDICT, other=(SENSOR, CHECKS))
+    _, errors = verify_tables("v.1", SENSOR, CHECKS, VERDICT, (SENSOR, CHECKS))
     for row in errors.records():
         assert row["other_error_mm"] == row["error_mm"]
         assert row["other_expanded_mm"] == row["expanded_mm"]
