@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.table import Column, Table
 from workbench.model.trial_event import COVERAGE_FACTOR as K
-from workbench.model.trial_event import LaserRange, ReadingTaken, TrialFinished
+from workbench.model.trial_event import STATUS_TEXT, LaserRange, ReadingTaken, TrialFinished
 
 READING = {
     "trial": "accuracy",
@@ -81,3 +81,17 @@ def test_the_interval_combines_sensor_and_reference(
 ) -> None:
     reading = ReadingTaken.model_validate(MEASURED | change)
     assert reading.interval_mm == (None if interval_mm is None else pytest.approx(interval_mm))
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        ({"status": "done", "range_mm": 500.0}, ""),
+        ({"notes": ["dark", "far"]}, "dark; far"),
+        ({}, STATUS_TEXT["no_points"]),
+    ],
+)
+def test_the_cause_of_a_missing_range_is_in_its_notes_or_its_status(
+    change: dict[str, object], cause: str
+) -> None:
+    assert ReadingTaken.model_validate(READING | change).cause == cause

@@ -210,8 +210,10 @@ def _called_for(fitted: CalibrationFit) -> list[TermSummary]:
         column = jacobian[:, [p.name for p in table.parameters].index(name)]
         along = within.T @ column
         information = column @ column - along @ covariance @ along
+        if information <= LEAST_INFORMATION:
+            continue
         score = -column @ residual
-        p_value = float(chi2_sf(score**2 / information, 1)) if information > LEAST_INFORMATION else 1.0
+        p_value = float(chi2_sf(score**2 / information, 1))
         if p_value < CALLED_FOR_P:
             log_factor = 0.5 * (score**2 / (1 + information) - log(1 + information))
             found.append(

@@ -96,6 +96,15 @@ def test_wrong_spots_are_left_out_and_the_rest_fits(seed: int) -> None:
         assert not last.used[2 * h.subject[0]]
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_spot_is_left_out_of_six_and_not_of_five(seed: int) -> None:
+    rig = RIG.model_copy(update={"lasers": RIG.lasers[:3]})
+    six = shifted(World(rig, seed).observations((300.0, 900.0)), "L2", 300.0, 12.0)
+    five = [s for s in six if (s.laser_id, s.standoff_mm) != ("L3", 900.0)]
+    assert [h.kind for h in explain_misfit(fit(rig, six))] == ["spot"]
+    assert "spot" not in [h.kind for h in explain_misfit(fit(rig, five))]
+
+
 def test_a_fit_far_worse_than_its_noise_is_improbable() -> None:
     fitted = fit(RIG, World(RIG, 1).observations())
     problem = problem_of(fitted)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from tests.support.message_text import numbers
 from tests.support.rigs import World, thesis_rig
-from workbench.calibration.checks.priors import doubted_priors, prior_strain
+from workbench.calibration.checks.priors import DOUBT_P, doubted_priors, prior_strain
 from workbench.calibration.estimation.fit import fit
 
 
@@ -44,3 +47,19 @@ def test_a_prior_that_the_data_contradict_is_named(seed: int) -> None:
     (line,) = doubted_priors(fit(rig, world.observations()))
     assert line.startswith("offset_mm = ")
     assert numbers(line)[1] == pytest.approx(22.0 / 5.0, abs=0.2)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_priors_that_only_together_contradict_the_data_are_named_in_one_line(seed: int) -> None:
+    """Four beams, each 3 deviations off by its prior, which one of 21 parameters may be."""
+    rig = thesis_rig()
+    world = World(rig, seed)
+    for laser_id, sign in zip(rig.laser_ids, (1, -1, 1, -1), strict=True):
+        world.values[f"{laser_id}.ty"] = sign * 3.0 * rig.lasers[0].ty.sd
+    fitted = fit(rig, world.observations())
+    (line,) = doubted_priors(fitted)
+    pulled, freedom = numbers(line)[:2]
+    assert chi2.sf(pulled + 0.5, freedom) < DOUBT_P
+    named = re.findall(r"L\d\.ty", line)
+    assert len(set(named)) == 3
+    assert not [name for name in set(re.findall(r"L\d\.\w+", line)) if name not in named]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from tests.support.rigs import STANDOFFS_MM, World, prior, thesis_rig
 from workbench.calibration.checks import residuals
@@ -123,6 +123,12 @@ def test_the_gamma_approximation_is_exact_for_a_chi_square(value: float) -> None
     expected = 2 * min(chi2.cdf(value, freedom), chi2.sf(value, freedom))
     assert residuals._two_sided(value, freedom, 2 * freedom, 8 * freedom) == pytest.approx(expected)
     assert residuals._two_sided(-value, -freedom, 2 * freedom, -8 * freedom) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("value", [-2.0, 0.0, 1.0, 5.0])
+def test_without_skewness_the_approximation_is_the_normal_distribution(value: float) -> None:
+    expected = 2 * norm.sf(abs(value - 1.0) / 1.5)
+    assert residuals._two_sided(value, 1.0, 1.5**2, 0.0) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("repeats", [2, 8])

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from tests.support.rigs import STANDOFFS_MM, World, prior, thesis_rig
 from workbench.calibration.data.spot_rows import observations_of_rows
-from workbench.calibration.estimation.fit import CalibrationFit, data_share, fit
+from workbench.calibration.estimation.fit import CalibrationFit, _check, data_share, fit
 from workbench.calibration.model.parameters import Parameter, ParameterTable
 from workbench.calibration.verdict.assessment import derive, determined_by
 from workbench.model.captures import load_captures
@@ -235,6 +235,22 @@ def test_a_target_behind_the_pinhole() -> None:
     bench = rig.bench.model_copy(update={"offset_mm": prior(-300.0, 5.0)})
     with pytest.raises(BadInputError, match=r"125 mm.*-175 mm"):
         fit(rig.model_copy(update={"bench": bench}), World(rig, 1).observations(repeats=1))
+
+
+def test_the_depth_of_a_target_includes_the_scale_of_the_ruler() -> None:
+    """125 mm on a ruler whose millimetres are 1.2 mm, before a pinhole 149 mm in front of the plane: 1 mm."""
+    rig = thesis_rig()
+    observations = World(rig, 1).observations(repeats=1)
+    for offset_mm, is_behind in ((-149.0, False), (-151.0, True)):
+        bench = rig.bench.model_copy(
+            update={"offset_mm": prior(offset_mm, 5.0), "ruler_scale": prior(0.2, 0.0)}
+        )
+        scaled = rig.model_copy(update={"bench": bench})
+        if is_behind:
+            with pytest.raises(BadInputError, match=r"125 mm.*-1 mm"):
+                _check(scaled, observations)
+        else:
+            _check(scaled, observations)
 
 
 def test_positions_that_contradict_everything_are_said_to() -> None:

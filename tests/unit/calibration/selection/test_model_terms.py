@@ -53,8 +53,11 @@ def log_likelihood(residual: FloatArray, jacobian: FloatArray) -> float:
 
 
 @pytest.mark.parametrize("name", ["k2", "k3", "ruler_scale", "tilts"])
-def test_the_bayes_factor_is_the_ratio_of_marginal_likelihoods(name: str) -> None:
+@pytest.mark.parametrize("mean", [0.0, 0.05])
+def test_the_bayes_factor_is_the_ratio_of_marginal_likelihoods(name: str, mean: float) -> None:
+    """Without the term its parameter is the mean of its prior."""
     rig = lens(thesis_rig(), k3=0.3)
+    rig = rig.model_copy(update={"camera": rig.camera.model_copy(update={"k2": prior(mean, 0.3)})})
     fitted = fit(rig, World(rig, 3).observations())
     index = model_terms._indices(fitted, name)
     residual, jacobian, _ = linear(fitted)

@@ -61,6 +61,20 @@ def test_the_largest_residual_is_that_of_most_standard_deviations(
     assert f"in {'uv'[axis]} of" in reason
 
 
+def test_a_sound_fit_has_no_warning_of_scatter(fitted: CalibrationFit) -> None:
+    assert fitted.cells.repeat_scale == fitted.noise_scale == 1.0
+    assert not [text for text in judged(fitted).warnings if "scatter" in text or "residuals" in text]
+
+
+def test_repeats_that_scatter_more_than_stated_are_a_warning() -> None:
+    rig = thesis_rig()
+    louder = thesis_rig(noise_px=3 * rig.noise.spot_sd_px)
+    found = fit(rig, World(louder, 1).observations(repeats=10))
+    assert found.cells.repeat_scale > 2
+    (line,) = [text for text in judged(found).warnings if "repeats scatter" in text]
+    assert numbers(line)[0] == pytest.approx(found.cells.repeat_scale, abs=0.006)
+
+
 def test_a_laser_that_never_lit_is_named() -> None:
     rig = thesis_rig()
     observations = [s for s in World(rig, 1).observations(repeats=1) if s.laser_id != "L2"]
