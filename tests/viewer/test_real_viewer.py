@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -15,6 +17,7 @@ from tests.viewer.session import LASERS, REPEATS, SENSOR_CHART, SESSION, STANDOF
 from workbench.model import event as ev
 from workbench.viewer.blueprint import FRAME_VIEW
 from workbench.viewer.entities import laser_colors
+from workbench.viewer.window import viewer_environment, viewer_executable
 
 TABS = ["Captures", "Calibration: which standoff?", "Calibration: details", TRIAL, "3D"]
 HIDDEN = {SENSOR_CHART}
@@ -28,6 +31,12 @@ def viewer(
     with headless_viewer(tmp_path_factory.mktemp("viewer"), request.param) as running:
         running.open(recorded.recording)
         yield running
+
+
+def test_the_file_is_complete_and_readable(recorded: Recorded, tmp_path: Path) -> None:
+    command = [str(viewer_executable()), "rrd", "verify", str(recorded.recording)]
+    environment = {**viewer_environment(), "HOME": str(tmp_path)}
+    assert subprocess.run(command, env=environment, capture_output=True, timeout=60).returncode == 0
 
 
 def test_shows_recording_timelines_and_screens(viewer: Viewer) -> None:
@@ -45,17 +54,16 @@ def test_shows_recording_timelines_and_screens(viewer: Viewer) -> None:
 def test_every_view_shows_something_and_none_complains(viewer: Viewer) -> None:
     """At the first placement, where a layout that loses the fit would be empty."""
     viewer.go_to("capture", 1)
-    seen = set()
+    seen: set[str] = set()
     for tab in TABS:
         viewer.show_tab(tab)
         viewer.shot()
-        front = viewer.views_in_front()
-        assert front
-        for view in front:
-            assert distinct_colors(viewer.glance(view.view_id)) > 30, (tab, view.name)
-        seen |= {view.view_id for view in front}
+        front = {view.name: view.view_id for view in viewer.views_in_front()}
+        for name in front.keys() - seen:
+            assert distinct_colors(viewer.glance(front[name])) > 30, (tab, name)
+        seen |= front.keys()
         assert viewer.problems() == []
-    assert {view.name for view in viewer.state().views if view.view_id not in seen} == HIDDEN
+    assert {view.name for view in viewer.state().views} - seen == HIDDEN
     viewer.show_tab(TRIAL)
     viewer.show_tab(SENSOR_CHART)
     viewer.shot()
