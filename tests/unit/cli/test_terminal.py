@@ -104,3 +104,11 @@ def test_a_stop_goes_through_a_fault_tolerant_consumer() -> None:
 )
 def test_times_are_no_finer_than_an_estimate_is(seconds: float, number: str, unit: str) -> None:
     assert about(seconds).split()[-2:] == [number, unit]
+
+
+def test_detail_tables_are_left_to_the_recording() -> None:
+    table = Table(name="t", title="Shown", columns=(Column(key="a", name="a"),), rows=((1,),))
+    detail = table.model_copy(update={"title": "Hidden", "is_detail": True})
+    lines = shown((1.0, ev.TrialFinished(trial="p.1", tables=(table, detail))))
+    assert any("Shown" in line for line in lines)
+    assert not any("Hidden" in line for line in lines)

@@ -147,3 +147,12 @@ def test_the_principal_point_and_f_are_the_truths(tmp_path: Path) -> None:
     rig = ideal_rig(camera={"f_px": exact(600.0)}, truth={"cx_px": 350.0, "cy_px": 220.0})
     centre, _ = moments(painted(rig, tmp_path, 1000.0))
     assert centre == pytest.approx([350 + 36, 220], abs=2e-3)
+
+
+def test_a_blocked_beam_has_no_spot(tmp_path: Path) -> None:
+    scene = scene_of(ideal_rig(laser("L1", -60.0), laser("L2", 60.0)), tmp_path)
+    scene.place(Placement(key="A", standoff_mm=500.0, blocked=("L2",)))
+    assert len(scene.spots("L1")) == 1
+    assert scene.spots("L2") == []
+    scene.place(Placement(key="A", standoff_mm=500.0))
+    assert len(scene.spots("L2")) == 1

@@ -51,3 +51,9 @@ def test_a_missing_range_is_shown_with_its_cause(values: dict[str, object], caus
     assert one.cause == cause
     assert cause in reading_remark(one)
     assert "L2" in reading_remark(one)
+
+
+@pytest.mark.parametrize("key", ["left_off", "blocked"])
+def test_lasers_without_a_spot_are_named(key: str) -> None:
+    one = reading(TRUE).model_copy(update={key: ("L2", "L3")})
+    assert "(L2, L3 " in reading_remark(one)

@@ -328,3 +328,13 @@ def test_half_of_a_drift_is_added_to_the_image_centre() -> None:
     index = parameters.names.index("cx_px")
     assert parameters.sd[index] == pytest.approx(np.hypot(found.sd[index], found.drift_px[0] / 2))
     assert parameters.covariance_array[index, index] == pytest.approx(parameters.sd[index] ** 2)
+
+
+def test_the_cross_validation_of_every_placement_is_kept(
+    fitted: CalibrationFit, calibration: Calibration
+) -> None:
+    kept = calibration.laser_ranger.fit.cross_validation
+    expected = leave_each_out(fitted)
+    assert [(one.standoff_mm, one.error_mm, one.sd_mm) for one in kept] == [
+        (one.standoff_mm, one.error_mm, one.sd_mm) for one in expected
+    ]

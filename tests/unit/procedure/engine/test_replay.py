@@ -106,3 +106,14 @@ def test_another_session_is_refused(tmp_path: Path) -> None:
         assert shown == []
         assert lines(tmp_path) == 2
     assert caught.value.exit_code == 2
+
+
+def test_placements_taken_again_are_known_before_and_after_a_resumption(tmp_path: Path) -> None:
+    first = ev.SetAside(key="p.1/300mm", from_n=1, reason="slipped")
+    other = ev.SetAside(key="p.2/300mm", from_n=2, reason="other step")
+    with replay(tmp_path, [STARTED, first]) as (recorder, _):
+        recorder.emit(STARTED)
+        second = first.model_copy(update={"key": "p.1/400mm"})
+        for event in (second, other):
+            recorder.emit(event)
+        assert recorder.set_aside("p.1/") == [first, second]
