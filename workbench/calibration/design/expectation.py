@@ -111,8 +111,8 @@ class Expectation:
         common = np.array(self.sensors[:, cell.common])
         if ranging:
             common[:, cell.bench_only] = 0.0
-        rays = self.sensors[:, cell.common.stop :].reshape(len(common), -1, len(RAY))
-        shape = (len(common), len(standoff_mm), rays.shape[1])
+        shape = (len(common), len(standoff_mm), len(self.rig.lasers))
+        rays = self.sensors[:, cell.common.stop :].reshape(len(common), len(self.rig.lasers), len(RAY))
         parts = [
             *common.T[:, :, None, None],
             *np.moveaxis(rays, -1, 0)[:, :, None, :],

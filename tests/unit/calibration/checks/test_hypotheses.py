@@ -78,6 +78,15 @@ def test_a_wrong_standoff_is_freed_to_where_the_target_stood(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_a_wrong_standoff_is_found_in_noise_larger_than_stated(seed: int) -> None:
+    """It explains nine tenths of the misfit, and the fit is improbable with it too."""
+    louder = World(thesis_rig(noise_px=0.1, speckle_px=0.1), seed)
+    (found,) = explain_misfit(fit(RIG, stated_as(louder.observations(), 600.0, 6000.0)))
+    assert found.kind == "standoff"
+    assert is_improbable(found.state)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_wrong_spots_are_left_out_and_the_rest_fits(seed: int) -> None:
     observations = shifted(World(RIG, seed).observations(), "L2", 600.0, 12.0)
     observations = shifted(observations, "L3", 210.0, -4.0)

@@ -124,14 +124,17 @@ def test_spots_outside_the_picture_or_behind_the_pinhole_are_not_in_frame() -> N
     assert not expectation.spot_rows(np.array([45.0]), 0.05).any()
 
 
-def test_spots_beyond_the_fold_of_a_sensor_s_lens_are_not_in_frame() -> None:
+@pytest.mark.parametrize("ruler_scale", [0.0, 0.5, -0.25])
+def test_spots_beyond_the_fold_of_a_sensor_s_lens_are_not_in_frame(ruler_scale: float) -> None:
     """37 mm deep, the outer lasers' spots lie at r = 1.62: in the picture, where the radius grows again."""
     table = drawn_sensors(RIG).table
     names = [p.name for p in table.parameters]
     sensors = np.repeat(table.prior_mean[None], 2, axis=0)
     for name, value in (("k1", -0.5), ("k2", 0.09), ("k3", 0.0)):
         sensors[1, names.index(name)] = value
-    standoff = np.array([37.0, 110.0]) - table.prior_mean[names.index("offset_mm")]
+    sensors[:, names.index("ruler_scale")] = ruler_scale
+    depth_mm = np.array([37.0, 110.0])
+    standoff = (depth_mm - table.prior_mean[names.index("offset_mm")]) / (1.0 + ruler_scale)
     expectation = Expectation(RIG, sensors)
     u = expectation.spots(standoff)[0][1, 0, :, 0]
     assert ((u > 0) & (u < 639)).all()

@@ -37,6 +37,14 @@ def test_other_readers_read_what_was_written(document: dict[str, Any]) -> None:
         assert repr(read) == repr(document)  # 1 is not 1.0, nor is it true
 
 
+def test_sentences_have_a_line_each_and_words_share_one() -> None:
+    text = yaml_text({"notes": ["a long sentence", "another one"], "names": ["k1", "k2"]})
+    lines = [line.strip() for line in text.splitlines()]
+    assert '- "a long sentence"' in lines
+    assert '- "another one"' in lines
+    assert 'names: ["k1", "k2"]' in lines
+
+
 def test_numbers_that_python_writes_without_a_point() -> None:
     """PyYAML reads 1e-05 as a string."""
     text = yaml_text({"sd": 1e-05, "data": [5e-324, 1e16, 1e22, -2e-07, 0.0, -0.0]})
