@@ -59,19 +59,21 @@ class DrawnSensors:
         shapes = []
         for true in self.sensors:
             spots = _spots(true, surface)
+            hit = np.flatnonzero(np.isfinite(spots).all(axis=1)).tolist()
             for noise in rng.normal(0.0, SD_PX, (n // self.draws, *spots.shape)):
                 ranges = self.ranger.sensor.ranges(IDS, spots + noise, sd)
-                shapes.append(fit_line(self.ranger.sensor, "u", IDS, ranges, range(len(IDS))).shape)
+                shapes.append(fit_line(self.ranger.sensor, "u", IDS, ranges, hit).shape)
         return shapes
 
 
 def _spots(sensor: CalibratedSensor, surface: Surface) -> FloatArray:
-    """(n, 2) where the beams meet the surface, px."""
+    """(n, 2) where the beams meet the surface, px; NaN for a beam that misses it."""
     found = []
     for laser_id in IDS:
         x, tangent = (sensor.overrides[f"{laser_id}.{name}"] for name in ("x_mm", "tx"))
         range_mm = 1000.0
         for _ in range(MEETING_STEPS):
-            range_mm = float(surface(np.array([x + tangent * (range_mm + sensor.offset_mm)]))[0])
+            with np.errstate(invalid="ignore"):  # beside a cylinder
+                range_mm = float(surface(np.array([x + tangent * (range_mm + sensor.offset_mm)]))[0])
         found.append(sensor.spot_px(laser_id, np.array([range_mm]))[0])
     return np.array(found)

@@ -149,7 +149,7 @@ def test_sessions_are_missed_where_their_intervals_are_wrong(
 def test_the_table_of_shapes_in_the_docs_is_what_comes_out() -> None:
     """Two of its columns; another processor's rounding may tip a reading or two of a thousand."""
     documented = _cells((ROOT / "docs/ranging.md").read_text().splitlines())
-    computed = _cells(list(shapes.shape_table(readings, (600, 2000))))
+    computed = _cells(list(shapes.shape_table(shapes.Simulation(readings), (600, 2000))))
     assert computed.keys() == documented.keys() == shapes.ROWS.keys()
     for name, cells in computed.items():
         told = [documented[name][shapes.CLOSEST_MM.index(at)] for at in (600, 2000)]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.surfaces import X, incline, seen
+from tests.support.surfaces import X, flat, incline, seen
 from workbench.cli.reading_json import plain
 from workbench.model.calibration import load_calibration
 from workbench.model.captures import load_captures
@@ -46,6 +46,17 @@ def test_a_shape_is_told_with_its_angle_in_degrees(reading: Reading) -> None:
     assert told["angle_deg"] == pytest.approx(25.0, abs=0.01)
     assert shape.angle_sigma_rad is not None
     assert told["angle_sigma_deg"] == pytest.approx(degrees(shape.angle_sigma_rad))
+    low, high = told["angle_interval_deg"]
+    assert low < 25.0 < high
+    assert told["probabilities"] == dict(shape.probabilities)
+
+
+def test_a_flat_has_probabilities_and_an_angle_too(reading: Reading) -> None:
+    shape = fit_shape(seen(X, flat(800.0)(X)))
+    flat_one = plain(replace(reading, lines=(replace(reading.lines[0], shape=shape),)))["shape"]
+    assert flat_one["kind"] == "flat"
+    assert flat_one["probabilities"].keys() == {"flat", "incline", "round", "cylinder"}
+    assert flat_one["angle_deg"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_reading_of_nothing_is_valid_json_too(reading: Reading) -> None:

@@ -58,6 +58,9 @@ def test_angle_and_closest_range_lie_where_stated_whatever_the_calibration() -> 
         assert abs(z.mean()) < 3.5 / np.sqrt(len(z))
 
 
+AXES: tuple[ImageAxis, ImageAxis] = ("u", "v")
+
+
 def line(axis: ImageAxis, range_mm: float, spot_sd_mm: float, by_parameter: float) -> LineShape:
     """A line whose closest range rests on one spot and one parameter of the calibration."""
     shape = replace(fit_shape(seen(X, flat(range_mm)(X))), closest_sigma_mm=spot_sd_mm)
@@ -81,6 +84,13 @@ def test_an_error_of_the_calibration_is_common_to_the_lines(other: float, expect
     lines = [line("u", 500.0, 1e-9, 1.0), line("v", 500.0, 1e-9, other)]
     _, sigma = mean_of_lines(lines, np.array([[9.0]]), "information", (640, 480))
     assert sigma == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_uncertainty_of_a_shape_is_that_of_its_line() -> None:
+    """What neither spots nor calibration explain is averaged over two lines."""
+    lines = [replace(line(axis, 500.0, 3.0, 0.0), closest_spot_sd_mm=np.zeros(1)) for axis in AXES]
+    _, sigma = mean_of_lines(lines, np.zeros((1, 1)), "information", (640, 480))
+    assert sigma == pytest.approx(3.0 / np.sqrt(2.0))
 
 
 @pytest.mark.parametrize("name", ["L2.x_mm", "L3.tx", "f_px", "k1", "offset_mm"])
