@@ -115,7 +115,7 @@ class Agreement:
         budgets = [
             ErrorBudget(float(one.errors_mm.var(ddof=1)), len(one.errors_mm) - 1, {"noise": noise_mm})
             for one, noise_mm in zip(self.placements, self.noise_mm.tolist(), strict=True)
-            if len(one.errors_mm) > 1
+            if len(one.errors_mm) > 1 and noise_mm > 0
         ]
         return budget_test(budgets) if budgets else None
 
