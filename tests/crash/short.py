@@ -46,6 +46,22 @@ def write_files(folder: Path, procedure: str = PROCEDURE) -> tuple[Path, Path]:
     return folder / "rig.yaml", folder / "p.yaml"
 
 
+def with_small_pictures(rig: Path) -> None:
+    """Give the rig file a camera of a quarter of the pixels, each of twice the side: frames are made faster."""
+    text = rig.read_text()
+    for old, new in (
+        ("width_px: 640", "width_px: 320"),
+        ("height_px: 480", "height_px: 240"),
+        ("f_px: {value: 533.3, sd: 26.7}", "f_px: {value: 266.65, sd: 13.35}"),
+        ("cx_px: {value: 319.5, sd: 40.0}", "cx_px: {value: 159.5, sd: 20.0}"),
+        ("cy_px: {value: 239.5, sd: 40.0}", "cy_px: {value: 119.5, sd: 20.0}"),
+        ("seed: 2001", "seed: 2001\n  sensor: {pitch_um: 15.0}"),
+    ):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    rig.write_text(text)
+
+
 def begin(files: Path, session: Path, consumers: Sequence[ev.Consumer] = ()) -> None:
     """Run it in a new session, with the calibration in the folder if there is one."""
     calibration = files / "c.yaml"

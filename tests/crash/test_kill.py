@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.crash.killer import Killer, serving
-from tests.crash.short import GROUP, begin, go_on, results, story, write_files
+from tests.crash.short import GROUP, begin, go_on, results, story, with_small_pictures, write_files
 from workbench.model import event as ev
 from workbench.session.journal import read_journal
 
@@ -22,7 +22,7 @@ RECORDS = 46
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A session that nobody disturbed."""
     folder = tmp_path_factory.mktemp("whole")
-    write_files(folder)
+    with_small_pictures(write_files(folder)[0])
     begin(folder, folder / "s")
     return folder / "s"
 
