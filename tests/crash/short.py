@@ -47,7 +47,7 @@ def write_files(folder: Path, procedure: str = PROCEDURE) -> tuple[Path, Path]:
 
 
 def with_small_pictures(rig: Path) -> None:
-    """Give the rig file a camera of a quarter of the pixels, each of twice the side: frames are made faster."""
+    """Give the rig file a camera of a quarter of the pixels, each of twice the side, for faster frames."""
     text = rig.read_text()
     for old, new in (
         ("width_px: 640", "width_px: 320"),
