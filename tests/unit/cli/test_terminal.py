@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import io
+import re
 
 import pytest
 from rich.console import Console
 
 from tests.support.records import SESSION, STEPS, records
-from workbench.cli.terminal import FaultTolerantConsumer, Terminal, about
+from workbench.cli.terminal import FaultTolerantConsumer, Terminal, _summary, about
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
+from workbench.model.number_text import counted
 from workbench.model.spot import Spot
 from workbench.model.table import Column, Table
 from workbench.procedure.engine.durations import StepDurations
@@ -51,6 +53,13 @@ def test_a_placement_is_summed_up_when_it_is_finished() -> None:
     assert {"500", "40", "0.707"} <= set(line.replace(",", " ").split())
     (progress,) = [line for line in lines if line.strip().startswith("placement ")]
     assert [int(word) for word in progress.split()[1:4:2]] == [1, 3]
+
+
+@pytest.mark.parametrize(("readings", "spots"), [(1, 1), (1, 2), (3, 1), (2, 4)])
+def test_readings_and_spots_are_singular_or_plural(readings: int, spots: int) -> None:
+    one = Spot(1.0, 2.0, 0.1, 0.1, 1e3, 1.5, 90.0)
+    text = _summary({"all": [[one] * spots] * readings})
+    assert re.findall(r"\d+ \w+", text) == [counted(readings, "reading"), counted(spots, "spot")]
 
 
 def test_what_is_wrong_is_shown_and_what_is_well_is_not() -> None:

@@ -138,6 +138,16 @@ def test_noise_smaller_than_stated_is_no_lag_and_no_difference(repeats: int) -> 
         assert alarms(residual_tests(fit(told, World(RIG, seed).observations(repeats=repeats)))) == ()
 
 
+def test_variances_are_compared_at_the_noise_of_the_data() -> None:
+    """Half of the p values are below a half, also where the noise is half of what is stated."""
+    told = thesis_rig(noise_px=0.12, speckle_px=0.08)
+    fits = [fit(told, World(RIG, seed).observations()) for seed in range(8)]
+    found = [test.p for one in fits for test in residual_tests(one) if test.name.startswith("variance")]
+    assert len(found) > 40
+    # Binomial: sqrt(1 / 4 / 40) = 0.08, four of them.
+    assert np.mean(np.array(found) < 0.5) == pytest.approx(0.5, abs=0.32)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("rounded", [False, True])
 def test_repeats_that_do_not_scatter_as_noise_are_not_tested(seed: int, rounded: bool) -> None:
