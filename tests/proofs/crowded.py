@@ -1,4 +1,4 @@
-"""`python -m tests.proofs.crowded`: flats so far away that their spots crowd, from frames to closest range.
+"""`python -m tests.proofs.crowded`: flats so far away that their spots crowd, from frames to the range.
 
 Errors of spots that are fitted together are correlated, which the ranges' covariance leaves out: this tells
 what that does to the shape. No speckle, which would hide it. Minutes; the table goes to docs/benchmarks.
@@ -49,20 +49,19 @@ def table(readings: int = READINGS) -> Iterator[str]:
 
 
 def _reading(bench: Bench, flat_mm: float, rng: np.random.Generator) -> tuple[str, float, float] | None:
-    """Kind of shape, its closest range and the part of its sigma that comes from the spots, mm."""
+    """Kind of shape, range of a flat, and the part of its sigma that comes from the spots, mm."""
     pair = bench.pair(lambda axis, x: flat_mm, bench.ranger.sensor.ids, rng)
     reading = acquire(bench.ranger, "", lambda fired: bench.finders[fired].find(*pair))
-    if not reading.lines:
+    if reading.flat_mm is None or reading.flat_spot_sd_mm is None:
         return None
-    line = reading.lines[0]
-    return line.shape.kind, line.shape.closest_mm, float(np.linalg.norm(line.closest_spot_sd_mm))
+    return reading.lines[0].shape.kind, reading.flat_mm, reading.flat_spot_sd_mm
 
 
 def main() -> int:
     """Run, print, write."""
     lines = [
         f"seed {SEED}, {READINGS} readings each",
-        "rejected: flats called something else, 1 % is stated. scatter: of the closest range, over its sigma",
+        "rejected: flats reported as another shape, at most 1 %. scatter: of the range, over its sigma",
         "by the spots alone; the calibration is the same in all readings. not told: no shape was told.",
         "",
         *table(),

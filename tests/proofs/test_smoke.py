@@ -170,10 +170,10 @@ def test_a_score_far_from_its_limits_is_missed(monkeypatch: pytest.MonkeyPatch) 
 
 
 def _cells(lines: list[str]) -> dict[str, list[tuple[float, ...]]]:
-    """The table's rows by name, each cell as its two numbers."""
+    """The first table's rows by name, each cell as its two numbers."""
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
     return {
         row[0]: [tuple(float(part) for part in cell.split("/")) for cell in row[1:]]
-        for row in rows
+        for row in reversed(rows)
         if row[0] in shapes.ROWS and "/" in row[1]
     }

@@ -58,7 +58,9 @@ def shape_posterior(
     prior: ShapePrior,
     highest: int,
 ) -> ShapePosterior | None:
-    """Posterior over shapes, from the fits of their degrees; None where every shape lies behind the sensor.
+    """Posterior over shapes, from the fits of their degrees.
+
+    None where all shapes that agree with the spots lie behind the sensor.
 
     Args:
         points: the spots, at least one.
@@ -86,10 +88,9 @@ def shape_posterior(
     if circle is not None:
         near, evidence = circle.closest(front_mm), _circle_evidence(points, components, circle)
         nodes = nodes.and_one(near, evidence if near.range_mm > _floor_mm(points) else -np.inf)
-    best = float(nodes.log_evidence.max())
-    if not math.isfinite(best):
+    mass = nodes.mass()
+    if not (nodes.share.any(axis=1) & (mass > 0.0)).any():
         return None
-    mass = np.exp(nodes.log_evidence - best)
     return _summary(_probabilities(components, mass / mass.sum()), points, nodes.mixture(mass))
 
 
@@ -110,6 +111,11 @@ class _Nodes(NamedTuple):
             np.vstack([self.share, np.eye(1, size)]),
             np.append(self.sd_mm, closest.sigma_mm),
         )
+
+    def mass(self) -> FloatArray:
+        """(C,) evidence of the components, relative to the largest."""
+        best = float(self.log_evidence.max())
+        return np.exp(self.log_evidence - best) if math.isfinite(best) else np.zeros(len(self.log_evidence))
 
     def mixture(self, mass: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(m,) ranges, deviations and weights of the nodes, by the mass (C,) of the components."""

@@ -227,6 +227,14 @@ def test_a_shape_that_reaches_behind_the_sensor_is_unknown() -> None:
     assert shape.closest_mm == pytest.approx(100.0)
 
 
+def test_a_shape_of_two_spots_that_reaches_behind_the_sensor_is_unknown() -> None:
+    """The incline through the spots does; a flat, which does not, is many deviations off."""
+    spots = seen(X[2:], np.array([190.0, 273.0]))
+    shape = fit_shape(spots, front_mm=(-60.0, 60.0), lasers=4)
+    assert (shape.kind, shape.closest_mm) == ("unknown", 190.0)
+    assert shape.closest_interval_mm[0] < 190.0 < shape.closest_interval_mm[1]
+
+
 def test_the_front_may_be_wider_than_the_lasers() -> None:
     shape = fit_shape(seen(X, incline(500.0, 30.0)(X)), front_mm=(-120.0, 120.0))
     assert shape.closest_mm == pytest.approx(500.0 - 60.0 * np.tan(np.radians(30.0)), abs=0.1)
