@@ -26,6 +26,7 @@ REAL_TIME = {
 worker that computes keeps their processes from running, as nothing does at a bench."""
 
 SLOW = {
+    "tests/unit/api/test_arguments.py",
     "tests/unit/calibration/checks/test_cross_validation.py",
     "tests/unit/calibration/checks/test_faults.py",
     "tests/unit/calibration/checks/test_hypotheses.py",
@@ -58,6 +59,7 @@ SLOW = {
     "tests/unit/sensor/test_calibrated.py",
     "tests/unit/sensor/test_curves.py",
     "tests/unit/spots/test_persistence.py",
+    "tests/unit/steps/test_fit.py",
     "tests/unit/trials/statistics/test_gauge_rr.py",
     "tests/unit/trials/statistics/test_repeatability.py",
     "tests/unit/trials/thesis/test_thesis_chain.py",

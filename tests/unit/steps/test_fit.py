@@ -41,7 +41,7 @@ def test_without_captures_there_is_nothing_to_fit(tmp_path: Path) -> None:
 
 
 RIG = Path(__file__).parents[3] / "rigs/thesis-emulated.yaml"
-GRID = "step: capture_grid, standoffs_mm: [300, 500, 800, 1200, 2000], repeats: 2"
+GRID = "step: capture_grid, standoffs_mm: [300, 500, 800, 1200, 2000], repeats: 1"
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 from tests.support.rigs import FISHEYE_STANDOFFS_MM, PROVENANCE, World, fisheye_rig, prior, thesis_rig
-from workbench.calibration.data.spot_rows import BEAM_HALF_WIDTH_PX, prior_scanline
+from workbench.calibration.data import spot_rows
+from workbench.calibration.data.observations import PlacementInfo
+from workbench.calibration.data.spot_rows import BEAM_HALF_WIDTH_PX, observations_of_rows, prior_scanline
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
+from workbench.model.arrays import Image
+from workbench.model.board import Board
+from workbench.model.captures import CaptureRow
+from workbench.model.fit_event import Rejected
 from workbench.model.rig import Rig
 from workbench.ranging.ranger import SCANLINE_HALF_WIDTH_PX, Ranger
 from workbench.spots.strip import distance_px
@@ -48,3 +57,54 @@ def test_a_straight_line_has_the_width_of_its_beam() -> None:
     fitted = fit(thesis_rig(), World(thesis_rig(), 1).observations())
     ranger = Ranger(calibrate(fitted, Acceptance(), PROVENANCE)[0])
     assert [line.half_width_px for line in ranger.scanlines] == [SCANLINE_HALF_WIDTH_PX] * 4
+
+
+def row(number: int, laser_id: str, standoff_mm: float | None, **cells: Any) -> CaptureRow:
+    known = {} if standoff_mm is None else {"standoff_mm": standoff_mm}
+    return CaptureRow.model_validate({"row": number, "laser_id": laser_id, "repeat": 0, **known, **cells})
+
+
+def test_rows_of_single_lasers_at_known_standoffs_are_observations() -> None:
+    rows = [
+        row(2, "L1", 500.0, u_px=200.0, v_px=240.0, tilt_deg=3.0),
+        row(3, "all", 500.0, on=Path("nowhere.png")),
+        row(4, "L1", None, u_px=200.0),
+        row(5, "L9", 500.0, u_px=200.0),
+        row(6, "L2", 700.0, u_px=250.0, scene="s", placement="p"),
+        row(7, "L2", 700.0, u_px=5000.0),
+    ]
+    observations, rejected, boards = observations_of_rows(thesis_rig(), rows)
+    assert [(s.source, s.laser_id, s.placement, s.yaw_deg) for s in observations] == [
+        ("row 2", "L1", "500 mm", 3.0),
+        ("row 6", "L2", "p", 0.0),
+    ]
+    assert [one.source for one in rejected] == ["row 3", "row 4", "row 5", "row 7"]
+    assert boards == []
+
+
+def test_all_frames_of_a_board_at_one_placement_are_one_view(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[list[float], PlacementInfo]] = []
+
+    def see(frames: list[Image], board: Board, placement: PlacementInfo) -> Rejected:
+        seen.append(([float(frame[0, 0]) for frame in frames], placement))
+        return Rejected(placement.source, "for a test")
+
+    def read(path: Path, size: tuple[int, int]) -> Image:
+        return np.full(size[::-1], int(path.stem), np.uint8)
+
+    monkeypatch.setattr(spot_rows, "see_board", see)
+    monkeypatch.setattr("workbench.session.frames.read_image", read)
+    rows = [
+        row(2, "board", 300.0, on=Path("1.png"), placement="a", tilt_deg=10.0, standoff_sd_mm=0.7),
+        row(3, "board", 300.0, on=Path("2.png"), placement="a"),
+        row(4, "board", 400.0, on=Path("3.png")),
+        row(5, "board", None, on=Path("4.png"), placement="b"),
+    ]
+    _, rejected, _ = observations_of_rows(thesis_rig(), rows)
+    assert [frames for frames, _ in seen] == [[1.0, 2.0], [3.0]]
+    assert [(p.key, p.standoff_mm, p.yaw_deg, p.source) for _, p in seen] == [
+        ("a", 300.0, 10.0, "row 2"),
+        ("400 mm", 400.0, 0.0, "row 4"),
+    ]
+    assert seen[0][1].standoff_sd_mm == 0.7
+    assert [one.source for one in rejected] == ["row 2", "row 4", "row 5"]

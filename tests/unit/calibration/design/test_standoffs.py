@@ -23,6 +23,7 @@ from workbench.calibration.design.standoffs import (
     worst_of,
 )
 from workbench.calibration.estimation.batch import fit_batch
+from workbench.model.errors import BadInputError
 from workbench.model.rig import BenchSpec, load_rig
 
 ROOT = Path(__file__).parents[4]
@@ -137,3 +138,18 @@ def test_one_more_placement_is_a_rank_update() -> None:
 def test_the_reach_is_a_span() -> None:
     with pytest.raises(ValueError, match=r"expected \[nearest, farthest\] in mm"):
         BenchSpec(reach_mm=(500.0, 500.0))
+
+
+def test_no_more_standoffs_are_proposed_than_show_a_spot() -> None:
+    """A picture of 120 px: u = 59.5 +- 533.3 x 30 / z is in it beyond 270 mm or so."""
+    camera = RIG.camera.model_copy(
+        update={"width_px": 120, "cx_px": RIG.camera.cx_px.model_copy(update={"value": 59.5})}
+    )
+    rig = RIG.model_copy(update={"camera": camera})
+    sensors = drawn_sensors(rig, SEARCH_DRAWS)
+    seen = int((sensors.in_frame(candidate_standoffs(rig)).any(axis=2).mean(axis=0) > 0.5).sum())
+    assert 5 < seen < 40
+    with pytest.raises(BadInputError, match=f"at most {seen}, got {seen + 1}"):
+        best_standoffs(rig, seen + 1, 10)
+    with pytest.raises(BadInputError):
+        best_standoffs(rig, 0, 10)
