@@ -92,4 +92,4 @@ def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
 
 def _powers(t: FloatArray, degree: int) -> FloatArray:
     """(n, degree + 1) t^0, t^1, ..."""
-    return np.ascontiguousarray(np.vander(t, degree + 1, increasing=True))
+    return np.asarray(t[:, None] ** np.arange(degree + 1))
