@@ -61,8 +61,11 @@ lint: $(INSTALLED)
 	$(BIN)/lint-imports
 	$(BIN)/python -m tests.prose
 
-test: lint
-	$(BIN)/python -m pytest -m "not real_time and not wheel"
+# The type checker takes minutes of one core: it runs beside the tests, which have priority.
+test: $(INSTALLED)
+	@nice -n 10 $(MAKE) lint & lint=$$!; \
+	$(BIN)/python -m pytest -m "not real_time and not wheel"; tests=$$?; \
+	wait $$lint && exit $$tests
 	$(BIN)/python -m pytest -n 0 -m real_time
 
 quick: lint
