@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import RLock
 
 import matplotlib as mpl
 
+_STYLE = RLock()
+"""Held while matplotlib's settings are ours."""
 INK, PAPER, FAINT = "#e6e6e6", "#121416", "#3a3d40"
 """Colours on a dark ground: among the panels of the viewer."""
 
@@ -15,9 +18,10 @@ INK, PAPER, FAINT = "#e6e6e6", "#121416", "#3a3d40"
 def own_style(*, dark: bool = False) -> Iterator[None]:
     """Context with matplotlib's defaults, independent of a user's matplotlibrc, and reproducible files.
 
+    The settings are those of the whole process: another thread that draws waits until the context ends.
     SVG: text as outlines, ids from a fixed salt. PDF: only the fonts that every reader provides.
     """
-    with mpl.rc_context():
+    with _STYLE, mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(
             {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from threading import Thread
+
 import matplotlib as mpl
 import pytest
 
@@ -32,3 +34,21 @@ def test_fonts_need_no_file_of_the_machine_s() -> None:
     with own_style():
         assert mpl.rcParams["svg.fonttype"] == "path"
         assert mpl.rcParams["pdf.use14corefonts"]
+
+
+def test_two_threads_that_draw_do_not_mix_their_styles() -> None:
+    """A recording draws on dark ground beside the writer of figures."""
+    seen: list[object] = []
+
+    def draw_dark() -> None:
+        with own_style(dark=True):
+            seen.append(mpl.rcParams["axes.facecolor"])
+
+    with own_style():
+        thread = Thread(target=draw_dark)
+        thread.start()
+        thread.join(0.2)
+        inside = mpl.rcParams["axes.facecolor"]
+        assert seen == [], "the other thread waits"
+    thread.join()
+    assert [inside] == [mpl.rcParamsDefault["axes.facecolor"]] != seen
