@@ -16,7 +16,7 @@ from workbench.session.state import effective
 from workbench.viewer.window import is_complete, open_viewer, serve
 
 if TYPE_CHECKING:  # loads Rerun
-    from workbench.viewer.recording import Source
+    from workbench.viewer.comparison import Source
 
 RECORDING_FILE = "recording.rrd"
 MOST_SIDES = 2
@@ -97,7 +97,7 @@ def _of_calibration(path: Path, folder: Path) -> Path:
 
 
 def _side_by_side(request: Request, folder: Path) -> Path:
-    from workbench.viewer.recording import Source, compare
+    from workbench.viewer.comparison import Source, compare
 
     sources = []
     for path in request.what:
@@ -132,8 +132,8 @@ def _refit(path: Path, rig_path: Path | None, without_mm: Sequence[float], name:
     from workbench.calibration.verdict.records import fit_finished
     from workbench.cli.fit import Request as FitRequest
     from workbench.cli.fit import fit_source
+    from workbench.viewer.comparison import Source
     from workbench.viewer.fit_records import fit_records
-    from workbench.viewer.recording import Source
 
     found = fit_source(FitRequest(path, rig_path, Path(), None, tuple(without_mm)))
     finished = fit_finished(found.fitted, found.assessment)

@@ -81,6 +81,20 @@ class CaptureLog:
         return {key: f"{min(n)}-{max(n)}" for key, n in found.items()}
 
 
+def capture_record(capture: CaptureTaken) -> dict[str, str | float | int]:
+    """Subject of a capture, for `readback.observations_of_recording`."""
+    unknown = float("nan")
+    return {
+        "purpose": capture.purpose,
+        "laser_id": capture.laser_id,
+        "placement": capture.placement_key,
+        "nominal_mm": float(capture.standoff_mm),  # `standoff_mm` is a timeline
+        "nominal_sd_mm": unknown if capture.standoff_sd_mm is None else float(capture.standoff_sd_mm),
+        "repeat": capture.repeat,
+        "source": capture.on.path,
+    }
+
+
 def _defect(spots: tuple[Spot, ...]) -> str:
     """Defect of a capture of one laser; empty for one sound spot."""
     if len(spots) != 1:

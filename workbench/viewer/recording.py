@@ -6,7 +6,6 @@ Journal and frames are the record. A damaged or incomplete recording can be made
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import singledispatchmethod
 from hashlib import sha256
 from pathlib import Path
@@ -27,8 +26,8 @@ from workbench.model.target import BoardTarget, FlatTarget, Placement
 from workbench.viewer import documents, fit, frame, scene, steps
 from workbench.viewer import entities as at
 from workbench.viewer.advice import AdviceView
-from workbench.viewer.blueprint import blueprint, comparison
-from workbench.viewer.captures import CaptureLog
+from workbench.viewer.blueprint import blueprint
+from workbench.viewer.captures import CaptureLog, capture_record
 from workbench.viewer.crops import Crops
 from workbench.viewer.geometry import Geometry
 from workbench.viewer.stream import Moment, Stream
@@ -69,7 +68,7 @@ class RecordingConsumer:
         self._rig = rig
         self._out = out or session_dir / RECORDING_FILE
         self._colors = at.laser_colors(rig.laser_ids)
-        self._open: _OpenRecording | None = None
+        self._open: OpenRecording | None = None
 
     def __call__(self, record: ev.Record) -> None:
         """Log one record. The first one must be `SessionStarted`, which names the recording."""
@@ -78,7 +77,7 @@ class RecordingConsumer:
                 raise ValueError(f"expected session_started as the first record, got {record.event.kind}")
             port = None if self._watch is None else free_port()
             stream = Stream(self._out, record.event.session, blueprint(self._rig), port)
-            self._open = _OpenRecording(stream, self._session_dir, self._rig)
+            self._open = OpenRecording(stream, self._session_dir, self._rig)
             if self._watch is not None and port is not None:
                 self._watch(port)
         self._open.take(record)
@@ -114,48 +113,7 @@ def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path
         partial.unlink(missing_ok=True)
 
 
-def capture_record(capture: ev.CaptureTaken) -> dict[str, str | float | int]:
-    """Subject of a capture, for `readback.observations_of_recording`."""
-    unknown = float("nan")
-    return {
-        "purpose": capture.purpose,
-        "laser_id": capture.laser_id,
-        "placement": capture.placement_key,
-        "nominal_mm": float(capture.standoff_mm),  # `standoff_mm` is a timeline
-        "nominal_sd_mm": unknown if capture.standoff_sd_mm is None else float(capture.standoff_sd_mm),
-        "repeat": capture.repeat,
-        "source": capture.on.path,
-    }
-
-
-def compare(sources: Sequence[Source], out: Path) -> None:
-    """Record several sessions side by side, with one cursor on the standoff.
-
-    Raises:
-        BadInputError: a frame of a record is missing, or has changed.
-    """
-    prefixes = [chr(ord("a") + n) for n in range(len(sources))]
-    columns = {prefix: (source.rig, source.name) for prefix, source in zip(prefixes, sources, strict=True)}
-    stream = Stream(out, " and ".join(source.name for source in sources), comparison(columns))
-    for prefix, source in zip(prefixes, sources, strict=True):
-        part = _OpenRecording(stream.below(prefix), source.folder, source.rig)
-        for record in source.records:
-            part.take(record)
-    stream.close()
-
-
-@dataclass(frozen=True)
-class Source:
-    """Records of a session, or of a fit of a captures file."""
-
-    name: str
-    folder: Path
-    """Folder to which the paths of frames are relative."""
-    rig: Rig
-    records: Iterable[ev.Record]
-
-
-class _OpenRecording:
+class OpenRecording:
     """Open recording, with the state that later records need."""
 
     def __init__(self, stream: Stream, session_dir: Path, rig: Rig) -> None:
@@ -367,7 +325,7 @@ class _OpenRecording:
         steps.log_text(self.stream, f"Session ended ({event.exit_code}): {event.message}", level)
 
     def _trial(self, name: str) -> TrialView:
-        """View of a trial; the first mention of it gives it a tab."""
+        """View of a trial; the first mention adds its tab."""
         for trial in self._trials:
             if trial.trial == name:
                 return trial

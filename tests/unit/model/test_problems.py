@@ -20,7 +20,8 @@ from workbench.model.prompt import Answer
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 LIBRARY = re.compile(
-    r"input should|should match|should be|valid (integer|number|string|list|tuple|dict)|(?<!cross_)validation|pydantic"
+    r"input should|should match|should be|valid (integer|number|string|list|tuple|dict)|(?<!cross_)validation"
+    r"|pydantic"
     r"|field required|extra inputs|unable to|discriminator|tag |items? after|something else|\{\w*\}|inf_nan"
 )
 """As pydantic puts things, and what our own words would look like if they were not filled in."""

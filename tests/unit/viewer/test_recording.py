@@ -28,7 +28,7 @@ from workbench.model import event as ev
 from workbench.model.chart import laser_colors
 from workbench.model.errors import BadInputError
 from workbench.model.fit_charts import residual_chart
-from workbench.viewer.recording import RecordingConsumer, _OpenRecording, rebuild
+from workbench.viewer.recording import OpenRecording, RecordingConsumer, rebuild
 from workbench.viewer.scene import BEYOND, DRAWN_DEPTH_MM
 from workbench.viewer.table_text import table_text
 
@@ -322,4 +322,4 @@ def test_first_record_must_name_the_session(recorded: Recorded, tmp_path: Path) 
 def test_every_event_has_its_way_of_being_logged() -> None:
     """One without would end the recording of a session, in which it is the first."""
     union, *_ = get_args(ev.Event)
-    assert set(get_args(union)) <= set(_OpenRecording.__dict__["_log"].dispatcher.registry)
+    assert set(get_args(union)) <= set(OpenRecording.__dict__["_log"].dispatcher.registry)
