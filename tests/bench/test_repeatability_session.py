@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.crash.short import ROOT, write_files
-from tests.support.killed_session import trial_finished, wait_for_capture
+from tests.support.killed_session import trial_finished
 from workbench.trials.any_sensor.readings_file import load_readings
 from workbench.trials.gauge_rr.table import gauge_table
 from workbench.trials.repeatability.table import precision_table
@@ -68,17 +67,3 @@ def test_statistics_follow_from_the_file_of_readings(session: Path) -> None:
         precision_table(f"{REPEATABILITY}-table", readings[REPEATABILITY]) == events[REPEATABILITY].tables[0]
     )
     assert gauge_table(f"{GAUGE}-table", readings[GAUGE]) == events[GAUGE].tables[0]
-
-
-@pytest.mark.parametrize("step", [GAUGE])
-def test_killed_and_resumed_it_gives_the_same_tables(folder: Path, session: Path, step: str) -> None:
-    sessions = f"killed-{step}"
-    process = subprocess.Popen(command(folder, sessions), stderr=subprocess.DEVNULL, cwd=ROOT)
-    killed = wait_for_capture(folder / sessions, step, process)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    workbench = str(Path(sys.executable).with_name("workbench"))
-    subprocess.run([workbench, "resume", str(killed)], check=True, capture_output=True, cwd=ROOT)
-    for name in FILES:
-        assert (killed / name).read_bytes() == (session / name).read_bytes()
-    assert trial_finished(killed, step) == trial_finished(session, step)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -12,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.bench.sensors import calibration_of
-from tests.crash.short import ROOT, results
-from tests.support.killed_session import wait_for_capture
+from tests.crash.short import ROOT
 from workbench.calibration.verdict.export import render
 from workbench.model.event import CalibrationLoaded, ReadingTaken, TrialFinished
 from workbench.model.rig import load_rig
@@ -93,14 +91,3 @@ def test_every_trial_ends_with_ranges_angles_and_radii(bench: Bench) -> None:
     trials = [event.trial for event in events if isinstance(event, TrialFinished)]
     assert trials == [f"targets.{n}" for n in range(1, 7)]
     assert (bench.whole / "targets.5-figure-41.svg").is_file()
-
-
-@pytest.mark.parametrize("step", ["targets.3"])
-def test_a_trial_that_is_killed_and_resumed_gives_the_same_tables(bench: Bench, step: str) -> None:
-    sessions = f"killed-{step}"
-    process = subprocess.Popen(bench.arguments(sessions), cwd=ROOT, stderr=subprocess.DEVNULL)
-    killed = wait_for_capture(bench.folder / sessions, step, process)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    call(str(SCRIPT), "resume", str(killed))
-    assert results(killed) == results(bench.whole)
