@@ -228,9 +228,7 @@ def _as_json(fitted: CalibrationFit, assessment: Assessment) -> dict[str, Any]:
         "derived": derived,
         "rms_px": fitted.rms_px,
         "observations": len(fitted.used),
-        "rejected": [
-            {"row": int(r.source.removeprefix("row ")), "reason": r.reason} for r in fitted.rejected
-        ],
+        "rejected": [_rejected_json(r) for r in fitted.rejected],
         "warnings": list(assessment.warnings),
         "null_directions": [asdict(direction) for direction in assessment.directions],
         "verdict": assessment.verdict,
@@ -240,6 +238,19 @@ def _as_json(fitted: CalibrationFit, assessment: Assessment) -> dict[str, Any]:
         "residual_tests": [test.model_dump() for test in assessment.residual_tests],
         "terms": [term.model_dump() for term in fitted.terms],
     }
+
+
+def _rejected_json(rejected: Rejected) -> dict[str, Any]:
+    """Row of a captures file, or frame of a recording, with the reason of its rejection."""
+    row = rejected.source.removeprefix("row ")
+    return (
+        {"row": int(row), "reason": rejected.reason}
+        if row.isdigit()
+        else {
+            "source": rejected.source,
+            "reason": rejected.reason,
+        }
+    )
 
 
 def _refusal(output: Path, reasons: Sequence[str]) -> str:

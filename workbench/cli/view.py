@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from workbench.cli.sessions import find_session
 from workbench.model.errors import BadInputError
-from workbench.session.journal import read_journal
+from workbench.session.journal import is_running, read_journal
 from workbench.session.manifest import load_session_rig
 from workbench.session.state import effective
 from workbench.viewer.window import is_complete, open_viewer, serve
@@ -66,13 +66,16 @@ def recording_of(request: Request, folder: Path) -> Path:
             return _of_calibration(first, folder)
         if first.suffix == ".csv":
             return _of_captures(first, request, folder)
-        return _of_session(find_session(first, request.sessions), rebuild=request.rebuild)
+        return _of_session(find_session(first, request.sessions), folder, rebuild=request.rebuild)
     return _side_by_side(request, folder)
 
 
-def _of_session(session: Path, *, rebuild: bool) -> Path:
-    """The session's recording; made again where it is missing, incomplete, or asked for."""
-    recording = session / RECORDING_FILE
+def _of_session(session: Path, folder: Path, *, rebuild: bool) -> Path:
+    """The session's recording; made again where it is missing, incomplete, or asked for.
+
+    That of a running session is made in `folder`: the session itself is still writing its own.
+    """
+    recording = (folder if is_running(session) else session) / RECORDING_FILE
     if rebuild or not is_complete(recording):
         from workbench.viewer.recording import rebuild as made_again
 

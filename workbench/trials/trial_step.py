@@ -51,7 +51,7 @@ def outside_prompt(placement: Placement, found: str) -> Prompt:
     return Prompt(
         key=f"{placement.key}/outside",
         do=f"{found}. Keep the readings at {here}?",
-        expect="1 of 20 readings lies outside without a cause. The target stands as it was asked for.",
+        expect="1 of 20 readings lies outside without a cause. The target is the one of the prompt.",
         otherwise="Remove the cause, then `redo`. The reason is shown in the result.",
         yes="keep them",
         may={"redo": f"{here} again", "skip": f"leave {here} out"},

@@ -1,4 +1,4 @@
-"""Recording of a calibration file: uncertainty of its ranges, parameters, verdict, rays."""
+"""Recording of a calibration file: uncertainty of its ranges, parameters, verdict."""
 
 from __future__ import annotations
 

@@ -16,6 +16,7 @@ import numpy as np
 import rerun as rr
 
 from workbench.model.arrays import FloatArray, Image
+from workbench.model.errors import BadInputError
 from workbench.model.event import LaserRange
 from workbench.model.spot import Spot
 from workbench.viewer import entities as at
@@ -31,6 +32,7 @@ AMBIENT_SHARE = 0.12
 """Grey level of the room light, as a share of white."""
 LEAST_WHITE = 0.25
 """Least value that is shown as white, as a share of full scale; above the noise of a dark room."""
+PNG_SIGNATURE = b"\x89PNG"
 SAMPLED = 4
 """Distance of the rows and columns from which the room light is taken."""
 LABEL_DISTANCE_PX = 44.0
@@ -57,6 +59,21 @@ def log_scanlines(stream: Stream, lines: Mapping[str, FloatArray], colors: Mappi
     strips = [line + RERUN_PIXEL_CENTRE for line in lines.values()]
     faint = [(*colors[laser], 60) for laser in lines]
     stream.log(at.SCANLINES, rr.LineStrips2D(strips, colors=faint, radii=_LINE if strips else None))
+
+
+def as_png(content: bytes) -> tuple[bytes, Image]:
+    """PNG file of a stored frame, the content itself where it is one, and its grey image, (height, width).
+
+    Raises:
+        BadInputError: OpenCV cannot read it.
+    """
+    flags = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
+    if image is None:
+        raise BadInputError("a frame of the recording is no picture that OpenCV reads")
+    grey = image.astype(np.uint8) if image.dtype == np.uint8 else image.astype(np.uint16)
+    is_png = content.startswith(PNG_SIGNATURE)
+    return (content if is_png else cv2.imencode(".png", grey)[1].tobytes()), grey
 
 
 def log_frame(stream: Stream, png: bytes, off: Image | None, full_scale: int) -> None:

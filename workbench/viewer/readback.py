@@ -6,14 +6,11 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
 from rerun.chunk import RrdReader
 
 from workbench.calibration.data.boards import BoardView, on_boards, see_board
 from workbench.calibration.data.observations import Observation, PlacementInfo
 from workbench.calibration.data.spot_rows import observe
-from workbench.model.arrays import Image
 from workbench.model.captures import BOARD
 from workbench.model.errors import BadInputError
 from workbench.model.fit_event import Rejected
@@ -21,6 +18,7 @@ from workbench.model.rig import Rig
 from workbench.model.spot import Failure, Spot
 from workbench.spots import Finding
 from workbench.viewer import entities as at
+from workbench.viewer.frame import RECORDED, as_png
 
 BLOB = "EncodedDepthImage:blob"
 Row = dict[str, Any]
@@ -103,15 +101,12 @@ def _observation(row: Row, spots: Row, rig: Rig, path: Path) -> Observation | Re
     count = len(spots.get("u_px") or ())
     found = tuple(
         Spot(
-            **{name: spots[name][n] for name in NUMBERS},
+            **{name: spots[name][n] for name in RECORDED},
             flags=frozenset(Failure(flag) for flag in spots["flags"][n].split()),
         )
         for n in range(count)
     )
     return observe(Finding(found), rig.lasers[rig.laser_ids.index(row["laser_id"])], observation)
-
-
-NUMBERS = ("u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "peak_dn")
 
 
 def _boards(captures: dict[int, Row], frames: dict[int, bytes], rig: Rig) -> dict[str, BoardView | Rejected]:
@@ -124,12 +119,5 @@ def _boards(captures: dict[int, Row], frames: dict[int, bytes], rig: Rig) -> dic
     for key, numbers in placed.items():
         first = captures[numbers[0]]
         info = PlacementInfo(key, first["nominal_mm"], first["nominal_sd_mm"], 0.0, first["source"])
-        found[key] = see_board([_grey(frames[n]) for n in numbers], rig.board, info)
+        found[key] = see_board([as_png(frames[n])[1] for n in numbers], rig.board, info)
     return found
-
-
-def _grey(png: bytes) -> Image:
-    image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise BadInputError("a frame of the recording is no picture")
-    return image.astype(np.uint8) if image.dtype == np.uint8 else image.astype(np.uint16)

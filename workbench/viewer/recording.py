@@ -11,8 +11,6 @@ from hashlib import sha256
 from pathlib import Path
 from types import TracebackType
 
-import cv2
-import numpy as np
 import rerun as rr
 
 from workbench.model import event as ev
@@ -35,7 +33,6 @@ from workbench.viewer.trial import TrialView, tabs
 from workbench.viewer.window import free_port
 
 RECORDING_FILE = "recording.rrd"
-PNG_SIGNATURE = b"\x89PNG"
 OF_NO_STANDOFF = (
     ev.ProcedureStarted,
     ev.StepStarted,
@@ -351,8 +348,8 @@ class OpenRecording:
         if not event.on.path:
             self._frames = None
             return
-        png, on = _as_png(self._read(event.on))
-        off = None if event.off is None else _as_png(self._read(event.off))[1]
+        png, on = frame.as_png(self._read(event.on))
+        off = None if event.off is None else frame.as_png(self._read(event.off))[1]
         self._frames = on, off
         frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
 
@@ -385,16 +382,3 @@ class OpenRecording:
                 f" {frame.sha256[:12]}...); restore it from a copy of the session folder"
             )
         return png
-
-
-def _as_png(content: bytes) -> tuple[bytes, Image]:
-    """Grey image, (height, width), and its PNG file: the content itself where that is one."""
-    image = cv2.imdecode(
-        np.frombuffer(content, np.uint8),
-        cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION,
-    )
-    if image is None:
-        raise BadInputError("a frame of the recording is no picture that OpenCV reads")
-    grey = image.astype(np.uint8) if image.dtype == np.uint8 else image.astype(np.uint16)
-    is_png = content.startswith(PNG_SIGNATURE)
-    return (content if is_png else cv2.imencode(".png", grey)[1].tobytes()), grey

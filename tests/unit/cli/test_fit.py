@@ -11,7 +11,9 @@ import pytest
 
 from tests.support.command_line import Run, refused
 from workbench.calibration.verdict.tables import derived_table
+from workbench.cli.fit import _rejected_json
 from workbench.model.calibration import load_calibration
+from workbench.model.fit_event import Rejected
 from workbench.model.fit_tables import parameter_table
 
 ROOT = Path(__file__).parents[3]
@@ -249,3 +251,9 @@ def test_a_file_that_is_no_image_is_named_with_its_kind(workbench: Run, tmp_path
     captures.write_text("laser_id,standoff_mm,repeat,on\n1,200,0,c.csv\n")
     outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
     refused(outcome, 2, f"{captures}: row 2: {captures}: ", "text")
+
+
+def test_a_rejected_capture_of_a_recording_has_its_frame_instead_of_a_row() -> None:
+    of_frame, of_row = Rejected("frames/p/L1/00-on.png", "no spot"), Rejected("row 12", "no spot")
+    assert _rejected_json(of_frame) == {"source": "frames/p/L1/00-on.png", "reason": "no spot"}
+    assert _rejected_json(of_row) == {"row": 12, "reason": "no spot"}

@@ -28,27 +28,29 @@ def reading() -> Reading:
 
 
 def test_numbers_are_the_readings(reading: Reading) -> None:
-    told = json.loads(json.dumps(plain(reading)))
-    assert (told["scene"], told["status"]) == (reading.scene, reading.status)
-    assert (told["closest_mm"], told["sigma_mm"]) == (reading.closest_mm, reading.sigma_mm)
-    assert [one["range_mm"] for one in told["lasers"]] == [laser.range_mm for laser in reading.lasers]
-    assert [one["interval_mm"] for one in told["lasers"]] == [[x.low_mm, x.high_mm] for x in reading.lasers]
-    assert told["lines"][0]["lasers"] == [laser.laser_id for laser in reading.lasers]
+    printed = json.loads(json.dumps(plain(reading)))
+    assert (printed["scene"], printed["status"]) == (reading.scene, reading.status)
+    assert (printed["closest_mm"], printed["sigma_mm"]) == (reading.closest_mm, reading.sigma_mm)
+    assert [one["range_mm"] for one in printed["lasers"]] == [laser.range_mm for laser in reading.lasers]
+    assert [one["interval_mm"] for one in printed["lasers"]] == [
+        [x.low_mm, x.high_mm] for x in reading.lasers
+    ]
+    assert printed["lines"][0]["lasers"] == [laser.laser_id for laser in reading.lasers]
 
 
 def test_a_shape_is_told_with_its_angle_in_degrees(reading: Reading) -> None:
     slope = incline(800.0, 25.0)
     shape = fit_shape(seen(X, slope(X)))
     other = replace(reading, lines=(replace(reading.lines[0], shape=shape),))
-    told = plain(other)["shape"]
-    assert told == plain(other)["lines"][0]["shape"]
-    assert (told["kind"], told["degree"]) == ("incline", 1)
-    assert told["angle_deg"] == pytest.approx(25.0, abs=0.01)
+    printed = plain(other)["shape"]
+    assert printed == plain(other)["lines"][0]["shape"]
+    assert (printed["kind"], printed["degree"]) == ("incline", 1)
+    assert printed["angle_deg"] == pytest.approx(25.0, abs=0.01)
     assert shape.angle_sigma_rad is not None
-    assert told["angle_sigma_deg"] == pytest.approx(degrees(shape.angle_sigma_rad))
-    low, high = told["angle_interval_deg"]
+    assert printed["angle_sigma_deg"] == pytest.approx(degrees(shape.angle_sigma_rad))
+    low, high = printed["angle_interval_deg"]
     assert low < 25.0 < high
-    assert told["probabilities"] == dict(shape.probabilities)
+    assert printed["probabilities"] == dict(shape.probabilities)
 
 
 def test_a_flat_has_probabilities_and_an_angle_too(reading: Reading) -> None:
@@ -61,7 +63,12 @@ def test_a_flat_has_probabilities_and_an_angle_too(reading: Reading) -> None:
 
 def test_a_reading_of_nothing_is_valid_json_too(reading: Reading) -> None:
     ranger = Ranger(load_calibration(SESSION / "calibration.yaml"))
-    told = json.loads(json.dumps(plain(ranger.read_lit("nothing", ()))))
-    assert told["status"] == "no_points"
-    assert (told["closest_mm"], told["interval_mm"], told["lasers"], told["lines"]) == (None, None, [], [])
-    assert told["shape"] == {"kind": "unknown"}
+    printed = json.loads(json.dumps(plain(ranger.read_lit("nothing", ()))))
+    assert printed["status"] == "no_points"
+    assert (printed["closest_mm"], printed["interval_mm"], printed["lasers"], printed["lines"]) == (
+        None,
+        None,
+        [],
+        [],
+    )
+    assert printed["shape"] == {"kind": "unknown"}

@@ -11,6 +11,8 @@ from tests.support.command_line import Run, refused
 from tests.viewer.readback import Contents
 from workbench.cli.view import Request, recording_of
 from workbench.model.errors import BadInputError
+from workbench.session.journal import Journal
+from workbench.viewer.window import is_complete
 
 ROOT = Path(__file__).parents[3]
 SESSION = ROOT / "data/session-0.1.0"
@@ -25,8 +27,8 @@ def session(tmp_path: Path) -> Path:
     return folder
 
 
-def asked(*what: Path, **options: object) -> Request:
-    return Request(what=what, sessions=Path("sessions"), rig=None, **options)  # type: ignore[arg-type]
+def asked(*what: Path, rebuild: bool = False) -> Request:
+    return Request(what, Path("sessions"), None, rebuild=rebuild)
 
 
 def test_a_folder_without_a_session_is_refused(workbench: Run, tmp_path: Path) -> None:
@@ -51,6 +53,16 @@ def test_an_incomplete_recording_is_made_again_and_a_complete_one_is_kept(
     again = recording_of(asked(session), tmp_path)
     assert (again.stat().st_mtime_ns == written) == (kept == 1.0)
     assert again.read_bytes()[-64:].count(b"RRF2FOOT") == 1
+
+
+def test_the_recording_that_a_running_session_writes_is_left_alone(session: Path, tmp_path: Path) -> None:
+    (session / "recording.rrd").write_bytes(b"incomplete")
+    journal, _ = Journal.reopen(session)
+    with journal:
+        shown = recording_of(asked(session), tmp_path)
+    assert shown == tmp_path / "recording.rrd"
+    assert is_complete(shown)
+    assert (session / "recording.rrd").read_bytes() == b"incomplete"
 
 
 def test_a_rebuilt_recording_has_the_same_content(session: Path, tmp_path: Path) -> None:

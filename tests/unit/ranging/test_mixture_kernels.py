@@ -60,14 +60,14 @@ def test_the_evidence_of_inclines_is_that_of_their_marginal_likelihood() -> None
     """Ratio to a flat: Gaussian ranges whose covariance has the prior of the slope in it."""
     ranges = incline(3000.0, 8.0)(X)
     points = seen(X, ranges)
-    fits = [fit_polynomial(points, degree) for degree in (0, 1)]
+    fits = [fit for degree in (0, 1) if (fit := fit_polynomial(points, degree)) is not None]
     sd_mm = 20.0
     evidence, _, _, _ = posterior(
         X / 60.0,
-        np.array([[fits[0].coefficients[0], 0.0], fits[1].coefficients]),  # type: ignore[union-attr]
-        np.array([fit.depth_mm for fit in fits if fit is not None]),
-        np.array([fit.weight for fit in fits if fit is not None]),
-        np.array([fit.chi2 for fit in fits if fit is not None]),
+        np.array([[fits[0].coefficients[0], 0.0], fits[1].coefficients]),
+        np.array([fit.depth_mm for fit in fits]),
+        np.array([fit.weight for fit in fits]),
+        np.array([fit.chi2 for fit in fits]),
         np.array([0, 1]),
         np.zeros(2),
         np.zeros((2, 1)),

@@ -126,11 +126,13 @@ def test_probabilities_of_the_kinds_sum_to_1(surface: Surface) -> None:
 )
 def test_inclines_are_told_and_covered(range_mm: float, angle_deg: float) -> None:
     shapes = [s for seed in SEEDS for s in readings(incline(range_mm, angle_deg), 1000, seed)]
-    told = [s for s in shapes if s.kind == "incline"]
-    assert len(told) > 0.97 * len(shapes)
-    bound = spread(0.95, len(told))
+    inclines = [s for s in shapes if s.kind == "incline"]
+    assert len(inclines) > 0.97 * len(shapes)
+    bound = spread(0.95, len(inclines))
     assert share(shapes, lambda s: holds(s, range_mm)) == pytest.approx(0.95, abs=bound + 0.01)
-    z = [(s.angle_rad - np.radians(angle_deg)) / s.angle_sigma_rad for s in told if s.angle_rad is not None]
+    z = [
+        (s.angle_rad - np.radians(angle_deg)) / s.angle_sigma_rad for s in inclines if s.angle_rad is not None
+    ]
     assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=bound)
 
 

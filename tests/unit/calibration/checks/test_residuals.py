@@ -133,15 +133,15 @@ def test_without_skewness_the_approximation_is_the_normal_distribution(value: fl
 
 @pytest.mark.parametrize("repeats", [2, 8])
 def test_noise_smaller_than_stated_is_no_lag_and_no_difference(repeats: int) -> None:
-    told = thesis_rig(noise_px=0.12)
+    loose = thesis_rig(noise_px=0.12)
     for seed in range(5):
-        assert alarms(residual_tests(fit(told, World(RIG, seed).observations(repeats=repeats)))) == ()
+        assert alarms(residual_tests(fit(loose, World(RIG, seed).observations(repeats=repeats)))) == ()
 
 
 def test_variances_are_compared_at_the_noise_of_the_data() -> None:
     """Half of the p values are below a half, also where the noise is half of what is stated."""
-    told = thesis_rig(noise_px=0.12, speckle_px=0.08)
-    fits = [fit(told, World(RIG, seed).observations()) for seed in range(8)]
+    loose = thesis_rig(noise_px=0.12, speckle_px=0.08)
+    fits = [fit(loose, World(RIG, seed).observations()) for seed in range(8)]
     found = [test.p for one in fits for test in residual_tests(one) if test.name.startswith("variance")]
     assert len(found) > 40
     # Binomial: sqrt(1 / 4 / 40) = 0.08, four of them.

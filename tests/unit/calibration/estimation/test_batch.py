@@ -116,9 +116,9 @@ def test_the_optimum_is_scipy_s(solved: Both, index: int) -> None:
 @pytest.mark.parametrize("stated_px", [0.04, 1.2])
 def test_noise_larger_than_stated(stated_px: float) -> None:
     """Spots three times as noisy as the rig says: both solvers enlarge the noise to the same."""
-    told = thesis_rig(noise_px=stated_px, speckle_px=stated_px)
+    loose = thesis_rig(noise_px=stated_px, speckle_px=stated_px)
     noisy = thesis_rig(noise_px=4 * stated_px, speckle_px=3 * stated_px)
-    pair = both(told, [World(noisy, seed).observations(STANDOFFS_MM, repeats=1) for seed in (11, 13)])
+    pair = both(loose, [World(noisy, seed).observations(STANDOFFS_MM, repeats=1) for seed in (11, 13)])
     for index, single in enumerate(pair.single):
         assert pair.batch.noise_scale[index] > 1.5
         assert pair.batch.noise_scale[index] == pytest.approx(single.noise_scale, rel=1e-6)
