@@ -64,7 +64,7 @@ def measure_noise(
 
     The expected squared residual is V (1 - h), with V = floor + slope * signal + contrast2 * mean_square and
     h the leverage. Weighted moments give slope and contrast. The assumed slope counts as a quarter of a
-    pixel, in the logarithm; a stated contrast as eight.
+    pixel, in the logarithm; a stated contrast as four. One that is not stated counts where it is significant.
 
     Args:
         signal: (n, height, width) expected signal, DN.

@@ -292,10 +292,11 @@ def split_elongated(
 
 def _fit_without_outliers(win: Windows, start: FloatArray, noise: PixelNoise) -> JointFit:
     """Joint fit with the noise measured from its own residuals, and without outlying pixels."""
+    assumed = noise
     for _ in range(_ROUNDS):
-        joint = fit_joint(win, start, noise)
+        joint = fit_joint(win, start, noise, assumed=assumed)
         signal, residual, weight = joint.signal[None], joint.residual[None], joint.weight[None]
         largest = np.array([[(weight * residual**2).max()]])
         usable, _ = without_outliers(win.usable, signal, residual, weight, largest)
         win, start, noise = win._replace(usable=usable), joint.params, joint.noise
-    return fit_joint(win, start, noise)
+    return fit_joint(win, start, noise, assumed=assumed)

@@ -46,7 +46,11 @@ class JointFit:
 
 
 def fit_joint(
-    win: Windows, start: FloatArray, noise: PixelNoise, weight: FloatArray | None = None
+    win: Windows,
+    start: FloatArray,
+    noise: PixelNoise,
+    weight: FloatArray | None = None,
+    assumed: PixelNoise | None = None,
 ) -> JointFit:
     """Fit k spots in a single window (n = 1).
 
@@ -55,6 +59,7 @@ def fit_joint(
         start: (k, 6) first guesses.
         noise: Of the window.
         weight: (height, width) fixed weights; None: those that the model predicts.
+        assumed: Noise that the measured one is averaged with; None: `noise`.
     """
     params, m = start.copy(), SHARED + OWN * len(start)
     cov, used = np.empty((m, m)), np.empty(win.shape) if weight is None else weight
@@ -81,7 +86,7 @@ def fit_joint(
     widened = _second_order(variance[:, 1:], np.exp(params[:, LN_SU:SHEAR]))
     if weight is None:
         noise = measure_noise(
-            signal[None], mean_square[None], residual[None], used[None], leverage[None], noise
+            signal[None], mean_square[None], residual[None], used[None], leverage[None], assumed or noise
         )
     else:
         by_noise = variance[:, 1:]

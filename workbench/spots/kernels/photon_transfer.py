@@ -20,10 +20,11 @@ _MAX_RATIO: Final = 3.0
 # Bounds of the slope relative to the assumed one: full wells of 300 to 3e5 electrons. A misfit, or a few
 # pixels by chance, would lead beyond.
 _SLOPE_SPAN: Final = 30.0
-# Weights of the assumed slope, of a stated contrast, and of no contrast where none is stated, in pixels.
+# Weights of the assumed slope and of a stated contrast, in pixels.
 _SLOPE_PRIOR_PIXELS: Final = 0.25
 _CONTRAST_PRIOR_PIXELS: Final = 4.0
-_NO_CONTRAST_PRIOR_PIXELS: Final = 8.0
+# Significance, in standard deviations, from which a contrast counts that is not stated.
+_SIGNIFICANT_SD: Final = 3.0
 # Squared contrast below which there is no speckle.
 _LEAST_CONTRAST2: Final = 1e-8
 # Share of a pixel's grains on its border, over the contrast.
@@ -117,32 +118,36 @@ def _consistent(moments: FloatArray, signal: FloatArray) -> BoolArray:
 
 
 @compiled
+def _blended_slope(measured: float, assumed: float, pixels: float) -> float:
+    """Slope measured from some pixels, averaged in the logarithm with the assumed one."""
+    share = _SLOPE_PRIOR_PIXELS / (pixels + _SLOPE_PRIOR_PIXELS)
+    within = min(max(measured, assumed / _SLOPE_SPAN), assumed * _SLOPE_SPAN)
+    slope: float = assumed**share * within ** (1.0 - share)
+    return slope
+
+
+@compiled
 def _solved(
     moments: FloatArray, slope: float, contrast2: float, assumed_slope: float, stated_contrast2: float
 ) -> tuple[float, float]:
     """Slope and squared contrast from the moments of a pool, which were taken at `slope` and `contrast2`.
 
-    The priors enter as further pixels: the slope's in its logarithm, linearised at `slope`.
+    First the contrast with the slope free, then the slope, then the contrast with that slope.
     """
-    slope_prior = _SLOPE_PRIOR_PIXELS / (slope * slope)
-    contrast_prior = 0.0
-    if contrast2 > _LEAST_CONTRAST2:
-        pixels = _CONTRAST_PRIOR_PIXELS if stated_contrast2 > 0.0 else _NO_CONTRAST_PRIOR_PIXELS
-        contrast_prior = pixels / (contrast2 * contrast2)
-    by_slope, mixed = moments[_BY_SLOPE] + slope_prior, moments[_MIXED]
-    by_contrast = moments[_BY_CONTRAST] + contrast_prior
-    of_slope = moments[_SLOPE_EXCESS] + slope_prior * slope * (1.0 - math.log(slope / assumed_slope))
-    of_contrast = moments[_CONTRAST_EXCESS] + contrast_prior * stated_contrast2
-    determinant = max(by_slope * by_contrast - mixed * mixed, 1e-30)
-    new_contrast2 = (by_slope * of_contrast - mixed * of_slope) / determinant
-    if not new_contrast2 > 0.0:  # not a number after a fit that diverged
-        new_contrast2 = 0.0
-    low, high = assumed_slope / _SLOPE_SPAN, assumed_slope * _SLOPE_SPAN
-    new_slope = (of_slope - mixed * new_contrast2) / by_slope
-    if not low <= new_slope <= high:
-        new_slope = low if new_slope < low else high
-        new_contrast2 = (of_contrast - mixed * new_slope) / max(by_contrast, 1e-30)
-    return new_slope, new_contrast2 if new_contrast2 > 0.0 else 0.0
+    by_slope, mixed = max(moments[_BY_SLOPE], 1e-30), moments[_MIXED]
+    by_contrast, of_contrast = max(moments[_BY_CONTRAST], 1e-30), moments[_CONTRAST_EXCESS]
+    if stated_contrast2 > 0.0 and contrast2 > _LEAST_CONTRAST2:
+        prior = _CONTRAST_PRIOR_PIXELS / (contrast2 * contrast2)
+        by_contrast, of_contrast = by_contrast + prior, of_contrast + prior * stated_contrast2
+    # The variance of the squared contrast is 2 / information.
+    information = max(by_contrast - mixed * mixed / by_slope, 1e-30)
+    free = (of_contrast - mixed * moments[_SLOPE_EXCESS] / by_slope) / information
+    least = 0.0 if stated_contrast2 > 0.0 else _SIGNIFICANT_SD * math.sqrt(2.0 / information)
+    speckled = free > least
+    measured = (moments[_SLOPE_EXCESS] - (mixed * free if speckled else 0.0)) / by_slope
+    new_slope = _blended_slope(measured, assumed_slope, by_slope * slope * slope)
+    new_contrast2 = (of_contrast - mixed * new_slope) / by_contrast
+    return new_slope, new_contrast2 if speckled and new_contrast2 > 0.0 else 0.0
 
 
 @compiled

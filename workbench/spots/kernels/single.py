@@ -186,13 +186,13 @@ def _fill_statistics(
     signal: FloatArray,
     residual: FloatArray,
     weight: FloatArray,
-    stated_speckle: FloatArray,
+    by_speckle: FloatArray,
     flux_variance: float,
     out: FloatArray,
 ) -> None:
     """Fill a window's statistics (STATISTIC_COLUMNS,), except deviations of the position and SHEAR_SCORE.
 
-    `stated_speckle` is the share of stated speckle in the variance of each pixel.
+    `by_speckle` is the share of speckle in the variance of each pixel.
     """
     height, width = signal.shape
     worst = at_rim = information = 0.0
@@ -202,7 +202,7 @@ def _fill_statistics(
             excess = residual[y, x] * residual[y, x] * weight[y, x]
             worst = max(worst, excess)
             peak = max(peak, signal[y, x])
-            information += weight[y, x] / (1.0 - stated_speckle[y, x]) * signal[y, x] * signal[y, x]
+            information += weight[y, x] / (1.0 - by_speckle[y, x]) * signal[y, x] * signal[y, x]
             if y == 0 or y == height - 1 or x == 0 or x == width - 1:
                 at_rim += excess
                 in_rim += weight[y, x] > 0.0
@@ -329,8 +329,7 @@ def fisher_scoring(
             break
     for i in range(n):
         by_speckle = weight[i] * contrast2[i] * mean_square[i]
-        stated = by_speckle * min(1.0, stated_contrast2 / max(contrast2[i], 1e-30))
-        _fill_statistics(signal[i], residual[i], weight[i], stated, cov[i, FLUX, FLUX], statistics[i])
+        _fill_statistics(signal[i], residual[i], weight[i], by_speckle, cov[i, FLUX, FLUX], statistics[i])
         _fill_deviations(
             along_u[i],
             along_v[i],

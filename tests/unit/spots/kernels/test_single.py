@@ -80,6 +80,7 @@ def test_a_window_is_accepted_by_numbers_that_numpy_finds_as_well() -> None:
     win = drawn_windows(params, (11, 13))
     fit = fit_spots(win, params, pixel_noise(4.0, 1.0, 2))
     excess = fit.residual**2 * fit.weight
+    noise_weight = (fit.weight > 0) / (4.0 + fit.noise.slope_dn[:, None, None] * np.maximum(fit.signal, 0.0))
     rim = np.ones((11, 13), bool)
     rim[1:-1, 1:-1] = False
     used = (fit.weight[:, rim] > 0).sum(axis=1)
@@ -88,7 +89,7 @@ def test_a_window_is_accepted_by_numbers_that_numpy_finds_as_well() -> None:
         RIM_NOISE: excess[:, rim].sum(axis=1) / used,
         RIM_PIXELS: used,
         PEAK_DN: fit.signal.max(axis=(1, 2)),
-        INFORMATION: (fit.weight * fit.signal**2).sum(axis=(1, 2)),
+        INFORMATION: (noise_weight * fit.signal**2).sum(axis=(1, 2)),
         FLUX_DEVIATION: np.sqrt(fit.cov[:, FLUX, FLUX]),
     }
     for column, values in expected.items():
