@@ -24,7 +24,7 @@ SENSOR = Sensor(electrons_per_dn=40_000 / 255, read_sd_electrons=225.0, bits=8, 
 GRAIN_PX = 0.65 * 2.0 / 7.5
 """Wavelength times f-number over the pitch: 650 nm, f/2, 7.5 um."""
 STATED_SD_PX = 0.04
-"""What the finder is told of speckle: of a centroid, 0.039 px."""
+"""Speckle as stated to the finder; a centroid has 0.039 px."""
 SHAPE, FINE = (31, 31), 12
 PLACEMENTS, REPEATS = 300, 5
 
