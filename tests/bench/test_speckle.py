@@ -34,7 +34,8 @@ def test_spots_scatter_by_speckle_as_the_rig_file_says(tmp_path: Path, name: str
                 bench.mark(f"P{i}/{repeat}")
                 with bench.lasers.lit(lasers, for_s=2.0):
                     on = bench.camera.grab().image
-                spots = find_spots(on, bench.camera.grab().image, expected=4).spots
+                off, speckle_sd_px = bench.camera.grab().image, rig.noise.speckle_sd_px
+                spots = find_spots(on, off, expected=4, speckle_sd_px=speckle_sd_px).spots
                 found.append([(s.u_px, s.v_px) for s in sorted(spots, key=lambda s: s.u_px)])
     places = np.reshape(found, (PLACEMENTS, 2, 4, 2))
     first, second = np.moveaxis(places - places.mean(axis=0), 1, 0)

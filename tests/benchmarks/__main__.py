@@ -11,7 +11,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from tests.benchmarks import accuracy, calibration, capture, detection, ranging, speed
+from tests.benchmarks import accuracy, calibration, capture, detection, ranging, speckle, speed
 
 RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 
@@ -21,7 +21,7 @@ def main() -> None:
     today = dt.datetime.now(tz=dt.UTC).date().isoformat()
     RESULTS.mkdir(parents=True, exist_ok=True)
     subjects = {
-        "spots": (speed.lines, detection.lines, accuracy.lines),
+        "spots": (speed.lines, detection.lines, accuracy.lines, speckle.lines),
         "calibration": (calibration.lines,),
         "ranging": (ranging.lines,),
         "capture": (capture.lines,),

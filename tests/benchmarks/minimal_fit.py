@@ -19,7 +19,7 @@ TILT_SD = np.radians(0.5)
 MEAN = np.array([533.3, 319.5, 239.5, 0, 0, 0, 0, 0, 0, *(n for x in BASELINES_MM for n in (x, 0, 0, 0))])
 SD = np.array([26.7, 40, 40, 0.3, 0.3, 5, 0.0005, TILT_SD, TILT_SD] + 4 * [0.2, 0.2, 0.005, 0.005])
 PLACEMENT_SD = np.array([0.3, TILT_SD, TILT_SD])
-SPOT_SD, SPECKLE_SD = 0.05, 0.048
+SPOT_SD, SPECKLE_SD = 0.05, 0.037
 LASERS = ("L1", "L2", "L3", "L4")
 
 with Path(sys.argv[1]).open(newline="") as file:

@@ -9,12 +9,19 @@ from workbench.spots import Spot
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U, V
 from workbench.spots.measure import FittedSpot
+from workbench.spots.noise import PixelNoise
 from workbench.spots.pair import Pair, PairSignal, measure_signal
 from workbench.spots.psf import derivatives
 from workbench.spots.strip import Strip
 
 ROUND = np.array([[0.0, 1.0, 7.3, 6.8, np.log(1.1), np.log(1.7)]])
 """(1, 6) an upright ellipse with a flux of 1."""
+
+
+def pixel_noise(floor_dn2: float, slope_dn: float, windows: int = 1, contrast2: float = 0.0) -> PixelNoise:
+    """The same noise in every window; `contrast2` is a first guess."""
+    floor, slope, speckle = (np.full(windows, value) for value in (floor_dn2, slope_dn, contrast2))
+    return PixelNoise(floor, slope, speckle)
 
 
 def drawn_windows(params: FloatArray, shape: tuple[int, int], seed: int = 1) -> Windows:
@@ -52,7 +59,7 @@ def fitted_spot(
     peak_dn = flux_dn / (2.0 * np.pi * width_px**2)
     spot = Spot(u_px, v_px, sd_px, sd_px, flux_dn, width_px, peak_dn)
     params = np.array([0.0, flux_dn, u_px, v_px, ln_width, ln_width])
-    return FittedSpot(spot, params, 0.1, width_px, flux_snr, scene or BLACK)
+    return FittedSpot(spot, params, 0.1, 0.0, width_px, flux_snr, scene or BLACK)
 
 
 BLACK = scene_of(np.zeros((60, 120), np.uint16))

@@ -71,4 +71,9 @@ class Ranger:
         """Searches the bands of all lasers."""
         lasers = self._ranger.sensor.ids
         width, height = self._ranger.size_px
-        return SpotFinder((height, width), self._ranger.searched(lasers), expected=len(lasers))
+        return SpotFinder(
+            (height, width),
+            self._ranger.searched(lasers),
+            expected=len(lasers),
+            speckle_sd_px=self._ranger.speckle_sd_px,
+        )

@@ -81,7 +81,7 @@ class Noise(FileModel):
     spot_sd_px: Annotated[float, Field(gt=0, le=LARGEST)]
     """Standard deviation of a spot that states none of its own."""
     speckle_sd_px: NonNegativeFloat
-    """Speckle noise of every spot; repeats at the same placement do not average it out."""
+    """Speckle noise of a spot that states none; repeats at the same placement do not average it out."""
 
 
 class Parameters(FileModel):

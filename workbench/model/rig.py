@@ -191,7 +191,8 @@ class NoiseSpec(FileModel):
     spot_sd_px: Annotated[float, Field(ge=1e-6)] = 0.1
     """Noise of one spot if its row states none."""
     speckle_sd_px: NonNegativeFloat = 0.0
-    """Speckle noise, common to all repeats of one laser at one placement: the pattern does not change."""
+    """Speckle noise of a centre, common to all repeats of one laser at one placement: the pattern does not
+    change. Used for spots without frames; in frames it is averaged with what they show (docs/spots.md)."""
 
 
 class AnyDeviceBlock(DeviceBlock):

@@ -30,7 +30,11 @@ Flags = Annotated[frozenset[Failure], PlainSerializer(sorted, return_type=list[s
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """Laser spot in a frame: (0, 0) is the centre of the top-left pixel, u right, v down, sd 1 sigma."""
+    """Laser spot in a frame: (0, 0) is the centre of the top-left pixel, u right, v down, sd 1 sigma.
+
+    `u_sd_px` and `v_sd_px` are by noise, which differs between captures. Speckle is frozen while the target
+    stands still: it is common to all captures of a placement.
+    """
 
     u_px: float
     v_px: float
@@ -45,3 +49,6 @@ class Spot:
     flags: Flags = NO_FLAGS
     laser_id: str | None = None
     """Laser that the spot is assigned to; None: not assigned."""
+    u_speckle_sd_px: float | None = None
+    """1 sigma by speckle; None: not known."""
+    v_speckle_sd_px: float | None = None

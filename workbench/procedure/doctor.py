@@ -112,7 +112,13 @@ def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:
     with bench.lasers.lit([laser.id], for_s=LEASE_S):
         on = bench.camera.grab().image
     off = bench.camera.grab().image
-    found = find_spots(on, off, scanlines=[prior_scanline(rig, laser)], expected=1)
+    found = find_spots(
+        on,
+        off,
+        scanlines=[prior_scanline(rig, laser)],
+        expected=1,
+        speckle_sd_px=rig.noise.speckle_sd_px,
+    )
     if len(found.spots) != 1:
         got = ", ".join(found.failures) or counted(len(found.spots), "spot")
         raise RigNotReadyError(

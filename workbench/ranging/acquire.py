@@ -92,11 +92,13 @@ class _Control:
             else:
                 self._notes.append(f"{laser_id}: on alone, {len(spots) or 'no'} spots on its line")
         ids, spots = [laser_id for laser_id, _ in self._known], [spot for _, spot in self._known]
-        position, sd = spot_arrays(spots)
+        position, sd, speckle_sd = spot_arrays(spots)
         self._notes += flag_notes(ids, spots)
         fired = len(self._ranger.sensor.ids)
         without_spot = [i for i in self._ranger.sensor.ids if i not in ids and i not in self._ambiguous]
-        reading = self._ranger.read_known(self._scene, fired, ids, position, sd, self._notes, without_spot)
+        reading = self._ranger.read_known(
+            self._scene, fired, ids, position, sd, self._notes, without_spot, speckle_sd
+        )
         # This state follows only a normal capture with spots.
         self.reading = replace(reading, status="not_enough_points") if not reading.lasers else reading
         return Seen.ASSIGNED if ids else Seen.NOTHING

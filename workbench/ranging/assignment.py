@@ -41,17 +41,24 @@ class LaserSpotPairs:
         return self.ranges.only(lasers * self.misfit_sd.shape[1] + spots)
 
 
-def pair_up(sensor: CalibratedSensor, position_px: FloatArray, sd_px: FloatArray) -> LaserSpotPairs:
+def pair_up(
+    sensor: CalibratedSensor,
+    position_px: FloatArray,
+    sd_px: FloatArray,
+    speckle_sd_px: FloatArray | None = None,
+) -> LaserSpotPairs:
     """Range every spot with every laser.
 
     Args:
         sensor: the calibrated sensor.
         position_px: (S, 2) u, v of the spots.
-        sd_px: (S, 2) their 1 sigma.
+        sd_px: (S, 2) their 1 sigma by noise.
+        speckle_sd_px: (S, 2) their 1 sigma by speckle; None: that of the calibration.
     """
     lasers, spots = len(sensor.ids), len(position_px)
     laser, spot = np.divmod(np.arange(lasers * spots), max(spots, 1))
-    ranges = sensor.ranges_of(laser, position_px[spot], sd_px[spot])
+    speckle = None if speckle_sd_px is None else speckle_sd_px[spot]
+    ranges = sensor.ranges_of(laser, position_px[spot], sd_px[spot], speckle)
     inverse_depth = (1.0 / (ranges.range_mm + sensor.offset_mm)).reshape(lasers, spots)
     possible = (inverse_depth > 0) & (ranges.range_mm.reshape(lasers, spots) > 0)
     misfit = ranges.misfit_sd.reshape(lasers, spots)

@@ -11,7 +11,7 @@ from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.model.arrays import FloatArray
 from workbench.model.captures import ALL_LASERS, CaptureRow
 from workbench.model.errors import BadInputError
-from workbench.ranging.ranger import Ranger, Reading
+from workbench.ranging.ranger import Ranger, Reading, spot_arrays
 from workbench.session.capture_spots import find_row_spots
 
 
@@ -54,9 +54,8 @@ def read_captures(ranger: Ranger, rows: Sequence[CaptureRow]) -> Iterator[Readin
         raise BadInputError("\n".join(unknown))
     for scene, members in scenes(rows).items():
         if members[0].laser_id == ALL_LASERS:
-            finding = find_row_spots(
-                members[0], ranger.size_px, ranger.searched(ranger.sensor.ids), len(ranger.sensor.ids)
-            )
+            lines, lasers_on = ranger.searched(ranger.sensor.ids), len(ranger.sensor.ids)
+            finding = find_row_spots(members[0], ranger.size_px, lines, lasers_on, ranger.speckle_sd_px)
             yield ranger.read_lit(scene, finding.spots)
         else:
             yield _read_alone(ranger, scene, members)
@@ -69,32 +68,37 @@ def _read_alone(ranger: Ranger, scene: str, rows: Sequence[CaptureRow]) -> Readi
     seen = {i: mean for i, mean in means.items() if mean is not None}
     position = np.array([mean[0] for mean in seen.values()]).reshape(-1, 2)
     sd = np.array([mean[1] for mean in seen.values()]).reshape(-1, 2)
+    speckle_sd = np.array([mean[2] for mean in seen.values()]).reshape(-1, 2)
     without_spot = [i for i in fired if i not in seen]
-    return ranger.read_known(scene, len(fired), list(seen), position, sd, without_spot=without_spot)
+    return ranger.read_known(
+        scene, len(fired), list(seen), position, sd, without_spot=without_spot, speckle_sd_px=speckle_sd
+    )
 
 
-def _mean_position(ranger: Ranger, rows: Sequence[CaptureRow]) -> tuple[FloatArray, FloatArray] | None:
-    """(2,) mean u, v and their standard deviations; None when no row shows the laser's spot.
+def _mean_position(
+    ranger: Ranger, rows: Sequence[CaptureRow]
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """(2,) mean u, v, and their deviations by noise and by speckle; None when no row shows the laser's spot.
 
     As in the fit: weighted by the stated deviations, without outliers, and with the deviations scaled where
-    the repeats scatter significantly more.
+    the repeats scatter significantly more. Speckle is common to the repeats.
     """
     found = [seen for row in rows if (seen := _position(ranger, row)) is not None]
     if not found:
         return None
-    position = np.array([(u, v) for u, v, _, _ in found])
-    stated = np.array([(u_sd, v_sd) for _, _, u_sd, v_sd in found])
+    position, stated, speckle_sd = np.moveaxis(np.array(found), 1, 0)
     sd = np.where(np.isfinite(stated), stated, ranger.calibration.laser_ranger.noise.spot_sd_px)
     kept = ~outliers(position, sd)
     scale = float(significant_scale(*scatter_chi2(position[kept], sd[kept])))
-    return weighted_mean(position[kept], scale * sd[kept])
+    return *weighted_mean(position[kept], scale * sd[kept]), np.sqrt((speckle_sd[kept] ** 2).mean(axis=0))
 
 
-def _position(ranger: Ranger, row: CaptureRow) -> tuple[float, float, float, float] | None:
-    """u, v and their standard deviations of the only spot that a row shows or states; None otherwise."""
+def _position(ranger: Ranger, row: CaptureRow) -> FloatArray | None:
+    """(3, 2) u, v, and their deviations by noise and by speckle, of a row's only spot; None otherwise."""
     if row.on is None:
-        return row.u_px, row.v_px, row.u_sd_px, row.v_sd_px
+        return np.array([(row.u_px, row.v_px), (row.u_sd_px, row.v_sd_px), (np.nan, np.nan)])
     index = ranger.sensor.ids.index(row.laser_id)
-    found = find_row_spots(row, ranger.size_px, ranger.scanlines[index : index + 1], 1).spots
+    lines = ranger.scanlines[index : index + 1]
+    found = find_row_spots(row, ranger.size_px, lines, 1, ranger.speckle_sd_px).spots
     spots = ranger.alone(row.laser_id, found)
-    return (spots[0].u_px, spots[0].v_px, spots[0].u_sd_px, spots[0].v_sd_px) if len(spots) == 1 else None
+    return np.stack(spot_arrays(spots))[:, 0] if len(spots) == 1 else None

@@ -113,7 +113,13 @@ class LiveRanger:
             )
         if ids not in self._finders:
             lines = self.ranger.searched(ids)
-            self._finders[ids] = SpotFinder((height, width), lines, expected=len(ids), reasons=False)
+            self._finders[ids] = SpotFinder(
+                (height, width),
+                lines,
+                expected=len(ids),
+                speckle_sd_px=self.ranger.speckle_sd_px,
+                reasons=False,
+            )
         return self._finders[ids].find(on, off)
 
 

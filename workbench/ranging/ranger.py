@@ -99,6 +99,11 @@ class Ranger:
         nearest, _ = self.calibration.laser_ranger.validity.standoff_mm
         return tuple(self._scanline(i, nearest) for i in self.sensor.ids)
 
+    @property
+    def speckle_sd_px(self) -> float:
+        """Deviation of a spot by speckle, for the search."""
+        return self.calibration.laser_ranger.noise.speckle_sd_px
+
     def searched(self, laser_ids: Sequence[str]) -> list[Scanline]:
         """Search bands for lasers that are on together, one for each line of lasers.
 
@@ -137,6 +142,7 @@ class Ranger:
         sd_px: FloatArray,
         notes: Sequence[str] = (),
         without_spot: Sequence[str] = (),
+        speckle_sd_px: FloatArray | None = None,
     ) -> Reading:
         """Range spots whose lasers are known, because each was on alone.
 
@@ -145,11 +151,12 @@ class Ranger:
             fired: number of lasers captured; with fewer ranges the status is `not_enough_points`.
             laser_ids: n lasers.
             position_px: (n, 2), NaN where a coordinate was not measured.
-            sd_px: (n, 2) 1 sigma, NaN where not known.
+            sd_px: (n, 2) 1 sigma by noise, NaN where not known.
             notes: notes on the captures.
             without_spot: lasers captured without a spot.
+            speckle_sd_px: (n, 2) 1 sigma by speckle, NaN where not known; None: nowhere.
         """
-        ranges = self.sensor.ranges(laser_ids, position_px, sd_px)
+        ranges = self.sensor.ranges(laser_ids, position_px, sd_px, speckle_sd_px)
         return self._answer(scene, fired, laser_ids, position_px, ranges, notes, without_spot)
 
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
@@ -165,7 +172,7 @@ class Ranger:
             return Reading(scene, "no_points", notes=(NOTHING_SEEN,))
         ids = [self.sensor.ids[i] for i in assignment.lasers]
         assigned = [spots[i] for i in assignment.spots.tolist()]
-        position, _ = spot_arrays(assigned)
+        position, _, _ = spot_arrays(assigned)
         notes = (*assignment.notes, *flag_notes(ids, assigned))
         without_spot = [i for i in self.sensor.ids if i not in ids and i not in assignment.ambiguous]
         reading = self._answer(
@@ -227,7 +234,7 @@ class Ranger:
             return []
         range_mm = pairs.chosen(seen, assigned).range_mm
         range_mm = range_mm[np.isfinite(range_mm)]
-        position, _ = spot_arrays(spots)
+        position, _, _ = spot_arrays(spots)
         near_px = MERGING_WIDTHS * np.array([spot.width_px for spot in spots])
         hidden = []
         for laser in np.setdiff1d(lasers, seen).tolist():
@@ -238,8 +245,7 @@ class Ranger:
 
     def alone(self, laser_id: str, spots: Sequence[Spot]) -> list[Spot]:
         """Spots on the line of a laser that was on alone; a single one is that of the laser."""
-        position, sd = spot_arrays(spots)
-        ranges = self.sensor.ranges([laser_id] * len(spots), position, sd)
+        ranges = self.sensor.ranges([laser_id] * len(spots), *spot_arrays(spots))
         possible = (ranges.range_mm > 0) & np.isfinite(ranges.range_mm)
         on_line = np.flatnonzero((ranges.misfit_sd < MOST_MISFIT_SD) & possible)
         return [spots[n] for n in on_line.tolist()]
@@ -321,8 +327,9 @@ class Ranger:
         return Scanline(far[0], far[1], du, dv, SCANLINE_HALF_WIDTH_PX + bend)
 
 
-def spot_arrays(spots: Sequence[Spot]) -> tuple[FloatArray, FloatArray]:
-    """(n, 2) positions and (n, 2) standard deviations."""
+def spot_arrays(spots: Sequence[Spot]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n, 2) positions, standard deviations by noise, and by speckle (NaN: not known)."""
     position = np.array([(s.u_px, s.v_px) for s in spots]).reshape(-1, 2)
     sd = np.array([(s.u_sd_px, s.v_sd_px) for s in spots]).reshape(-1, 2)
-    return position, sd
+    speckle_sd = np.array([(s.u_speckle_sd_px, s.v_speckle_sd_px) for s in spots], float).reshape(-1, 2)
+    return position, sd, speckle_sd

@@ -127,7 +127,13 @@ class CalibratedSensor:
         gradient[:, :, self._columns["offset_mm"]] = -by[:, :, -1] * w[:, None] ** 2
         return gradient
 
-    def ranges(self, laser_ids: Sequence[str], position_px: FloatArray, sd_px: FloatArray) -> RangeEstimates:
+    def ranges(
+        self,
+        laser_ids: Sequence[str],
+        position_px: FloatArray,
+        sd_px: FloatArray,
+        speckle_sd_px: FloatArray | None = None,
+    ) -> RangeEstimates:
         """Ranges of n spots with known lasers.
 
         Args:
@@ -135,15 +141,21 @@ class CalibratedSensor:
             position_px: (n, 2) u, v; NaN where a coordinate was not measured.
             sd_px: (n, 2) 1 sigma of the spot's noise without speckle, which is added here; NaN: that of the
                 calibration.
+            speckle_sd_px: (n, 2) 1 sigma by speckle; NaN or None: that of the calibration.
         """
-        return self.ranges_of(np.array([self.ids.index(i) for i in laser_ids], np.intp), position_px, sd_px)
+        laser = np.array([self.ids.index(i) for i in laser_ids], np.intp)
+        return self.ranges_of(laser, position_px, sd_px, speckle_sd_px)
 
-    def ranges_of(self, laser: IndexArray, position_px: FloatArray, sd_px: FloatArray) -> RangeEstimates:
+    def ranges_of(
+        self,
+        laser: IndexArray,
+        position_px: FloatArray,
+        sd_px: FloatArray,
+        speckle_sd_px: FloatArray | None = None,
+    ) -> RangeEstimates:
         """`ranges` for lasers given by their indices (n,) in the order of `ids`."""
-        noise = self.calibration.laser_ranger.noise
         measured = np.isfinite(position_px)
-        own_sd = np.where(np.isfinite(sd_px), sd_px, noise.spot_sd_px)
-        inverse_sd = measured / np.hypot(own_sd, noise.speckle_sd_px)
+        inverse_sd = measured / self._total_sd(sd_px, speckle_sd_px)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # no range, or infinite
             found = self._curves.invert(laser, np.where(measured, position_px, 0.0), inverse_sd)
             w = found.inverse_depth_per_mm
@@ -156,6 +168,18 @@ class CalibratedSensor:
         line_variance = ((line @ self.covariance) * line).sum(axis=1)
         misfit_sd = np.abs(found.across_sd) / np.sqrt(1 + line_variance)
         return RangeEstimates(range_mm, found.z_sd_of_spot_mm, gradient, covariance, misfit_sd)
+
+    def _total_sd(self, sd_px: FloatArray, speckle_sd_px: FloatArray | None) -> FloatArray:
+        """(n, 2) 1 sigma by noise and speckle.
+
+        Speckle is scaled as the calibration scaled it by its residuals, which its own value includes.
+        """
+        file = self.calibration.laser_ranger
+        own_sd = np.where(np.isfinite(sd_px), sd_px, file.noise.spot_sd_px)
+        if speckle_sd_px is None:
+            return np.hypot(own_sd, file.noise.speckle_sd_px)
+        scaled = speckle_sd_px * file.fit.noise_scale
+        return np.hypot(own_sd, np.where(np.isfinite(scaled), scaled, file.noise.speckle_sd_px))
 
     def places(
         self, laser_ids: Sequence[str], axis: ImageAxis, ranges: RangeEstimates

@@ -22,6 +22,8 @@ class SpotFinder:
         expected: Number of lasers that are on.
         saturation_dn: Value of a clipped pixel; None means the full scale of the depth (255; for uint16 the
             10, 12 or 14 bit full scale if the brightest pixel has exactly that value, else 65535).
+        speckle_sd_px: Deviation of a spot's centre by speckle, as the rig or the calibration states it. The
+            contrast of speckle is measured in each frame, and averaged with it; 0: not known.
         reasons: Whether missing spots start a search for the reason, over the whole frame.
 
     Raises:
@@ -35,6 +37,7 @@ class SpotFinder:
         *,
         expected: int | None = None,
         saturation_dn: int | None = None,
+        speckle_sd_px: float = 0.0,
         reasons: bool = True,
     ) -> None:
         # Imported here, because numba takes half a second to load.
@@ -44,7 +47,7 @@ class SpotFinder:
             check_line(line)
         self._shape = shape
         self._saturation_dn = saturation_dn
-        self._search = Search(shape, tuple(scanlines), expected, reasons)
+        self._search = Search(shape, tuple(scanlines), expected, speckle_sd_px, reasons)
 
     def find(self, on: Image, off: Image | None = None) -> Finding:
         """Spots of one capture.
@@ -68,6 +71,7 @@ def find_spots(
     scanlines: Sequence[Scanline] = (),
     expected: int | None = None,
     saturation_dn: int | None = None,
+    speckle_sd_px: float = 0.0,
 ) -> Finding:
     """Find laser spots in a frame with the lasers on, or in its difference to one with the lasers off.
 
@@ -83,6 +87,7 @@ def find_spots(
         scanlines,
         expected=expected,
         saturation_dn=saturation_dn,
+        speckle_sd_px=speckle_sd_px,
     )
     return finder.find(on, off)
 

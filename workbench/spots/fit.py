@@ -45,19 +45,19 @@ class SpotFit:
     """(n, height, width), inverse variance, 0 where unused."""
     converged: BoolArray
     """(n,)."""
-    slope_dn: FloatArray
-    """(n,) measured photon-transfer slope."""
+    noise: PixelNoise
+    """With the measured slope and contrast."""
     statistics: FloatArray
     """(n, STATISTIC_COLUMNS) statistics for acceptance; see `kernels.columns`."""
 
 
 def fit_spots(win: Windows, start: FloatArray, noise: PixelNoise) -> SpotFit:
-    """Fit one spot per window, and measure the photon-transfer slope from the residuals.
+    """Fit one spot per window, and measure the noise of its light from the residuals.
 
     Args:
         win: The windows.
         start: (n, k) first guesses as in `kernels.columns`; k is 6 for upright ellipses, 7 for tilted ones.
-        noise: Floor (fixed) and slope (a first guess).
+        noise: Floor (fixed), first guesses of slope and contrast.
     """
     n, k = start.shape
     shape = win.data.shape
@@ -68,22 +68,23 @@ def fit_spots(win: Windows, start: FloatArray, noise: PixelNoise) -> SpotFit:
         np.empty(shape),
         np.empty(shape),
         np.empty(n, bool),
-        np.empty(n),
+        noise.copy(),
         np.empty((n, STATISTIC_COLUMNS)),
     )
     fisher_scoring(
         win.data,
         win.usable,
         win.clip_dn,
-        noise.floor_dn2,
-        noise.slope_dn,
+        fit.noise.floor_dn2,
+        fit.noise.slope_dn,
+        fit.noise.contrast2,
+        noise.stated_contrast2,
         fit.params,
         fit.cov,
         fit.signal,
         fit.residual,
         fit.weight,
         fit.converged,
-        fit.slope_dn,
         fit.statistics,
     )
     return fit

@@ -38,6 +38,9 @@ class FittedSpot(NamedTuple):
     params: FloatArray
     """(6,) or (7,) as in `kernels.columns`, u and v in pixels of the image."""
     slope_dn: float
+    """Photon-transfer slope, as measured."""
+    contrast2: float
+    """Squared contrast of speckle, as measured."""
     reach_px: float
     """The larger of both widths."""
     flux_snr: float
@@ -74,7 +77,18 @@ def measure(scene: PairSignal, peaks: Peaks) -> list[FittedSpot]:
             numbers = np.array(group)
             if turn > 0 or half > _SMALLEST or len(group) < n:
                 win = scene.pair.cut(rows, cols, numbers, half)
-            fit_group(*win, numbers, rows, cols, start, scene.variance, slope_dn, shape, found)
+            fit_group(
+                *win,
+                numbers,
+                rows,
+                cols,
+                start,
+                scene.variance,
+                slope_dn,
+                scene.pair.stated_contrast2,
+                shape,
+                found,
+            )
             for k, wanted in zip(group, found[numbers, NEXT_HALF].tolist(), strict=True):
                 halves[k] = int(wanted)
         if not any(halves):
@@ -102,9 +116,10 @@ def _fitted_spots(scene: PairSignal, found: FloatArray) -> list[FittedSpot]:
     flags = spot_flags(scene, found)
     fits = []
     for params, row, its_flags in zip(found, found.tolist(), flags, strict=True):
-        _, flux, u, v, ln_su, ln_sv, _, u_sd, v_sd, flux_sd, peak, slope, is_spot, _ = row
+        _, flux, u, v, ln_su, ln_sv, _, u_sd, v_sd, u_speckle, v_speckle, *rest, is_spot, _ = row
         if is_spot:
-            spot = Spot(u, v, u_sd, v_sd, flux, math.exp(0.5 * (ln_su + ln_sv)), peak, its_flags)
-            reach = math.exp(max(ln_su, ln_sv))
-            fits.append(FittedSpot(spot, params[:U_SD], slope, reach, flux / flux_sd, scene))
+            flux_sd, peak, slope, contrast2 = rest
+            width, reach = math.exp(0.5 * (ln_su + ln_sv)), math.exp(max(ln_su, ln_sv))
+            spot = Spot(u, v, u_sd, v_sd, flux, width, peak, its_flags, None, u_speckle, v_speckle)
+            fits.append(FittedSpot(spot, params[:U_SD], slope, contrast2, reach, flux / flux_sd, scene))
     return fits

@@ -1,11 +1,12 @@
-"""Pixel noise measured from the frame: floor from the background, slope from the residuals of the fits."""
+"""Pixel noise measured from the frame: floor from the background, the rest from the residuals of the fits."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from workbench.model.arrays import Float32Array, FloatArray
-from workbench.spots.kernels.photon_transfer import transfer_slope
+from workbench.spots.kernels.photon_transfer import measure_variance, shared_grains
 from workbench.spots.kernels.strip_pixels import level_of
 
 _SAMPLES = 1200
@@ -16,12 +17,20 @@ ROUNDING_DN2 = 1.0 / 12.0
 
 @dataclass(frozen=True, slots=True)
 class PixelNoise:
-    """Variance of a pixel as a straight line over its expected signal (photon transfer)."""
+    """Variance of a pixel in n windows: read noise and ambient light, shot noise, speckle (docs/spots.md)."""
 
     floor_dn2: FloatArray
-    """(n,) variance without signal, DN^2, for each window."""
+    """(n,) variance without signal, DN^2."""
     slope_dn: FloatArray
-    """(n,) variance per signal, DN^2 / DN."""
+    """(n,) variance per signal (photon transfer), DN^2 / DN."""
+    contrast2: FloatArray
+    """(n,) squared contrast of speckle in an evenly lit pixel."""
+    stated_contrast2: float = 0.0
+    """The same as stated, which a measurement is averaged with; 0: not known."""
+
+    def copy(self) -> PixelNoise:
+        """The same with arrays of slope and contrast of its own, which a fit replaces."""
+        return replace(self, slope_dn=self.slope_dn.copy(), contrast2=self.contrast2.copy())
 
 
 def level_and_variance(values: Float32Array) -> tuple[float, float]:
@@ -33,22 +42,48 @@ def level_and_variance(values: Float32Array) -> tuple[float, float]:
     return level_of(values, _SAMPLES, _CLIP_SD, ROUNDING_DN2)
 
 
-def photon_transfer_slope(
-    signal: FloatArray, residual: FloatArray, weight: FloatArray, leverage: FloatArray, noise: PixelNoise
-) -> FloatArray:
-    """(n,) variance per signal (DN) measured from the residuals of all spots of a frame.
+def stated_contrast2(speckle_sd_px: float) -> float:
+    """Squared contrast of speckle in a pixel, from the deviation of a centre that it causes.
 
-    The expected squared residual is V (1 - h), with V = floor + slope * signal and h the leverage. Weighted
-    moments give the slope. It is averaged, in the logarithm, with the assumed one, which has the weight of
-    a quarter of a pixel. The inverse of a slope from n pixels is biased upwards, and standard deviations
-    would be too small on average (Student, factor n / (n - 2)). As the assumed slope bounds the measured
-    one, the factor at n + 4 suffices.
+    That of a centroid is c / sqrt(8 pi) for any width, where c^2 is the area of a grain in pixels. The
+    maximum-likelihood centre is better where the spot is bright, and worse where it is dim.
+    """
+    area = 8.0 * math.pi * speckle_sd_px**2
+    return area / shared_grains(area)
+
+
+def measure_noise(
+    signal: FloatArray,
+    mean_square: FloatArray,
+    residual: FloatArray,
+    weight: FloatArray,
+    leverage: FloatArray,
+    noise: PixelNoise,
+) -> PixelNoise:
+    """Slope and contrast measured from the residuals of all spots of a frame.
+
+    The expected squared residual is V (1 - h), with V = floor + slope * signal + contrast2 * mean_square and
+    h the leverage. Weighted moments give slope and contrast. The assumed slope counts as a quarter of a
+    pixel, in the logarithm; a stated contrast as four. One that is not stated counts where it is significant.
 
     Args:
         signal: (n, height, width) expected signal, DN.
+        mean_square: (n, height, width) mean square of the light on a pixel, DN^2.
         residual: (n, height, width), DN.
         weight: (n, height, width) inverse variance, 0 where unused.
         leverage: (n, height, width) variance of the fitted value, DN^2.
-        noise: Floor, and the assumed slope.
+        noise: Floor, the assumed slope, a first guess of the contrast, and the stated one.
     """
-    return transfer_slope(signal, residual, weight, leverage, noise.floor_dn2, noise.slope_dn)
+    measured = noise.copy()
+    measure_variance(
+        signal,
+        mean_square,
+        residual,
+        weight,
+        leverage,
+        measured.floor_dn2,
+        measured.slope_dn,
+        measured.contrast2,
+        measured.stated_contrast2,
+    )
+    return measured

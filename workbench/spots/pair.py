@@ -28,6 +28,8 @@ class Pair(NamedTuple):
     """Value of a clipped pixel."""
     off_share: float = 1.0
     level_dn: float = 0.0
+    stated_contrast2: float = 0.0
+    """Squared contrast of speckle in an evenly lit pixel; 0: not known."""
 
     def signal(self, strip: Strip) -> Float32Array:
         """(height, width) signal of a strip, DN."""

@@ -25,8 +25,13 @@ def is_same_spot(spot: Spot, other: Spot) -> bool:
 
 
 def significance(spot: Spot) -> float:
-    """Width over the standard deviation of the position, which is about the flux over that of the flux."""
-    return spot.width_px / min(spot.u_sd_px, spot.v_sd_px)
+    """Width over the standard deviation of the position, which is about the flux over that of the flux.
+
+    Speckle counts, since a misfit to what is no spot looks like it.
+    """
+    u_sd_px = hypot(spot.u_sd_px, spot.u_speckle_sd_px or 0.0)
+    v_sd_px = hypot(spot.v_sd_px, spot.v_speckle_sd_px or 0.0)
+    return spot.width_px / min(u_sd_px, v_sd_px)
 
 
 def persistent_spots(spots: Sequence[Spot], find_again: Callable[[], Sequence[Spot]]) -> list[Spot]:

@@ -18,6 +18,7 @@ from workbench.spots.deblending.clusters import (
 )
 from workbench.spots.detect import COARSE_PX, FINE_PX, Peaks, find_peaks
 from workbench.spots.measure import FittedSpot, measure
+from workbench.spots.noise import stated_contrast2
 from workbench.spots.pair import Pair, PairSignal, measure_signal
 from workbench.spots.strip import Strip, is_on, strip_of
 from workbench.spots.types import Finding, Scanline
@@ -32,18 +33,24 @@ class Search:
     """Search in frames of one size; arguments as in `SpotFinder`."""
 
     def __init__(
-        self, shape: tuple[int, int], scanlines: tuple[Scanline, ...], expected: int | None, reasons: bool
+        self,
+        shape: tuple[int, int],
+        scanlines: tuple[Scanline, ...],
+        expected: int | None,
+        speckle_sd_px: float,
+        reasons: bool,
     ) -> None:
         self._lines = scanlines
         self._wants_reasons = reasons
         self._expected = expected
+        self._contrast2 = stated_contrast2(speckle_sd_px)
         self._everywhere = Strip(slice(0, shape[0]), slice(0, shape[1]), None)
         strips = tuple(strip_of(line, shape) for line in scanlines) or (self._everywhere,)
         self._strips = tuple(s for s in strips if s.rows.stop > s.rows.start and s.cols.stop > s.cols.start)
 
     def find(self, on: Image, off: Image | None, clip_dn: float) -> Finding:
         """Spots and failures of a checked pair of frames."""
-        pair = Pair(on, off, clip_dn)
+        pair = Pair(on, off, clip_dn, stated_contrast2=self._contrast2)
         scenes = [measure_signal(pair, strip) for strip in self._strips]
         fits = self._search(scenes)
         spots = self._in_order([t.spot for t in fits if self._on_a_line(t.spot)])

@@ -79,6 +79,17 @@ def test_speckle_stays_in_every_range(sensor: CalibratedSensor) -> None:
     assert sharp == pytest.approx(0.04 * 1000.0**2 / f_b, rel=0.05)
 
 
+def test_the_speckle_of_a_spot_replaces_that_of_the_calibration(sensor: CalibratedSensor) -> None:
+    spot, sd = sensor.spot_px("L4", np.array([1000.0])), np.full((1, 2), 1e-9)
+    file = sensor.calibration.laser_ranger
+    typical = sensor.ranges(["L4"], spot, sd).spot_sd_mm[0]
+    unknown = sensor.ranges(["L4"], spot, sd, np.full((1, 2), np.nan)).spot_sd_mm[0]
+    assert unknown == typical
+    own = sensor.ranges(["L4"], spot, sd, np.full((1, 2), 0.08)).spot_sd_mm[0]
+    expected = 0.08 * file.fit.noise_scale / file.noise.speckle_sd_px
+    assert own / typical == pytest.approx(expected, rel=1e-6)
+
+
 def test_ranges_of_unseen_standoffs_lie_where_stated() -> None:
     """40 rigs: errors of ranges at standoffs that the fits did not see, whitened by their covariance."""
     seen = [(i, r) for i in ("L1", "L2", "L3", "L4") for r in (180.0, 750.0, 1800.0)]

@@ -38,7 +38,7 @@ def test_the_spot_is_found_in_the_rows_images(tmp_path: Path, seed: int) -> None
     image(tmp_path / "on.png", [Drawn(200.3, 239.6), lamp], seed)
     image(tmp_path / "off.png", [lamp], seed + 100)
     (row,) = load_captures(captures(tmp_path, "L1,500,0,on.png,off.png,,"))
-    (spot,) = find_row_spots(row, SIZE, LINES, 1).spots
+    (spot,) = find_row_spots(row, SIZE, LINES, 1, 0.0).spots
     assert abs(spot.u_px - 200.3) < 5 * spot.u_sd_px
     assert abs(spot.v_px - 239.6) < 5 * spot.v_sd_px
 
@@ -52,11 +52,11 @@ def test_an_image_that_cannot_be_used_is_named_with_its_row(tmp_path: Path, faul
         (tmp_path / "off.png").write_text("no picture")
     (row,) = load_captures(captures(tmp_path, "L1,500,0,on.png,off.png,,"))
     with pytest.raises(BadInputError, match=r"^row 2: .*off\.png") as caught:
-        find_row_spots(row, SIZE, LINES, 1)
+        find_row_spots(row, SIZE, LINES, 1, 0.0)
     assert caught.value.exit_code == 2
 
 
 def test_a_row_of_pixel_positions_has_no_images(tmp_path: Path) -> None:
     (row,) = load_captures(captures(tmp_path, "L1,500,0,,,200,239"))
     with pytest.raises(ValueError, match="row 2"):
-        find_row_spots(row, SIZE, LINES, 1)
+        find_row_spots(row, SIZE, LINES, 1, 0.0)

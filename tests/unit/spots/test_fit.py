@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.benchmarks.speckle import measure_cell
 from tests.support.draw import Drawn, Sensor, draw
 from workbench.spots import Scanline, find_spots
 from workbench.spots.crlb import CameraNoise, position_bound_px
@@ -127,3 +128,15 @@ def test_clipped_neighbours_are_measured_as_honestly(apart: float, over: float, 
         z.extend(sign * (spot.u_px - true.u) / spot.u_sd_px for spot, true, sign in outwards)
     assert np.std(z) == pytest.approx(1.0, abs=0.05 + 4 * np.sqrt(0.5 / len(z)))
     assert abs(np.mean(z)) < 0.1 + 4 / np.sqrt(len(z))
+
+
+@pytest.mark.parametrize(("width_px", "peak_dn", "seed"), [(0.75, 120.0, 1), (1.5, 60.0, 2), (1.5, 180.0, 3)])
+def test_noise_and_speckle_are_stated_each_for_itself(width_px: float, peak_dn: float, seed: int) -> None:
+    """Repeats scatter by the noise; single frames and means of repeats are off by the speckle as well."""
+    cell = measure_cell(width_px, peak_dn, 1, seed, placements=120)
+    # Patterns are independent between placements and axes: 240 values.
+    margin = 4.0 * np.sqrt(0.5 / 240)
+    assert cell.z_single == pytest.approx(1.0, abs=0.05 + margin)
+    assert cell.z_mean == pytest.approx(1.0, abs=0.08 + margin)
+    assert cell.noise_sd_px == pytest.approx(cell.scatter_px, rel=0.12 + 4.0 * np.sqrt(0.5 / 960))
+    assert cell.lost == 0

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from workbench.spots.noise import ROUNDING_DN2, PixelNoise, level_and_variance, photon_transfer_slope
+from tests.support.spot_models import pixel_noise
+from workbench.model.arrays import FloatArray
+from workbench.spots.noise import (
+    ROUNDING_DN2,
+    PixelNoise,
+    level_and_variance,
+    measure_noise,
+    stated_contrast2,
+)
 
 SAMPLES = 1200
 """Pixels that the estimate is taken from, in a strip of many more."""
@@ -33,16 +43,20 @@ def test_an_even_frame_has_the_variance_of_rounding() -> None:
     assert (level, variance) == (17.0, ROUNDING_DN2)
 
 
-def drawn(slope: float, seed: int, windows: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Signal, residual and inverse variance of windows with a floor of 4 DN^2."""
+def drawn(slope: float, contrast2: float, seed: int, windows: int = 6) -> tuple[FloatArray, ...]:
+    """Signal, its square, residual and inverse variance of windows with a floor of 4 DN^2."""
     rng = np.random.default_rng(seed)
-    signal = rng.uniform(20.0, 400.0, (windows, 21, 21))
-    variance = 4.0 + slope * signal
-    return signal, rng.normal(0.0, np.sqrt(variance)), 1.0 / variance
+    x = np.arange(21) - 10.0
+    shape = np.exp(-0.5 * (x[:, None] ** 2 + x**2) / 4.0**2)
+    signal = rng.uniform(200.0, 400.0, (windows, 1, 1)) * shape
+    variance = 4.0 + slope * signal + contrast2 * signal**2
+    return signal, signal**2, rng.normal(0.0, np.sqrt(variance)), 1.0 / variance
 
 
-def noise(windows: int, assumed: float) -> PixelNoise:
-    return PixelNoise(np.full(windows, 4.0), np.full(windows, assumed))
+def measured(windows: tuple[FloatArray, ...], noise: PixelNoise) -> PixelNoise:
+    """Noise of the windows of `drawn`, of which no fit absorbs anything."""
+    signal, square, residual, weight = windows
+    return measure_noise(signal, square, residual, weight, np.zeros_like(signal), noise)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -50,16 +64,37 @@ def noise(windows: int, assumed: float) -> PixelNoise:
 def test_the_slope_is_that_of_the_noise_for_any_assumed_slope(
     slope: float, assumed: float, seed: int
 ) -> None:
-    signal, residual, weight = drawn(slope, seed)
-    found = photon_transfer_slope(signal, residual, weight, np.zeros_like(signal), noise(6, assumed))
-    # The variance of n pixels is known to sqrt(2 / n) of itself; the floor's share is small.
-    assert found == pytest.approx(np.full(6, slope), rel=4.5 * np.sqrt(2 / signal.size))
+    windows = drawn(slope, 0.0, seed)
+    found = measured(windows, pixel_noise(4.0, assumed, 6))
+    # The variance of n pixels is known to sqrt(2 / n) of itself, here of those brighter than the floor; the
+    # contrast, free as well, doubles the deviation.
+    pixels = 6 * np.pi * 4.0**2 * 2.0
+    assert found.slope_dn == pytest.approx(np.full(6, slope), rel=4.5 * 2.0 * np.sqrt(2 / pixels))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("stated", [0.0, 0.04])
+def test_the_contrast_is_that_of_the_speckle(stated: float, seed: int) -> None:
+    windows = drawn(0.02, 0.03, seed)
+    noise = replace(pixel_noise(4.0, 0.02, 6, stated), stated_contrast2=stated)
+    found = measured(windows, noise)
+    pixels = 6 * np.pi * 4.0**2 * 2.0
+    assert found.contrast2 == pytest.approx(np.full(6, 0.03), rel=4.5 * 1.5 * np.sqrt(2 / pixels))
 
 
 def test_a_window_that_fits_badly_does_not_speak_for_the_others() -> None:
-    signal, residual, weight = drawn(0.5, 4)
-    residual[2] *= 10.0
-    found = photon_transfer_slope(signal, residual, weight, np.zeros_like(signal), noise(6, 0.5))
-    others = np.delete(found, 2)
-    assert others == pytest.approx(np.full(5, 0.5), rel=4.5 * np.sqrt(2 / signal[1:].size))
-    assert found[2] > 10 * others[0]
+    windows = drawn(0.5, 0.0, 4)
+    windows[2][2] *= 10.0
+    found = measured(windows, pixel_noise(4.0, 0.5, 6))
+    total = found.slope_dn + 200.0 * found.contrast2
+    others = np.delete(total, 2)
+    assert others == pytest.approx(np.full(5, 0.5), rel=0.3)
+    assert total[2] > 10 * others[0]
+
+
+def test_the_speckle_of_a_centroid_gives_the_contrast_of_its_grains() -> None:
+    """650 nm, f/2, 7.5 um: grains of (4 / pi) (0.173 px)^2, a centroid moves by 0.173 / (sqrt(2) pi) px."""
+    grain_px = 0.65 * 2.0 / 7.5
+    found = stated_contrast2(grain_px / (np.sqrt(2.0) * np.pi))
+    # The exact contrast, averaged over a pixel, is that of test_photon_transfer.
+    assert found == pytest.approx(0.0312, rel=0.04)

@@ -180,8 +180,7 @@ def _prediction(
     mean = fit.cells.position_px.ravel()[rows] + reduced.residual[rows] * sd
     slope = by_standoff(reduced)[rows] * sd
     own = reduced.jacobian[rows] * sd[:, None]
-    speckle_px = fit.rig.noise.speckle_sd_px * reduced.scale
-    shared = (rows[:, None] == rows) * speckle_px**2
+    shared = (rows[:, None] == rows) * (fit.cells.speckle_sd_px.ravel()[rows] * reduced.scale) ** 2
     standoff = FREE_STANDOFF * fit.cells.placements[index].standoff_mm * slope
     variance = np.diag((captures.sd_px * reduced.scale) ** 2) + shared
     return mean, slope, variance + own @ reduced.covariance @ own.T + np.outer(standoff, standoff)

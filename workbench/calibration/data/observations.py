@@ -47,6 +47,9 @@ class Observation:
     """Commanded tilt of the target about the vertical."""
     saturated: bool = False
     """The middle of the spot was clipped."""
+    u_speckle_sd_px: float = float("nan")
+    """1 sigma by speckle, which the repeats share; `u_sd_px` does not include it."""
+    v_speckle_sd_px: float = float("nan")
 
     @property
     def seen(self) -> bool:
@@ -106,6 +109,8 @@ class MeanObservations:
     """(N, 2) u, v; NaN where a coordinate was not measured."""
     sd_px: FloatArray
     """(N, 2) 1 sigma of the mean, including the error that the repeats share (speckle)."""
+    speckle_sd_px: FloatArray
+    """(N, 2) 1 sigma of that shared error."""
     time: FloatArray
     """(N,) mean place of the repeats in the order of capture: -0.5 first of the session, 0.5 last."""
     members: tuple[tuple[Observation, ...], ...]
@@ -153,6 +158,7 @@ def group(
         weighted_mean(positions(m), own * stated_sd(m, noise))
         for m, own in zip(kept.values(), scales, strict=True)
     ]
+    speckle_sd = [np.sqrt((stated_speckle_sd(m, noise) ** 2).mean(axis=0)) for m in kept.values()]
     seen_at = {placement for placement, _ in kept}
     order = [key for key in placements if key in seen_at]
     return (
@@ -161,7 +167,8 @@ def group(
             laser=np.array([laser_ids.index(laser) for _, laser in kept], dtype=np.intp),
             placement=np.array([order.index(placement) for placement, _ in kept], dtype=np.intp),
             position_px=np.array([mean for mean, _ in means]).reshape(-1, 2),
-            sd_px=np.array([np.hypot(sd, noise.speckle_sd_px) for _, sd in means]).reshape(-1, 2),
+            sd_px=np.hypot([sd for _, sd in means], speckle_sd).reshape(-1, 2),
+            speckle_sd_px=np.reshape(speckle_sd, (-1, 2)),
             time=_mean_times(seen, list(kept.values())),
             members=tuple(tuple(m) for m in kept.values()),
             repeat_scale=scale,
@@ -197,6 +204,12 @@ def stated_sd(observations: Sequence[Observation], noise: NoiseSpec) -> FloatArr
     """(n, 2) standard deviation of each position, the rig's where the observation states none."""
     sd = np.array([(s.u_sd_px, s.v_sd_px) for s in observations]).reshape(-1, 2)
     return np.where(np.isfinite(sd), sd, noise.spot_sd_px)
+
+
+def stated_speckle_sd(observations: Sequence[Observation], noise: NoiseSpec) -> FloatArray:
+    """(n, 2) standard deviation by speckle, the rig's where the observation states none."""
+    sd = np.array([(s.u_speckle_sd_px, s.v_speckle_sd_px) for s in observations]).reshape(-1, 2)
+    return np.where(np.isfinite(sd), sd, noise.speckle_sd_px)
 
 
 def _check_placement(first: PlacementInfo, observation: Observation) -> None:

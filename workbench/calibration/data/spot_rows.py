@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isnan
+from math import isnan, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,6 +75,8 @@ def observe(finding: Finding, laser: LaserSpec, observation: Observation) -> Obs
         v_px=spot.v_px,
         u_sd_px=spot.u_sd_px,
         v_sd_px=spot.v_sd_px,
+        u_speckle_sd_px=nan if spot.u_speckle_sd_px is None else spot.u_speckle_sd_px,
+        v_speckle_sd_px=nan if spot.v_speckle_sd_px is None else spot.v_speckle_sd_px,
         saturated=Failure.SATURATED in spot.flags,
     )
 
@@ -169,4 +171,5 @@ def _sight_row(rig: Rig, row: CaptureRow) -> Observation | Rejected:
 
     laser = rig.lasers[rig.laser_ids.index(row.laser_id)]
     size = rig.camera.width_px, rig.camera.height_px
-    return observe(find_row_spots(row, size, [prior_scanline(rig, laser)], 1), laser, observation)
+    found = find_row_spots(row, size, [prior_scanline(rig, laser)], 1, rig.noise.speckle_sd_px)
+    return observe(found, laser, observation)

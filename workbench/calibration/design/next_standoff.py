@@ -19,6 +19,7 @@ from workbench.calibration.data.observations import (
     group,
     positions,
     stated_sd,
+    stated_speckle_sd,
 )
 from workbench.calibration.design.expectation import Expectation
 from workbench.calibration.design.standoffs import Candidates, RangeGoals, candidate_standoffs
@@ -186,6 +187,7 @@ def _padded(cells: MeanObservations, lasers: int, planned: int) -> MeanObservati
         placement=placement,
         position_px=position.reshape(-1, 2),
         sd_px=sd.reshape(-1, 2),
+        speckle_sd_px=np.full((len(laser), 2), np.nan),
         time=np.zeros(len(laser)),
         members=(),
     )
@@ -200,4 +202,5 @@ def _noise(rig: Rig, observations: Sequence[Observation], repeat_scale: float, s
     """Noise as a calibration of these observations states it."""
     seen = np.isfinite(positions(observations))
     own = float(np.sqrt((stated_sd(observations, rig.noise)[seen] ** 2).mean()))
-    return NoiseSpec(spot_sd_px=own * repeat_scale * scale, speckle_sd_px=rig.noise.speckle_sd_px * scale)
+    shared = float(np.sqrt((stated_speckle_sd(observations, rig.noise)[seen] ** 2).mean()))
+    return NoiseSpec(spot_sd_px=own * repeat_scale * scale, speckle_sd_px=shared * scale)

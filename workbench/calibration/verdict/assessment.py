@@ -275,7 +275,7 @@ def _warnings(fit: CalibrationFit) -> list[str]:
             f" (chi2 {fit.chi2:.1f} for {fit.degrees_of_freedom:.1f} degrees of freedom);"
             f" every sd is scaled by this factor. The largest residual is {_largest_residual(fit)}."
         )
-    if fit.noise_scale > SPECKLE_SCALE and fit.rig.noise.speckle_sd_px == 0:
+    if fit.noise_scale > SPECKLE_SCALE and not fit.cells.speckle_sd_px.any():
         warnings.append(
             "the rig file states no speckle (noise.speckle_sd_px): all repeats of a spot share it, so their"
             " scatter does not show it. State it: docs/rig-format.md computes it from wavelength, f-number"

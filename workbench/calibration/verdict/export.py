@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.calibration.checks.cross_validation import leave_each_out
-from workbench.calibration.data.observations import positions, stated_sd
+from workbench.calibration.data.observations import positions, stated_sd, stated_speckle_sd
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.verdict.assessment import Assessment, assess, determined_by
 from workbench.calibration.verdict.observability import RangeGradients, null_directions
@@ -128,7 +128,7 @@ def _calibration(
             ),
             noise=Noise(
                 spot_sd_px=_typical_spot_sd(fit),
-                speckle_sd_px=fit.rig.noise.speckle_sd_px * fit.noise_scale,
+                speckle_sd_px=_typical_speckle_sd(fit),
             ),
             parameters=_parameters(fit),
             validity=Validity(standoff_mm=(min(standoffs), max(standoffs)), max_relative_range_sd=worst),
@@ -177,6 +177,12 @@ def _typical_spot_sd(fit: CalibrationFit) -> float:
     """Root mean square sd of a single spot, as stated and scaled to the scatter of the data, px."""
     sd, seen = stated_sd(fit.used, fit.rig.noise), np.isfinite(positions(fit.used))
     return float(np.sqrt((sd[seen] ** 2).mean()) * fit.cells.repeat_scale * fit.noise_scale)
+
+
+def _typical_speckle_sd(fit: CalibrationFit) -> float:
+    """Root mean square sd by speckle, scaled to the scatter of the data, px."""
+    sd, seen = stated_speckle_sd(fit.used, fit.rig.noise), np.isfinite(positions(fit.used))
+    return float(np.sqrt((sd[seen] ** 2).mean()) * fit.noise_scale)
 
 
 def _ranges(sensor: CalibratedSensor) -> RangeGradients:

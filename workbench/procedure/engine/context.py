@@ -107,7 +107,13 @@ class Context:
         self.begin(key)
         on, off, taken = self.pairs.pair(key, laser_ids, placement, repeat, scene, left_off)
         self.emit(taken)
-        finding = find_spots(on, off, scanlines=scanlines, expected=len(laser_ids))
+        finding = find_spots(
+            on,
+            off,
+            scanlines=scanlines,
+            expected=len(laser_ids),
+            speckle_sd_px=self.rig.noise.speckle_sd_px,
+        )
         self.emit(spots_found(key, finding, laser_ids))
         self.pairs.check_dark(key, off, finding, scanlines)
         self.captures.append(taken)

@@ -60,9 +60,14 @@ class Blend:
         reach_px: float | None = None,
     ) -> None:
         self.scene = group[0].scene
-        # Start value: the lowest of the measured slopes, since a misfit only raises a slope.
-        slope = min(t.slope_dn for t in group)
-        self.noise = PixelNoise(np.array([self.scene.variance]), np.array([slope]))
+        # Start values: the lowest that were measured, since a misfit only raises them.
+        slope, contrast2 = min(t.slope_dn for t in group), min(t.contrast2 for t in group)
+        self.noise = PixelNoise(
+            np.array([self.scene.variance]),
+            np.array([slope]),
+            np.array([contrast2]),
+            self.scene.pair.stated_contrast2,
+        )
         points = np.array([t.params[U:LN_SU] for t in group])
         reach = reach_px or max(t.reach_px for t in group)
         u, v = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -88,9 +93,8 @@ class Blend:
         """Spots of a joint fit, in pixels of the image."""
         absolute = joint.params + np.array([0, 0, self.col0, self.row0, 0, 0])
         fits = []
-        for i, (params, sd, flags) in enumerate(
-            zip(absolute, joint.sd, spot_flags(self.scene, absolute), strict=True)
-        ):
+        own = zip(absolute, joint.sd, joint.speckle_sd, spot_flags(self.scene, absolute), strict=True)
+        for i, (params, sd, speckle_sd, flags) in enumerate(own):
             _, flux, u, v, ln_su, ln_sv = params.tolist()
             reach = math.exp(max(ln_su, ln_sv))
             others = np.delete(absolute, i, axis=0)[:, U:LN_SU]
@@ -98,9 +102,20 @@ class Blend:
                 flags |= {Failure.MERGED}
             width = math.exp(0.5 * (ln_su + ln_sv))
             peak = flux / (2.0 * math.pi * (width**2 + 1.0 / 12.0))
-            spot = Spot(u, v, float(sd[1]), float(sd[2]), flux, width, peak, flags)
-            slope = float(joint.noise.slope_dn[0])
-            fits.append(FittedSpot(spot, params, slope, reach, flux / float(sd[0]), self.scene))
+            spot = Spot(
+                u_px=u,
+                v_px=v,
+                u_sd_px=float(sd[1]),
+                v_sd_px=float(sd[2]),
+                flux_dn=flux,
+                width_px=width,
+                peak_dn=peak,
+                flags=flags,
+                u_speckle_sd_px=float(speckle_sd[0]),
+                v_speckle_sd_px=float(speckle_sd[1]),
+            )
+            slope, contrast2 = float(joint.noise.slope_dn[0]), float(joint.noise.contrast2[0])
+            fits.append(FittedSpot(spot, params, slope, contrast2, reach, flux / float(sd[0]), self.scene))
         return fits
 
     def _light_of(self, fits: Sequence[FittedSpot], shape: tuple[int, int]) -> BoolArray:
@@ -277,10 +292,11 @@ def split_elongated(
 
 def _fit_without_outliers(win: Windows, start: FloatArray, noise: PixelNoise) -> JointFit:
     """Joint fit with the noise measured from its own residuals, and without outlying pixels."""
+    assumed = noise
     for _ in range(_ROUNDS):
-        joint = fit_joint(win, start, noise)
+        joint = fit_joint(win, start, noise, assumed=assumed)
         signal, residual, weight = joint.signal[None], joint.residual[None], joint.weight[None]
         largest = np.array([[(weight * residual**2).max()]])
         usable, _ = without_outliers(win.usable, signal, residual, weight, largest)
         win, start, noise = win._replace(usable=usable), joint.params, joint.noise
-    return fit_joint(win, start, noise)
+    return fit_joint(win, start, noise, assumed=assumed)

@@ -12,7 +12,8 @@ from workbench.spots.fit import Windows
 from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U, V
 from workbench.spots.kernels.joint import joint_fisher_scoring
 from workbench.spots.kernels.joint_sums import OWN, SHARED
-from workbench.spots.noise import PixelNoise, photon_transfer_slope
+from workbench.spots.kernels.photon_transfer import shared_grains
+from workbench.spots.noise import PixelNoise, measure_noise
 from workbench.spots.psf import principal_axes
 
 _HIDDEN_SD = 5.0
@@ -28,7 +29,9 @@ class JointFit:
     params: FloatArray
     """(k, 6) in the order of `kernels.columns`; background and widths are the same in all rows."""
     sd: FloatArray
-    """(k, 3): of flux, u, v."""
+    """(k, 3): of flux, u, v; of the position by noise."""
+    speckle_sd: FloatArray
+    """(k, 2) of u, v by speckle; 0 where the weights were fixed."""
     chi2: float
     """Sum of squared residuals times their weights."""
     signal: FloatArray
@@ -38,12 +41,16 @@ class JointFit:
     weight: FloatArray
     """(height, width) inverse variance, 0 where unused."""
     noise: PixelNoise
-    """With the photon-transfer slope measured from the residuals, unless the weights were fixed."""
+    """With slope and contrast measured from the residuals, unless the weights were fixed."""
     converged: bool
 
 
 def fit_joint(
-    win: Windows, start: FloatArray, noise: PixelNoise, weight: FloatArray | None = None
+    win: Windows,
+    start: FloatArray,
+    noise: PixelNoise,
+    weight: FloatArray | None = None,
+    assumed: PixelNoise | None = None,
 ) -> JointFit:
     """Fit k spots in a single window (n = 1).
 
@@ -52,41 +59,60 @@ def fit_joint(
         start: (k, 6) first guesses.
         noise: Of the window.
         weight: (height, width) fixed weights; None: those that the model predicts.
+        assumed: Noise that the measured one is averaged with; None: `noise`.
     """
     params, m = start.copy(), SHARED + OWN * len(start)
     cov, used = np.empty((m, m)), np.empty(win.shape) if weight is None else weight
-    signal, residual, leverage = np.empty(win.shape), np.empty(win.shape), np.empty(win.shape)
-    floor, slope = float(noise.floor_dn2[0]), float(noise.slope_dn[0])
+    signal, mean_square, residual, leverage = (np.empty(win.shape) for _ in range(4))
+    by_noise = np.zeros((len(start), 2))
+    contrast2 = float(noise.contrast2[0])
     converged = joint_fisher_scoring(
         win.data[0],
         win.usable[0],
-        floor,
-        slope,
+        float(noise.floor_dn2[0]),
+        float(noise.slope_dn[0]),
+        contrast2,
         weight is not None,
         params,
         cov,
+        by_noise,
         signal,
+        mean_square,
         residual,
         used,
         leverage,
     )
-    sd = np.sqrt(np.maximum(np.diag(cov)[SHARED:], 0.0)).reshape(-1, OWN)
-    sd[:, 1:] = _with_second_order(sd[:, 1:], np.exp(params[:, LN_SU:SHEAR]))
+    variance = np.maximum(np.diag(cov)[SHARED:], 0.0).reshape(-1, OWN)
+    widened = _second_order(variance[:, 1:], np.exp(params[:, LN_SU:SHEAR]))
     if weight is None:
-        measured = photon_transfer_slope(signal[None], residual[None], used[None], leverage[None], noise)
-        noise = PixelNoise(noise.floor_dn2, measured)
-    return JointFit(params, sd, float(np.vdot(used, residual**2)), signal, residual, used, noise, converged)
+        noise = measure_noise(
+            signal[None], mean_square[None], residual[None], used[None], leverage[None], assumed or noise
+        )
+    else:
+        by_noise = variance[:, 1:]
+    by_speckle = np.maximum(variance[:, 1:] - by_noise, 0.0) * shared_grains(contrast2)
+    return JointFit(
+        params,
+        np.column_stack([np.sqrt(variance[:, 0]), np.sqrt(by_noise) * widened]),
+        np.sqrt(by_speckle) * widened,
+        float(np.vdot(used, residual**2)),
+        signal,
+        residual,
+        used,
+        noise,
+        converged,
+    )
 
 
-def _with_second_order(sd_px: FloatArray, width_px: FloatArray) -> FloatArray:
-    """(k, 2) standard deviations of u and v with the second term of their series in 1 / A.
+def _second_order(variance_px2: FloatArray, width_px: FloatArray) -> FloatArray:
+    """(k, 2) factor on the standard deviations of u and v by the second term of their series in 1 / A.
 
     A is the information on the amplitude as in `kernels.acceptance`. It is taken from the variance of each
     coordinate, which is 2 width^2 / A for an isolated spot in white noise; an overlapping neighbour lowers
     it.
     """
-    widened: FloatArray = sd_px * np.sqrt(1.0 + 0.5 * _SECOND_ORDER * (sd_px / width_px) ** 2)
-    return widened
+    factor: FloatArray = np.sqrt(1.0 + 0.5 * _SECOND_ORDER * variance_px2 / width_px**2)
+    return factor
 
 
 def pair_guess(params: FloatArray) -> FloatArray:

@@ -30,7 +30,9 @@ from workbench.spots.kernels.columns import (
     SHEAR_SCORE,
     STATISTIC_COLUMNS,
     U_DEVIATION,
+    U_SPECKLE,
     V_DEVIATION,
+    V_SPECKLE,
     WORST_EXCESS,
     U,
     V,
@@ -42,8 +44,8 @@ from workbench.spots.noise import ROUNDING_DN2
 
 # Columns of a table of spots, one row each. The first seven are the parameters as in `columns`, in pixels of
 # the image; the next half-width is 0 where the window suits the spot.
-U_SD, V_SD, FLUX_SD, PEAK, SLOPE, IS_SPOT, NEXT_HALF = range(7, 14)
-COLUMNS: Final = 14
+U_SD, V_SD, U_SPECKLE_SD, V_SPECKLE_SD, FLUX_SD, PEAK, SLOPE, CONTRAST2, IS_SPOT, NEXT_HALF = range(7, 17)
+COLUMNS: Final = 17
 # Below the narrowest spot of a lens (0.6 px is the least specified): a hot pixel.
 _MIN_WIDTH_PX: Final = 0.5
 _MAX_WIDTH_PX: Final = 7.0
@@ -135,37 +137,57 @@ def _fit_tilted(
     usable: BoolArray,
     clip: FloatArray,
     floor: FloatArray,
-    guess: FloatArray,
+    slope: FloatArray,
+    contrast2: FloatArray,
+    stated_contrast2: float,
     start: FloatArray,
     tilted: FloatArray,
-) -> tuple[bool, FloatArray, float]:
+) -> tuple[bool, FloatArray]:
     """Fit an ellipse at any angle to one window, from the upright fit `start` (6,); fill `tilted` (1, 7).
 
+    `slope` and `contrast2` (1,) are replaced by the measured ones.
+
     Returns:
-        Whether it converged, the statistics (STATISTIC_COLUMNS,), the photon-transfer slope.
+        Whether it converged, the statistics (STATISTIC_COLUMNS,).
     """
     tilted[0, :6], tilted[0, SHEAR] = start, 0.0
-    cov, statistics, slope = np.empty((1, 7, 7)), np.empty((1, STATISTIC_COLUMNS)), np.empty(1)
+    cov, statistics = np.empty((1, 7, 7)), np.empty((1, STATISTIC_COLUMNS))
     signal, residual, weight = np.empty_like(data), np.empty_like(data), np.empty_like(data)
     converged = np.empty(1, np.bool_)
     fisher_scoring(
-        data, usable, clip, floor, guess, tilted, cov, signal, residual, weight, converged, slope, statistics
+        data,
+        usable,
+        clip,
+        floor,
+        slope,
+        contrast2,
+        stated_contrast2,
+        tilted,
+        cov,
+        signal,
+        residual,
+        weight,
+        converged,
+        statistics,
     )
-    return converged[0], statistics[0], slope[0]
+    return converged[0], statistics[0]
 
 
 @compiled
-def _fill_row(params: FloatArray, statistics: FloatArray, slope: float, row: FloatArray) -> None:
+def _fill_row(
+    params: FloatArray, statistics: FloatArray, slope: float, contrast2: float, row: FloatArray
+) -> None:
     """Fill a spot's row of the table, except `NEXT_HALF`."""
     row[SHEAR] = 0.0
     row[: params.size] = params
     inflation = math.sqrt(1.0 + _SECOND_ORDER / statistics[INFORMATION])
-    row[U_SD], row[V_SD], row[FLUX_SD] = (
-        statistics[U_DEVIATION] * inflation,
-        statistics[V_DEVIATION] * inflation,
-        statistics[FLUX_DEVIATION],
+    row[U_SD], row[V_SD] = statistics[U_DEVIATION] * inflation, statistics[V_DEVIATION] * inflation
+    row[U_SPECKLE_SD], row[V_SPECKLE_SD] = (
+        statistics[U_SPECKLE] * inflation,
+        statistics[V_SPECKLE] * inflation,
     )
-    row[PEAK], row[SLOPE], row[IS_SPOT] = statistics[PEAK_DN], slope, 1.0
+    row[FLUX_SD] = statistics[FLUX_DEVIATION] * inflation
+    row[PEAK], row[SLOPE], row[CONTRAST2], row[IS_SPOT] = statistics[PEAK_DN], slope, contrast2, 1.0
 
 
 @compiled
@@ -191,6 +213,7 @@ def fit_group(
     start: FloatArray,
     variance: float,
     slope_dn: float,
+    stated_contrast2: float,
     shape: tuple[int, int],
     found: FloatArray,
 ) -> None:
@@ -206,6 +229,7 @@ def fit_group(
         start: (peaks, 6) first guesses in pixels of the image; replaced by the fits of upright ellipses.
         variance: Of a pixel without signal, DN^2.
         slope_dn: First guess of the photon-transfer slope.
+        stated_contrast2: Squared contrast of speckle; 0: not known.
         shape: Height and width of the image.
         found: (peaks, COLUMNS) table of spots.
     """
@@ -214,25 +238,28 @@ def fit_group(
     for i in range(n):
         origin[i, U], origin[i, V] = cols[group[i]] - half, rows[group[i]] - half
         params[i] = start[group[i]] - origin[i, :6]
-    cov, statistics, slope = np.empty((n, 6, 6)), np.empty((n, STATISTIC_COLUMNS)), np.empty(n)
+    cov, statistics = np.empty((n, 6, 6)), np.empty((n, STATISTIC_COLUMNS))
     signal, residual, weight = np.empty_like(data), np.empty_like(data), np.empty_like(data)
-    floor, guess, converged = np.full(n, variance), np.full(n, slope_dn), np.empty(n, np.bool_)
+    floor, converged = np.full(n, variance), np.empty(n, np.bool_)
+    slope, contrast2 = np.empty(n), np.empty(n)
     refit = True
     for turn in range(3):
         if refit:
+            slope[:], contrast2[:] = slope_dn, stated_contrast2
             fisher_scoring(
                 data,
                 usable,
                 clip,
                 floor,
-                guess,
+                slope,
+                contrast2,
+                stated_contrast2,
                 params,
                 cov,
                 signal,
                 residual,
                 weight,
                 converged,
-                slope,
                 statistics,
             )
         if turn == 0:
@@ -240,27 +267,26 @@ def fit_group(
         elif turn == 1:
             refit = _take_floor_from_rim(floor, statistics)
     for i in range(n):
-        k = group[i]
+        k, one = group[i], slice(i, i + 1)
         start[k] = params[i] + origin[i, :6]
         found[k, NEXT_HALF] = 0.0
-        final, final_statistics, final_slope, is_fitted = start[k], statistics[i], slope[i], converged[i]
+        final, final_statistics, is_fitted = start[k], statistics[i], converged[i]
         if statistics[i, SHEAR_SCORE] > _SHEAR_SD**2:
-            fitted, tilted_statistics, tilted_slope = _fit_tilted(
-                data[i : i + 1],
-                usable[i : i + 1],
-                clip[i : i + 1],
-                floor[i : i + 1],
-                guess[i : i + 1],
+            own_slope, own_contrast2 = np.full(1, slope_dn), np.full(1, stated_contrast2)
+            fitted, tilted_statistics = _fit_tilted(
+                data[one],
+                usable[one],
+                clip[one],
+                floor[one],
+                own_slope,
+                own_contrast2,
+                stated_contrast2,
                 params[i],
                 tilted,
             )
             if fitted:
-                final, final_statistics, final_slope, is_fitted = (
-                    tilted[0] + origin[i],
-                    tilted_statistics,
-                    tilted_slope,
-                    True,
-                )
+                final, final_statistics, is_fitted = tilted[0] + origin[i], tilted_statistics, True
+                slope[i], contrast2[i] = own_slope[0], own_contrast2[0]
         if is_fitted and _is_spot(final, final_statistics, shape):
-            _fill_row(final, final_statistics, final_slope, found[k])
+            _fill_row(final, final_statistics, slope[i], contrast2[i], found[k])
             _request_window(start[k], half, rows, cols, k, found)

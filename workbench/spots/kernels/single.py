@@ -20,13 +20,13 @@ from workbench.spots.kernels.columns import (
     RIM_PIXELS,
     SHEAR_SCORE,
     U_DEVIATION,
-    V_DEVIATION,
+    U_SPECKLE,
     WORST_EXCESS,
     U,
     V,
 )
 from workbench.spots.kernels.compiled import compiled
-from workbench.spots.kernels.photon_transfer import transfer_slope
+from workbench.spots.kernels.photon_transfer import measure_variance, shared_grains
 from workbench.spots.kernels.profiles import profile, sheared_rows, upright_rows
 from workbench.spots.kernels.single_sums import dense_sums, fill_leverage, invert, separable_sums
 
@@ -47,6 +47,8 @@ _STEPS_TO_SETTLE: Final = 6
 # Margin between a pixel's expected value and clipping. Closer pixels are excluded, clipped or not: a choice
 # by the data would be a choice by noise.
 _CLIP_MARGIN_SD: Final = 2.0
+# Least share of noise in the variance of a position.
+_LEAST_SHARE: Final = 1e-6
 
 
 @compiled
@@ -54,15 +56,17 @@ def _fill_weights(
     usable: BoolArray,
     clip: FloatArray,
     signal: FloatArray,
+    mean_square: FloatArray,
     background: float,
     floor: float,
     slope: float,
+    contrast2: float,
     out: FloatArray,
 ) -> None:
     """Fill the inverse of the variance that the model predicts; 0 for a pixel that is not used."""
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
-            variance = floor + slope * max(signal[y, x], 0.0)
+            variance = floor + slope * max(signal[y, x], 0.0) + contrast2 * mean_square[y, x]
             out[y, x] = usable[y, x] / variance
             if clip[y, x] < math.inf:
                 margin = clip[y, x] - signal[y, x] - background
@@ -102,18 +106,27 @@ def _evaluate(
     along_v: FloatArray,
     rows: FloatArray,
     signal: FloatArray,
+    mean_square: FloatArray,
     residual: FloatArray,
 ) -> None:
-    """Fill profiles (or derivatives of a tilted ellipse), signal and residual of one window at `params`."""
+    """Fill profiles (or derivatives of a tilted ellipse), and the pixels of one window at `params`.
+
+    The mean square of the light on a pixel is the square of its mean, and a twelfth of that of its slope.
+    """
+    flux = params[FLUX]
     if params.size == 7:
         sheared_rows(params, rows)
-        signal[:] = params[FLUX] * rows[1]
+        signal[:] = flux * rows[1]
+        mean_square[:] = flux**2 * (rows[1] ** 2 + (rows[2] ** 2 + rows[3] ** 2) / 12.0)
     else:
         profile(params[U], params[LN_SU], along_u)
         profile(params[V], params[LN_SV], along_v)
         for y in range(signal.shape[0]):
+            height = flux * along_v[0, y]
+            height2 = flux**2 * (along_v[0, y] ** 2 + along_v[1, y] ** 2 / 12.0)
             for x in range(signal.shape[1]):
-                signal[y, x] = params[FLUX] * along_v[0, y] * along_u[0, x]
+                signal[y, x] = height * along_u[0, x]
+                mean_square[y, x] = height2 * (along_u[0, x] ** 2 + along_u[1, x] ** 2 / 12.0)
     residual[:] = data - signal - params[BACKGROUND]
 
 
@@ -173,11 +186,14 @@ def _fill_statistics(
     signal: FloatArray,
     residual: FloatArray,
     weight: FloatArray,
-    cov: FloatArray,
-    flux: float,
+    by_speckle: FloatArray,
+    flux_variance: float,
     out: FloatArray,
 ) -> None:
-    """Fill a window's statistics (STATISTIC_COLUMNS,), except SHEAR_SCORE."""
+    """Fill a window's statistics (STATISTIC_COLUMNS,), except deviations of the position and SHEAR_SCORE.
+
+    `by_speckle` is the share of speckle in the variance of each pixel.
+    """
     height, width = signal.shape
     worst = at_rim = information = 0.0
     peak, in_rim = -math.inf, 0
@@ -186,15 +202,49 @@ def _fill_statistics(
             excess = residual[y, x] * residual[y, x] * weight[y, x]
             worst = max(worst, excess)
             peak = max(peak, signal[y, x])
-            information += weight[y, x] * signal[y, x] * signal[y, x]
+            information += weight[y, x] / (1.0 - by_speckle[y, x]) * signal[y, x] * signal[y, x]
             if y == 0 or y == height - 1 or x == 0 or x == width - 1:
                 at_rim += excess
                 in_rim += weight[y, x] > 0.0
     out[WORST_EXCESS], out[PEAK_DN], out[INFORMATION] = worst, peak, information
     out[RIM_NOISE], out[RIM_PIXELS] = at_rim / max(in_rim, 1), in_rim
-    out[FLUX_DEVIATION] = math.sqrt(max(cov[FLUX, FLUX], 0.0))
-    out[U_DEVIATION] = math.sqrt(max(cov[U, U], 0.0)) / max(flux, 1e-12)
-    out[V_DEVIATION] = math.sqrt(max(cov[V, V], 0.0)) / max(flux, 1e-12)
+    out[FLUX_DEVIATION] = math.sqrt(max(flux_variance, 0.0))
+
+
+@compiled
+def _fill_deviations(
+    along_u: FloatArray,
+    along_v: FloatArray,
+    rows: FloatArray,
+    weight: FloatArray,
+    by_speckle: FloatArray,
+    cov: FloatArray,
+    params: FloatArray,
+    contrast2: float,
+    out: FloatArray,
+) -> None:
+    """Fill the deviations of the position among a window's statistics, by noise and by speckle.
+
+    The covariance `cov` is the sum of both (sandwich formula, docs/spots.md). That of noise is
+    `cov (J^T W N W J) cov` with the weights W and the variance N of noise alone, a share of 1 / W.
+    """
+    information, gradient = np.empty_like(cov), np.empty_like(params)
+    noise = weight * (1.0 - by_speckle)
+    if params.size == 7:
+        dense_sums(rows, noise, by_speckle, information, gradient)
+    else:
+        separable_sums(along_u, along_v, noise, by_speckle, information, gradient)
+    flux2, grains = max(params[FLUX], 1e-12) ** 2, shared_grains(contrast2)
+    for axis in range(2):
+        variance = 0.0
+        for a in range(params.size):
+            for b in range(params.size):
+                variance += cov[U + axis, a] * information[a, b] * cov[U + axis, b]
+        total = max(cov[U + axis, U + axis], 0.0)
+        variance = min(max(variance, _LEAST_SHARE * total), total)  # against rounding
+        speckle = grains * (total - variance)
+        out[U_DEVIATION + axis] = math.sqrt(variance / flux2)
+        out[U_SPECKLE + axis] = math.sqrt(speckle / flux2)
 
 
 @compiled
@@ -203,42 +253,71 @@ def fisher_scoring(
     usable: BoolArray,
     clip: FloatArray,
     floor: FloatArray,
-    guess: FloatArray,
+    slope: FloatArray,
+    contrast2: FloatArray,
+    stated_contrast2: float,
     params: FloatArray,
     cov: FloatArray,
     signal: FloatArray,
     residual: FloatArray,
     weight: FloatArray,
     converged: BoolArray,
-    slope: FloatArray,
     statistics: FloatArray,
 ) -> None:
     """Fit one spot per window, starting at `params`; it and all arguments after it are filled, see `SpotFit`.
 
-    The caller allocates them, since returning a new array takes longer than a step of one window.
+    `slope` and `contrast2` (n,) are replaced by the measured ones. The caller allocates all arrays, since
+    returning a new one takes longer than a step of one window.
     """
     n, k = params.shape
     delta = np.empty((n, k))
-    slope[:] = guess
+    mean_square = np.empty_like(data)
     along_u, along_v = np.empty((n, 4, data.shape[2])), np.empty((n, 4, data.shape[1]))
     rows = np.empty((n, k, data.shape[1], data.shape[2]))
     measured = False
     for step in range(_MAX_STEPS):
         for i in range(n):
-            _evaluate(params[i], data[i], along_u[i], along_v[i], rows[i], signal[i], residual[i])
+            _evaluate(
+                params[i],
+                data[i],
+                along_u[i],
+                along_v[i],
+                rows[i],
+                signal[i],
+                mean_square[i],
+                residual[i],
+            )
         again = True
         while again:
             within = True
             for i in range(n):
                 _fill_weights(
-                    usable[i], clip[i], signal[i], params[i, BACKGROUND], floor[i], slope[i], weight[i]
+                    usable[i],
+                    clip[i],
+                    signal[i],
+                    mean_square[i],
+                    params[i, BACKGROUND],
+                    floor[i],
+                    slope[i],
+                    contrast2[i],
+                    weight[i],
                 )
                 _solve(along_u[i], along_v[i], rows[i], weight[i], residual[i], cov[i], delta[i])
                 within = within and _within(delta[i], cov[i], 0.0)
             again = not measured and (within or step == _STEPS_TO_MEASURE)
             if again:
                 leverage = _leverages(params, cov, data)
-                slope[:] = transfer_slope(signal, residual, weight, leverage, floor, guess)
+                measure_variance(
+                    signal,
+                    mean_square,
+                    residual,
+                    weight,
+                    leverage,
+                    floor,
+                    slope,
+                    contrast2,
+                    stated_contrast2,
+                )
                 measured = True
         if step == _STEPS_TO_SETTLE:
             usable = weight > 0.0
@@ -249,7 +328,19 @@ def fisher_scoring(
         if measured and converged.all():
             break
     for i in range(n):
-        _fill_statistics(signal[i], residual[i], weight[i], cov[i], params[i, FLUX], statistics[i])
+        by_speckle = weight[i] * contrast2[i] * mean_square[i]
+        _fill_statistics(signal[i], residual[i], weight[i], by_speckle, cov[i, FLUX, FLUX], statistics[i])
+        _fill_deviations(
+            along_u[i],
+            along_v[i],
+            rows[i],
+            weight[i],
+            by_speckle,
+            cov[i],
+            params[i],
+            contrast2[i],
+            statistics[i],
+        )
         statistics[i, SHEAR_SCORE] = (
             0.0 if k == 7 else _shear_score(along_u[i], along_v[i], weight[i], residual[i])
         )

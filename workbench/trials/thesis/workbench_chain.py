@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import degrees
 
@@ -27,7 +27,7 @@ from workbench.optics.rays import RAY
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.ranging.shape import Shape
-from workbench.spots import Finding, SpotFinder
+from workbench.spots import Finding, Spot, SpotFinder
 from workbench.trials.thesis.camera import BAND_PX, expose
 from workbench.trials.thesis.scene import LaserLine, Outcome
 
@@ -53,7 +53,8 @@ class Chain:
         def capture(ids: tuple[str, ...]) -> Finding:
             on_lasers = lit & np.isin(self.line.ids, ids)
             on, off = expose(self.line, depths_mm, spots, on_lasers, rng if self.noisy else None)
-            return self._finders[ids].find(on, off)
+            found = self._finders[ids].find(on, off)
+            return replace(found, spots=tuple(map(_without_speckle, found.spots)))
 
         return _outcome(acquire(self.ranger, "simulated", capture))
 
@@ -67,6 +68,11 @@ class Chain:
         size = self.ranger.size_px[::-1]
         sets = [self.line.ids, *((i,) for i in self.line.ids)]
         return {ids: SpotFinder(size, self.ranger.searched(ids), expected=len(ids)) for ids in sets}
+
+
+def _without_speckle(spot: Spot) -> Spot:
+    """Spot with the calibration's speckle, which shifts whole spots here, and is not seen in the frame."""
+    return replace(spot, u_speckle_sd_px=None, v_speckle_sd_px=None)
 
 
 def _outcome(reading: Reading) -> Outcome:

@@ -27,6 +27,17 @@ def test_the_mean_is_weighted_and_keeps_the_shared_error() -> None:
     assert rejected == []
 
 
+def test_repeats_average_their_noise_but_not_their_speckle() -> None:
+    repeats = [
+        replace(one, u_speckle_sd_px=u, v_speckle_sd_px=0.06)
+        for one, u in zip(observations([100.0, 100.2, 100.4], [0.3] * 3), (0.03, 0.05, np.nan), strict=True)
+    ]
+    cells, _ = group(repeats, ["1"], NOISE)
+    shared2 = (0.03**2 + 0.05**2 + NOISE.speckle_sd_px**2) / 3
+    np.testing.assert_allclose(cells.speckle_sd_px**2, [[shared2, 0.06**2]])
+    np.testing.assert_allclose(cells.sd_px**2, [[0.03 + shared2, 0.03 + 0.06**2]])
+
+
 def test_a_deviation_not_stated_is_the_rig_s() -> None:
     cells, _ = group([replace(observations([7.0], [1.0])[0], u_sd_px=np.nan)], ["1"], NOISE)
     np.testing.assert_allclose(cells.sd_px[0], [np.hypot(0.1, 0.04), np.hypot(1.0, 0.04)])

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from tests.support.spot_models import jacobian_of
+from tests.support.spot_models import jacobian_of, pixel_noise
 from workbench.spots.deblending.joint_fit import fit_joint
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.columns import FLUX, LN_SU, LN_SV, U, V
-from workbench.spots.noise import PixelNoise
 
 WIDTH, HALF, APART, INFORMATION = 2.5, 12, 3.0, 400.0
 
@@ -58,7 +57,7 @@ def test_spots_that_start_with_shapes_of_their_own_end_with_one(seed: int) -> No
 
     theirs = least_squares(misfit, first, x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
     win = Windows(data.reshape(1, *shape), np.ones((1, *shape), bool), np.full((1, *shape), np.inf))
-    ours = fit_joint(win, start, PixelNoise(np.full(1, 4.0), np.full(1, 1e-12)))
+    ours = fit_joint(win, start, pixel_noise(4.0, 1e-12))
     assert ours.converged
     assert (ours.params[:, LN_SU:] == ours.params[0, LN_SU:]).all()
     assert (ours.params[:, 0] == ours.params[0, 0]).all()
@@ -75,12 +74,12 @@ def test_a_start_that_is_no_number_does_not_converge() -> None:
     start = np.zeros((2, 6))
     start[:, FLUX], start[:, U], start[:, V] = 500.0, (5.0, np.nan), 6.0
     win = Windows(np.zeros((1, 13, 13)), np.ones((1, 13, 13), bool), np.full((1, 13, 13), np.inf))
-    assert not fit_joint(win, start, PixelNoise(np.ones(1), np.ones(1))).converged
+    assert not fit_joint(win, start, pixel_noise(1.0, 1.0)).converged
 
 
 def test_the_deviations_of_spots_fitted_together_are_right_to_second_order() -> None:
     rng = np.random.default_rng(1)
-    white = PixelNoise(np.ones(1), np.full(1, 1e-9))
+    white = pixel_noise(1.0, 1e-9)
     terms = []
     for _ in range(PAIRS):
         true = two_spots(rng)

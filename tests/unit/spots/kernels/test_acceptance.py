@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from tests.support.draw import Drawn, draw, profile
+from tests.support.spot_models import pixel_noise
 from workbench.spots import find_spots
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.acceptance import (
@@ -21,8 +22,15 @@ from workbench.spots.kernels.acceptance import (
     fit_group,
     without_outliers,
 )
-from workbench.spots.kernels.columns import FLUX, WORST_EXCESS, U, V
-from workbench.spots.noise import PixelNoise
+from workbench.spots.kernels.columns import (
+    FLUX,
+    RIM_NOISE,
+    RIM_PIXELS,
+    STATISTIC_COLUMNS,
+    WORST_EXCESS,
+    U,
+    V,
+)
 
 HALF, WINDOWS = 5, 400
 SIDE = 2 * HALF + 1
@@ -44,17 +52,17 @@ def windows(used: str, seed: int, sd: float = 1.0) -> Windows:
 def test_the_noise_at_the_rim_does_not_depend_on_how_much_of_it_is_used(used: str, count: int) -> None:
     win = windows(used, 1)
     start = np.tile([0.0, 4000.0, HALF, HALF, 0.3, 0.3], (WINDOWS, 1))
-    statistics = fit_spots(win, start, PixelNoise(np.ones(WINDOWS), np.full(WINDOWS, 1e-3))).statistics
-    assert (statistics[:, 8] == count).all()
+    statistics = fit_spots(win, start, pixel_noise(1.0, 1e-3, WINDOWS)).statistics
+    assert (statistics[:, RIM_PIXELS] == count).all()
     # The mean of `count` squared normal numbers has sd sqrt(2 / count); the fit takes the leverage of six
     # parameters, of which the background's share of the rim is the larger part: 4 % at most.
-    assert statistics[:, 1].mean() == pytest.approx(1.0, abs=0.06 + 4 * np.sqrt(2 / count / WINDOWS))
+    assert statistics[:, RIM_NOISE].mean() == pytest.approx(1.0, abs=0.06 + 4 * np.sqrt(2 / count / WINDOWS))
 
 
 @pytest.mark.parametrize(("count", "reads", "raised"), [(40, 1.9, False), (40, 2.2, True), (20, 2.2, False)])
 def test_a_rim_of_fewer_pixels_must_be_noisier_to_count(count: int, reads: float, raised: bool) -> None:
-    statistics, floor = np.zeros((1, 9)), np.ones(1)
-    statistics[0, 1], statistics[0, 8] = reads, count
+    statistics, floor = np.zeros((1, STATISTIC_COLUMNS)), np.ones(1)
+    statistics[0, RIM_NOISE], statistics[0, RIM_PIXELS] = reads, count
     assert _take_floor_from_rim(floor, statistics) == raised
     assert floor[0] == (reads if raised else 1.0)
 
@@ -64,8 +72,8 @@ def test_a_rim_of_fewer_pixels_must_be_noisier_to_count(count: int, reads: float
 )
 def test_a_rim_must_be_much_quieter_to_count(count: int, reads: float, lowered: bool) -> None:
     """As rare as 5 sd of a Gaussian on one side: 2.9e-7."""
-    statistics, floor = np.zeros((1, 9)), np.ones(1)
-    statistics[0, 1], statistics[0, 8] = reads, count
+    statistics, floor = np.zeros((1, STATISTIC_COLUMNS)), np.ones(1)
+    statistics[0, RIM_NOISE], statistics[0, RIM_PIXELS] = reads, count
     assert _take_floor_from_rim(floor, statistics) == lowered
     assert floor[0] == (reads if lowered else 1.0)
     assert (chi2(count).cdf(reads * count) < 2.9e-7) == lowered
@@ -87,7 +95,7 @@ def test_in_a_dark_patch_of_a_bright_scene_the_deviation_is_that_of_the_patch(se
 
 def test_a_rim_without_used_pixels_leaves_the_floor_unchanged() -> None:
     floor = np.ones(1)
-    assert not _take_floor_from_rim(floor, np.zeros((1, 9)))
+    assert not _take_floor_from_rim(floor, np.zeros((1, STATISTIC_COLUMNS)))
     assert floor[0] == 1.0
 
 
@@ -98,7 +106,7 @@ def table_of(light: np.ndarray, start: list[float]) -> tuple[np.ndarray, np.ndar
     rows, cols = np.array([40.0]), np.array([50.0])
     usable, clip = np.ones(data.shape, bool), np.full(data.shape, np.inf)
     group = np.array([0])
-    fit_group(data, usable, clip, group, rows, cols, np.array([start]), 1.0, 0.01, (80, 100), found)
+    fit_group(data, usable, clip, group, rows, cols, np.array([start]), 1.0, 0.01, 0.0, (80, 100), found)
     return found[0], rows, cols
 
 
@@ -138,7 +146,7 @@ def test_a_few_pixels_that_no_spot_explains_are_left_out(outliers: int, dropped:
     residual, weight = np.zeros((2, 11, 11)), np.ones((2, 11, 11))
     residual[1, 3, :outliers] = 6.1
     residual[1, 5, 5] = 5.9
-    statistics = np.zeros((2, 9))
+    statistics = np.zeros((2, STATISTIC_COLUMNS))
     statistics[:, WORST_EXCESS] = (weight * residual**2).max(axis=(1, 2))
     kept, changed = without_outliers(usable, signal, residual, weight, statistics)
     assert changed == bool(dropped)

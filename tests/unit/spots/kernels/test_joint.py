@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from tests.support.spot_models import jacobian_of
+from tests.support.spot_models import jacobian_of, pixel_noise
 from workbench.model.arrays import FloatArray
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.columns import BACKGROUND, FLUX, LN_SU, LN_SV, U, V
 from workbench.spots.kernels.joint import joint_fisher_scoring
-from workbench.spots.noise import PixelNoise
 
 SHAPE = (21, 27)
 FLOOR, SLOPE = 4.0, 0.5
@@ -23,22 +22,25 @@ class Scored(NamedTuple):
     converged: bool
     params: FloatArray
     cov: FloatArray
+    by_noise: FloatArray
     signal: FloatArray
+    mean_square: FloatArray
     residual: FloatArray
     weight: FloatArray
     leverage: FloatArray
 
 
-def scored(data: FloatArray, start: FloatArray, weight: FloatArray | None = None) -> Scored:
+def scored(
+    data: FloatArray, start: FloatArray, weight: FloatArray | None = None, contrast2: float = 0.0
+) -> Scored:
     m = 3 + 3 * len(start)
-    params, cov = start.copy(), np.empty((m, m))
-    signal, residual, leverage = np.empty(SHAPE), np.empty(SHAPE), np.empty(SHAPE)
+    params, cov, by_noise = start.copy(), np.empty((m, m)), np.zeros((len(start), 2))
+    signal, mean_square, residual, leverage = (np.empty(SHAPE) for _ in range(4))
     used = np.empty(SHAPE) if weight is None else weight.copy()
+    filled = (params, cov, by_noise, signal, mean_square, residual, used, leverage)
     usable, fixed = np.ones(SHAPE, bool), weight is not None
-    converged = joint_fisher_scoring(
-        data, usable, FLOOR, SLOPE, fixed, params, cov, signal, residual, used, leverage
-    )
-    return Scored(converged, params, cov, signal, residual, used, leverage)
+    converged = joint_fisher_scoring(data, usable, FLOOR, SLOPE, contrast2, fixed, *filled)
+    return Scored(converged, *filled)
 
 
 def spots_of(*places: tuple[float, float]) -> FloatArray:
@@ -90,7 +92,7 @@ def test_one_spot_alone_is_fitted_as_by_itself(seed: int) -> None:
     true = spots_of((13.3, 9.7))
     data = drawn(true, seed)
     win = Windows(data[None], np.ones((1, *SHAPE), bool), np.full((1, *SHAPE), np.inf))
-    alone = fit_spots(win, true, PixelNoise(np.full(1, FLOOR), np.full(1, SLOPE)))
+    alone = fit_spots(win, true, pixel_noise(FLOOR, SLOPE))
     # That one measures the slope of its noise; with the same weights the two are one.
     joint = scored(data, true, alone.weight[0])
     sd = np.sqrt(np.diag(joint.cov))
@@ -115,3 +117,24 @@ def test_a_step_moves_no_spot_out_of_its_place_at_once() -> None:
     found = scored(light(true), start)
     assert found.converged
     assert found.params[0, [U, V]] == pytest.approx([10.0, 10.0], abs=1e-3)
+
+
+def test_the_variance_by_noise_is_that_of_the_sandwich_formula() -> None:
+    true, contrast2 = spots_of((8.2, 9.8), (14.1, 11.3)), 0.03
+    found = scored(light(true), true, contrast2=contrast2)
+    assert found.converged
+    jacobian, by_noise = jacobian_of(true, SHAPE), FLOOR + SLOPE * np.maximum(found.signal, 0.0)
+    variance = by_noise + contrast2 * found.mean_square
+    np.testing.assert_allclose(found.weight, 1.0 / variance, rtol=1e-12)
+    cov = np.linalg.inv((jacobian / variance.ravel()) @ jacobian.T)
+    sandwich = cov @ (jacobian * (by_noise / variance**2).ravel()) @ jacobian.T @ cov
+    np.testing.assert_allclose(found.by_noise.ravel(), np.diag(sandwich)[[4, 5, 7, 8]], rtol=1e-4)
+
+
+def test_the_speckle_of_two_lasers_adds_in_squares() -> None:
+    """They do not interfere: where both light a pixel evenly, its variance is the sum of both."""
+    wide = np.array([[0.0, 9e4, 13.0, 10.0, np.log(8.0), np.log(8.0)]])
+    one = scored(light(wide), wide)
+    two = scored(light(np.vstack([wide, wide])), np.vstack([wide, wide]))
+    np.testing.assert_allclose(two.mean_square, 2.0 * one.mean_square, rtol=0.01)
+    np.testing.assert_allclose(one.mean_square, one.signal**2, rtol=0.02)
