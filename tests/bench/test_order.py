@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from pathlib import Path
@@ -74,13 +75,15 @@ def test_frames_are_on_disk_before_the_record_that_names_them(
     done = session(tmp_path, GRID, Says())
     at = [n for n, call in enumerate(calls) if call == ("append", "capture_taken")]
     assert len(at) == 3 * 2 * 2
-    for n in at:
-        # Two frames: each synced under a temporary name, renamed, its folder synced.
-        steps = calls[n - 6 : n]
-        assert [what for what, _ in steps] == ["sync", "rename", "sync"] * 2
-        for synced, renamed in ((steps[0], steps[1]), (steps[3], steps[4])):
-            assert synced[1].startswith(f".{renamed[1]}.")
-        assert calls[n + 1 : n + 3] == [("record", "whole"), ("sync", "journal.jsonl")]
+    for begin, end in itertools.pairwise([-1, *at]):
+        # Two frames, written side by side: each synced under a temporary name, renamed, its folder synced.
+        steps = [call for call in calls[begin + 1 : end] if call[1] != "journal.jsonl"]
+        renamed = [(n, of) for n, (what, of) in enumerate(steps) if what == "rename" and of.endswith(".png")]
+        assert len(renamed) == 2
+        for n, name in renamed:
+            assert any(what == "sync" and of.startswith(f".{name}.") for what, of in steps[:n])
+            assert any(what == "sync" and not of.startswith(".") for what, of in steps[n + 1 :])
+        assert calls[end + 1 : end + 3] == [("record", "whole"), ("sync", "journal.jsonl")]
     appends = [n for n, (what, _) in enumerate(calls) if what == "append"]
     assert len(appends) == len(list(read_journal(done)))
     assert all(calls[n + 1] == ("record", "whole") for n in appends), "one write a record"
