@@ -4,8 +4,13 @@ The names in `__all__` are the public interface, documented in docs/api.md. They
 that the command line starts fast. All other modules are private to the project.
 """
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING
+
+# Read by OpenCV when it is imported: an image file of 1 MB may decode to gigabytes. The largest cameras have
+# 150 million pixels.
+os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(2**28))
 
 if TYPE_CHECKING:
     from workbench.api import BadInputError as BadInputError

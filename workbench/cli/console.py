@@ -9,11 +9,14 @@ from contextlib import suppress
 
 import typer
 
+from workbench.model.contents import printable
+
 
 def print_message(message: str, red: bool = False) -> None:
     """Print a message, wrapped at words on a terminal, otherwise unchanged so that `grep` finds it."""
     with suppress(OSError):  # a closed terminal
-        text = wrapped(message, columns()) if sys.stderr.isatty() else message
+        shown = printable(message)
+        text = wrapped(shown, columns()) if sys.stderr.isatty() else shown
         typer.secho(text, err=True, fg="red" if red else None, bold=red or None)
 
 

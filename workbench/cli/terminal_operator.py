@@ -15,6 +15,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from workbench.devices.protocols import Operator
+from workbench.model.contents import printable
 from workbench.model.errors import AnswerNeededError, StoppedError
 from workbench.model.problems import THOUSANDS
 from workbench.model.prompt import Answer, Prompt
@@ -110,7 +111,7 @@ class TerminalOperator:
             raise AnswerNeededError(
                 f"prompt {prompt.key}: {prompt.do} -- the terminal was closed, or end-of-file typed (^D)"
             )
-        return typed.strip()
+        return printable(typed.strip())
 
     def _print(self, text: str) -> None:
         self._console.print(Padding(Text(text, style="yellow"), (0, 0, 0, 2)))

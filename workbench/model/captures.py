@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite, nan
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field, ValidationError, model_validator
 
-from workbench.model.contents import not_text
-from workbench.model.csv_header import check_header
+from workbench.model.csvfile import CsvRow, check_header, parse_csv, read_csv
 from workbench.model.errors import BadInputError
 from workbench.model.problems import problems
 from workbench.model.yamlfile import FileModel
 
+EXPECTED = "a captures file (CSV)"
 ALL_LASERS = "all"
 BOARD = "board"
 """Value of `laser_id` for a frame of the printed board in room light, all lasers off."""
@@ -105,12 +103,7 @@ def read_captures_file(path: Path) -> bytes:
     Raises:
         BadInputError: the file cannot be read.
     """
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise BadInputError(f"{path}: no such file; expected a captures file") from None
-    except (OSError, ValueError) as error:
-        raise BadInputError(f"{path}: expected a captures file: {error}") from None
+    return read_csv(path, EXPECTED)
 
 
 def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
@@ -124,21 +117,9 @@ def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
         BadInputError: a column is missing or unknown, there are no rows, or values are wrong; one line for
             each wrong value, with row, column, expected value and actual value.
     """
-    if (got := not_text(content)) is not None:
-        raise BadInputError(f"{path}: expected a captures file (CSV), got {got}")
-    try:
-        reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""))
-        _check_header(path, reader.fieldnames or [])
-        rows, mistakes = [], []
-        for cells in reader:
-            try:
-                rows.append(_row(path, reader.line_num, cells))
-            except BadInputError as error:
-                mistakes.append(str(error))
-    except csv.Error as error:
-        raise BadInputError(f"{path}: expected a captures file (CSV): {error}") from None
-    if mistakes:
-        raise BadInputError("\n".join(mistakes))
+    rows = parse_csv(
+        path, content, EXPECTED, lambda names: _check_header(path, names), lambda row: _row(path, row)
+    )
     if not rows:
         raise BadInputError(f"{path}: expected at least one row below the header, got none")
     return tuple(rows)
@@ -173,8 +154,7 @@ def errors_name_file(path: Path) -> Iterator[None]:
         raise BadInputError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from None
 
 
-def _check_header(path: Path, names: object) -> None:
-    present = list(map(str, names)) if isinstance(names, list) else []
+def _check_header(path: Path, present: list[str]) -> None:
     if len(present) == 1 and (
         present[0].startswith("%YAML") or present[0].rstrip().endswith(":") or ": " in present[0]
     ):
@@ -188,19 +168,16 @@ def _check_header(path: Path, names: object) -> None:
         )
 
 
-def _row(path: Path, number: int, cells: dict[str | None, Any]) -> CaptureRow:
+def _row(path: Path, row: CsvRow) -> CaptureRow:
     """Validate the cells of one row.
 
     Raises:
         BadInputError: values are wrong; one line for each, with row and column.
     """
-    where = f"{path}: row {number}"
-    if None in cells or None in cells.values():
-        raise BadInputError(f"{where}: the number of values differs from the number of columns in the header")
-    given = {str(name): value.strip() for name, value in cells.items() if value.strip()}
+    where, given = f"{path}: row {row.line}", row.cells
     images = {name: path.parent / given[name] for name in IMAGES if name in given}
     try:
-        return CaptureRow.model_validate(given | images | {"row": number})
+        return CaptureRow.model_validate(given | images | {"row": row.line})
     except ValidationError as error:
         found = problems(CaptureRow, given, error.errors())
         # A rule about the whole row names its column in its own text.

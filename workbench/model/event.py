@@ -357,9 +357,9 @@ Event = Annotated[
 class Record(FileModel):
     """An event with its number and time."""
 
-    n: int
+    n: Annotated[int, Field(ge=0)]
     """Number in the session, from 0 without gaps."""
-    time_ns: int
+    time_ns: Annotated[int, Field(ge=0, lt=2**63)]
     """Wall clock time, nanoseconds since 1970 (UTC)."""
     event: Event
 

@@ -9,16 +9,20 @@ from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from ruamel.yaml import YAML
-from ruamel.yaml.constructor import RoundTripConstructor
+from ruamel.yaml.constructor import ConstructorError, RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 
-from workbench.model.contents import not_text
+from workbench.model.contents import CONTROL, not_text, printable, read_file
 from workbench.model.errors import BadInputError
 from workbench.model.problems import Location, SchemaProblem, problems
 
 KINDS = {"procedure": "a procedure", "rig": "a rig", "laser_ranger": "a calibration"}
 """Keys that identify the kind of a file, with the kind's name."""
-
+LARGEST_BYTES = 4 * 2**20
+"""Largest YAML file; a calibration of 100 lasers takes 3 MiB."""
+MOST_VALUES = 250_000
+"""Most values of a YAML file, aliases written out; a calibration of 100 lasers has 170 000."""
 
 HINTS = {
     "that cannot start any token": "; indent with spaces; quote text that begins with a special character",
@@ -161,11 +165,22 @@ def parse_document(text: str, path: Path) -> Document:
 
 
 class _Constructor(RoundTripConstructor):
-    """Constructor that collects duplicate keys instead of stopping at the first one."""
+    """Constructor of plain values: no tags, no keys but plain ones, a bounded number of values.
+
+    Collects duplicate keys instead of stopping at the first one; escapes control characters in text.
+    """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.doubled: list[Mistake] = []
+
+    def construct_document(self, node: Any) -> Any:
+        _count_values(node, {})
+        return super().construct_document(node)
+
+    def construct_scalar(self, node: Any) -> Any:
+        value = super().construct_scalar(node)
+        return printable(value) if isinstance(value, str) and CONTROL.search(value) else value
 
     def check_mapping_key(self, node: Any, key_node: Any, mapping: Any, key: Any, value: Any) -> bool:
         if key not in mapping:
@@ -174,6 +189,42 @@ class _Constructor(RoundTripConstructor):
         line = key_node.start_mark.line + 1
         self.doubled.append(Mistake(line, f"{key}: duplicate key, first on line {first}; remove one of them"))
         return False
+
+
+def _count_values(node: Any, counts: dict[int, int]) -> int:
+    """Number of values of a node with its aliases written out; checks what a file may contain.
+
+    Args:
+        node: node of the file.
+        counts: numbers of the nodes counted so far, by identity; 0 while a node is being counted.
+
+    Raises:
+        ConstructorError: a tag, a key that is a list or mapping, a list or mapping that contains itself, or
+            more than MOST_VALUES values.
+    """
+    if (known := counts.get(id(node))) is not None:
+        if known:
+            return known
+        raise _not_accepted("an alias of a list or mapping that contains it; write its values out", node)
+    if node.ctag.handle is not None:
+        raise _not_accepted(f"the tag {node.ctag}; remove it (text: in quotes)", node)
+    counts[id(node)] = 0
+    total = 1
+    if isinstance(node, MappingNode):
+        for key, value in node.value:
+            if not isinstance(key, ScalarNode):
+                raise _not_accepted("a key that is a list or mapping", key)
+            total += _count_values(key, counts) + _count_values(value, counts)
+    elif isinstance(node, SequenceNode):
+        total += sum(_count_values(value, counts) for value in node.value)
+    if total > MOST_VALUES:
+        raise _not_accepted(f"more than {MOST_VALUES} values", node)
+    counts[id(node)] = total
+    return total
+
+
+def _not_accepted(what: str, node: Any) -> ConstructorError:
+    return ConstructorError(None, None, f"expected plain values, got {what}", node.start_mark)
 
 
 def kind_of(data: Any) -> str:
@@ -192,14 +243,7 @@ def _check_kind(path: Path, data: Any, model: type[BaseModel]) -> None:
 
 
 def _read(path: Path) -> str:
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise BadInputError(f"{path}: no such file; expected a YAML file") from None
-    except IsADirectoryError:
-        raise BadInputError(f"{path}: expected a YAML file, got a folder; name a file in it") from None
-    except (OSError, ValueError) as error:
-        raise BadInputError(f"{path}: expected a readable YAML file: {error}") from None
+    content = read_file(path, "a YAML file", LARGEST_BYTES)
     if (got := not_text(content)) is not None:
         raise BadInputError(f"{path}: expected a YAML file, got {got}")
     return content.decode("utf-8")

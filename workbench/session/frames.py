@@ -11,10 +11,13 @@ import cv2
 import numpy as np
 
 from workbench.model.arrays import Image
-from workbench.model.contents import not_text
+from workbench.model.contents import not_text, read_file
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import FrameRef
 from workbench.session.files import sync_folder, write_record
+
+LARGEST_BYTES = 2**30
+"""Largest image file: 16 bits a pixel for the largest cameras, not compressed, in three colours."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +78,10 @@ def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
         size_px: required (width, height).
 
     Raises:
-        BadInputError: the file is missing, no image, truncated, or of another size.
+        BadInputError: the file is missing, no image, truncated, of another size, or of more pixels than any
+            camera has (`workbench/__init__.py`).
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise BadInputError(f"{path}: expected an image: {error.strerror}") from None
+    content = read_file(path, "an image", LARGEST_BYTES)
     _check_whole(path, content)
     # An orientation tag would rotate the image and move every spot: pixels are used as stored.
     flags = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION

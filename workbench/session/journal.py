@@ -10,13 +10,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 
-from pydantic import ValidationError
-
+from workbench.model.contents import printable_json, read_file
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import Event, Record, SpotsFound
 from workbench.model.problems import short
 
 JOURNAL = "journal.jsonl"
+LARGEST_BYTES = 2**30
+"""Largest journal; one of 10 000 captures has 30 MB."""
 
 
 class Journal:
@@ -107,22 +108,26 @@ def read_journal(session_dir: Path) -> Iterator[Record]:
     A last line without newline, left by a power failure, is dropped.
 
     Raises:
-        BadInputError: there is no journal, or a line is damaged; names file and line.
+        BadInputError: there is no journal, or a line is damaged, missing, repeated or exchanged; names file
+            and line.
     """
     path = session_dir / JOURNAL
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise BadInputError(f"{path}: expected a session's journal: {error.strerror}") from None
+    content = read_file(path, "a session's journal", LARGEST_BYTES)
     whole, _, _ = content.rpartition(b"\n")
     for number, line in enumerate(whole.split(b"\n") if whole else [], start=1):
         try:
-            yield Record.model_validate_json(line)
-        except ValidationError:
+            record = Record.model_validate_json(printable_json(line.decode("utf-8")))
+        except ValueError:
             got = short(line.decode(errors="replace"))
             raise BadInputError(
                 f"{path}:{number}: expected a journal record, got {got}; restore the journal from a copy"
             ) from None
+        if record.n != number - 1:
+            raise BadInputError(
+                f"{path}:{number}: expected record {number - 1}, got {record.n}: lines are missing, repeated"
+                " or exchanged; restore the journal from a copy"
+            )
+        yield record
 
 
 def is_running(session_dir: Path) -> bool:

@@ -135,3 +135,37 @@ def test_duplicate_keys_are_found_with_their_lines() -> None:
     document = parse_document("a:\n  b: 1\n  c: 2\n  b: 3\na: 4\n", Path("f.yaml"))
     assert [(one.line, one.text.split(":")[0]) for one in document.doubled] == [(4, "b"), (5, "a")]
     assert document.data["a"]["b"] == 1
+
+
+LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 10)}]\n"
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        *((f"a: 1\nb: {value}\n", 2) for value in ("!!bool x", "!!int _", "!!set x", "!!omap x", "!x y")),
+        ("a: !!str 01\n", 1),
+        ("a: 1\n? [[a]]\n: 2\n", 2),
+        ("a: 1\n? {b: 1}\n: 2\n", 2),
+        ("a: &a [1, *a]\n", 1),
+        ("a: &a {b: {c: *a}}\n", 1),
+        (LAUGHS, 6),
+    ],
+)
+def test_only_plain_values_are_accepted(text: str, line: int) -> None:
+    with pytest.raises(BadInputError, match=f"^f.yaml:{line}: "):
+        parse_document(text, Path("f.yaml"))
+
+
+def test_aliases_and_merged_keys_are_read() -> None:
+    data = parse_document("a: &a {x: 1, y: 2}\nb: *a\nc: {<<: *a, y: 3}\n", Path("f.yaml")).data
+    assert data["b"] == {"x": 1, "y": 2}
+    assert {key: data["c"][key] for key in ("x", "y")} == {"x": 1, "y": 3}
+
+
+def test_control_characters_in_text_are_shown() -> None:
+    data = parse_document('"k\\e": "T\\e[31m\\a"\n', Path("f.yaml")).data
+    assert dict(data) == {"k\\x1b": "T\\x1b[31m\\x07"}

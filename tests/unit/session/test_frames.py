@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import struct
+import subprocess
+import sys
+import zlib
 from pathlib import Path
 
 import cv2
@@ -54,7 +58,7 @@ def test_a_truncated_image_is_named(tmp_path: Path, extension: str, part: float)
 
 
 def test_a_missing_image_is_named(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match=r"no\.png: expected an image"):
+    with pytest.raises(BadInputError, match=r"no\.png: .*expected an image"):
         read_image(tmp_path / "no.png")
 
 
@@ -94,3 +98,25 @@ def test_an_image_of_32_bits_is_refused(tmp_path: Path) -> None:
     cv2.imwrite(str(path), np.zeros((4, 4), np.float32))
     with pytest.raises(BadInputError, match="float32"):
         read_image(path)
+
+
+def test_an_image_of_too_many_pixels_is_refused_before_it_is_decoded(tmp_path: Path) -> None:
+    """30 000 x 30 000 pixels in a file of some bytes; decoding takes a gigabyte."""
+    png = bytearray(cv2.imencode(".png", np.zeros((4, 4), np.uint8))[1].tobytes())
+    png[16:24] = struct.pack(">II", 30_000, 30_000)
+    png[29:33] = struct.pack(">I", zlib.crc32(png[12:29]))
+    (tmp_path / "big.png").write_bytes(png)
+    # OpenCV reads the limit when it is imported: here it may have been imported before the workbench.
+    script = """
+import sys
+from pathlib import Path
+from workbench.model.errors import BadInputError
+from workbench.session.frames import read_image
+try:
+    read_image(Path(sys.argv[1]))
+except BadInputError as error:
+    print(error)
+"""
+    command = [sys.executable, "-c", script, str(tmp_path / "big.png")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "PIXELS" in done.stdout

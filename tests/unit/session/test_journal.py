@@ -42,6 +42,38 @@ def test_a_damaged_line_is_named(tmp_path: Path) -> None:
         list(read_journal(tmp_path))
 
 
+@pytest.mark.parametrize(("order", "line"), [((0, 2), 2), ((0, 1, 1, 2), 3), ((0, 2, 1), 2), ((1, 2), 1)])
+def test_a_line_that_is_missing_repeated_or_exchanged_is_named(
+    tmp_path: Path, order: tuple[int, ...], line: int
+) -> None:
+    with Journal(tmp_path) as journal:
+        for event in (STARTED, STEP, SessionFinished(exit_code=0, message="done")):
+            journal.append(event)
+    path = tmp_path / JOURNAL
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[number] for number in order))
+    with pytest.raises(BadInputError, match=rf"journal\.jsonl:{line}: "):
+        list(read_journal(tmp_path))
+
+
+@pytest.mark.parametrize("time_ns", [-1, 2**63])
+def test_a_time_out_of_range_is_named(tmp_path: Path, time_ns: int) -> None:
+    with Journal(tmp_path) as journal:
+        written = journal.append(STARTED)
+    path = tmp_path / JOURNAL
+    path.write_text(path.read_text().replace(str(written.time_ns), str(time_ns)))
+    with pytest.raises(BadInputError, match=r"journal\.jsonl:1: "):
+        list(read_journal(tmp_path))
+
+
+def test_control_characters_of_a_foreign_journal_are_shown(tmp_path: Path) -> None:
+    with Journal(tmp_path) as journal:
+        journal.append(STEP.model_copy(update={"title": "T\x1b[2J\u202e"}))
+    (record,) = read_journal(tmp_path)
+    assert isinstance(record.event, StepStarted)
+    assert record.event.title == r"T\x1b[2J\u202e"
+
+
 def test_a_journal_is_never_written_over(tmp_path: Path) -> None:
     Journal(tmp_path).close()
     with pytest.raises(FileExistsError):

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
+from itertools import count
 from math import nan
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import pandas as pd
 from pydantic import Field, ValidationError
 
-from workbench.model.contents import not_text
-from workbench.model.csv_header import check_header
+from workbench.model.csvfile import check_header, parse_csv, read_csv
 from workbench.model.errors import BadInputError
 from workbench.model.problems import problems
 from workbench.model.yamlfile import FileModel
 from workbench.trials.reading_frame import COLUMNS, reading_frame
 
+EXPECTED = "a file of readings (CSV)"
 REQUIRED = ("true_mm", "measured_mm")
 LARGEST_MM = 1e9
 """Largest accepted range in either direction, mm."""
@@ -68,25 +67,14 @@ def load_readings(path: Path) -> pd.DataFrame:
         BadInputError: the file cannot be read, a column is missing or unknown, or no reading has a range.
             Wrong values give one line each, with row and column.
     """
-    try:
-        content = path.read_bytes()
-    except (OSError, ValueError) as error:
-        raise BadInputError(f"{path}: expected a file of readings (CSV): {error}") from None
-    if (got := not_text(content)) is not None:
-        raise BadInputError(f"{path}: expected a file of readings (CSV), got {got}")
-    rows, mistakes = [], []
-    try:
-        reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""))
-        check_header(path, reader.fieldnames or [], REQUIRED, COLUMNS)
-        for number, cells in enumerate(reader):
-            try:
-                rows.append(_row(f"{path}: row {reader.line_num}", number, cells))
-            except BadInputError as error:
-                mistakes.append(str(error))
-    except csv.Error as error:
-        raise BadInputError(f"{path}: expected a file of readings (CSV): {error}") from None
-    if mistakes:
-        raise BadInputError("\n".join(mistakes))
+    number = count()
+    rows = parse_csv(
+        path,
+        read_csv(path, EXPECTED),
+        EXPECTED,
+        lambda names: check_header(path, names, REQUIRED, COLUMNS),
+        lambda row: _row(f"{path}: row {row.line}", next(number), row.cells),
+    )
     frame = reading_frame(rows)
     if not frame["measured_mm"].count():
         raise BadInputError(f"{path}: expected at least one reading with a range, got {len(frame)} without")
@@ -109,17 +97,13 @@ def _check_unit(path: Path, frame: pd.DataFrame) -> None:
         )
 
 
-def _row(where: str, number: int, cells: dict[str | Any, str | Any]) -> dict[str, object]:
+def _row(where: str, number: int, cells: dict[str, str]) -> dict[str, object]:
     """Row of the frame from the cells of one line.
 
     Raises:
         BadInputError: values are wrong; one line for each, with row and column.
     """
-    if None in cells or None in cells.values():
-        raise BadInputError(f"{where}: the number of values differs from the number of columns in the header")
-    given = {
-        name: cells[name].strip() for name in ReadingRow.model_fields if name in cells and cells[name].strip()
-    }
+    given = {name: cells[name] for name in ReadingRow.model_fields if name in cells}
     try:
         row = ReadingRow.model_validate(given)
     except ValidationError as error:
