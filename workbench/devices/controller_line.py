@@ -18,6 +18,8 @@ from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 REPLY_S = 1.0
 """Longest wait for a reply, s. Controllers answer within milliseconds; a busy computer may add delay."""
 LONGEST_REPLY = 200
+LATE = (b"OK STATE ", b"OK OFF\n")
+"""Beginnings of replies that come late where computer or controller are busy."""
 LOOK_S = 0.02
 """Time between two calls of `alarm` while a reply is awaited, s."""
 LINE_FAILURES = (serial.SerialException, OSError, termios.error)
@@ -130,7 +132,7 @@ class ControllerLine:
         try:
             self._line.reset_input_buffer()
             self._line.write(request.encode() if request == "!" else f"{request}\n".encode())
-            received = self._receive(alarm)
+            received = self._receive(alarm, f"OK {expected}")
         except LINE_FAILURES as error:
             raise self._unexpected(request, f"OK {expected}", f"a line failure ({error})") from None
         reply = received.decode("ascii", errors="backslashreplace")
@@ -139,11 +141,18 @@ class ControllerLine:
             raise self._unexpected(request, head, repr(reply) if received else f"nothing within {REPLY_S} s")
         return reply.rstrip()[len(head) + 1 :]
 
-    def _receive(self, alarm: Callable[[], bool]) -> bytes:
-        """Receive one line, possibly incomplete after `REPLY_S`; after an alarm, up to the reply to off."""
-        received, end = b"", b"\n"
+    def _receive(self, alarm: Callable[[], bool], head: str) -> bytes:
+        """Receive one line, possibly incomplete after `REPLY_S`; after an alarm, up to the reply to off.
+
+        Late replies to earlier requests that switch nothing on are skipped.
+        """
+        received, end, wanted = b"", b"\n", head.encode()
         deadline = time.monotonic() + REPLY_S
-        while end not in received and len(received) < LONGEST_REPLY and time.monotonic() < deadline:
+        while time.monotonic() < deadline:
+            while end == b"\n" in received and received.startswith(LATE) and not received.startswith(wanted):
+                received = received.partition(b"\n")[2]
+            if end in received or len(received) >= LONGEST_REPLY:
+                break
             if end == b"\n" and alarm():
                 self._line.write(b"!")
                 end = b"OK OFF\n"

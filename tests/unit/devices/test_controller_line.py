@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 
 import pytest
 
-from workbench.devices.controller_line import ControllerLine, SerialBlock
+from workbench.devices.controller_line import REPLY_S, ControllerLine, SerialBlock
 from workbench.emulator.controller import IDENTITY, Controller
 from workbench.emulator.pty import PtyServer
 from workbench.emulator.spec import ControllerSpec
@@ -58,3 +59,23 @@ def test_an_alarm_while_lighting_puts_off_at_once(controller: Controller, port: 
         line.light(0b11, 60_000)
     assert controller.lit() == ()
     line.close()
+
+
+def test_a_late_reply_is_not_taken_for_that_to_off(controller: Controller) -> None:
+    """The state comes when off has been sent again: off is confirmed, not in doubt."""
+    asked: list[bytes] = []
+
+    def receive(data: bytes) -> bytes:
+        asked.append(data)
+        if data.startswith(b"STATE") and sum(one.startswith(b"STATE") for one in asked) == 1:
+            time.sleep(1.3 * REPLY_S)
+        return controller.receive(data)
+
+    server = PtyServer(receive)
+    line = ControllerLine(SerialBlock(port=server.port), 4, lambda: False)
+    line.light(1, 60_000)
+    line.all_off()
+    assert controller.lit() == ()
+    assert [one[:5] for one in asked[1:]] == [b"!", b"STATE", b"!", b"STATE"]
+    line.close()
+    server.close()
