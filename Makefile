@@ -9,11 +9,12 @@ INSTALLED := $(VENV)/.installed
 # The dependencies of the workbench alone, without those of its developers.
 RUNNABLE := $(VENV)/.runnable
 
-.PHONY: help demo test quick wheel lint bench prove mutants crash lock clean schema pictures
+.PHONY: help demo test thorough quick wheel lint bench prove mutants crash lock clean schema pictures
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
 	@echo "make test   lint, type check and test everything; PYTHON=python3.13 with another interpreter"
+	@echo "make thorough  further cases of the same tests, and long ones (ten minutes)"
 	@echo "make quick  lint, type check and the fast unit tests (a minute and a half)"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
 	@echo "make prove  stated uncertainties compared with simulated calibrations, shapes and trials (an hour)"
@@ -64,12 +65,15 @@ lint: $(INSTALLED)
 # The type checker takes minutes of one core: it runs beside the tests, which have priority.
 test: $(INSTALLED)
 	@nice -n 10 $(MAKE) lint & lint=$$!; \
-	$(BIN)/python -m pytest -m "not real_time and not wheel"; tests=$$?; \
+	$(BIN)/python -m pytest -m "not real_time and not wheel and not thorough"; tests=$$?; \
 	wait $$lint && exit $$tests
 	$(BIN)/python -m pytest -n 0 -m real_time
 
+thorough: $(INSTALLED)
+	$(BIN)/python -m pytest -m thorough
+
 quick: lint
-	$(BIN)/python -m pytest -m "not slow and not real_time" tests/unit
+	$(BIN)/python -m pytest -m "not slow and not real_time and not thorough" tests/unit
 
 wheel: $(INSTALLED)
 	$(BIN)/python -m pytest -n 0 -m wheel

@@ -69,7 +69,7 @@ def test_spots_are_bright_and_whole_at_every_standoff(tmp_path: Path) -> None:
     assert len(list(rows)) == 12, "trial frames are not kept"
 
 
-@pytest.mark.parametrize("stop_after", [1, 2, 3])
+@pytest.mark.parametrize("stop_after", [1, *(pytest.param(n, marks=pytest.mark.thorough) for n in (2, 3))])
 def test_a_stop_right_after_it_was_set(tmp_path: Path, stop_after: int) -> None:
     whole = session(tmp_path / "whole")
     with pytest.raises(StoppedError, match="enough"):

@@ -237,6 +237,7 @@ def test_the_recording_is_a_view_that_can_be_made_again(demo: Demo, tmp_path: Pa
     assert first.everything() == second.everything()
 
 
+@pytest.mark.thorough
 def test_the_recording_opens_in_the_real_viewer(demo: Demo, tmp_path: Path) -> None:
     with headless_viewer(tmp_path, "1600x900") as viewer:
         viewer.open(demo.folder / "recording.rrd")

@@ -165,7 +165,9 @@ class Bench:
         return "run", procedure, "--rig", rig, "--sessions", sessions
 
 
-@pytest.fixture(scope="module", params=["in this test", "installed"])
+@pytest.fixture(
+    scope="module", params=["installed", pytest.param("in this test", marks=pytest.mark.thorough)]
+)
 def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Bench:
     folder = tmp_path_factory.mktemp("own")
     environment = os.environ | {"COLUMNS": "80"}

@@ -70,8 +70,18 @@ def wait_for_captures(folder: Path, process: subprocess.Popen[str]) -> Path:
     raise AssertionError(f"no captures: {process.stderr.read() if process.stderr else ''}")
 
 
-@pytest.mark.parametrize("times", [1, 3])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    ("number", "times"),
+    [
+        (signal.SIGINT, 3),
+        (signal.SIGTERM, 1),
+        (signal.SIGHUP, 1),
+        *(
+            pytest.param(*case, marks=pytest.mark.thorough)
+            for case in ((signal.SIGINT, 1), (signal.SIGTERM, 3), (signal.SIGHUP, 3))
+        ),
+    ],
+)
 def test_a_signal_stops_in_good_order(tmp_path: Path, number: signal.Signals, times: int) -> None:
     process = start(tmp_path)
     session = wait_for_captures(tmp_path, process)
@@ -105,7 +115,7 @@ def test_a_controller_that_does_not_confirm_is_not_believed(tmp_path: Path) -> N
     assert process.returncode == 7, err
 
 
-@pytest.mark.parametrize("after_s", [0.0, 0.15, 0.5])
+@pytest.mark.parametrize("after_s", [0.0, pytest.param(0.15, marks=pytest.mark.thorough), 0.5])
 def test_stops_do_not_take_the_place_of_an_off_that_is_not_confirmed(tmp_path: Path, after_s: float) -> None:
     """Two SIGINT, counted from the first lit laser; before it, there is nothing to switch off."""
     process = start(tmp_path, RIG + IGNORES_OFF, program=(sys.executable, "-c", PRINTS_LIT))

@@ -22,6 +22,8 @@ from workbench.session.journal import read_journal
 from workbench.viewer.recording import rebuild
 from workbench.viewer.table_text import table_text
 
+pytestmark = pytest.mark.thorough
+
 ROOT = Path(__file__).parents[2]
 SCRIPT = Path(sys.executable).with_name("workbench")
 OUTER_LOST = "flat-outer-lost"

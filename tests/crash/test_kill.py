@@ -48,8 +48,16 @@ def test_the_number_of_records(whole: Path) -> None:
     assert len(list(read_journal(whole))) == RECORDS
 
 
+QUICK = {*(("torn", n) for n in range(0, RECORDS, 3)), *(("after", n) for n in range(1, RECORDS, 9))}
+
+
 @pytest.mark.parametrize(
-    ("how", "n"), [("torn", n) for n in range(RECORDS)] + [("after", n) for n in range(0, RECORDS, 5)]
+    ("how", "n"),
+    [
+        pytest.param(how, n, marks=() if (how, n) in QUICK else pytest.mark.thorough)
+        for how in ("torn", "after")
+        for n in range(RECORDS)
+    ],
 )
 def test_killed_at_a_record(tmp_path: Path, whole: Path, killer: Killer, how: str, n: int) -> None:
     session = tmp_path / "s"
@@ -64,7 +72,15 @@ def test_killed_at_a_record(tmp_path: Path, whole: Path, killer: Killer, how: st
     assert 0 <= again <= GROUP, "at most the placement that was under way is captured again"
 
 
-@pytest.mark.parametrize(("first", "second"), [(9, 12), (9, 18), (14, 16), (32, 33), (36, 40)])
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (9, 18),
+        (14, 16),
+        (36, 40),
+        *(pytest.param(*case, marks=pytest.mark.thorough) for case in ((9, 12), (32, 33))),
+    ],
+)
 def test_killed_again_while_it_goes_on(
     tmp_path: Path, whole: Path, killer: Killer, first: int, second: int
 ) -> None:

@@ -9,6 +9,7 @@ import pytest
 from tests.crash.long import KEPT_B, compare, growth
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [2])
 def test_a_session_with_random_faults_loses_nothing(tmp_path: Path, seed: int) -> None:
     told = compare(100, tmp_path, seed, mean_records=150)

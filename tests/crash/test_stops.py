@@ -36,8 +36,13 @@ def assert_goes_on(session: Path, whole: Path) -> None:
     assert results(session) == results(whole)
 
 
-@pytest.mark.parametrize("room", [0, 40])
-@pytest.mark.parametrize("n", [0, 3, 7, 12])
+@pytest.mark.parametrize(
+    ("n", "room"),
+    [
+        *((0, 0), (3, 40), (7, 0), (12, 40)),
+        *(pytest.param(*case, marks=pytest.mark.thorough) for case in ((0, 40), (3, 0), (7, 40), (12, 0))),
+    ],
+)
 def test_a_journal_that_finds_no_room(
     tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, n: int, room: int
 ) -> None:
