@@ -115,7 +115,7 @@ def table(sessions: int) -> Iterator[str]:
             outcomes.append(ended)
         else:
             ended_early.append(f"seed {seed}: {ended}")
-        print(seed, "ended" if isinstance(ended, str) else "exported", file=sys.stderr)
+        print(seed, ended if isinstance(ended, str) else "exported", file=sys.stderr, flush=True)
     yield f"{sessions} sessions, seeds from {FIRST_SEED} on; without a calibration: {len(ended_early)}"
     yield from ended_early
     misses = []
