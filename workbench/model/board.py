@@ -13,9 +13,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from workbench.model.arrays import FloatArray
+from workbench.model.bounds import within
 from workbench.model.yamlfile import FileModel
 
-Millimetres = Annotated[float, Field(gt=0)]
+Millimetres = Annotated[float, within(0.01, 10_000, "millimetres")]
 PAGE_MARGIN_MM = 5.0
 """Margin on each side that printers leave blank."""
 BELOW_MM = 13.0

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from workbench.model.board import Board
+from workbench.model.bounds import prior_within, within
 from workbench.model.device_block import DeviceBlock
 from workbench.model.lens import COEFFICIENTS, LensName, lens_parameters
 from workbench.model.yamlfile import FileModel, load_yaml_model
@@ -26,8 +27,11 @@ LaserId = Annotated[Name, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 """Laser id; part of file names, therefore of letters, digits, `_`, `.` and `-`."""
 LARGEST = 1e6
 """Largest accepted number of millimetres or pixels."""
+FEWEST_PX = 16
 MOST_PX = 100_000
-"""Largest accepted width or height of an image."""
+"""Smallest and largest accepted width or height of an image."""
+MOST_PIXELS = 2**28
+"""Largest accepted product of width and height: no camera has more pixels."""
 SMALLEST_SD = 1e-9
 """Smallest accepted standard deviation of a prior other than 0."""
 
@@ -54,10 +58,17 @@ def exactly(value: float) -> Prior:
     return Prior(value=value, sd=0.0)
 
 
+Coefficient = Annotated[Prior, prior_within(-100, 100, 100, "no lens distorts so much")]
+Baseline = Annotated[Prior, prior_within(-10_000, 10_000, 1000, "millimetres from the camera")]
+Slope = Annotated[Prior, prior_within(-10, 10, 1, "tangent of the beam's angle to the optical axis")]
+Scale = Annotated[Prior, prior_within(-0.5, 0.5, 0.5, "relative: 0.001 is one millimetre in a metre")]
+Drift = Annotated[Prior, prior_within(-1000, 1000, 1000, "pixels over all captures")]
+SpotSd = Annotated[float, Field(ge=1e-6), within(0, 100, "pixels; a spot is some pixels wide")]
+
 TARGET_TILT = ("target_slope_x", "target_slope_y")
 """Parameters of a calibration: tilt of the target that all placements share, as slopes."""
-TiltAngle = Annotated[float, Field(ge=-60, le=60)]
-TiltSd = Annotated[float, Field(ge=0, le=45)]
+TiltAngle = Annotated[float, within(-60, 60, "degrees")]
+TiltSd = Annotated[float, within(0, 45, "degrees")]
 
 
 def _slope(angle_deg: float, sd_deg: float) -> Prior:
@@ -73,20 +84,38 @@ DECENTRED = Prior(value=0.0, sd=0.002)
 class CameraSpec(FileModel):
     """Camera: image format, and the lens according to its data sheet."""
 
-    width_px: Annotated[int, Field(gt=0, le=MOST_PX)]
-    height_px: Annotated[int, Field(gt=0, le=MOST_PX)]
+    width_px: Annotated[int, within(FEWEST_PX, MOST_PX, "pixels of the image")]
+    height_px: Annotated[int, within(FEWEST_PX, MOST_PX, "pixels of the image")]
     bits: Annotated[int, Field(ge=8, le=16)] = 8
     lens: LensName = "plumb_bob"
     """Lens model; it selects the distortion coefficients below. Other coefficients are not used."""
-    f_px: Prior
+    f_px: Annotated[Prior, prior_within(1, LARGEST, LARGEST, "pixels: millimetres over the pixel pitch")]
     cx_px: Prior
     cy_px: Prior
-    k1: Prior = exactly(0.0)
-    k2: Prior = exactly(0.0)
-    p1: Prior = DECENTRED
-    p2: Prior = DECENTRED
-    k3: Prior = exactly(0.0)
-    k4: Prior = exactly(0.0)
+    k1: Coefficient = exactly(0.0)
+    k2: Coefficient = exactly(0.0)
+    p1: Coefficient = DECENTRED
+    p2: Coefficient = DECENTRED
+    k3: Coefficient = exactly(0.0)
+    k4: Coefficient = exactly(0.0)
+
+    @field_validator("height_px")
+    @classmethod
+    def _is_an_image(cls, height_px: int, info: ValidationInfo) -> int:
+        if (pixels := height_px * info.data.get("width_px", 0)) > MOST_PIXELS:
+            raise ValueError(f"expected at most {MOST_PIXELS} pixels (width x height), got {pixels}")
+        return height_px
+
+    @field_validator("cx_px", "cy_px")
+    @classmethod
+    def _is_near_the_image(cls, centre: Prior, info: ValidationInfo) -> Prior:
+        side = info.data.get("width_px" if info.field_name == "cx_px" else "height_px")
+        if side is not None and not (abs(centre.value - side / 2) <= 2 * side and centre.sd <= 2 * side):
+            raise ValueError(
+                f"expected the principal point within {2 * side} px of the image's centre, and an sd below"
+                f" this, got {centre.value:g} +- {centre.sd:g}"
+            )
+        return centre
 
     @field_validator("k1", "k2", "p1", "p2", "k3", "k4")
     @classmethod
@@ -106,8 +135,8 @@ class CameraSpec(FileModel):
     @field_validator("f_px")
     @classmethod
     def _has_a_focal_length(cls, f_px: Prior) -> Prior:
-        if f_px.value <= 0:
-            raise ValueError(f"expected a focal length above 0, got {f_px.value:g}")
+        if f_px.sd > f_px.value:
+            raise ValueError(f"expected an sd below the value, {f_px.value:g}, got {f_px.sd:g}")
         return f_px
 
     @property
@@ -122,10 +151,10 @@ class LaserSpec(FileModel):
     id: LaserId
     axis: ImageAxis
     """Image axis along which the spot moves with range: u for a laser beside the camera, v above or below."""
-    x_mm: Prior
-    y_mm: Prior
-    tx: Prior = exactly(0.0)
-    ty: Prior = exactly(0.0)
+    x_mm: Baseline
+    y_mm: Baseline
+    tx: Slope = exactly(0.0)
+    ty: Slope = exactly(0.0)
 
     @model_validator(mode="after")
     def _has_a_baseline(self) -> LaserSpec:
@@ -142,12 +171,12 @@ class LaserSpec(FileModel):
 class BenchSpec(FileModel):
     """Ruler and target: uncertainty of standoffs. All standard deviations are 1 sigma."""
 
-    offset_mm: Prior = exactly(0.0)
+    offset_mm: Baseline = exactly(0.0)
     """Distance of the pinhole behind the rig's reference plane: z = standoff + offset."""
-    ruler_scale: Prior = exactly(0.0)
+    ruler_scale: Scale = exactly(0.0)
     """Relative error of the ruler: true standoff = ruler reading x (1 + ruler_scale)."""
-    placement_sd_mm: NonNegativeFloat = 0.0
-    tilt_sd_deg: NonNegativeFloat = 0.0
+    placement_sd_mm: Annotated[float, within(0, 1000, "millimetres")] = 0.0
+    tilt_sd_deg: TiltSd = 0.0
     """Tilt of a flat target about each of its two axes, independent at every placement."""
     target_yaw_deg: TiltAngle = 0.0
     """Tilt about the vertical common to all placements, as measured: the rail or the target's mount is not
@@ -156,15 +185,15 @@ class BenchSpec(FileModel):
     """Common tilt about the horizontal. Positive: the target's lower side is farther away."""
     target_tilt_sd_deg: TiltSd = 0.5
     """Standard uncertainty of the common tilt about each of the two axes."""
-    drift_u_px: Prior = exactly(0.0)
+    drift_u_px: Drift = exactly(0.0)
     """Shift of the image from the first capture to the last, linear in the order of the captures. With sd 0
     it is fixed at its value; the fit frees it if the data show a drift."""
-    drift_v_px: Prior = exactly(0.0)
+    drift_v_px: Drift = exactly(0.0)
     reach_mm: tuple[PositiveFloat, PositiveFloat] = (100.0, 5000.0)
     """Nearest and farthest standoff at which the target can be placed without saturated spots."""
-    print_scale: Prior = Prior(value=0.0, sd=0.002)
+    print_scale: Scale = Prior(value=0.0, sd=0.002)
     """Relative error of the printed board: true length = nominal length x (1 + print_scale)."""
-    board_flatness_sd_mm: Annotated[float, Field(ge=0, le=LARGEST)] = 0.1
+    board_flatness_sd_mm: Annotated[float, within(0, 100, "millimetres")] = 0.1
     """Deviation of the board's paper from its plane at 100 mm from its centre."""
 
     @property
@@ -188,9 +217,9 @@ class BenchSpec(FileModel):
 class NoiseSpec(FileModel):
     """Noise of spot positions that the captures do not state, 1 sigma, pixels."""
 
-    spot_sd_px: Annotated[float, Field(ge=1e-6)] = 0.1
+    spot_sd_px: SpotSd = 0.1
     """Noise of one spot if its row states none."""
-    speckle_sd_px: NonNegativeFloat = 0.0
+    speckle_sd_px: Annotated[float, within(0, 100, "pixels")] = 0.0
     """Speckle noise of a centre, common to all repeats of one laser at one placement: the pattern does not
     change. Used for spots without frames; in frames it is averaged with what they show (docs/spots.md)."""
 

@@ -18,7 +18,7 @@ from workbench.model.errors import BadInputError
     ("block", "says"),
     [
         (None, "emulator.seed: is missing"),
-        ({"seed": 1, "beam": {"power_mw": -1}}, r"emulator.beam.power_mw: expected more than 0.*, got -1"),
+        ({"seed": 1, "beam": {"power_mw": -1}}, r"emulator.beam.power_mw: expected 1e-06 to .*, got -1"),
         ({"seed": 1, "truth": {"target_yaw_deg": 61}}, r"emulator.truth.target_yaw_deg: expected .*got 61"),
         ({"seed": 1, "drift": {"u_px": 0.1}}, "emulator.drift.u_px: no such key"),
         ({"seed": 1, "lense": {}}, "emulator.lense: no such key"),
