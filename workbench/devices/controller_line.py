@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import select
 import termios
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Annotated, ClassVar
 
 import serial
@@ -18,8 +20,8 @@ from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 REPLY_S = 1.0
 """Longest wait for a reply, s. Controllers answer within milliseconds; a busy computer may add delay."""
 LONGEST_REPLY = 200
-LATE = (b"OK STATE ", b"OK OFF\n")
-"""Beginnings of replies that come late where computer or controller are busy."""
+STATE = b"OK STATE "
+OFF = b"OK OFF\n"
 LOOK_S = 0.02
 """Time between two calls of `alarm` while a reply is awaited, s."""
 LINE_FAILURES = (serial.SerialException, OSError, termios.error)
@@ -55,6 +57,8 @@ class ControllerLine:
             self._line = serial.Serial(
                 settings.port, settings.baud, timeout=0, write_timeout=REPLY_S, exclusive=True
             )
+            # The lock of `exclusive` keeps out programs that look for it; this keeps out every other user's.
+            fcntl.ioctl(self._line.fileno(), termios.TIOCEXCL)
         except LINE_FAILURES as error:
             raise RigNotReadyError(
                 f"laser controller: expected a serial port at {settings.port}, got: {error};"
@@ -115,6 +119,8 @@ class ControllerLine:
 
     def close(self) -> None:
         """Release the port."""
+        with suppress(*LINE_FAILURES):  # disconnected
+            fcntl.ioctl(self._line.fileno(), termios.TIOCNXCL)
         self._line.close()
 
     def _expect_dark(self) -> None:
@@ -147,15 +153,16 @@ class ControllerLine:
         Late replies to earlier requests that switch nothing on are skipped.
         """
         received, end, wanted = b"", b"\n", head.encode()
+        late = (STATE, OFF) if wanted.startswith(STATE) else STATE
         deadline = time.monotonic() + REPLY_S
         while time.monotonic() < deadline:
-            while end == b"\n" in received and received.startswith(LATE) and not received.startswith(wanted):
+            while end == b"\n" in received and received.startswith(late) and not received.startswith(wanted):
                 received = received.partition(b"\n")[2]
             if end in received or len(received) >= LONGEST_REPLY:
                 break
             if end == b"\n" and alarm():
                 self._line.write(b"!")
-                end = b"OK OFF\n"
+                end = OFF
             ready, _, _ = select.select([self._line], [], [], LOOK_S)
             if ready:
                 part = os.read(self._line.fileno(), LONGEST_REPLY)

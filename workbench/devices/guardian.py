@@ -14,6 +14,9 @@ per line with the command's number:
 The first answer, number 0 without a command, is the device's identity. A second descriptor receives the
 numbers of signals to the workbench, one byte each, written by its C-level signal handler.
 
+While no laser is on, the guardian looks every `WATCH_S` whether another program has switched one on, and
+switches it off.
+
 The guardian switches all lasers off when the workbench ends in any way or gets SIGTERM or SIGHUP. It also
 does so when no beat has come for `hang_s` while a laser was on. The device's clock enforces the last rule: it
 never gets a lease longer than `hang_s`, and each beat renews the lease. For a device without leases, such as
@@ -40,6 +43,8 @@ from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, 
 LOOK_S = 0.02
 """Interval of checks that the workbench is alive while a laser is on, s. They detect an end that the pipe
 does not show: a child process keeps it open, or the workbench has not been scheduled."""
+WATCH_S = 0.5
+"""Interval of looks at the device's state while the workbench has no laser on, s."""
 TRY_ALONE_S = 1.0
 """Time for which the guardian tries to switch off after the workbench's end, s: twice the longest lease."""
 RENEW = 5
@@ -161,11 +166,27 @@ class Guardian:
                 self._end_of_lease(self._lease)
             elif self._lease is None and self._may_be_on:
                 self._put_off(self._failure)
+            elif self._lease is None:
+                self._look_for_strangers()
 
-    def _wait_s(self) -> float | None:
-        """Time until the next check, s; None: no laser is on."""
+    def _look_for_strangers(self) -> None:
+        """Switch off lasers that another program switched on; the next command reports it."""
+        try:
+            mask, _ = self._line.state()
+        except RigNotReadyError:
+            return  # the next command meets the same failure
+        if mask:
+            self._put_off(
+                RigNotReadyError(
+                    "another program switched lasers on; the workbench switched them off. End that program."
+                    " Take this capture again"
+                )
+            )
+
+    def _wait_s(self) -> float:
+        """Time until the next check, s."""
         if self._lease is None:
-            return LOOK_S if self._may_be_on else None
+            return LOOK_S if self._may_be_on else WATCH_S
         return min(LOOK_S, max(0.0, self._lease.held_until - time.monotonic()))
 
     def _obey(self, command: str) -> None:
@@ -184,6 +205,8 @@ class Guardian:
     def _light(self, mask: int, lease_ms: int) -> None:
         if self._workbench.end_signal is not None:
             raise self._stopped()
+        if self._failure is not None:
+            self._off()
         self._lease = Lease(mask, time.monotonic() + lease_ms / 1000)
         try:
             self._renew(self._lease)

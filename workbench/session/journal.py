@@ -28,7 +28,7 @@ class Journal:
 
     def __init__(self, session_dir: Path, flags: int = os.O_CREAT | os.O_EXCL) -> None:
         self._path = session_dir / JOURNAL
-        self._file = os.open(self._path, os.O_RDWR | os.O_APPEND | flags, 0o644)
+        self._file = os.open(self._path, os.O_RDWR | os.O_APPEND | flags, 0o666)
         self._next = self._size = 0
         self._torn = False
         try:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -79,3 +83,16 @@ def test_a_late_reply_is_not_taken_for_that_to_off(controller: Controller) -> No
     assert [one[:5] for one in asked[1:]] == [b"!", b"STATE", b"!", b"STATE"]
     line.close()
     server.close()
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can open a port as another user")
+def test_another_user_cannot_open_the_port_while_it_is_held(port: str) -> None:
+    Path(port).chmod(0o666)
+    script = "import os, sys; os.setuid(65534); os.close(os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY))"
+    opening = [sys.executable, "-c", script, port]
+    line = ControllerLine(SerialBlock(port=port), 4, lambda: False)
+    held = subprocess.run(opening, capture_output=True, text=True)
+    line.close()
+    free = subprocess.run(opening, capture_output=True, text=True)
+    assert (held.returncode, free.returncode) == (1, 0), free.stderr
+    assert "busy" in held.stderr

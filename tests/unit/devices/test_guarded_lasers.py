@@ -10,6 +10,7 @@ import pytest
 
 from tests.support.lasers import serial_bank
 from workbench.devices.guarded_lasers import GuardedLaserBank
+from workbench.devices.guardian import WATCH_S
 from workbench.devices.protocols import LaserBank
 from workbench.emulator.controller import IDENTITY, Controller
 from workbench.emulator.pty import PtyServer
@@ -255,3 +256,15 @@ def test_close_puts_off(wired: Wired) -> None:
     wired.controller.receive(b"ON 1 60000\n")
     bank.close()
     assert wired.controller.lit() == ()
+
+
+def test_lasers_that_a_stranger_lights_are_put_off_and_reported(wired: Wired, bank: GuardedLaserBank) -> None:
+    wired.controller.receive(b"MASK 3 60000\n")
+    deadline = time.monotonic() + 10 * WATCH_S
+    while wired.controller.lit():
+        assert time.monotonic() < deadline
+        time.sleep(WATCH_S / 10)
+    with pytest.raises(RigNotReadyError, match="another program"), bank.lit(["L1"], for_s=1.0):
+        raise AssertionError("lit before it was reported")
+    with bank.lit(["L1"], for_s=1.0):
+        assert wired.controller.lit() == ("L1",)

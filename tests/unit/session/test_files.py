@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
 
 import pytest
@@ -57,3 +58,18 @@ def test_a_record_that_cannot_be_written_stops_the_session(tmp_path: Path) -> No
     with pytest.raises(StoppedError, match="no/a") as caught:
         write_record(tmp_path / "no/a", b"")
     assert caught.value.exit_code == 5
+
+
+@pytest.mark.parametrize("umask", [0o022, 0o027, 0o077])
+def test_a_new_file_follows_the_umask_and_an_existing_one_keeps_its_mode(tmp_path: Path, umask: int) -> None:
+    (tmp_path / "old").touch()
+    (tmp_path / "old").chmod(0o640)
+    before = os.umask(umask)
+    try:
+        for name in ("new", "old"):
+            write_atomically(tmp_path / name, b"1")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "new").stat().st_mode) == 0o666 & ~umask
+    assert stat.S_IMODE((tmp_path / "old").stat().st_mode) == 0o640
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["new", "old"]
