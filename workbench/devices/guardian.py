@@ -43,6 +43,7 @@ from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, 
 LOOK_S = 0.02
 """Interval of checks that the workbench is alive while a laser is on, s. They detect an end that the pipe
 does not show: a child process keeps it open, or the workbench has not been scheduled."""
+SWITCHED_OFF, AGAIN = "the lasers were switched off during a capture", "Take this capture again"
 WATCH_S = 0.5
 """Interval of looks at the device's state while the workbench has no laser on, s."""
 TRY_ALONE_S = 1.0
@@ -51,6 +52,8 @@ RENEW = 5
 """A lease is renewed after the fraction 1/RENEW of its duration."""
 AT_ONCE = {int(signal.SIGTERM), int(signal.SIGHUP)}
 """Signals to the workbench on which the lasers are switched off at once."""
+SUSPENDED = {b"T", b"t"}
+"""States in /proc/PID/stat of a process that a signal or a debugger has stopped."""
 STAT_FLAGS = 6
 """Index of the flags in /proc/PID/stat, counted after the process's name."""
 ENDING = 0x4 | 0x200 | 0x400
@@ -67,11 +70,12 @@ class Workbench:
         self.gone = False
         self.end_signal: str | None = None
         """Name of the signal that ends the workbench; None without one."""
+        self.suspended = False
 
     def alarm(self) -> bool:
         """Whether the lasers must be switched off at once."""
         self._look(0.0)
-        return self.gone or self.end_signal is not None
+        return self.gone or self.suspended or self.end_signal is not None
 
     def command(self, wait_s: float | None) -> str | None:
         """Next command; None after another event or without one in `wait_s` (None: no limit)."""
@@ -92,33 +96,49 @@ class Workbench:
             received = os.read(self._commands, 4096)
             self._heard += received
             self.gone = self.gone or not received
-        gone, pending = _pending_end(self._pid)
-        self.end_signal = self.end_signal or pending
-        self.gone = self.gone or gone or os.getppid() != self._pid
+        seen = _as_the_kernel_sees(self._pid)
+        self.suspended = seen.suspended
+        self.end_signal = self.end_signal or seen.end_signal
+        self.gone = self.gone or seen.gone or os.getppid() != self._pid
 
 
-def _pending_end(pid: int) -> tuple[bool, str | None]:
-    """Whether a process is about to end, and the name of a pending signal.
+@dataclass(frozen=True)
+class Seen:
+    """A process in /proc (proc(5))."""
+
+    gone: bool = False
+    """Whether it is about to end."""
+    suspended: bool = False
+    end_signal: str | None = None
+    """Name of a pending signal that ends it."""
+
+
+def _as_the_kernel_sees(pid: int) -> Seen:
+    """State of a process, before its own actions show it.
 
     A process handles signals and ends only when it is scheduled, and its pipes close only after its core is
-    dumped and its memory released. The kernel shows both earlier in /proc (proc(5)).
+    dumped and its memory released. One that is suspended may have a signal in hand that is no longer pending.
     """
     try:
         if Path("/proc/self").readlink() != Path(str(os.getpid())):
-            return False, None  # /proc of another namespace, where the number is another process
+            return Seen()  # /proc of another namespace, where the number is another process
         status = Path(f"/proc/{pid}/status").read_bytes()
         stat = Path(f"/proc/{pid}/stat").read_bytes()
     except OSError:
-        return False, None
+        return Seen()
     waiting = 0
     for line in status.splitlines():
         name, _, mask = line.partition(b":")
         if name in {b"SigPnd", b"ShdPnd"}:
             waiting |= int(mask, 16)
     pending = {number for number in (*AT_ONCE, signal.SIGKILL) if waiting >> (number - 1) & 1}
-    flags = int(stat.rpartition(b")")[2].split()[STAT_FLAGS])
+    fields = stat.rpartition(b")")[2].split()
     names = [signal.Signals(number).name for number in sorted(AT_ONCE & pending)]
-    return signal.SIGKILL in pending or bool(flags & ENDING), names[0] if names else None
+    return Seen(
+        gone=signal.SIGKILL in pending or bool(int(fields[STAT_FLAGS]) & ENDING),
+        suspended=fields[0] in SUSPENDED,
+        end_signal=names[0] if names else None,
+    )
 
 
 @dataclass
@@ -160,6 +180,8 @@ class Guardian:
                 break  # the last command is not executed
             if self._lease is not None and self._workbench.end_signal is not None:
                 self._put_off(self._stopped())
+            if self._lease is not None and self._workbench.suspended:
+                self._put_off(RigNotReadyError(f"{SWITCHED_OFF}: the workbench was suspended. {AGAIN}"))
             if command is not None:
                 self._obey(command)
             elif self._lease is not None and time.monotonic() >= self._lease.held_until:
@@ -179,7 +201,7 @@ class Guardian:
             self._put_off(
                 RigNotReadyError(
                     "another program switched lasers on; the workbench switched them off. End that program."
-                    " Take this capture again"
+                    f" {AGAIN}"
                 )
             )
 
@@ -238,8 +260,8 @@ class Guardian:
         hung = lease.held_until < lease.ends
         self._put_off(
             RigNotReadyError(
-                f"the lasers were switched off: no sign of life from the workbench for {self._hang_s:g} s"
-                " while they were on; it was suspended, or the computer too busy. Take this capture again"
+                f"{SWITCHED_OFF}: no sign of life from the workbench for {self._hang_s:g} s; the computer was"
+                f" too busy. {AGAIN}"
             )
             if hung
             else None
