@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import textwrap
+import warnings
 from contextlib import suppress
 
 import typer
@@ -18,6 +19,11 @@ def print_message(message: str, red: bool = False) -> None:
         shown = printable(message)
         text = wrapped(shown, columns()) if sys.stderr.isatty() else shown
         typer.secho(text, err=True, fg="red" if red else None, bold=red or None)
+
+
+def print_warnings_as_notes() -> None:
+    """Show Python's warnings as one line each, without the place in the code."""
+    warnings.showwarning = lambda message, *_unused: print_message(f"note: {message}")
 
 
 def wrapped(message: str, width: int) -> str:

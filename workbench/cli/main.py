@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from workbench.cli.console import print_message
+from workbench.cli.console import print_message, print_warnings_as_notes
 from workbench.cli.exit import exit_program
 from workbench.cli.option_types import millimetres, whole
 from workbench.cli.stdio import fill_closed_streams
@@ -362,6 +362,7 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     fill_closed_streams()
     stop_at_once()
+    print_warnings_as_notes()
     try:
         app()
     except (Exception, SystemExit) as error:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
+
 import pytest
 
-from workbench.cli.console import columns, print_message, wrapped
+from workbench.cli.console import columns, print_message, print_warnings_as_notes, wrapped
 
 PATH = "/a/very/long/path/without-any-space/" + "x" * 60
 
@@ -32,3 +34,14 @@ def test_where_no_terminal_is_a_message_stays_one_line(capsys: pytest.CaptureFix
 def test_the_environment_states_the_width(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "57")
     assert columns() == 57
+
+
+def test_a_warning_is_one_line_without_its_place_in_the_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    print_warnings_as_notes()
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        warnings.warn("slow", stacklevel=1)
+    assert capsys.readouterr().err == "note: slow\n"

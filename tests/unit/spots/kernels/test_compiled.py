@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from numba.core.caching import CacheImpl
 
 from workbench.model.arrays import FloatArray
-from workbench.spots.kernels.compiled import compiled
+from workbench.spots.kernels.compiled import _warn_without_cache, compiled
 
 
 @compiled
@@ -44,3 +45,17 @@ def test_a_number_that_is_none_spoils_the_sum_and_is_seen() -> None:
 def test_division_by_zero_is_as_in_numpy() -> None:
     assert quotient(1.0, 0.0) == math.inf
     assert math.isnan(quotient(0.0, 0.0))
+
+
+def test_without_a_place_for_machine_code_it_compiles_and_warns_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where the program's folder and the user's cache cannot be written."""
+    monkeypatch.setattr(CacheImpl, "_locator_classes", [])
+    _warn_without_cache.cache_clear()
+    with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as warned:
+        doubled = [compiled(twice), compiled(twice)]
+    assert len(warned) == 1
+    assert [one(2.0) for one in doubled] == [4.0, 4.0]
+
+
+def twice(value: float) -> float:
+    return 2.0 * value
