@@ -16,10 +16,20 @@ from workbench.model.yamlfile import FileModel, load_yaml_model
 
 PositiveFloat = Annotated[float, Field(gt=0)]
 NonNegativeFloat = Annotated[float, Field(ge=0)]
-# YAML reads `id: 1` as a number; to the workbench an id is a name.
-Name = Annotated[
-    str, BeforeValidator(lambda v: str(v) if isinstance(v, int) and not isinstance(v, bool) else v)
-]
+
+
+def _as_name(value: object) -> object:
+    """Text of a number: YAML reads `id: 1` as a number; to the workbench an id is a name."""
+    if not isinstance(value, int) or isinstance(value, bool):
+        return value
+    if type(value) is not int:  # its digits are lost, as of 01, 0x10 and 1_0
+        raise ValueError(
+            f"expected text; YAML reads this as the number {int(value)}: write the text in quotes"
+        )
+    return str(value)
+
+
+Name = Annotated[str, BeforeValidator(_as_name)]
 
 ImageAxis = Literal["u", "v"]
 """Axis of the image: u to the right, v down."""

@@ -208,3 +208,16 @@ def test_omitted_bench_values_are_those_of_the_documentation() -> None:
     assert (bench.placement_sd_mm, bench.tilt_sd_deg, bench.target_tilt_sd_deg) == (0.0, 0.0, 0.5)
     assert (bench.print_scale.value, bench.print_scale.sd, bench.board_flatness_sd_mm) == (0.0, 0.002, 0.1)
     assert bench.drift_u_px == bench.drift_v_px == Prior(value=0.0, sd=0.0)
+
+
+@pytest.mark.parametrize("written", ["01", "0x10", "1_0", "007"])
+def test_digits_whose_spelling_yaml_loses_need_quotes_as_an_id(tmp_path: Path, written: str) -> None:
+    text = RIG.replace("COEFFICIENTS", "")
+    path = tmp_path / "rig.yaml"
+    path.write_text(text.replace("id: 1", f"id: {written}"))
+    with pytest.raises(BadInputError, match="quotes"):
+        load_rig(path)
+    path.write_text(text.replace("id: 1", f"id: '{written}'"))
+    assert load_rig(path).laser_ids[0] == written
+    path.write_text(text)
+    assert load_rig(path).laser_ids[0] == "1"
