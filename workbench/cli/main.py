@@ -15,7 +15,8 @@ import typer
 
 from workbench.cli.console import print_message, print_warnings_as_notes
 from workbench.cli.exit import exit_program
-from workbench.cli.option_types import millimetres, whole
+from workbench.cli.option_types import AnswersFile, NoInput, Sessions, View, millimetres, reason, whole
+from workbench.cli.repair import repair
 from workbench.cli.stdio import fill_closed_streams
 from workbench.cli.stopping import ignore_signals, stop_at_once
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
@@ -30,6 +31,7 @@ app = typer.Typer(
 
 lasers = typer.Typer(help="Control a rig's lasers without a session.", no_args_is_help=True)
 app.add_typer(lasers, name="lasers")
+app.command()(repair)
 
 INTERNAL_ERROR = 1
 WRITE_FAILURES = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
@@ -52,19 +54,6 @@ def _common(
     ] = False,
 ) -> None:
     """Calibration and lab-measurement workbench for laser-spot range sensors."""
-
-
-AnswersFile = Annotated[
-    Path | None,
-    typer.Option(help="Answers to prompts (YAML), except those that need a person at the bench."),
-]
-NoInput = Annotated[
-    bool, typer.Option("--no-input", help="Do not ask: an open prompt ends with exit code 6.")
-]
-View = Annotated[
-    bool | None,
-    typer.Option("--view/--no-view", help="Watch in the Rerun viewer. Default: if there is a display."),
-]
 
 
 ExistingCalibration = Annotated[
@@ -97,15 +86,6 @@ def run(
     run_procedures(procedures, rig, sessions, Answers(answers, no_input), calibration, view)
 
 
-Sessions = Annotated[Path, typer.Option(help="Folder of sessions.")]
-
-
-def _reason(given: str | None) -> str | None:
-    if given is not None and not given.strip():
-        raise typer.BadParameter("expected a reason in words, got a blank")
-    return given
-
-
 @app.command()
 def resume(
     session: Annotated[
@@ -115,7 +95,7 @@ def resume(
     accept_changes: Annotated[
         str | None,
         typer.Option(
-            metavar="REASON", callback=_reason, help="Resume although rig, procedures or versions changed."
+            metavar="REASON", callback=reason, help="Resume although rig, procedures or versions changed."
         ),
     ] = None,
     answers: AnswersFile = None,
@@ -183,7 +163,7 @@ def fit(
     accept: Annotated[
         str | None,
         typer.Option(
-            metavar="REASON", callback=_reason, help="Reason to write the file even if a limit fails."
+            metavar="REASON", callback=reason, help="Reason to write the file even if a limit fails."
         ),
     ] = None,
     without_standoff: Annotated[

@@ -1,11 +1,26 @@
-"""Parsers of numbers on the command line, with plain error messages."""
+"""Options shared by commands, and parsers of their values with plain error messages."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from math import isfinite
+from pathlib import Path
+from typing import Annotated
 
 import typer
+
+AnswersFile = Annotated[
+    Path | None,
+    typer.Option(help="Answers to prompts (YAML), except those that need a person at the bench."),
+]
+NoInput = Annotated[
+    bool, typer.Option("--no-input", help="Do not ask: an open prompt ends with exit code 6.")
+]
+View = Annotated[
+    bool | None,
+    typer.Option("--view/--no-view", help="Watch in the Rerun viewer. Default: if there is a display."),
+]
+Sessions = Annotated[Path, typer.Option(help="Folder of sessions.")]
 
 MOST_MM = 1e6
 """Largest accepted length, as in rig and captures files."""
@@ -37,3 +52,10 @@ def millimetres(least: float) -> Callable[[object], float]:
         return value
 
     return parse
+
+
+def reason(given: str | None) -> str | None:
+    """Refuse a blank reason."""
+    if given is not None and not given.strip():
+        raise typer.BadParameter("expected a reason in words, got a blank")
+    return given

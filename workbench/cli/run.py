@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from rich.console import Console
 from workbench.cli.background import Background
 from workbench.cli.console import print_message
 from workbench.cli.invocation import command_line
+from workbench.cli.refusal import ask_for_repair, refused_fit, repair_commands
 from workbench.cli.stopping import StopAfterCapture
 from workbench.cli.terminal import FaultTolerantConsumer, Terminal
 from workbench.cli.terminal_operator import choose_operator
@@ -21,6 +22,7 @@ from workbench.model.chart import laser_colors
 from workbench.model.errors import (
     AnswerNeededError,
     LaserOffNotConfirmedError,
+    LimitFailedError,
     RigNotReadyError,
     StoppedError,
 )
@@ -28,6 +30,7 @@ from workbench.procedure.engine.durations import learn_durations
 from workbench.procedure.engine.operator import ScriptedOperator
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.progress import TimeLeft
+from workbench.procedure.engine.repair import Repair
 from workbench.procedure.engine.resume import files_now, plan_of, resume
 from workbench.procedure.engine.run import NO_OPERATOR, Invocation, run
 from workbench.report.figure_writer import FigureWriter
@@ -72,7 +75,7 @@ def run_procedures(
     """
     plan = Plan.load(rig_path, procedures, calibration)
     session_dir = plan.new_session(sessions)
-    with session_interface(session_dir, plan, answers, view) as ui:
+    with _repairable(session_dir, plan, answers, view) as ui:
         run(plan, session_dir, ui.consumers, _caller(), ui.stopping, ui.operator)
 
 
@@ -86,8 +89,41 @@ def resume_session(
     """
     now, _ = files_now(session_dir, load_manifest(session_dir))
     plan = plan_of(session_dir, now)
-    with session_interface(session_dir, plan, answers, view) as ui:
+    with _repairable(session_dir, plan, answers, view) as ui:
         resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes)
+
+
+def repair_session(session_dir: Path, repair: Repair, answers: Answers, view: bool | None = None) -> None:
+    """Repair a session that has ended, and run its procedures again.
+
+    Raises:
+        WorkbenchError: see `workbench.procedure.engine.resume.resume`.
+    """
+    plan = plan_of(session_dir, load_manifest(session_dir))
+    with _repairable(session_dir, plan, answers, view) as ui:
+        resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, repair=repair)
+
+
+@contextmanager
+def _repairable(
+    session_dir: Path, plan: Plan, answers: Answers, view: bool | None
+) -> Iterator[SessionInterface]:
+    """`session_interface`; if the calibration is refused, prints repairs, or lets a person choose one."""
+    try:
+        with session_interface(session_dir, plan, answers, view) as ui:
+            yield ui
+    except LimitFailedError as refused:
+        fit = refused_fit(session_dir)
+        if fit is None:
+            raise
+        for command in repair_commands(session_dir, fit):
+            print_message(f"repair:  {command}")
+        stop, console = StopAfterCapture(), Console(stderr=True, markup=False)
+        person = choose_operator(answers.no_input, console, lambda: stop.reason, nullcontext)
+        repair = ask_for_repair(fit, str(refused), person)
+        if repair is None:
+            raise
+        repair_session(session_dir, repair, answers, view)
 
 
 @contextmanager

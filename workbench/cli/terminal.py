@@ -95,6 +95,8 @@ class Terminal:
                 self._print(
                     f"resumed, {counted(len(e.changes), 'change')} accepted" if e.changes else "resumed", 2
                 )
+            case ev.SessionRepaired() as e:
+                self._print(f"repair: {e.text}", 2)
             case ev.StandoffAdvised() as e:
                 self._print(e.text)
             case ev.StepFinished() as e:

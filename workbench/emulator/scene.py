@@ -71,7 +71,9 @@ class BenchScene:
         Raises:
             BadInputError: a flat target or the board is turned by 90 degrees or more.
         """
-        own = draw_placement_error(self._rig, self._spec, placement.key, _turn_sds_deg(placement.target))
+        own = draw_placement_error(
+            self._rig, self._spec, placement.key, _turn_sds_deg(placement.target), placement.attempt
+        )
         error = replace(
             own,
             yaw_deg=own.yaw_deg + self._truth.target_yaw_deg,

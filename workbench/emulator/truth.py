@@ -132,19 +132,25 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
 
 
 def draw_placement_error(
-    rig: Rig, spec: EmulatorSpec, key: str, turn_sds_deg: tuple[float | None, float | None] = (None, None)
+    rig: Rig,
+    spec: EmulatorSpec,
+    key: str,
+    turn_sds_deg: tuple[float | None, float | None] = (None, None),
+    attempt: int = 1,
 ) -> PlacementError:
-    """Errors of the placement `key` itself, equal whenever the same key is placed again.
+    """Errors of the placement `key` itself, equal whenever the same attempt is repeated.
 
     Args:
         rig: rig with the tolerances of placements.
         spec: settings of the bench.
         key: key of the placement.
         turn_sds_deg: standard deviations of yaw and pitch; None: the rig's `tilt_sd_deg`.
+        attempt: number of the attempt; pinned values hold for the first.
     """
-    rng = generator(spec.seed, "placement", key)
-    error, yaw, pitch = rng.standard_normal(3)
-    pins = spec.truth.placements.get(key, PlacementTruth())
+    again = () if attempt == 1 else (attempt,)
+    error, yaw, pitch = generator(spec.seed, "placement", key, *again).standard_normal(3)
+    pins = spec.truth.placements.get(key) if attempt == 1 else None
+    pins = pins or PlacementTruth()
     yaw_sd_deg, pitch_sd_deg = (rig.bench.tilt_sd_deg if sd is None else sd for sd in turn_sds_deg)
     return PlacementError(
         error_mm=_pinned(pins.error_mm, rig.bench.placement_sd_mm * error),

@@ -136,6 +136,45 @@ class SessionResumed(FileModel):
     accepted_because: str | None = None
 
 
+class SessionRepaired(FileModel):
+    """Decisions about placements of a session that has ended; its procedures then run again.
+
+    The later of two decisions about a placement counts. Placements are named by their keys.
+    """
+
+    kind: Literal["session_repaired"] = "session_repaired"
+    operator: str
+    command: str
+    created: str
+    reason: str
+    recapture: tuple[str, ...] = ()
+    """To be captured again; the captures so far do not count."""
+    leave_out: tuple[str, ...] = ()
+    """Not to be used; the captures stay on disk."""
+    restore: tuple[str, ...] = ()
+    """To be used again after all, or captured if they were skipped."""
+    add_mm: tuple[float, ...] = ()
+    """Standoffs of additional placements in the last grid before the fit."""
+    accept: bool = False
+    """Whether a calibration that fails its limits is accepted."""
+
+    @property
+    def text(self) -> str:
+        """Summary in one line."""
+        parts = [
+            f"{what} {', '.join(keys)}"
+            for what, keys in (
+                ("capture again", self.recapture),
+                ("leave out", self.leave_out),
+                ("restore", self.restore),
+                ("add", tuple(f"{standoff:g} mm" for standoff in self.add_mm)),
+                ("accept the calibration", ("although it fails its limits",) * self.accept),
+            )
+            if keys
+        ]
+        return f"{'; '.join(parts)}: {self.reason}"
+
+
 class ExposureSet(FileModel):
     """Exposure of the camera for the captures at a placement, found by trial exposures with all lasers on."""
 
@@ -337,6 +376,7 @@ Event = Annotated[
     | PlacementFinished
     | SetAside
     | SessionResumed
+    | SessionRepaired
     | CaptureTaken
     | SpotsFound
     | LimitChecked

@@ -101,6 +101,8 @@ class Fault(FileModel):
 
     name: str
     message: str
+    placement: str | None = None
+    """Key of the placement that is wrong; None: no single one."""
 
 
 class ResidualTest(FileModel):

@@ -77,5 +77,7 @@ class Placement(FileModel):
     target: TargetShape = FlatTarget()
     standoff_sd_mm: Annotated[float, Field(ge=0)] | None = None
     """Standard uncertainty of the standoff; None: the rig's `placement_sd_mm`."""
+    attempt: int = 1
+    """Number of times that the session has been at this placement; repairs count."""
     blocked: tuple[str, ...] = ()
     """Lasers whose beams are blocked before they meet the target."""

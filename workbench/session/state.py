@@ -14,12 +14,17 @@ from workbench.session.manifest import MANIFEST
 
 
 def effective(records: Iterable[ev.Record]) -> list[ev.Record]:
-    """Valid records: all but those that a resumption or a repeated placement has made void."""
+    """Valid records: all but those that a resumption or a repeated placement has made void.
+
+    Repairs stay valid.
+    """
     kept: list[ev.Record] = []
     for record in records:
         if isinstance(record.event, ev.SessionResumed | ev.SetAside):
+            void = []
             while kept and kept[-1].n >= record.event.from_n:
-                kept.pop()
+                void.append(kept.pop())
+            kept += [one for one in reversed(void) if isinstance(one.event, ev.SessionRepaired)]
         kept.append(record)
     return kept
 
@@ -38,7 +43,7 @@ class PlacementCaptures:
 def placement_captures(records: Iterable[ev.Record]) -> dict[str, PlacementCaptures]:
     """Latest captures of each placement by its key, complete or not.
 
-    Frames stay valid when computed records become void: only `SetAside` discards the captures of a placement.
+    Frames stay valid when computed records become void: only `SetAside` and a repair discard captures.
     """
     found: dict[str, PlacementCaptures] = {}
     for event in (record.event for record in records):
@@ -53,6 +58,9 @@ def placement_captures(records: Iterable[ev.Record]) -> dict[str, PlacementCaptu
                 found[event.key].complete = True
             case ev.SetAside():
                 found.pop(event.key, None)
+            case ev.SessionRepaired():
+                for key in event.recapture:
+                    found.pop(key, None)
             case _:
                 pass
     return found

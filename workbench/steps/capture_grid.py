@@ -83,7 +83,23 @@ class CaptureGridStep(StepModel):
             _advise(context)
             return pairs
 
-        return counted(sum(visit_placements(context, self.placements(name, context.rig), work)), "pair")
+        placements = [*self.placements(name, context.rig), *self._added(context, name)]
+        return counted(sum(visit_placements(context, placements, work)), "pair")
+
+    def _added(self, context: Context, name: str) -> list[Placement]:
+        """Placements that repairs have added, in the last grid before the fit."""
+        upcoming = _next_fit(context.steps, context.step_index)
+        later = context.steps[context.step_index + 1 :]
+        until = later if upcoming is None else later[: later.index(upcoming[1])]
+        if any(isinstance(step, CaptureGridStep) for step in until):
+            return []
+        visited = list(self.visits_mm)
+        added = []
+        for standoff_mm in context.recorder.repairs.added_mm:
+            number = visited.count(standoff_mm) + 1
+            visited.append(standoff_mm)
+            added.append(flat_placement(name, standoff_mm, number if number > 1 else None))
+        return added
 
 
 def _advise(context: Context) -> None:

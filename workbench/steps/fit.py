@@ -41,7 +41,7 @@ class FitStep(StepModel):
         from workbench.calibration.data.boards import BoardView, on_boards
         from workbench.calibration.data.observations import Observation
         from workbench.calibration.selection.model_terms import fit_calibration
-        from workbench.calibration.verdict.export import calibrate
+        from workbench.calibration.verdict.export import accept_with_reason, calibrate
         from workbench.calibration.verdict.records import fit_finished
         from workbench.model.fit_event import Rejected
         from workbench.procedure.engine.observed import observe_capture
@@ -60,7 +60,11 @@ class FitStep(StepModel):
         notes = _skipped_notes(_planned(context, name), captures, [one.standoff_mm for one in fitted.used])
         calibration, assessment = calibrate(fitted, self.limits, provenance, notes)
         context.emit(fit_finished(fitted, assessment))
-        if assessment.verdict == "refused":
+        because = context.recorder.repairs.accepted_because
+        if assessment.verdict == "refused" and because is not None:
+            calibration = accept_with_reason(calibration, because)
+            notes = [*notes, f"accepted although {'; '.join(assessment.reasons)}, because: {because}"]
+        elif assessment.verdict == "refused":
             raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
         context.accepted, context.cross_validation = calibration, assessment.cross_validation
         worst = calibration.laser_ranger.validity.max_relative_range_sd

@@ -103,6 +103,7 @@ def _standoff_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
     fitted = float(np.asarray(h.state.problem.data.standoff_mm)[h.subject[0]])
     return Fault(
         name="standoff",
+        placement=info.key,
         message=f"the captures at {info.standoff_mm:g} mm fit a standoff of {fitted:.4g} mm"
         f"{_digit_error(info.standoff_mm, fitted)}; no other cause explains them. Do: correct the standoff in"
         f" the captures, or leave it out (--without-standoff {info.standoff_mm:g})",
@@ -115,6 +116,7 @@ def _tilt_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
     axis, expected_deg = ("vertical", info.yaw_deg) if name.endswith("slope_x") else ("horizontal", 0.0)
     return Fault(
         name="tilted",
+        placement=info.key,
         message=f"the target at {info.standoff_mm:g} mm was turned by {_tilt_deg(h):+.1f} deg"
         f" about the {axis} (expected {expected_deg:g} +- {fit.rig.bench.tilt_sd_deg:g} deg). Do: set it"
         " square, then capture this standoff again or leave it out (--without-standoff"
@@ -142,6 +144,7 @@ def _motion_fault(fit: CalibrationFit, motion: TargetMotion) -> Fault:
     info = fit.cells.placements[motion.placement]
     return Fault(
         name="moved",
+        placement=info.key,
         message=f"the target at {info.standoff_mm:g} mm moved by {motion.step_mm:+.2g} mm after"
         f" {motion.before} of its {motion.captures} captures, between {motion.last_before} and"
         f" {motion.first_after}. Do: fix the target, then capture this standoff again or leave it out"

@@ -141,7 +141,9 @@ def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Recor
         return context.emit(context.pairs.replayed.placed), context.pairs.replayed.placed.placement
     FrameStore(context.session_dir).set_aside(asked.key)
     measured = answer.value if isinstance(answer.value, float) else asked.standoff_mm
-    placed = context.bench.target.place(asked.model_copy(update={"standoff_mm": measured}))
+    attempt = 1 + context.recorder.repairs.attempts[asked.key]
+    wanted = asked.model_copy(update={"standoff_mm": measured, "attempt": attempt})
+    placed = context.bench.target.place(wanted)
     return context.emit(ev.TargetPlaced(placement=placed, by=answer.by)), placed
 
 

@@ -15,6 +15,7 @@ from workbench.model.errors import BadInputError
 from workbench.model.prompt import Answer
 from workbench.procedure.engine.prompts import SAFETY
 from workbench.session.journal import Journal
+from workbench.session.repairs import repairs_of
 from workbench.session.state import PlacementCaptures, effective, placement_captures, safe_part
 
 
@@ -44,10 +45,13 @@ class ReplayingJournal:
             key: captures for key, captures in placement_captures(before).items() if captures.complete
         }
         """Complete placements by key, which are not captured again."""
+        self.repairs = repairs_of(before)
+        """Decisions of the session's repairs."""
         self._answers = {
-            e.key: e for e in (record.event for record in self._kept) if isinstance(e, ev.Answered)
+            r.event.key: r.event
+            for r in self._kept
+            if isinstance(r.event, ev.Answered) and self.repairs.counts(r.event.key, r.n)
         }
-
         self._set_aside = [r.event for r in effective(before) if isinstance(r.event, ev.SetAside)]
         self._retries = Counter(r.event.key for r in before if _is_retry(r.event))
         measured = [e for e in (r.event for r in self._kept) if isinstance(e, ev.LatencyMeasured)]
@@ -76,6 +80,9 @@ class ReplayingJournal:
         if self._kept and isinstance(event, ev.SessionFinished) and event.exit_code != 0:
             # The resumed session ended before any new event: all earlier records stay valid.
             self._from_n = self._kept[-1].n + 1
+        for record in self._kept:
+            if isinstance(record.event, ev.SessionRepaired):
+                self._pass_on(record)
         self._kept.clear()
         if self._resumed is not None:
             resumed = self._resumed.model_copy(update={"from_n": self._from_n})
@@ -84,8 +91,8 @@ class ReplayingJournal:
         return self._show(self._journal.append(event))
 
     def complete_placement(self, key: str) -> PlacementCaptures | None:
-        """Captures at a placement that was complete before the resumption; None for others."""
-        return self._complete.get(key)
+        """Captures at a placement that was complete before the resumption and counts; None for others."""
+        return None if key in self.repairs.left_out else self._complete.get(key)
 
     def retries(self, key: str) -> int:
         """Number of retries of a placement by limits in this session, including before resumptions."""
@@ -96,7 +103,9 @@ class ReplayingJournal:
         return [event for event in self._set_aside if event.key.startswith(prefix)]
 
     def answer(self, key: str) -> Answer | None:
-        """Answer that was given before the session ended early; None if there is none."""
+        """Answer that was given before the session ended early, or by a repair; None if there is none."""
+        if (reason := self.repairs.left_out.get(key)) is not None:
+            return Answer(action="skip", reason=reason)
         given = self._answers.get(key)
         return None if given is None or key == SAFETY else given.answer
 
@@ -106,12 +115,15 @@ class ReplayingJournal:
         self._answers = {k: e for k, e in self._answers.items() if k != key and not k.startswith(f"{key}/")}
 
     def _show_notes(self) -> None:
-        """Pass on records that no step emits again: resumptions, repetitions, confirmations of safety."""
+        """Pass on records that no step emits again: resumptions, repairs, repetitions, confirmed safety."""
         while self._kept and _is_note(self._kept[0].event):
             self._show(self._kept.popleft())
 
     def _show(self, record: ev.Record) -> ev.Record:
         self._from_n = record.n + 1
+        return self._pass_on(record)
+
+    def _pass_on(self, record: ev.Record) -> ev.Record:
         for consumer in self._consumers:
             consumer(record)
         return record
@@ -128,6 +140,6 @@ def _is_retry(event: ev.Event) -> TypeGuard[ev.SetAside]:
 
 
 def _is_note(event: ev.Event) -> bool:
-    return isinstance(event, ev.SessionResumed | ev.SetAside) or (
+    return isinstance(event, ev.SessionResumed | ev.SessionRepaired | ev.SetAside) or (
         isinstance(event, ev.Answered) and event.key == SAFETY
     )

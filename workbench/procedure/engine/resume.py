@@ -16,6 +16,7 @@ from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_mode
 from workbench.procedure.engine.existing_calibration import ExistingCalibration
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.procedure_file import Procedure
+from workbench.procedure.engine.repair import Repair
 from workbench.procedure.engine.replay import ReplayingJournal
 from workbench.procedure.engine.run import NO_OPERATOR, Invocation, open_context, run_steps
 from workbench.session.journal import JOURNAL, Journal, read_journal
@@ -36,6 +37,7 @@ def resume(
     stopping: Callable[[], str | None],
     operator: Operator = NO_OPERATOR,
     accepted_because: str | None = None,
+    repair: Repair | None = None,
 ) -> None:
     """Replay the session's procedures from the start with the frames on disk, then continue them.
 
@@ -49,14 +51,15 @@ def resume(
         stopping: called between captures; a text is the reason to end the session.
         operator: operator, unless the bench has its own.
         accepted_because: reason to resume although rig, procedures or versions have changed.
+        repair: decisions about placements, which are journalled first; a finished session can be repaired.
 
     Raises:
-        BadInputError: `session_dir` is no session, the session is finished or running, or files or versions
-            have changed.
+        BadInputError: `session_dir` is no session, the session is finished or running, files or versions have
+            changed, or the repair names no placement of the session.
         WorkbenchError: see `run`.
     """
     began_with = load_manifest(session_dir)
-    _check_unfinished(session_dir)
+    _check_unfinished(session_dir, finished_too=repair is not None)
     now, changes = files_now(session_dir, began_with)
     if changes and accepted_because is None:
         raise BadInputError(
@@ -67,6 +70,7 @@ def resume(
     with ExitStack() as stack:
         journal, before = Journal.reopen(session_dir)
         stack.enter_context(journal)
+        decided = None if repair is None else repair.decided(plan, before, caller)
         bench = stack.enter_context(open_bench(plan.rig, session_dir))
         if changes:
             replace_manifest(session_dir, began_with, now.rig, now.procedures)
@@ -78,6 +82,8 @@ def resume(
             changes=changes,
             accepted_because=accepted_because if changes else None,
         )
+        if decided is not None:
+            before = (*before, journal.append(decided))
         recorder = ReplayingJournal(journal, consumers, before, resumed)
         began = Invocation(began_with.operator, began_with.command, began_with.created)
         run_steps(plan, open_context(plan, session_dir, bench, operator, recorder, began, stopping))
@@ -132,7 +138,7 @@ def _now(session_dir: Path, entry: Entry, model: type[FileModel]) -> tuple[Entry
     return entry.model_copy(update={"text": path.read_text(encoding="utf-8")}), [change]
 
 
-def _check_unfinished(session_dir: Path) -> None:
+def _check_unfinished(session_dir: Path, *, finished_too: bool) -> None:
     records = list(read_journal(session_dir)) if (session_dir / JOURNAL).exists() else []
     first, last = (records[0].event, records[-1].event) if records else (None, None)
     if isinstance(first, ev.SessionStarted) and first.session != session_dir.name:
@@ -140,5 +146,8 @@ def _check_unfinished(session_dir: Path) -> None:
             f"{session_dir}: expected the folder name {first.session}, as at the session's start; rename the"
             " folder"
         )
-    if isinstance(last, ev.SessionFinished) and last.exit_code == 0:
-        raise BadInputError(f"{session_dir}: the session is finished and cannot be resumed")
+    if isinstance(last, ev.SessionFinished) and last.exit_code == 0 and not finished_too:
+        raise BadInputError(
+            f"{session_dir}: the session is finished and cannot be resumed; to capture a placement again or"
+            " to leave one out, see workbench repair --help"
+        )

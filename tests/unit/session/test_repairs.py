@@ -1,0 +1,65 @@
+"""Decisions of repairs, read from the records."""
+
+from __future__ import annotations
+
+from workbench.model import event as ev
+from workbench.model.target import Placement
+from workbench.session.repairs import repairs_of
+from workbench.session.state import effective, placement_captures
+
+A, B = "p.1/100mm", "p.1/200mm"
+
+
+def repaired(n: int, **decisions: object) -> ev.Record:
+    event = ev.SessionRepaired.model_validate(
+        {"operator": "o", "command": "c", "created": "t", "reason": f"r{n}"} | decisions
+    )
+    return ev.Record(n=n, time_ns=n, event=event)
+
+
+def record(n: int, event: ev.Event) -> ev.Record:
+    return ev.Record(n=n, time_ns=n, event=event)
+
+
+def test_of_two_decisions_about_a_placement_the_later_counts() -> None:
+    out, back = repaired(5, leave_out=(A, B)), repaired(9, restore=(A,), recapture=(B,))
+    assert repairs_of([out]).left_out == {A: "r5", B: "r5"}
+    assert repairs_of([out, back]).left_out == {}
+    assert repairs_of([back, out]).left_out == {A: "r5", B: "r5"}
+
+
+def test_answers_before_a_placement_is_asked_again_do_not_count() -> None:
+    found = repairs_of([repaired(5, recapture=(A,)), repaired(7, restore=(B,))])
+    assert [found.counts(A, n) for n in (4, 5, 6)] == [False, False, True]
+    assert [found.counts(f"{B}/limit", n) for n in (6, 7, 8)] == [False, False, True]
+    assert found.counts("p.1/1000mm", 0)
+
+
+def test_attempts_and_added_standoffs_add_up() -> None:
+    found = repairs_of(
+        [repaired(1, recapture=(A,), add_mm=(300.0,)), repaired(2, recapture=(A, B), add_mm=(50.0,))]
+    )
+    assert found.attempts == {A: 2, B: 1}
+    assert found.added_mm == [300.0, 50.0]
+
+
+def test_a_calibration_is_accepted_with_the_reason_of_the_repair() -> None:
+    assert repairs_of([repaired(1, leave_out=(A,))]).accepted_because is None
+    assert repairs_of([repaired(1, accept=True), repaired(2, leave_out=(A,))]).accepted_because == "r1"
+
+
+def test_captures_before_a_recapture_do_not_count_and_those_after_it_do() -> None:
+    placed = ev.TargetPlaced(placement=Placement(key=A, standoff_mm=100.0), by="person")
+    captured = [record(0, placed), record(1, ev.PlacementFinished(key=A))]
+    assert placement_captures(captured)[A].complete
+    again = [*captured, repaired(2, recapture=(A,))]
+    assert placement_captures(again) == {}
+    assert placement_captures([*again, record(3, placed), record(4, ev.PlacementFinished(key=A))])[A].complete
+    assert placement_captures([*captured, repaired(2, leave_out=(A,))])[A].complete
+
+
+def test_a_resumption_makes_no_repair_void() -> None:
+    started = record(0, ev.SessionStarted(session="s", rig="r", procedures=("p",)))
+    repair = repaired(1, leave_out=(A,))
+    resumed = record(2, ev.SessionResumed(from_n=0, operator="o", command="c", created="t"))
+    assert effective([started, repair, resumed]) == [repair, resumed]

@@ -1,0 +1,114 @@
+"""Decisions about placements of a session that has ended, by the names that a person uses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from workbench.model import event as ev
+from workbench.model.errors import BadInputError
+from workbench.procedure.engine.plan import Plan
+from workbench.session.repairs import repairs_of
+
+if TYPE_CHECKING:
+    from workbench.procedure.engine.run import Invocation
+
+
+GRID = "capture_grid"
+"""Kind of the step that takes additional standoffs."""
+
+
+@dataclass(frozen=True)
+class Repair:
+    """Decisions as given; placements by key or standoff, such as `calibrate-flat.2/280mm` or `280`."""
+
+    reason: str
+    recapture: tuple[str, ...] = ()
+    leave_out: tuple[str, ...] = ()
+    restore: tuple[str, ...] = ()
+    add_mm: tuple[float, ...] = ()
+    accept: bool = False
+    """Whether a calibration that fails its limits is accepted."""
+
+    def decided(self, plan: Plan, records: Sequence[ev.Record], caller: Invocation) -> ev.SessionRepaired:
+        """Event of the repair.
+
+        Args:
+            plan: rig and procedures of the session.
+            records: records of the session so far.
+            caller: invocation of the repair.
+
+        Raises:
+            BadInputError: there is no decision, a name is that of no placement or of several, two decisions
+                contradict each other, nothing can be restored, or there is no grid to add to.
+        """
+        keys = placement_keys(plan, records)
+        recapture, leave_out, restore = (
+            tuple(find_placement(name, keys) for name in names)
+            for names in (self.recapture, self.leave_out, self.restore)
+        )
+        chosen = [*recapture, *leave_out, *restore]
+        if not (chosen or self.add_mm or self.accept):
+            raise BadInputError(
+                "repair: expected at least one of --recapture, --leave-out, --restore, --add, --accept"
+            )
+        if doubled := [key for key in chosen if chosen.count(key) > 1]:
+            raise BadInputError(f"repair: expected one decision for each placement, got two for {doubled[0]}")
+        out = {*repairs_of(records).left_out, *_skipped(records)}
+        if wrong := [key for key in restore if key not in out]:
+            those = ", ".join(sorted(out)) or "none"
+            raise BadInputError(f"repair: {wrong[0]} is neither left out nor skipped; those are: {those}")
+        if self.add_mm and not any(step.step == GRID for p in plan.procedures for step in p.steps):
+            raise BadInputError("repair: expected a step capture_grid, to which a standoff can be added")
+        return ev.SessionRepaired(
+            operator=caller.operator,
+            command=caller.command,
+            created=caller.created,
+            reason=self.reason,
+            recapture=recapture,
+            leave_out=leave_out,
+            restore=restore,
+            add_mm=self.add_mm,
+            accept=self.accept,
+        )
+
+
+def placement_keys(plan: Plan, records: Sequence[ev.Record]) -> list[str]:
+    """Keys of all placements of a session, in order: those of its procedures, then those that were added."""
+    planned = [
+        placement.key
+        for procedure in plan.procedures
+        for index, step in enumerate(procedure.steps, start=1)
+        for placement in step.placements(procedure.step_name(index), plan.rig)
+    ]
+    placed = [r.event.placement.key for r in records if isinstance(r.event, ev.TargetPlaced)]
+    return list(dict.fromkeys([*planned, *placed]))
+
+
+def find_placement(name: str, keys: Sequence[str]) -> str:
+    """Key of the placement that a person names.
+
+    Args:
+        name: key, its end, or the standoff in mm.
+        keys: keys of all placements.
+
+    Raises:
+        BadInputError: no placement has this name, or several have.
+    """
+    if name in keys:
+        return name
+    place = name.strip().removesuffix("mm").strip()
+    ends = (f"/{place}mm", f"-{place}mm", f"/{name}")
+    found = [key for key in keys if key.endswith(ends)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise BadInputError(f"repair: several placements at {place} mm: {', '.join(found)}; name one of them")
+    raise BadInputError(f"repair: no placement {name}; expected one of {', '.join(keys) or 'none'}")
+
+
+def _skipped(records: Sequence[ev.Record]) -> list[str]:
+    answers = {r.event.key: r.event.answer for r in records if isinstance(r.event, ev.Answered)}
+    set_aside = [r.event.key for r in records if isinstance(r.event, ev.SetAside) and r.event.left_out]
+    return [*(key for key, answer in answers.items() if answer.action == "skip"), *set_aside]
