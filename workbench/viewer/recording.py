@@ -26,6 +26,7 @@ from workbench.viewer import entities as at
 from workbench.viewer.advice import AdviceView
 from workbench.viewer.blueprint import blueprint
 from workbench.viewer.captures import CaptureLog, capture_record
+from workbench.viewer.compaction import compact
 from workbench.viewer.crops import Crops
 from workbench.viewer.geometry import Geometry
 from workbench.viewer.stream import Moment, Stream
@@ -55,6 +56,7 @@ class RecordingConsumer:
 
     Raises:
         BadInputError: a frame of a record is missing in the session folder, or has changed.
+        OSError: the file cannot be written (disk full); found at the end of a capture.
     """
 
     def __init__(
@@ -78,12 +80,14 @@ class RecordingConsumer:
             if self._watch is not None and port is not None:
                 self._watch(port)
         self._open.take(record)
+        if isinstance(record.event, ev.SpotsFound):
+            self._open.stream.flush()
 
     def close(self) -> None:
         """Flush and close the file; a second call has no effect."""
-        if self._open is not None:
-            self._open.stream.close()
-            self._open = None
+        recording, self._open = self._open, None
+        if recording is not None:
+            recording.stream.close()
 
     def __enter__(self) -> RecordingConsumer:
         return self
@@ -105,6 +109,7 @@ def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path
         with RecordingConsumer(session_dir, rig, partial) as consumer:
             for record in records:
                 consumer(record)
+        compact(partial)
         partial.replace(out)
     finally:
         partial.unlink(missing_ok=True)
@@ -212,6 +217,10 @@ class OpenRecording:
     @_log.register
     def _(self, event: ev.SessionResumed, moment: Moment) -> None:
         steps.log_text(self.stream, f"Resumed by {event.operator} at {event.created}", steps.WARN)
+
+    @_log.register
+    def _(self, event: ev.Incident, moment: Moment) -> None:
+        steps.log_text(self.stream, f"{event.of} failed: {event.message}", steps.WARN)
 
     @_log.register
     def _(self, event: ev.CaptureTaken, moment: Moment) -> None:

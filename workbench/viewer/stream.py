@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
+from errno import EIO
 from pathlib import Path
 
 import numpy as np
@@ -38,11 +41,15 @@ class Stream:
         layout: first layout.
         port: port on loopback at which a viewer may watch; None: none may. The recording does not wait for a
             viewer: one that hangs, or never comes, costs memory up to a limit.
+
+    Raises:
+        OSError: the file cannot be written.
     """
 
     def __init__(
         self, path: Path | None, session: str, layout: rrb.Blueprint, port: int | None = None
     ) -> None:
+        self._path = path
         self._recording = rr.RecordingStream(
             APPLICATION,
             recording_id=session,
@@ -56,7 +63,8 @@ class Stream:
         sinks: list[rr.FileSink | rr.GrpcServerSink] = [] if path is None else [rr.FileSink(str(path))]
         if port is not None:
             sinks.append(rr.GrpcServerSink(bind_ip=LOOPBACK, port=port, server_memory_limit=SERVER_MEMORY))
-        self._recording.set_sinks(*sinks, default_blueprint=layout)
+        with self._named():
+            self._recording.set_sinks(*sinks, default_blueprint=layout)
         self._recording.send_recording_name(session)
         self._prefix = ""
 
@@ -93,7 +101,27 @@ class Stream:
         properties = rr.AnyValues(drop_untyped_nones=True, **values)
         self._recording.send_property(f"{self._prefix.replace('/', '_')}{name}", properties)
 
+    def flush(self) -> None:
+        """Write buffered data.
+
+        Raises:
+            OSError: the file cannot be written. Logging itself does not report it.
+        """
+        with self._named():
+            self._recording.flush(timeout_sec=FLUSH_SECONDS)
+
     def close(self) -> None:
-        """Write buffered data and the footer of the file."""
-        self._recording.flush(timeout_sec=FLUSH_SECONDS)
-        self._recording.disconnect()
+        """Write buffered data and the footer of the file; raises the errors of `flush`."""
+        try:
+            self.flush()
+        finally:
+            self._recording.disconnect()
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Errors of Rerun as errors of the file."""
+        try:
+            yield
+        except RuntimeError as error:
+            cause = f"the recording has failed ({error}); check the free space of the disk"
+            raise OSError(EIO, cause, str(self._path)) from error

@@ -40,6 +40,8 @@ class ReplayingJournal:
         self._kept = deque(safe_part(before))
         self._from_n = 0
         self._resumed = resumed if before else None
+        self._incidents: list[ev.Incident] = []
+        """Incidents to journal with the next new event; replayed events have no place for them."""
         self._complete = {
             key: captures for key, captures in placement_captures(before).items() if captures.complete
         }
@@ -81,7 +83,11 @@ class ReplayingJournal:
             resumed = self._resumed.model_copy(update={"from_n": self._from_n})
             self._resumed = None
             self._show(self._journal.append(resumed))
-        return self._show(self._journal.append(event))
+        self._journal_incidents()
+        record = self._show(self._journal.append(event))
+        if not isinstance(event, ev.SessionFinished):  # the last record of a session
+            self._journal_incidents()
+        return record
 
     def complete_placement(self, key: str) -> PlacementCaptures | None:
         """Captures at a placement that was complete before the resumption; None for others."""
@@ -106,15 +112,22 @@ class ReplayingJournal:
         self._answers = {k: e for k, e in self._answers.items() if k != key and not k.startswith(f"{key}/")}
 
     def _show_notes(self) -> None:
-        """Pass on records that no step emits again: resumptions, repetitions, confirmations of safety."""
+        """Pass on records that no step emits again: resumptions, repetitions, incidents, safety."""
         while self._kept and _is_note(self._kept[0].event):
             self._show(self._kept.popleft())
 
     def _show(self, record: ev.Record) -> ev.Record:
         self._from_n = record.n + 1
         for consumer in self._consumers:
-            consumer(record)
+            try:
+                consumer(record)
+            except ev.ConsumerFailedError as error:
+                self._incidents.append(error.incident)
         return record
+
+    def _journal_incidents(self) -> None:
+        while self._incidents:
+            self._show(self._journal.append(self._incidents.pop(0)))
 
 
 def _what(started: ev.Event) -> str:
@@ -128,6 +141,6 @@ def _is_retry(event: ev.Event) -> TypeGuard[ev.SetAside]:
 
 
 def _is_note(event: ev.Event) -> bool:
-    return isinstance(event, ev.SessionResumed | ev.SetAside) or (
+    return isinstance(event, ev.SessionResumed | ev.SetAside | ev.Incident) or (
         isinstance(event, ev.Answered) and event.key == SAFETY
     )
