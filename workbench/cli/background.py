@@ -6,6 +6,7 @@ import queue
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +14,9 @@ from types import TracebackType
 from rich.console import Console
 
 from workbench.cli import exit as exit_
+from workbench.devices.protocols import Operator
 from workbench.model import event as ev
+from workbench.model.prompt import Answer, Prompt
 from workbench.viewer.compaction import compact
 from workbench.viewer.recording import RecordingConsumer
 
@@ -25,6 +28,19 @@ MOST_WAITING = 10_000
 """Largest number of records in the queue."""
 
 
+@dataclass(frozen=True)
+class _Asking:
+    """Operator whose prompts are passed on before they are answered."""
+
+    person: Operator
+    show: Callable[[Prompt], None]
+
+    def ask(self, prompt: Prompt) -> Answer:
+        """See `Operator.ask`."""
+        self.show(prompt)
+        return self.person.ask(prompt)
+
+
 class Background:
     """Passes records to the recording in a separate thread.
 
@@ -34,7 +50,7 @@ class Background:
 
     def __init__(self, recording: RecordingConsumer, path: Path, console: Console) -> None:
         self._recording, self._path, self._console = recording, path, console
-        self._records: queue.Queue[ev.Record | threading.Event | None] = queue.Queue(MOST_WAITING)
+        self._records: queue.Queue[ev.Record | Prompt | threading.Event | None] = queue.Queue(MOST_WAITING)
         self._given_up: str | None = None
         self._failure: str | None = None
         """Failure that is not yet reported to the session."""
@@ -83,6 +99,14 @@ class Background:
             failure, self._failure = self._failure, None
             raise ev.ConsumerFailedError("the recording", failure)
 
+    def asking(self, person: Operator) -> Operator:
+        """The operator, whose prompts a viewer shows while they are open."""
+        return _Asking(person, self._show_prompt)
+
+    def _show_prompt(self, prompt: Prompt) -> None:
+        with suppress(queue.Full):
+            self._records.put_nowait(prompt)
+
     def _settle(self) -> None:
         """Wait until all records are written: a failure after the session's end could not be journalled."""
         settled = threading.Event()
@@ -94,12 +118,14 @@ class Background:
         while (item := self._records.get()) is not None:
             if isinstance(item, threading.Event):
                 item.set()
+            elif isinstance(item, Prompt):
+                self._attempt(partial(self._recording.show_prompt, item))
             elif self._given_up is None:
                 self._attempt(partial(self._recording, item))
         self._attempt(self._recording.close)
 
     def _attempt(self, part: Callable[[], None]) -> None:
-        """Do a part of the recording; a failure ends it."""
+        """Call a part of the recording; a failure ends it."""
         try:
             part()
         except Exception as error:

@@ -13,12 +13,15 @@ from workbench.model.errors import BadInputError
 from workbench.session.journal import is_running, read_journal
 from workbench.session.manifest import load_session_rig
 from workbench.session.state import effective
+from workbench.viewer.compaction import compact
 from workbench.viewer.window import is_complete, open_viewer, serve
 
 if TYPE_CHECKING:  # loads Rerun
     from workbench.viewer.comparison import Source
 
 RECORDING_FILE = "recording.rrd"
+MADE_FROM_FILES = {".rrd", ".yaml", ".yml", ".csv"}
+"""Endings of files that are shown; anything else is a session."""
 MOST_SIDES = 2
 """Number of sessions that fit side by side on a screen."""
 
@@ -59,6 +62,8 @@ def recording_of(request: Request, folder: Path) -> Path:
     if len(request.what) > MOST_SIDES:
         raise BadInputError(f"expected one or two sessions or captures files, got {len(request.what)}")
     first = request.what[0]
+    if request.rebuild:
+        _check_rebuild(request)
     if len(request.what) == 1 and not request.without_mm:
         if first.suffix == ".rrd":
             return first
@@ -70,16 +75,28 @@ def recording_of(request: Request, folder: Path) -> Path:
     return _side_by_side(request, folder)
 
 
+def _check_rebuild(request: Request) -> None:
+    first = request.what[0]
+    if len(request.what) > 1 or request.without_mm or first.suffix in MADE_FROM_FILES:
+        raise BadInputError(
+            "--rebuild: expected one session, whose recording is made again from its frames and journal;"
+            " a recording of anything else is made anew each time, or has no frames beside it"
+        )
+
+
 def _of_session(session: Path, folder: Path, *, rebuild: bool) -> Path:
     """The session's recording; made again where it is missing, incomplete, or asked for.
 
     That of a running session is made in `folder`: the session itself is still writing its own.
     """
-    recording = (folder if is_running(session) else session) / RECORDING_FILE
+    running = is_running(session)
+    recording = (folder if running else session) / RECORDING_FILE
     if rebuild or not is_complete(recording):
         from workbench.viewer.recording import rebuild as made_again
 
         made_again(session, load_session_rig(session), effective(read_journal(session)), recording)
+        if not running:
+            compact(recording)
     return recording
 
 

@@ -43,15 +43,30 @@ class TrialTab:
     """Name and title of each chart."""
 
 
-def blueprint(rig: Rig, trials: Sequence[TrialTab] = (), phase: Phase = "capture") -> rrb.Blueprint:
+def blueprint(
+    rig: Rig,
+    trials: Sequence[TrialTab] = (),
+    phase: Phase = "capture",
+    *,
+    calibrates: bool = True,
+    live: bool = False,
+) -> rrb.Blueprint:
     """Layout for one rig; the time cursor follows new data.
 
     Args:
         rig: rig with the camera and the lasers.
         trials: trials so far, in order.
         phase: screen in front.
+        calibrates: whether the session calibrates; if not, there are no screens of a fit.
+        live: whether the session is running, so that the present step and the open prompt are shown.
     """
-    screens = [_captures(rig), _result(rig), _parameters(), *(_trial(rig, one) for one in trials), _bench()]
+    fit = [_result(rig, live), _parameters()] if calibrates else []
+    screens = [
+        _captures(rig, calibrates, live),
+        *fit,
+        *(_trial(rig, one, live) for one in trials),
+        _bench(),
+    ]
     front = {"capture": 0, "fit": 1, "trial": len(screens) - 2}[phase]
     return rrb.Blueprint(
         rrb.Tabs(*screens, active_tab=front),
@@ -95,39 +110,42 @@ def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
     )
 
 
-def _captures(rig: Rig) -> rrb.Container:
+def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
     """Screen of the technician: what is captured now, and how the uncertainty decreases."""
     axis = f"{rig.lasers[0].axis}_px"
-    texts = rrb.Vertical(
-        text_view(at.NOW, "Now"),
-        rrb.TextLogView(
-            origin=at.STEP_LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
-        ),
-        row_shares=[1, 2],
+    log = rrb.TextLogView(
+        origin=at.STEP_LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
+    )
+    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (log, 4))
+    lanes = rrb.Vertical(
+        rrb.StateTimelineView(origin=at.LANES, name="Steps"),
+        _series(at.AMBIENT, "Ambient light [DN]"),
+        row_shares=[3, 2],
+    )
+    progress = rrb.Tabs(
+        picture_view(at.UNCERTAINTY, "Range uncertainty", SMALL_PX),
+        picture_view(at.NARROWING, "Parameters", SMALL_PX),
+        _series(at.ADVICE, "Largest range uncertainty so far [%]"),
+        active_tab=0,
     )
     curves = rrb.Horizontal(
         _series(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
         _series(f"{at.SPOTS}/{axis}", f"Spot position {axis[0]} [px]"),
-        rrb.Tabs(
-            picture_view(at.UNCERTAINTY, "Range uncertainty", SMALL_PX),
-            picture_view(at.NARROWING, "Parameters", SMALL_PX),
-            _series(at.ADVICE, "Largest range uncertainty so far [%]"),
-            active_tab=0,
-        ),
-        rrb.StateTimelineView(origin=at.LANES, name="Steps"),
-        column_shares=[3, 3, 5, 4],
+        *([progress] if calibrates else []),
+        lanes,
+        column_shares=[3, 3, *([5] if calibrates else []), 4],
     )
     return rrb.Vertical(_seen(rig, texts), curves, row_shares=[5, 4], name="Captures")
 
 
-def _result(rig: Rig) -> rrb.Container:
+def _result(rig: Rig, live: bool) -> rrb.Container:
     """Screen of the engineer: which standoff is bad, and what the camera saw there."""
     axis = rig.lasers[0].axis
-    texts = rrb.Vertical(
-        text_view(at.NOW, "Now"),
-        text_view(at.FIT_VERDICT, "Verdict"),
-        table_view(at.FIT_WORST, "Worst"),
-        row_shares=[2, 6, 6],
+    texts = _texts(
+        live,
+        (text_view(at.NOW, "Now"), 2),
+        (text_view(at.FIT_VERDICT, "Verdict"), 6),
+        (table_view(at.FIT_WORST, "Worst"), 6),
     )
     charts = rrb.Horizontal(
         picture_view(f"{at.FIT_PICTURE}/{axis}", f"Residuals along {axis}"),
@@ -147,10 +165,9 @@ def _parameters() -> rrb.Container:
     return rrb.Horizontal(charts, texts, column_shares=[1, 1], name="Calibration: details")
 
 
-def _trial(rig: Rig, trial: TrialTab) -> rrb.Container:
-    texts = rrb.Vertical(
-        text_view(at.NOW, "Now"), table_view(at.trial_tables(trial.trial), "Tables"), row_shares=[1, 4]
-    )
+def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
+    tables = table_view(at.trial_tables(trial.trial), "Tables")
+    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (tables, 8))
     pictures = [picture_view(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
     charts = rrb.Horizontal(
         pictures[0] if len(pictures) == 1 else rrb.Tabs(*pictures, active_tab=0),
@@ -176,6 +193,13 @@ def _bench() -> rrb.Container:
         ),
         name="3D",
     )
+
+
+def _texts(live: bool, *parts: tuple[rrb.View, int]) -> rrb.Container:
+    """Column of texts with their shares of its height; above them the present task of a running session."""
+    all_parts = [(text_view(at.TASK, "Task"), 3), *parts] if live else list(parts)
+    views, shares = zip(*all_parts, strict=True)
+    return rrb.Vertical(*views, row_shares=list(shares))
 
 
 def _seen(rig: Rig, texts: rrb.Container) -> rrb.Container:

@@ -88,6 +88,6 @@ def _spots(row: CaptureRow, source: str, rig: Rig) -> ev.SpotsFound:
         return ev.SpotsFound(key=source, spots=(stated,) if seen else ())
     size = rig.camera.width_px, rig.camera.height_px
     laser = rig.lasers[rig.laser_ids.index(row.laser_id)]
-    found = find_row_spots(row, size, [prior_scanline(rig, laser)], 1)
+    found = find_row_spots(row, size, [prior_scanline(rig, laser)], 1, rig.noise.speckle_sd_px)
     spots = tuple(replace(spot, laser_id=row.laser_id) for spot in found.spots)
     return ev.SpotsFound(key=source, spots=spots, failures=tuple(found.failures))

@@ -6,6 +6,7 @@ Journal and frames are the record. A damaged or incomplete recording can be made
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from functools import singledispatchmethod
 from hashlib import sha256
 from pathlib import Path
@@ -17,6 +18,7 @@ from workbench.model import event as ev
 from workbench.model.arrays import FloatArray, Image
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError
+from workbench.model.prompt import Prompt
 from workbench.model.reading_text import reading_remark
 from workbench.model.rig import Rig
 from workbench.model.spot import Failure, Spot
@@ -24,9 +26,8 @@ from workbench.model.target import BoardTarget, FlatTarget, Placement
 from workbench.viewer import documents, fit, frame, scene, steps
 from workbench.viewer import entities as at
 from workbench.viewer.advice import AdviceView
-from workbench.viewer.blueprint import blueprint
+from workbench.viewer.blueprint import Phase, blueprint
 from workbench.viewer.captures import CaptureLog, capture_record
-from workbench.viewer.compaction import compact
 from workbench.viewer.crops import Crops
 from workbench.viewer.geometry import Geometry
 from workbench.viewer.stream import Moment, Stream
@@ -75,13 +76,18 @@ class RecordingConsumer:
             if not isinstance(record.event, ev.SessionStarted):
                 raise ValueError(f"expected session_started as the first record, got {record.event.kind}")
             port = None if self._watch is None else free_port()
-            stream = Stream(self._out, record.event.session, blueprint(self._rig), port)
+            stream = Stream(self._out, record.event.session, blueprint(self._rig, live=True), port)
             self._open = OpenRecording(stream, self._session_dir, self._rig)
             if self._watch is not None and port is not None:
                 self._watch(port)
         self._open.take(record)
         if isinstance(record.event, ev.SpotsFound):
             self._open.stream.flush()
+
+    def show_prompt(self, prompt: Prompt) -> None:
+        """Show an open prompt until the next event; it is not kept in the recording."""
+        if self._open is not None:
+            self._open.show_task(prompt)
 
     def close(self) -> None:
         """Flush and close the file; a second call has no effect."""
@@ -109,7 +115,6 @@ def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path
         with RecordingConsumer(session_dir, rig, partial) as consumer:
             for record in records:
                 consumer(record)
-        compact(partial)
         partial.replace(out)
     finally:
         partial.unlink(missing_ok=True)
@@ -133,6 +138,11 @@ class OpenRecording:
         self._frames: tuple[Image, Image | None] | None = None
         self._spots: tuple[Spot, ...] = ()
         self._title = ""
+        self._step = ""
+        self._calibrates = True
+        self._live = True
+        self._phase: Phase = "capture"
+        self._length = ""
         self._capture = 1
         self._steps = 0
 
@@ -177,12 +187,15 @@ class OpenRecording:
 
     @_log.register
     def _(self, event: ev.ProcedureStarted, moment: Moment) -> None:
+        self._length = event.length
         steps.lane(self.stream, at.LANE_PROCEDURE, event.procedure)
         steps.log_text(self.stream, f"{event.procedure}: {event.title} ({event.length})")
 
     @_log.register
     def _(self, event: ev.StepStarted, moment: Moment) -> None:
         self._title = event.title
+        self._step = f"**Step {event.index} of {self._length}: {event.title}**"
+        self.show_task()
         self._note(f"**{event.title}**")
         steps.lane(self.stream, at.LANE_STEP, event.title)
         if event.shots == 0:
@@ -195,13 +208,16 @@ class OpenRecording:
 
     @_log.register
     def _(self, event: ev.TargetPlaced, moment: Moment) -> None:
+        self.show_task()
         self._show_sensor()
         self._crops.log_none()
         frame.log_predicted(self.stream, self._expected(), self._colors)
+        frame.log_predicted_ellipses(self.stream, self._expected_ellipses(), self._colors)
         steps.log_text(self.stream, f"Target placed at {event.placement.standoff_mm:g} mm")
 
     @_log.register
     def _(self, event: ev.Answered, moment: Moment) -> None:
+        self.show_task()
         answer = event.answer
         text = answer.action if answer.value is None else answer.value
         steps.log_text(self.stream, f"{event.question} {text} {answer.reason or ''}".rstrip())
@@ -240,7 +256,7 @@ class OpenRecording:
         self._spots = event.spots
         if capture.laser_id in self._colors:
             self._captures.spots[event.key] = event.spots
-        frame.log_spots(self.stream, event.spots, self._colors)
+        frame.log_spots(self.stream, event.spots, self._colors, self._rig.camera.height_px)
         if capture.laser_id in self._colors:
             self._show_crops(event.spots, [capture.laser_id])
         saturated = any(Failure.SATURATED in spot.flags for spot in event.spots)
@@ -275,7 +291,8 @@ class OpenRecording:
         self._geometry = self._geometry.fitted(event.parameters)
         self._show_sensor()
         fit.log_fit(self.stream, event, self._captures, moment, self._colors)
-        self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "fit"))
+        self._calibrates = True
+        self._lay_out("fit")
         good = event.verdict == "accepted"
         steps.log_text(
             self.stream,
@@ -287,12 +304,16 @@ class OpenRecording:
 
     @_log.register
     def _(self, event: ev.CalibrationExported, moment: Moment) -> None:
+        with suppress(BadInputError):  # moved or edited since: the fit's values stay, without a covariance
+            self._geometry = self._geometry.calibrated(load_calibration(self._session_dir / event.path))
         steps.log_text(self.stream, f"Calibration written to {event.path}")
 
     @_log.register
     def _(self, event: ev.CalibrationLoaded, moment: Moment) -> None:
         calibration = load_calibration(self._session_dir / event.path)
         self._geometry = self._geometry.calibrated(calibration)
+        self._calibrates = False
+        self._lay_out("capture")
         self._show_sensor()
         steps.log_text(self.stream, event.text)
 
@@ -300,7 +321,7 @@ class OpenRecording:
     def _(self, event: ev.ReadingTaken, moment: Moment) -> None:
         self.stream.at(self._exposure)
         spots = frame.assigned(self._spots, event.lasers)
-        frame.log_assigned(self.stream, self._spots, spots, self._colors)
+        frame.log_assigned(self.stream, self._spots, spots, self._colors, self._rig.camera.height_px)
         self._show_crops(spots, [laser for laser in self._colors if laser not in event.left_off])
         if self._placement is not None:
             scene.log_ranged(self.stream, event.lasers, self._placement, self._geometry, self._colors)
@@ -314,7 +335,7 @@ class OpenRecording:
         trial = self._trial(event.trial)
         trial.finish(event)
         self.stream.at(moment)
-        self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "trial"))
+        self._lay_out("trial")
         steps.log_text(self.stream, f"Trial {event.trial} finished, {len(event.tables)} tables")
 
     @_log.register
@@ -323,6 +344,9 @@ class OpenRecording:
 
     @_log.register
     def _(self, event: ev.SessionFinished, moment: Moment) -> None:
+        self.stream.log_static_text(at.TASK, "Session ended")
+        self._live = False
+        self._lay_out(self._phase)
         for trial in self._trials:
             trial.stop()
         self.stream.at(moment)
@@ -338,8 +362,20 @@ class OpenRecording:
         trial = TrialView(self.stream, self._colors, name)
         trial.start()
         self._trials.append(trial)
-        self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "trial"))
+        self._lay_out("trial")
         return trial
+
+    def show_task(self, prompt: Prompt | None = None) -> None:
+        """Show the present step, and below it an open prompt."""
+        text = documents.task_text(self._step, prompt)
+        self.stream.log_static_text(at.TASK, text, rr.MediaType.MARKDOWN)
+
+    def _lay_out(self, phase: Phase) -> None:
+        """Send the layout with a screen in front."""
+        self._phase = phase
+        self.stream.lay_out(
+            blueprint(self._rig, tabs(self._trials), phase, calibrates=self._calibrates, live=self._live)
+        )
 
     def _note(self, markdown: str) -> None:
         self.stream.log(at.NOW, rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN))
@@ -361,6 +397,7 @@ class OpenRecording:
         off = None if event.off is None else frame.as_png(self._read(event.off))[1]
         self._frames = on, off
         frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
+        frame.log_ambient(self.stream, on if off is None else off)
 
     def _show_crops(self, spots: Sequence[Spot], lasers: Sequence[str]) -> None:
         if self._frames is not None:
@@ -374,6 +411,15 @@ class OpenRecording:
             return {}
         target, standoff_mm = placement.target, placement.standoff_mm
         return {laser: self._geometry.spot_on(laser, target, standoff_mm) for laser in self._colors}
+
+    def _expected_ellipses(self) -> dict[str, FloatArray]:
+        """Outline (N, 2), px, of the uncertainty of each expected spot; empty where it is not known."""
+        placement = self._placement
+        if placement is None or not isinstance(placement.target, FlatTarget | BoardTarget):
+            return {}
+        target, standoff_mm = placement.target, placement.standoff_mm
+        outlines = {laser: self._geometry.spot_ellipse(laser, target, standoff_mm) for laser in self._colors}
+        return {laser: outline for laser, outline in outlines.items() if outline is not None}
 
     def _read(self, frame: ev.FrameRef) -> bytes:
         path = self._session_dir / frame.path

@@ -13,10 +13,12 @@ from rich.console import Console
 from tests.support.records import finished, placed, records, started, taken
 from tests.support.running import two_laser_rig
 from tests.viewer import full_disk
+from tests.viewer.readback import Contents
 from workbench.cli import background as background_module
 from workbench.cli import exit as exit_
 from workbench.cli.background import Background
 from workbench.model import event as ev
+from workbench.model.prompt import Answer, Prompt
 from workbench.session.journal import read_journal
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
 
@@ -75,6 +77,21 @@ def test_a_file_that_cannot_be_written_is_an_incident(tmp_path: Path) -> None:
     with background, pytest.raises(ev.ConsumerFailedError) as failed:
         list(map(background, records((0, FIRST), (1, finished(1)))))
     assert failed.value.incident.of == "the recording"
+
+
+class Yes:
+    def ask(self, prompt: Prompt) -> Answer:
+        return Answer(value=prompt.do)
+
+
+def test_prompts_are_shown_in_the_recording_and_answered_by_the_person(tmp_path: Path) -> None:
+    path = tmp_path / RECORDING_FILE
+    recording = RecordingConsumer(tmp_path, two_laser_rig())
+    with Background(recording, path, Console(file=io.StringIO())) as background:
+        background(records((0, FIRST))[0])
+        assert background.asking(Yes()).ask(Prompt(key="k", do="Go on?")) == Answer(value="Go on?")
+    (text,) = Contents(path).static("/task", "TextDocument:text")[-1]
+    assert "Go on?" in text
 
 
 def test_a_finished_recording_is_compacted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

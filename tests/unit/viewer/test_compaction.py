@@ -17,7 +17,7 @@ from workbench.viewer.window import is_complete
 
 @pytest.fixture
 def recording(recorded: Recorded, tmp_path: Path) -> Path:
-    return shutil.copy(recorded.recording, tmp_path / "recording.rrd")
+    return Path(shutil.copy(recorded.recording, tmp_path / "recording.rrd"))
 
 
 def test_a_compacted_recording_is_smaller_and_has_the_same_rows_and_layout(
