@@ -80,7 +80,7 @@ def _check_rebuild(request: Request) -> None:
     if len(request.what) > 1 or request.without_mm or first.suffix in MADE_FROM_FILES:
         raise BadInputError(
             "--rebuild: expected one session, whose recording is made again from its frames and journal;"
-            " a recording of anything else is made anew each time, or has no frames beside it"
+            " a recording of anything else is made each time, or has no frames beside it"
         )
 
 

@@ -117,8 +117,8 @@ def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
         origin=at.STEP_LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
     )
     texts = _texts(live, (text_view(at.NOW, "Now"), 2), (log, 4))
-    lanes = rrb.Vertical(
-        rrb.StateTimelineView(origin=at.LANES, name="Steps"),
+    brightness = rrb.Vertical(
+        _series(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
         _series(at.AMBIENT, "Ambient light [DN]"),
         row_shares=[3, 2],
     )
@@ -129,10 +129,10 @@ def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
         active_tab=0,
     )
     curves = rrb.Horizontal(
-        _series(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
+        brightness,
         _series(f"{at.SPOTS}/{axis}", f"Spot position {axis[0]} [px]"),
         *([progress] if calibrates else []),
-        lanes,
+        rrb.StateTimelineView(origin=at.LANES, name="Steps"),
         column_shares=[3, 3, *([5] if calibrates else []), 4],
     )
     return rrb.Vertical(_seen(rig, texts), curves, row_shares=[5, 4], name="Captures")

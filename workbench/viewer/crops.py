@@ -38,6 +38,10 @@ _THIN = rr.Radius.ui_points(0.75)
 _NO_DOT = rr.Radius.ui_points(0.0)
 
 
+Capture = tuple[Image, Image | None, Sequence[Spot], Mapping[str, FloatArray]]
+"""Arguments of `Crops.take`."""
+
+
 @dataclass(frozen=True)
 class Crop:
     """Square of a frame around one laser's spot."""
@@ -79,8 +83,21 @@ class Crops:
             spots: spots with their lasers; others are ignored.
             expected: (2,) expected position, px, of the spot of each laser that was on.
         """
-        by_laser = {spot.laser_id: spot for spot in spots if spot.laser_id in self.colors}
         self.latest = {laser: replace(crop, earlier=True) for laser, crop in self.latest.items()}
+        self._add(on, off, spots, expected)
+        self._log()
+
+    def take_each(self, captures: Sequence[Capture]) -> None:
+        """Log the crops of captures of one laser each, in place of all earlier ones."""
+        self.latest.clear()
+        for capture in captures:
+            self._add(*capture)
+        self._log()
+
+    def _add(
+        self, on: Image, off: Image | None, spots: Sequence[Spot], expected: Mapping[str, FloatArray]
+    ) -> None:
+        by_laser = {spot.laser_id: spot for spot in spots if spot.laser_id in self.colors}
         for laser in self.colors:
             if laser not in by_laser and laser not in expected:
                 continue
@@ -89,7 +106,6 @@ class Crops:
             if np.isfinite(centre).all():
                 others = tuple(one for one in spots if one is not spot)
                 self.latest[laser] = _crop(on, off, centre, spot, others)
-        self._log()
 
     def _log(self) -> None:
         lasers = list(self.colors)

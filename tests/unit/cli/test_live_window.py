@@ -1,37 +1,32 @@
-"""Window of live readings: drawn beside the ranging, which never waits."""
+"""Window of live readings: drawn beside the measurement, which never waits."""
 
 from __future__ import annotations
 
 import threading
-from functools import cache
-from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tests.viewer.session import a_rig
 from workbench.cli import live_window
-from workbench.cli.live_window import LiveWindow, watching
-from workbench.ranging.acquire import acquire
-from workbench.ranging.ranger import Ranger, Reading
-from workbench.sensor.usable import load_usable
-from workbench.spots import Finding
-from workbench.viewer.ranger_view import RangerView, Shown
-
-FRAME = np.zeros((480, 640), np.uint8)
+from workbench.cli.live_window import watching
+from workbench.viewer.blueprint import blueprint
 
 
-class SlowView(RangerView):
-    """View that takes its first reading when it is released."""
+class Slow:
+    """View that draws its first reading when it is released."""
 
-    released = threading.Event()
-    began = threading.Event()
-    drawn: list[Reading]
+    def __init__(self) -> None:
+        self.began, self.released = threading.Event(), threading.Event()
+        self.drawn: list[int] = []
+        self.closed = False
 
-    def take(self, shown: Shown) -> None:
+    def take(self, shown: int) -> None:
         self.began.set()
         assert self.released.wait(10.0)
-        self.drawn.append(shown.reading)
+        self.drawn.append(shown)
+
+    def close(self) -> None:
+        self.closed = True
 
 
 @pytest.fixture
@@ -42,44 +37,27 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return ports
 
 
-@cache
-def a_ranger() -> Ranger:
-    return Ranger(load_usable(Path(__file__).parents[3] / "data/session-0.1.0/calibration.yaml"))
-
-
-def show(window: LiveWindow, reading: Reading) -> None:
-    window.show(reading, FRAME, FRAME, ())
-
-
-def reading() -> Reading:
-    return acquire(a_ranger(), "s", lambda _: Finding(()))
-
-
-def test_readings_that_come_while_one_is_drawn_are_skipped(
-    opened: list[int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    drawn: list[Reading] = []
-    monkeypatch.setattr(SlowView, "drawn", drawn, raising=False)
-    monkeypatch.setattr("workbench.viewer.ranger_view.RangerView", SlowView)
-    readings = [reading() for _ in range(4)]
-    with watching(a_rig(), a_ranger()) as window:
-        show(window, readings[0])
-        assert SlowView.began.wait(10.0)
-        for one in readings[1:]:
-            show(window, one)
-        SlowView.released.set()
-    assert drawn == readings[:2]
+def test_readings_that_come_while_one_is_drawn_are_skipped(opened: list[int]) -> None:
+    view = Slow()
+    with watching("live", blueprint(a_rig()), lambda _: view) as window:
+        window.show(1)
+        assert view.began.wait(10.0)
+        for number in (2, 3, 4):
+            window.show(number)
+        view.released.set()
+    assert view.drawn == [1, 2]
+    assert view.closed
     assert len(opened) == 1
 
 
 def test_a_view_that_hangs_does_not_keep_the_program(
     opened: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    hang = threading.Event()
+    view = Slow()
     monkeypatch.setattr(live_window, "PATIENCE_S", 0.05)
-    monkeypatch.setattr("workbench.viewer.ranger_view.RangerView.take", lambda *_: hang.wait(10.0))
-    with watching(a_rig(), a_ranger()) as window:
-        for _ in range(3):
-            show(window, reading())
-    hang.set()
+    with watching("live", blueprint(a_rig()), lambda _: view) as window:
+        for number in range(3):
+            window.show(number)
+    view.released.set()
+    assert not view.closed
     assert len(opened) == 1
