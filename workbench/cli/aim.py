@@ -22,7 +22,6 @@ from workbench.cli.live_window import LiveWindow, watching
 from workbench.cli.stopping import StopAfterCapture
 from workbench.cli.terminal_operator import choose_operator
 from workbench.devices.registry import load_bench_rig, open_bench
-from workbench.devices.watched import watched
 from workbench.model.errors import StoppedError
 from workbench.model.table import Table
 from workbench.procedure.aiming import Aim
@@ -72,7 +71,7 @@ def aim_lasers(request: AimRequest) -> None:
     # A bench may need a session folder for its files; aiming keeps none.
     with (
         tempfile.TemporaryDirectory(prefix="workbench-aim-") as folder,
-        watched(open_bench(rig, Path(folder) / "live")) as bench,
+        open_bench(rig, Path(folder) / "aim") as bench,
     ):
         person = choose_operator(
             request.no_input, Console(stderr=True, markup=False), lambda: stopping.reason, nullcontext
@@ -82,6 +81,7 @@ def aim_lasers(request: AimRequest) -> None:
             raise StoppedError(f"aborted by the operator: {answer.reason}")
         aim = Aim(rig, bench, calibration)
         aim.get_ready()
+        print_message("To change the standoff, type it in mm, then Enter. To end, type Ctrl-C.")
         with _window(aim) if request.view else nullcontext() as window, _output() as show:
             _aim_all(aim, request.standoff_mm, stopping, show, window)
     if stopping.reason is not None and stopping.reason != f"stopped by {signal.SIGINT.name}":
@@ -114,7 +114,7 @@ def _aim_all(
 def _title(aim: Aim) -> str:
     at = "standoff not known" if aim.standoff_mm is None else f"standoff {aim.standoff_mm:g} mm"
     exposure = "exposure of the rig file" if aim.exposure is None else aim.exposure.text
-    return f"{at}, {exposure}; another standoff: type it in mm, then Enter; end: Ctrl-C"
+    return f"{at}, {exposure}"
 
 
 class TypedNumbers:

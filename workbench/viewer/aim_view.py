@@ -100,7 +100,7 @@ def aim_layout(rig: Rig) -> rrb.Blueprint:
         rrb.TimeSeriesView(origin=WIDTH, name="Width of each spot [px]", time_ranges=last),
         rrb.TimeSeriesView(origin=PEAK, name="Peak of each spot [DN]", time_ranges=last),
     )
-    lower = rrb.Horizontal(layout.table_view(TABLE, "Table"), curves, column_shares=[5, 4])
+    lower = rrb.Horizontal(layout.table_view(TABLE, "Table"), curves, column_shares=[3, 2])
     return rrb.Blueprint(
         rrb.Vertical(upper, lower, row_shares=[4, 3]),
         rrb.BlueprintPanel(state="collapsed"),

@@ -23,6 +23,7 @@ from workbench.model.reading_text import reading_remark
 from workbench.model.rig import Rig
 from workbench.model.spot import Failure, Spot
 from workbench.model.target import BoardTarget, FlatTarget, Placement
+from workbench.session.frames import recent_image
 from workbench.viewer import documents, fit, frame, scene, steps
 from workbench.viewer import entities as at
 from workbench.viewer.advice import AdviceView
@@ -393,8 +394,8 @@ class OpenRecording:
         if not event.on.path:
             self._frames = None
             return
-        png, on = frame.as_png(self._read(event.on))
-        off = None if event.off is None else frame.as_png(self._read(event.off))[1]
+        png, on = self._image(event.on)
+        off = None if event.off is None else self._image(event.off)[1]
         self._frames = on, off
         frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
         frame.log_ambient(self.stream, on if off is None else off)
@@ -420,6 +421,12 @@ class OpenRecording:
         target, standoff_mm = placement.target, placement.standoff_mm
         outlines = {laser: self._geometry.spot_ellipse(laser, target, standoff_mm) for laser in self._colors}
         return {laser: outline for laser, outline in outlines.items() if outline is not None}
+
+    def _image(self, ref: ev.FrameRef) -> tuple[bytes, Image]:
+        """PNG file and image of a frame; raises the errors of `_read`."""
+        content = self._read(ref)
+        image = recent_image(ref.sha256)
+        return frame.as_png(content) if image is None else (content, image)
 
     def _read(self, frame: ev.FrameRef) -> bytes:
         path = self._session_dir / frame.path
