@@ -27,6 +27,8 @@ PLAYED_PER_SECOND = 10.0
 """Captures per second when a recording is played."""
 TEXT = rrb.archetypes.TextDocumentFormat(monospace=True, word_wrap=False)
 """Format of tables in plain text."""
+PER_PAGE = 2
+"""Number of charts of a trial without readings on one screen."""
 WHOLE_TIME = rrb.TimeAxis(
     view_range=rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
 )
@@ -41,6 +43,8 @@ class TrialTab:
     """Name of the step."""
     charts: tuple[tuple[str, str], ...]
     """Name and title of each chart."""
+    reads: bool = True
+    """Whether it takes readings; a simulation or a comparison of trials takes none."""
 
 
 def blueprint(
@@ -48,6 +52,7 @@ def blueprint(
     trials: Sequence[TrialTab] = (),
     phase: Phase = "capture",
     *,
+    captures: bool = True,
     calibrates: bool = True,
     live: bool = False,
 ) -> rrb.Blueprint:
@@ -57,17 +62,14 @@ def blueprint(
         rig: rig with the camera and the lasers.
         trials: trials so far, in order.
         phase: screen in front.
+        captures: whether the session captures; a simulation does not.
         calibrates: whether the session calibrates; if not, there are no screens of a fit.
         live: whether the session is running, so that the present step and the open prompt are shown.
     """
     fit = [_result(rig, live), _parameters()] if calibrates else []
-    screens = [
-        _captures(rig, calibrates, live),
-        *fit,
-        *(_trial(rig, one, live) for one in trials),
-        _bench(),
-    ]
-    front = {"capture": 0, "fit": 1, "trial": len(screens) - 2}[phase]
+    before = [_captures(rig, calibrates, live) if captures else _steps(live), *fit]
+    screens = [*before, *(_trial(rig, one, live) for one in trials), *([_bench()] if captures else [])]
+    front = {"capture": 0, "fit": 1, "trial": len(before) + len(trials) - 1}[phase]
     return rrb.Blueprint(
         rrb.Tabs(*screens, active_tab=front),
         rrb.BlueprintPanel(state="collapsed"),
@@ -113,10 +115,7 @@ def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
 def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
     """Screen of the technician: what is captured now, and how the uncertainty decreases."""
     axis = f"{rig.lasers[0].axis}_px"
-    log = rrb.TextLogView(
-        origin=at.STEP_LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
-    )
-    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (log, 4))
+    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (_log(), 4))
     brightness = rrb.Vertical(
         _series(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
         _series(at.AMBIENT, "Ambient light [DN]"),
@@ -136,6 +135,17 @@ def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
         column_shares=[3, 3, *([5] if calibrates else []), 4],
     )
     return rrb.Vertical(_seen(rig, texts), curves, row_shares=[5, 4], name="Captures")
+
+
+def _steps(live: bool) -> rrb.Container:
+    """Screen of a session without captures."""
+    lanes = rrb.StateTimelineView(origin=at.LANES, name="Steps")
+    return rrb.Horizontal(_texts(live, (_log(), 4)), lanes, name="Steps")
+
+
+def _log() -> rrb.View:
+    columns = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
+    return rrb.TextLogView(origin=at.STEP_LOG, name="Log", columns=columns)
 
 
 def _result(rig: Rig, live: bool) -> rrb.Container:
@@ -167,8 +177,16 @@ def _parameters() -> rrb.Container:
 
 def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
     tables = table_view(at.trial_tables(trial.trial), "Tables")
-    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (tables, 8))
     pictures = [picture_view(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
+    if not trial.reads:
+        shown = [*(_grid(pictures[n : n + PER_PAGE]) for n in range(0, len(pictures), PER_PAGE))]
+        return rrb.Horizontal(
+            shown[0] if len(shown) == 1 else rrb.Tabs(*shown, active_tab=0),
+            _texts(live, (tables, 8)),
+            column_shares=[3, 2],
+            name=trial.trial,
+        )
+    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (tables, 8))
     charts = rrb.Horizontal(
         pictures[0] if len(pictures) == 1 else rrb.Tabs(*pictures, active_tab=0),
         _series(
@@ -178,6 +196,11 @@ def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
         column_shares=[10, 5],
     )
     return rrb.Vertical(_seen(rig, texts), charts, row_shares=[5, 4], name=trial.trial)
+
+
+def _grid(pictures: Sequence[rrb.View]) -> rrb.Container:
+    """Charts one below the other, named by the first."""
+    return rrb.Vertical(*pictures, name=pictures[0].name)
 
 
 def _bench() -> rrb.Container:

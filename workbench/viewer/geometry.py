@@ -16,7 +16,7 @@ from workbench.model.calibration import Calibration
 from workbench.model.event import ParameterRecord
 from workbench.model.lens import LensName
 from workbench.model.rig import Rig
-from workbench.model.target import BoardTarget, FlatTarget
+from workbench.model.target import BoardTarget, FlatTarget, Placement
 from workbench.optics.lens_models import lens_model
 from workbench.optics.rays import RAY
 from workbench.optics.undistort import undistort
@@ -163,3 +163,20 @@ class Geometry:
         facing = 1.0 - slope_x * sight[:, 0] - slope_y * sight[:, 1]
         depth = (standoff_mm + self.offset_mm) / facing
         return np.column_stack([sight * depth[:, None], depth])
+
+
+def expected_spots(geometry: Geometry, placement: Placement | None) -> dict[str, FloatArray]:
+    """Expected spot (2,), px, of each laser on a flat target; empty without one."""
+    if placement is None or not isinstance(placement.target, FlatTarget | BoardTarget):
+        return {}
+    target, standoff_mm = placement.target, placement.standoff_mm
+    return {laser: geometry.spot_on(laser, target, standoff_mm) for laser in geometry.rays}
+
+
+def expected_ellipses(geometry: Geometry, placement: Placement | None) -> dict[str, FloatArray]:
+    """Outline (N, 2), px, of the uncertainty of each expected spot; empty where it is not known."""
+    if placement is None or not isinstance(placement.target, FlatTarget | BoardTarget):
+        return {}
+    target, standoff_mm = placement.target, placement.standoff_mm
+    outlines = {laser: geometry.spot_ellipse(laser, target, standoff_mm) for laser in geometry.rays}
+    return {laser: outline for laser, outline in outlines.items() if outline is not None}

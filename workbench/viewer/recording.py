@@ -8,29 +8,28 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from functools import singledispatchmethod
-from hashlib import sha256
 from pathlib import Path
 from types import TracebackType
 
 import rerun as rr
 
 from workbench.model import event as ev
-from workbench.model.arrays import FloatArray, Image
+from workbench.model.arrays import Image
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError
 from workbench.model.prompt import Prompt
 from workbench.model.reading_text import reading_remark
 from workbench.model.rig import Rig
 from workbench.model.spot import Failure, Spot
-from workbench.model.target import BoardTarget, FlatTarget, Placement
-from workbench.session.frames import recent_image
+from workbench.model.target import Placement
 from workbench.viewer import documents, fit, frame, scene, steps
 from workbench.viewer import entities as at
 from workbench.viewer.advice import AdviceView
 from workbench.viewer.blueprint import Phase, blueprint
 from workbench.viewer.captures import CaptureLog, capture_record
 from workbench.viewer.crops import Crops
-from workbench.viewer.geometry import Geometry
+from workbench.viewer.geometry import Geometry, expected_ellipses, expected_spots
+from workbench.viewer.stored_frames import StoredFrames
 from workbench.viewer.stream import Moment, Stream
 from workbench.viewer.trial import TrialView, tabs
 from workbench.viewer.window import free_port
@@ -77,13 +76,15 @@ class RecordingConsumer:
             if not isinstance(record.event, ev.SessionStarted):
                 raise ValueError(f"expected session_started as the first record, got {record.event.kind}")
             port = None if self._watch is None else free_port()
-            stream = Stream(self._out, record.event.session, blueprint(self._rig, live=True), port)
+            stream = Stream(
+                self._out, record.event.session, blueprint(self._rig, calibrates=False, live=True), port
+            )
             self._open = OpenRecording(stream, self._session_dir, self._rig)
             if self._watch is not None and port is not None:
                 self._watch(port)
         self._open.take(record)
         if isinstance(record.event, ev.SpotsFound):
-            self._open.stream.flush()
+            self._open.stream.check_written()
 
     def show_prompt(self, prompt: Prompt) -> None:
         """Show an open prompt until the next event; it is not kept in the recording."""
@@ -127,6 +128,7 @@ class OpenRecording:
     def __init__(self, stream: Stream, session_dir: Path, rig: Rig) -> None:
         self.stream = stream
         self._session_dir = session_dir
+        self._stored = StoredFrames(session_dir)
         self._rig = rig
         self._colors = at.laser_colors(rig.laser_ids)
         self._geometry = Geometry.of_rig(rig)
@@ -140,7 +142,7 @@ class OpenRecording:
         self._spots: tuple[Spot, ...] = ()
         self._title = ""
         self._step = ""
-        self._calibrates = True
+        self._calibrates = False
         self._live = True
         self._phase: Phase = "capture"
         self._length = ""
@@ -212,8 +214,10 @@ class OpenRecording:
         self.show_task()
         self._show_sensor()
         self._crops.log_none()
-        frame.log_predicted(self.stream, self._expected(), self._colors)
-        frame.log_predicted_ellipses(self.stream, self._expected_ellipses(), self._colors)
+        frame.log_predicted(self.stream, expected_spots(self._geometry, self._placement), self._colors)
+        frame.log_predicted_ellipses(
+            self.stream, expected_ellipses(self._geometry, self._placement), self._colors
+        )
         steps.log_text(self.stream, f"Target placed at {event.placement.standoff_mm:g} mm")
 
     @_log.register
@@ -243,6 +247,9 @@ class OpenRecording:
     def _(self, event: ev.CaptureTaken, moment: Moment) -> None:
         self._exposure = Moment(moment.capture, moment.step, event.on.time_ns, event.standoff_mm)
         self._captures.add(event, self._placement, self._exposure)
+        if event.purpose == "calibration" and not self._calibrates:
+            self._calibrates = True
+            self._lay_out("capture")
         self.stream.at(self._exposure)
         self._show_frame(event)
         self.stream.log(at.CAPTURE_RECORD, rr.AnyValues(drop_untyped_nones=True, **capture_record(event)))
@@ -313,8 +320,6 @@ class OpenRecording:
     def _(self, event: ev.CalibrationLoaded, moment: Moment) -> None:
         calibration = load_calibration(self._session_dir / event.path)
         self._geometry = self._geometry.calibrated(calibration)
-        self._calibrates = False
-        self._lay_out("capture")
         self._show_sensor()
         steps.log_text(self.stream, event.text)
 
@@ -375,7 +380,14 @@ class OpenRecording:
         """Send the layout with a screen in front."""
         self._phase = phase
         self.stream.lay_out(
-            blueprint(self._rig, tabs(self._trials), phase, calibrates=self._calibrates, live=self._live)
+            blueprint(
+                self._rig,
+                tabs(self._trials),
+                phase,
+                captures=bool(self._captures.numbers),
+                calibrates=self._calibrates,
+                live=self._live,
+            )
         )
 
     def _note(self, markdown: str) -> None:
@@ -394,53 +406,17 @@ class OpenRecording:
         if not event.on.path:
             self._frames = None
             return
-        png, on = self._image(event.on)
-        off = None if event.off is None else self._image(event.off)[1]
+        png, on = self._stored.image(event.on)
+        off = None if event.off is None else self._stored.image(event.off)[1]
         self._frames = on, off
         frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
         frame.log_ambient(self.stream, on if off is None else off)
 
     def _show_crops(self, spots: Sequence[Spot], lasers: Sequence[str]) -> None:
         if self._frames is not None:
-            expected = {laser: spot for laser, spot in self._expected().items() if laser in lasers}
+            expected = {
+                laser: spot
+                for laser, spot in expected_spots(self._geometry, self._placement).items()
+                if laser in lasers
+            }
             self._crops.take(*self._frames, spots, expected)
-
-    def _expected(self) -> dict[str, FloatArray]:
-        """Expected spot (2,), px, of each laser on a flat at the present placement; empty without one."""
-        placement = self._placement
-        if placement is None or not isinstance(placement.target, FlatTarget | BoardTarget):
-            return {}
-        target, standoff_mm = placement.target, placement.standoff_mm
-        return {laser: self._geometry.spot_on(laser, target, standoff_mm) for laser in self._colors}
-
-    def _expected_ellipses(self) -> dict[str, FloatArray]:
-        """Outline (N, 2), px, of the uncertainty of each expected spot; empty where it is not known."""
-        placement = self._placement
-        if placement is None or not isinstance(placement.target, FlatTarget | BoardTarget):
-            return {}
-        target, standoff_mm = placement.target, placement.standoff_mm
-        outlines = {laser: self._geometry.spot_ellipse(laser, target, standoff_mm) for laser in self._colors}
-        return {laser: outline for laser, outline in outlines.items() if outline is not None}
-
-    def _image(self, ref: ev.FrameRef) -> tuple[bytes, Image]:
-        """PNG file and image of a frame; raises the errors of `_read`."""
-        content = self._read(ref)
-        image = recent_image(ref.sha256)
-        return frame.as_png(content) if image is None else (content, image)
-
-    def _read(self, frame: ev.FrameRef) -> bytes:
-        path = self._session_dir / frame.path
-        try:
-            png = path.read_bytes()
-        except OSError as error:
-            raise BadInputError(
-                f"{path}: the frame of a journal record cannot be read ({error.strerror}); "
-                "restore it from a copy of the session folder"
-            ) from None
-        # The viewer would show a damaged picture, or none, without an error.
-        if frame.sha256 and sha256(png).hexdigest() != frame.sha256:
-            raise BadInputError(
-                f"{path}: the frame has changed since it was captured (expected sha256"
-                f" {frame.sha256[:12]}...); restore it from a copy of the session folder"
-            )
-        return png

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import copy
@@ -17,6 +18,8 @@ from workbench.viewer.entities import APPLICATION, CAPTURE, STANDOFF, STEP, WALL
 from workbench.viewer.window import LOOPBACK
 
 FLUSH_SECONDS = 20.0
+STALL_S = 60.0
+"""Longest time between checks for which a served recording may not grow; a viewer that hangs delays it."""
 SERVER_MEMORY = "256MiB"
 """Memory that the server keeps for a viewer that has not yet come."""
 
@@ -49,7 +52,10 @@ class Stream:
     def __init__(
         self, path: Path | None, session: str, layout: rrb.Blueprint, port: int | None = None
     ) -> None:
-        self._path = path
+        self._path, self._served = path, port is not None
+        self._size = 0
+        self._stalled_since: float | None = None
+        """Time of the first check at which the file had its present size."""
         self._recording = rr.RecordingStream(
             APPLICATION,
             recording_id=session,
@@ -100,6 +106,24 @@ class Stream:
         """Set properties of the recording."""
         properties = rr.AnyValues(drop_untyped_nones=True, **values)
         self._recording.send_property(f"{self._prefix.replace('/', '_')}{name}", properties)
+
+    def check_written(self) -> None:
+        """Raise if the file cannot be written; called now and then, after something was logged.
+
+        A served stream is not flushed, which would wait for a viewer that hangs: its file must grow.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        if not self._served or self._path is None:
+            self.flush()
+            return
+        size, now = self._path.stat().st_size, time.monotonic()
+        if size != self._size or self._stalled_since is None:
+            self._size, self._stalled_since = size, None if size != self._size else now
+        elif now - self._stalled_since > STALL_S:
+            cause = f"the recording has not grown for {STALL_S:g} s; check the free space of the disk"
+            raise OSError(EIO, cause, str(self._path))
 
     def flush(self) -> None:
         """Write buffered data.

@@ -156,3 +156,17 @@ def test_the_task_is_shown_on_the_screens_of_a_running_session_only() -> None:
         found = by_screen(root)
         for name in ("Captures", "Calibration: which standoff?", "accuracy", "round"):
             assert ("task" in {view.origin for view in found[name]}) == live
+
+
+def test_a_session_without_captures_has_no_frames() -> None:
+    """As a simulation, whose charts fill the screen."""
+    charts = tuple((f"c{n}", f"Chart {n}") for n in range(5))
+    trials = [TrialTab("simulation", charts, reads=False)]
+    root = blueprint(a_rig(), trials, "trial", captures=False, calibrates=False).root_container
+    assert isinstance(root, rrb.Tabs)
+    found = by_screen(root)
+    assert list(found) == ["Steps", "simulation"]
+    assert root.active_tab == 1
+    origins = {str(view.origin) for views in found.values() for view in views}
+    assert origins >= {f"trials/simulation/pictures/{name}" for name, _ in charts}
+    assert not origins & {"frame", "crops", "bench", "spots/peak_dn"}

@@ -171,6 +171,19 @@ def test_a_session_with_an_existing_calibration_has_no_screens_of_a_fit(
     assert Contents(out).values("/frame/predicted_ellipses", "LineStrips2D:strips")
 
 
+def test_a_simulation_has_no_screens_of_captures(recorded: Recorded, tmp_path: Path) -> None:
+    first, *others = recorded.records
+    kinds = (ev.ProcedureStarted, ev.StepStarted, ev.TrialFinished, ev.SessionFinished)
+    (start,) = (n for n, record in enumerate(others) if _starts_trial(record.event))
+    kept = [record for record in others[start:] if isinstance(record.event, kinds)]
+    out = recording_of(recorded, [first, *kept], tmp_path / "simulation.rrd")
+    contents, views = Contents(out), layout_views(out)
+    assert front_tab(out) == TRIAL
+    assert {view.origin for view in views} >= {f"/trials/{TRIAL}/tables", "/steps/log"}
+    for view in views:
+        assert has_content(contents, view, "capture", 1), view.name
+
+
 def test_the_open_prompt_is_shown_until_the_next_event(recorded: Recorded, tmp_path: Path) -> None:
     prompt = Prompt(key="k", do="Place the target at 200 mm.")
     out = tmp_path / "part.rrd"
