@@ -29,7 +29,8 @@ from workbench.model.chart import laser_colors
 from workbench.model.errors import BadInputError
 from workbench.model.fit_charts import residual_chart
 from workbench.model.prompt import Prompt
-from workbench.viewer.recording import OpenRecording, RecordingConsumer, rebuild
+from workbench.viewer.open_recording import OpenRecording
+from workbench.viewer.recording import RecordingConsumer, rebuild
 from workbench.viewer.scene import BEYOND, DRAWN_DEPTH_MM
 from workbench.viewer.table_text import table_text
 
