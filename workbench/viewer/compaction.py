@@ -24,8 +24,10 @@ def compact(recording: Path) -> bool:
     A compaction that fails leaves the recording as it is.
 
     Returns:
-        Whether the recording was replaced.
+        Whether the recording was replaced; not where there is none, or an incomplete one.
     """
+    if not is_complete(recording):
+        return False
     compacted = recording.with_name(recording.name + ".compacted")
     try:
         command = [str(viewer_executable()), "rrd", "optimize", str(recording), "-o", str(compacted)]

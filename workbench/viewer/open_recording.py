@@ -108,14 +108,14 @@ class OpenRecording:
 
     @_log.register
     def _(self, event: ev.ProcedureStarted, moment: Moment) -> None:
-        self._length = event.length
+        self._length = f" of {event.steps}"
         steps.lane(self.stream, at.LANE_PROCEDURE, event.procedure)
         steps.log_text(self.stream, f"{event.procedure}: {event.title} ({event.length})")
 
     @_log.register
     def _(self, event: ev.StepStarted, moment: Moment) -> None:
         self._title = event.title
-        self._step = f"**Step {event.index} of {self._length}: {event.title}**"
+        self._step = f"**Step {event.index}{self._length}: {event.title}**"
         self.show_task()
         self._note(f"**{event.title}**")
         steps.lane(self.stream, at.LANE_STEP, event.title)

@@ -33,11 +33,12 @@ def test_a_compacted_recording_is_smaller_and_has_the_same_rows_and_layout(
     assert [path.name for path in recording.parent.iterdir()] == ["recording.rrd"]
 
 
-def test_no_recording_is_left_alone(tmp_path: Path) -> None:
+@pytest.mark.parametrize("content", [b"no recording", b"neither, with a mark at its end: RRF2FOOT"])
+def test_no_recording_is_left_alone(tmp_path: Path, content: bytes) -> None:
     damaged = tmp_path / "recording.rrd"
-    damaged.write_bytes(b"no recording")
+    damaged.write_bytes(content)
     assert not compact(damaged)
-    assert damaged.read_bytes() == b"no recording"
+    assert damaged.read_bytes() == content
     assert list(tmp_path.iterdir()) == [damaged]
 
 

@@ -198,7 +198,7 @@ def test_the_open_prompt_is_shown_until_the_next_event(recorded: Recorded, tmp_p
     texts = [text for (text,) in Contents(out).static("/task", "TextDocument:text")]
     asked = [prompt.do in text for text in texts]
     assert asked == [False, True, False]
-    assert "Capture at 200 mm" in texts[0]
+    assert texts[0] == "**Step 1 of 6: Capture at 200 mm**"
     assert texts[0] == texts[2]
 
 
