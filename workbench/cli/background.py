@@ -17,7 +17,6 @@ from workbench.cli import exit as exit_
 from workbench.devices.protocols import Operator
 from workbench.model import event as ev
 from workbench.model.prompt import Answer, Prompt
-from workbench.viewer.compaction import compact
 from workbench.viewer.recording import RecordingConsumer
 
 PATIENCE_S = 30.0
@@ -70,7 +69,6 @@ class Background:
             exit_.hung = True
             self._given_up = "its file cannot be written"
         if self._given_up is None:
-            compact(self._path)
             return
         self._path.unlink(missing_ok=True)
         with suppress(OSError):

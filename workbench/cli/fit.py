@@ -43,7 +43,6 @@ from workbench.report.terminal_table import TerminalTable
 from workbench.session.caller import now, operator
 from workbench.session.files import check_output
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
-from workbench.viewer.compaction import compact
 
 MOST_REASONS = 3
 """Largest number of reasons that a refusal prints."""
@@ -136,7 +135,6 @@ def fit_captures(request: Request, as_json: bool) -> None:
         write_calibration(request.output, calibration)
     if request.recording is not None:  # of a refused fit, too: to see why
         record_fit(found, request.source.stem, request.recording)
-        compact(request.recording)
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))
     _print_tables(fitted, assessment)

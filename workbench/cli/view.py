@@ -13,7 +13,6 @@ from workbench.model.errors import BadInputError
 from workbench.session.journal import is_running, read_journal
 from workbench.session.manifest import load_session_rig
 from workbench.session.state import effective
-from workbench.viewer.compaction import compact
 from workbench.viewer.window import is_complete, open_viewer, serve
 
 if TYPE_CHECKING:  # loads Rerun
@@ -89,14 +88,11 @@ def _of_session(session: Path, folder: Path, *, rebuild: bool) -> Path:
 
     That of a running session is made in `folder`: the session itself is still writing its own.
     """
-    running = is_running(session)
-    recording = (folder if running else session) / RECORDING_FILE
+    recording = (folder if is_running(session) else session) / RECORDING_FILE
     if rebuild or not is_complete(recording):
         from workbench.viewer.recording import rebuild as made_again
 
         made_again(session, load_session_rig(session), effective(read_journal(session)), recording)
-        if not running:
-            compact(recording)
     return recording
 
 

@@ -8,6 +8,7 @@ from functools import singledispatchmethod
 from pathlib import Path
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from workbench.model import event as ev
 from workbench.model.arrays import Image
@@ -297,15 +298,18 @@ class OpenRecording:
     def _lay_out(self, phase: Phase) -> None:
         """Send the layout with a screen in front."""
         self._phase = phase
-        self.stream.lay_out(
-            blueprint(
-                self._rig,
-                tabs(self._trials),
-                phase,
-                captures=bool(self._captures.numbers),
-                calibrates=self._calibrates,
-                live=self._live,
-            )
+        self.stream.lay_out(self.layout)
+
+    @property
+    def layout(self) -> rrb.Blueprint:
+        """Present layout."""
+        return blueprint(
+            self._rig,
+            tabs(self._trials),
+            self._phase,
+            captures=bool(self._captures.numbers),
+            calibrates=self._calibrates,
+            live=self._live,
         )
 
     def _note(self, markdown: str) -> None:

@@ -14,6 +14,7 @@ from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.viewer import entities as at
 from workbench.viewer.blueprint import blueprint
+from workbench.viewer.compaction import compact
 from workbench.viewer.open_recording import OpenRecording
 from workbench.viewer.stream import Stream
 from workbench.viewer.window import free_port
@@ -67,10 +68,15 @@ class RecordingConsumer:
             self._open.show_task(prompt)
 
     def close(self) -> None:
-        """Flush and close the file; a second call has no effect."""
+        """Flush, close and compact the file; a second call has no effect.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
         recording, self._open = self._open, None
         if recording is not None:
             recording.stream.close()
+            compact(self._out, recording.layout)
 
     def __enter__(self) -> RecordingConsumer:
         return self

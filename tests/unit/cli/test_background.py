@@ -14,7 +14,6 @@ from tests.support.records import finished, placed, records, started, taken
 from tests.support.running import two_laser_rig
 from tests.viewer import full_disk
 from tests.viewer.readback import Contents
-from workbench.cli import background as background_module
 from workbench.cli import exit as exit_
 from workbench.cli.background import Background
 from workbench.model import event as ev
@@ -92,11 +91,3 @@ def test_prompts_are_shown_in_the_recording_and_answered_by_the_person(tmp_path:
         assert background.asking(Yes()).ask(Prompt(key="k", do="Go on?")) == Answer(value="Go on?")
     (text,) = Contents(path).static("/task", "TextDocument:text")[-1]
     assert "Go on?" in text
-
-
-def test_a_finished_recording_is_compacted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    compacted: list[Path] = []
-    monkeypatch.setattr(background_module, "compact", compacted.append)
-    recorded(tmp_path, FIRST, LAST)
-    recorded(tmp_path, FIRST, ev.SetAside(key="a", from_n=1, reason="snr"), LAST)
-    assert compacted == [tmp_path / RECORDING_FILE]
