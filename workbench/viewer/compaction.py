@@ -17,7 +17,7 @@ from rerun.chunk import OptimizationProfile, RrdReader
 from workbench.viewer.window import is_complete
 
 MOST_BYTES = 1 << 29
-"""Largest recording that is compacted, as of 3000 captures of 640 x 480 px. It takes six times that memory."""
+"""Largest recording to compact, as of 3000 captures of 640 x 480 px; it takes six times the memory."""
 FLUSH_SECONDS = 20.0
 
 
