@@ -329,7 +329,7 @@ class OpenRecording:
             self._frames = None
             return
         png, on = self._stored.image(event.on)
-        off = None if event.off is None else self._stored.image(event.off)[1]
+        off = None if event.off is None else self._stored.pixels(event.off)
         self._frames = on, off
         frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
         frame.log_ambient(self.stream, on if off is None else off)

@@ -29,6 +29,11 @@ class StoredFrames:
         image = recent_image(ref.sha256)
         return as_png(content) if image is None else (content, image)
 
+    def pixels(self, ref: FrameRef) -> Image:
+        """Image of a frame, without reading its file where it was stored just now; errors as of `image`."""
+        image = recent_image(ref.sha256)
+        return self.image(ref)[1] if image is None else image
+
     def _read(self, ref: FrameRef) -> bytes:
         path = self.session_dir / ref.path
         try:

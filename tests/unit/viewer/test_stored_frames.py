@@ -24,6 +24,7 @@ def test_a_frame_is_its_file_and_its_image(
     content, image = StoredFrames(tmp_path).image(ref)
     assert content == (tmp_path / ref.path).read_bytes()
     np.testing.assert_array_equal(image, IMAGE)
+    np.testing.assert_array_equal(StoredFrames(tmp_path).pixels(ref), IMAGE)
 
 
 def test_a_frame_that_is_missing_or_has_changed_is_named(tmp_path: Path) -> None:
