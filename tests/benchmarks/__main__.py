@@ -11,7 +11,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from tests.benchmarks import accuracy, calibration, capture, detection, ranging, speckle, speed
+from tests.benchmarks import accuracy, calibration, capture, detection, ranging, recording, speckle, speed
 
 RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 
@@ -24,7 +24,7 @@ def main() -> None:
         "spots": (speed.lines, detection.lines, accuracy.lines, speckle.lines),
         "calibration": (calibration.lines,),
         "ranging": (ranging.lines,),
-        "capture": (capture.lines,),
+        "capture": (capture.lines, recording.lines),
     }
     for subject, tables in subjects.items():
         with (RESULTS / f"{today}-{subject}.txt").open("w") as file:

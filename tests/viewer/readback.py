@@ -59,8 +59,14 @@ class Contents:
         return sorted(entity for entity in self._rows if f"{entity}/".startswith(f"{origin}/"))
 
     def everything(self) -> dict[str, list[str]]:
-        """All rows, without the ids that differ from one writing to the next."""
-        return {entity: sorted(_comparable(row) for row in rows) for entity, rows in self._rows.items()}
+        """All rows, without the ids that differ from one writing to the next.
+
+        Static rows are one row with the values that are shown: a compacted recording has no others.
+        """
+        return {
+            entity: sorted(map(_comparable, [*_shown_static(rows), *(r for r in rows if not _is_static(r))]))
+            for entity, rows in self._rows.items()
+        }
 
     def _on(self, entity: str, component: str, timeline: str) -> list[tuple[Any, Row]]:
         rows = [row for row in self._rows[entity] if timeline in row and row.get(component) is not None]
@@ -142,6 +148,14 @@ def _row_id(row: Row) -> bytes:
 
 def _is_static(row: Row) -> bool:
     return not any(timeline in row for timeline in TIMELINES)
+
+
+def _shown_static(rows: list[Row]) -> list[Row]:
+    """One row with the latest value of each static component, if there is any."""
+    shown: Row = {}
+    for row in sorted(filter(_is_static, rows), key=_row_id):
+        shown |= {name: value for name, value in row.items() if value is not None}
+    return [shown] if shown else []
 
 
 def _comparable(row: Row) -> str:

@@ -12,7 +12,7 @@ from workbench.cli.stopping import ignore_signals
 from workbench.model.errors import StoppedError
 
 hung = False
-"""Whether a thread hangs in a library, for which the interpreter would wait at the end."""
+"""Whether a thread hangs in a library, or may, for which the interpreter would wait at the end."""
 
 
 def exit_program(code: int, at_once: bool = False) -> NoReturn:

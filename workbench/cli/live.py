@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import tempfile
 import time
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from workbench.cli.console import print_message
 from workbench.cli.live_window import LiveWindow, watching
@@ -17,12 +18,19 @@ from workbench.cli.stopping import StopAfterCapture
 from workbench.devices.protocols import Bench
 from workbench.devices.registry import load_bench_rig, open_bench
 from workbench.devices.watched import watched
+from workbench.model.arrays import Image
 from workbench.model.errors import StoppedError
+from workbench.model.rig import Rig
+from workbench.model.spot import Spot
 from workbench.model.target import Placement
 from workbench.ranging.live import LiveRanger, latency_text
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.report.readings import reading_line
 from workbench.sensor.usable import check_same_sensor, load_usable
+
+if TYPE_CHECKING:  # loads Rerun
+    from workbench.viewer.ranger_view import Shown
+    from workbench.viewer.stream import Stream
 
 FIXED_EXPOSURE = (
     "the camera keeps the exposure of the rig file; a reading with a clipped spot has a note; `workbench"
@@ -65,7 +73,7 @@ def range_live(request: LiveRequest, as_json: bool) -> None:
         watched(open_bench(rig, Path(folder) / "live")) as bench,
     ):
         ranger = Ranger(calibration)
-        with watching(rig, ranger) if request.view else nullcontext() as window:
+        with _window(rig, ranger) if request.view else nullcontext() as window:
             _read_all(bench, ranger, request, as_json, stopping, window)
 
 
@@ -75,7 +83,7 @@ def _read_all(
     request: LiveRequest,
     as_json: bool,
     stopping: StopAfterCapture,
-    window: LiveWindow | None,
+    window: LiveWindow[Shown] | None,
 ) -> None:
     live = LiveRanger(ranger, bench)
     live.warm_up()
@@ -93,12 +101,29 @@ def _read_all(
             reading = live.read(f"{number}")
             _show(reading, as_json)
             if window is not None and live.seen is not None:
-                window.show(reading, *live.seen)
+                _draw(window, reading, *live.seen)
             if number == 0 and reading.status == "no_points":
                 print_message(f"hint: {_hint_without_spot(request, bench.virtual)}")
     finally:
         if request.stats:
             print_message(latency_text(live.latencies_s, time.monotonic() - began))
+
+
+def _window(rig: Rig, ranger: Ranger) -> AbstractContextManager[LiveWindow[Shown]]:
+    from workbench.viewer.ranger_view import RangerView, ranger_layout
+
+    def view(stream: Stream) -> RangerView:
+        return RangerView(stream, rig, ranger)
+
+    return watching(f"range {rig.rig}", ranger_layout(rig), view)
+
+
+def _draw(
+    window: LiveWindow[Shown], reading: Reading, on: Image, off: Image, spots: tuple[Spot, ...]
+) -> None:
+    from workbench.viewer.ranger_view import Shown
+
+    window.show(Shown(reading, on, off, spots))
 
 
 def _hint_without_spot(request: LiveRequest, virtual: bool) -> str:

@@ -256,6 +256,29 @@ def range_(
         range_live(LiveRequest(rig, calibration, readings, standoff, stats, view), json)
 
 
+@app.command()
+def aim(
+    rig: Annotated[Path, typer.Option(help="Rig file.")],
+    standoff: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            parser=millimetres(1),
+            help="Standoff of the target; another one is typed while the command runs.",
+        ),
+    ] = None,
+    calibration: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Compare with this calibration, not the rig file.")
+    ] = None,
+    no_input: NoInput = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the spots in the Rerun viewer.")] = False,
+) -> None:
+    """Aim and focus lasers: place, width, peak and direction of each spot, until Ctrl-C."""
+    from workbench.cli.aim import AimRequest, aim_lasers
+
+    aim_lasers(AimRequest(rig, calibration, standoff, no_input, view))
+
+
 class TrialKind(StrEnum):
     """Kinds of statistics of `workbench trial`."""
 

@@ -153,7 +153,9 @@ def session_interface(
     recording = RecordingConsumer(session_dir, plan.rig, watch=watched)
     file = session_dir / RECORDING_FILE
     with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
-        person = choose_operator(answers.no_input, console, lambda: stop.reason, terminal.quiet)
+        person = beside.asking(
+            choose_operator(answers.no_input, console, lambda: stop.reason, terminal.quiet)
+        )
         operator = person if script is None else replace(script, other=person)
         writer = FigureWriter(session_dir, laser_colors(plan.rig.laser_ids))
         figures = FaultTolerantConsumer(writer, "drawing figures", console)

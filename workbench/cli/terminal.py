@@ -154,7 +154,11 @@ class FaultTolerantConsumer:
         self._name, self._console = name, console
 
     def __call__(self, record: ev.Record) -> None:
-        """Pass the record on, unless the consumer has failed before."""
+        """Pass the record on, unless the consumer has failed before.
+
+        Raises:
+            ConsumerFailedError: it fails now.
+        """
         if self._consumer is None:
             return
         try:
@@ -166,6 +170,7 @@ class FaultTolerantConsumer:
             with suppress(OSError):
                 self._console.print(Text(f"warning: {self._name} failed: {error}", style="yellow"))
                 self._console.print("Captures continue.")
+            raise ev.ConsumerFailedError(self._name, str(error)) from error
 
 
 def about(seconds: float) -> str:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:  # loads Rerun
     from workbench.viewer.comparison import Source
 
 RECORDING_FILE = "recording.rrd"
+MADE_FROM_FILES = {".rrd", ".yaml", ".yml", ".csv"}
+"""Endings of files that are shown; anything else is a session."""
 MOST_SIDES = 2
 """Number of sessions that fit side by side on a screen."""
 
@@ -59,6 +61,8 @@ def recording_of(request: Request, folder: Path) -> Path:
     if len(request.what) > MOST_SIDES:
         raise BadInputError(f"expected one or two sessions or captures files, got {len(request.what)}")
     first = request.what[0]
+    if request.rebuild:
+        _check_rebuild(request)
     if len(request.what) == 1 and not request.without_mm:
         if first.suffix == ".rrd":
             return first
@@ -68,6 +72,15 @@ def recording_of(request: Request, folder: Path) -> Path:
             return _of_captures(first, request, folder)
         return _of_session(find_session(first, request.sessions), folder, rebuild=request.rebuild)
     return _side_by_side(request, folder)
+
+
+def _check_rebuild(request: Request) -> None:
+    first = request.what[0]
+    if len(request.what) > 1 or request.without_mm or first.suffix in MADE_FROM_FILES:
+        raise BadInputError(
+            "--rebuild: expected one session, whose recording is made again from its frames and journal;"
+            " a recording of anything else is made each time, or has no frames beside it"
+        )
 
 
 def _of_session(session: Path, folder: Path, *, rebuild: bool) -> Path:

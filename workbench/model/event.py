@@ -357,6 +357,16 @@ class CalibrationLoaded(FileModel):
         return f"calibration {self.file}, {made}, {age}"
 
 
+class Incident(FileModel):
+    """A view of the session has failed. Captures continue, because frames and journal are the record."""
+
+    kind: Literal["incident"] = "incident"
+    of: str
+    """The view: the recording, the figures, the progress on the terminal."""
+    message: str
+    """Cause in one line."""
+
+
 class SessionFinished(FileModel):
     """Last record of a session that ended, with or without success."""
 
@@ -388,6 +398,7 @@ Event = Annotated[
     | ReadingTaken
     | TrialProgress
     | TrialFinished
+    | Incident
     | SessionFinished,
     Field(discriminator="kind"),
     BeforeValidator(upgraded),
@@ -404,4 +415,13 @@ class Record(FileModel):
     event: Event
 
 
+class ConsumerFailedError(Exception):
+    """Failure of a consumer that the session survives; raised once, and journalled as an `Incident`."""
+
+    def __init__(self, of: str, cause: str) -> None:
+        super().__init__(f"{of}: {cause}")
+        self.incident = Incident(of=of, message=cause)
+
+
 Consumer = Callable[[Record], None]
+"""Raises `ConsumerFailedError` for a failure that must not end the session."""

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from workbench.model.calibration import TERM_VERDICTS, TermSummary
+from workbench.model.calibration import TERM_VERDICTS, Parameters, TermSummary
 from workbench.model.fit_event import CrossValidatedPlacement, FitFinished, ParameterRecord
 from workbench.model.table import Column, Table
 
 DETERMINED_BY = "joint: by the data together with the priors of other parameters"
+
+
+_PARAMETER_COLUMNS = (
+    Column(key="name", name="parameter"),
+    Column(key="value", name="value", format="digits of sd"),
+    Column(key="sd", name="sd", format="sd"),
+    Column(key="unit", name="unit"),
+    Column(key="prior_value", name="prior", format="g"),
+    Column(key="prior_sd", name="prior sd", format=".3g"),
+    Column(key="data_share", name="information share", unit="%", scale=100, format=".0f"),
+    Column(key="determined_by", name="determined by"),
+)
 
 
 def parameter_table(parameters: Sequence[ParameterRecord]) -> Table:
@@ -18,21 +30,25 @@ def parameter_table(parameters: Sequence[ParameterRecord]) -> Table:
     return Table(
         name="parameters",
         title="Parameters (sd: 1 sigma)",
-        columns=(
-            Column(key="name", name="parameter"),
-            Column(key="value", name="value", format="digits of sd"),
-            Column(key="sd", name="sd", format="sd"),
-            Column(key="unit", name="unit"),
-            Column(key="prior_value", name="prior", format="g"),
-            Column(key="prior_sd", name="prior sd", format=".3g"),
-            Column(key="data_share", name="information share", unit="%", scale=100, format=".0f"),
-            Column(key="determined_by", name="determined by"),
-        ),
+        columns=_PARAMETER_COLUMNS,
         rows=tuple(
             (p.name, p.value, p.sd, p.unit, p.prior_value, p.prior_sd, p.data_share, p.determined_by)
             for p in fitted
         ),
         caption=f"{DETERMINED_BY}. Fixed: {fixed}" if fixed else DETERMINED_BY,
+    )
+
+
+def calibration_parameter_table(parameters: Parameters) -> Table:
+    """Parameters of a calibration file, 1 sigma; it contains no values of the priors."""
+    p = parameters
+    each = zip(p.names, p.values, p.sd, p.units, p.prior_sd, p.data_share, p.determined_by, strict=True)
+    return Table(
+        name="parameters",
+        title="Parameters (sd: 1 sigma)",
+        columns=tuple(column for column in _PARAMETER_COLUMNS if column.key != "prior_value"),
+        rows=tuple(row for row in each if row[4] > 0),
+        caption=DETERMINED_BY,
     )
 
 

@@ -27,6 +27,8 @@ PLAYED_PER_SECOND = 10.0
 """Captures per second when a recording is played."""
 TEXT = rrb.archetypes.TextDocumentFormat(monospace=True, word_wrap=False)
 """Format of tables in plain text."""
+PER_PAGE = 2
+"""Number of charts of a trial without readings on one screen."""
 WHOLE_TIME = rrb.TimeAxis(
     view_range=rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
 )
@@ -41,18 +43,33 @@ class TrialTab:
     """Name of the step."""
     charts: tuple[tuple[str, str], ...]
     """Name and title of each chart."""
+    reads: bool = True
+    """Whether it takes readings; a simulation or a comparison of trials takes none."""
 
 
-def blueprint(rig: Rig, trials: Sequence[TrialTab] = (), phase: Phase = "capture") -> rrb.Blueprint:
+def blueprint(
+    rig: Rig,
+    trials: Sequence[TrialTab] = (),
+    phase: Phase = "capture",
+    *,
+    captures: bool = True,
+    calibrates: bool = True,
+    live: bool = False,
+) -> rrb.Blueprint:
     """Layout for one rig; the time cursor follows new data.
 
     Args:
         rig: rig with the camera and the lasers.
         trials: trials so far, in order.
         phase: screen in front.
+        captures: whether the session captures; a simulation does not.
+        calibrates: whether the session calibrates; if not, there are no screens of a fit.
+        live: whether the session is running, so that the present step and the open prompt are shown.
     """
-    screens = [_captures(rig), _result(rig), _parameters(), *(_trial(rig, one) for one in trials), _bench()]
-    front = {"capture": 0, "fit": 1, "trial": len(screens) - 2}[phase]
+    fit = [_result(rig, live), _parameters()] if calibrates else []
+    before = [_captures(rig, calibrates, live) if captures else _steps(live), *fit]
+    screens = [*before, *(_trial(rig, one, live) for one in trials), *([_bench()] if captures else [])]
+    front = {"capture": 0, "fit": 1, "trial": len(before) + len(trials) - 1}[phase]
     return rrb.Blueprint(
         rrb.Tabs(*screens, active_tab=front),
         rrb.BlueprintPanel(state="collapsed"),
@@ -95,39 +112,50 @@ def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
     )
 
 
-def _captures(rig: Rig) -> rrb.Container:
+def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
     """Screen of the technician: what is captured now, and how the uncertainty decreases."""
     axis = f"{rig.lasers[0].axis}_px"
-    texts = rrb.Vertical(
-        text_view(at.NOW, "Now"),
-        rrb.TextLogView(
-            origin=at.STEP_LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
-        ),
-        row_shares=[1, 2],
+    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (_log(), 4))
+    brightness = rrb.Vertical(
+        _series(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
+        _series(at.AMBIENT, "Ambient light [DN]"),
+        row_shares=[3, 2],
+    )
+    progress = rrb.Tabs(
+        picture_view(at.UNCERTAINTY, "Range uncertainty", SMALL_PX),
+        picture_view(at.NARROWING, "Parameters", SMALL_PX),
+        _series(at.ADVICE, "Largest range uncertainty so far [%]"),
+        active_tab=0,
     )
     curves = rrb.Horizontal(
-        _series(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
+        brightness,
         _series(f"{at.SPOTS}/{axis}", f"Spot position {axis[0]} [px]"),
-        rrb.Tabs(
-            picture_view(at.UNCERTAINTY, "Range uncertainty", SMALL_PX),
-            picture_view(at.NARROWING, "Parameters", SMALL_PX),
-            _series(at.ADVICE, "Largest range uncertainty so far [%]"),
-            active_tab=0,
-        ),
+        *([progress] if calibrates else []),
         rrb.StateTimelineView(origin=at.LANES, name="Steps"),
-        column_shares=[3, 3, 5, 4],
+        column_shares=[3, 3, *([5] if calibrates else []), 4],
     )
     return rrb.Vertical(_seen(rig, texts), curves, row_shares=[5, 4], name="Captures")
 
 
-def _result(rig: Rig) -> rrb.Container:
+def _steps(live: bool) -> rrb.Container:
+    """Screen of a session without captures."""
+    lanes = rrb.StateTimelineView(origin=at.LANES, name="Steps")
+    return rrb.Horizontal(_texts(live, (_log(), 4)), lanes, name="Steps")
+
+
+def _log() -> rrb.View:
+    columns = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
+    return rrb.TextLogView(origin=at.STEP_LOG, name="Log", columns=columns)
+
+
+def _result(rig: Rig, live: bool) -> rrb.Container:
     """Screen of the engineer: which standoff is bad, and what the camera saw there."""
     axis = rig.lasers[0].axis
-    texts = rrb.Vertical(
-        text_view(at.NOW, "Now"),
-        text_view(at.FIT_VERDICT, "Verdict"),
-        table_view(at.FIT_WORST, "Worst"),
-        row_shares=[2, 6, 6],
+    texts = _texts(
+        live,
+        (text_view(at.NOW, "Now"), 2),
+        (text_view(at.FIT_VERDICT, "Verdict"), 6),
+        (table_view(at.FIT_WORST, "Worst"), 6),
     )
     charts = rrb.Horizontal(
         picture_view(f"{at.FIT_PICTURE}/{axis}", f"Residuals along {axis}"),
@@ -147,11 +175,18 @@ def _parameters() -> rrb.Container:
     return rrb.Horizontal(charts, texts, column_shares=[1, 1], name="Calibration: details")
 
 
-def _trial(rig: Rig, trial: TrialTab) -> rrb.Container:
-    texts = rrb.Vertical(
-        text_view(at.NOW, "Now"), table_view(at.trial_tables(trial.trial), "Tables"), row_shares=[1, 4]
-    )
+def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
+    tables = table_view(at.trial_tables(trial.trial), "Tables")
     pictures = [picture_view(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
+    if not trial.reads:
+        shown = [*(_grid(pictures[n : n + PER_PAGE]) for n in range(0, len(pictures), PER_PAGE))]
+        return rrb.Horizontal(
+            shown[0] if len(shown) == 1 else rrb.Tabs(*shown, active_tab=0),
+            _texts(live, (tables, 8)),
+            column_shares=[3, 2],
+            name=trial.trial,
+        )
+    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (tables, 8))
     charts = rrb.Horizontal(
         pictures[0] if len(pictures) == 1 else rrb.Tabs(*pictures, active_tab=0),
         _series(
@@ -161,6 +196,11 @@ def _trial(rig: Rig, trial: TrialTab) -> rrb.Container:
         column_shares=[10, 5],
     )
     return rrb.Vertical(_seen(rig, texts), charts, row_shares=[5, 4], name=trial.trial)
+
+
+def _grid(pictures: Sequence[rrb.View]) -> rrb.Container:
+    """Charts one below the other, named by the first."""
+    return rrb.Vertical(*pictures, name=pictures[0].name)
 
 
 def _bench() -> rrb.Container:
@@ -176,6 +216,13 @@ def _bench() -> rrb.Container:
         ),
         name="3D",
     )
+
+
+def _texts(live: bool, *parts: tuple[rrb.View, int]) -> rrb.Container:
+    """Column of texts with their shares of its height; above them the present task of a running session."""
+    all_parts = [(text_view(at.TASK, "Task"), 3), *parts] if live else list(parts)
+    views, shares = zip(*all_parts, strict=True)
+    return rrb.Vertical(*views, row_shares=list(shares))
 
 
 def _seen(rig: Rig, texts: rrb.Container) -> rrb.Container:

@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 
 from workbench.model.calibration import Calibration
 from workbench.model.chart import Axis, Chart, LimitLine, Series
-from workbench.model.table import Column, Table
+from workbench.model.fit_tables import calibration_parameter_table
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.viewer import blueprint as layout
 from workbench.viewer import entities as at
@@ -31,7 +31,8 @@ def record_calibration(calibration: Calibration, name: str, out: Path) -> Path:
     stream.at(Moment(0, 0, 0))
     sensor = CalibratedSensor(calibration)
     log_chart(stream, PICTURE, uncertainty_chart(sensor), at.laser_colors(sensor.ids), "no spot in the image")
-    stream.log_static_text(TABLE, table_text(parameters_table(calibration)))
+    table = calibration_parameter_table(calibration.laser_ranger.parameters)
+    stream.log_static_text(TABLE, table_text(table))
     stream.log_static_text(VERDICT, verdict_text(calibration), rr.MediaType.MARKDOWN)
     stream.close()
     return out
@@ -56,25 +57,6 @@ def uncertainty_chart(sensor: CalibratedSensor) -> Chart:
         y=Axis(label="u", unit="%"),
         series=tuple(series),
         limits=(LimitLine(name="largest within the validity", y=PERCENT * limit),),
-    )
-
-
-def parameters_table(calibration: Calibration) -> Table:
-    """Parameters with their deviations and priors, 1 sigma."""
-    p = calibration.laser_ranger.parameters
-    rows = zip(p.names, p.values, p.sd, p.units, p.prior_sd, p.determined_by, strict=True)
-    return Table(
-        name="parameters",
-        title="Parameters (sd: 1 sigma)",
-        columns=(
-            Column(key="name", name="parameter"),
-            Column(key="value", name="value", format="digits of sd"),
-            Column(key="sd", name="sd", format="sd"),
-            Column(key="unit", name="unit"),
-            Column(key="prior_sd", name="prior sd", format=".3g"),
-            Column(key="determined_by", name="determined by"),
-        ),
-        rows=tuple(row for row in rows if row[4] > 0),
     )
 
 

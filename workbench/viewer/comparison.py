@@ -9,7 +9,7 @@ from pathlib import Path
 from workbench.model import event as ev
 from workbench.model.rig import Rig
 from workbench.viewer.blueprint import comparison
-from workbench.viewer.recording import OpenRecording
+from workbench.viewer.open_recording import OpenRecording
 from workbench.viewer.stream import Stream
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from workbench.model.event import CaptureTaken, FitFinished, ReadingTaken
+from workbench.model.prompt import Prompt
 from workbench.model.table import Table
 
 MOST_LINES = 6
@@ -22,6 +23,18 @@ def capture_line(number: int, capture: CaptureTaken, step: str) -> str:
         f"**Capture {number}: {capture.standoff_mm:g} mm, {laser}{off}**, repeat {capture.repeat}"
         f"{exposure.rstrip()}\n\n{step}"
     )
+
+
+def task_text(step: str, prompt: Prompt | None) -> str:
+    """Present step, and below it an open prompt with what to see and what to do otherwise, in Markdown."""
+    if prompt is None:
+        return step
+    lines = [step, f"**> {prompt.do}**"]
+    if prompt.expect:
+        lines.append(f"Expected: {prompt.expect}")
+    if prompt.otherwise:
+        lines.append(f"Otherwise: {prompt.otherwise}")
+    return "\n\n".join(line for line in lines if line)
 
 
 def fit_summary(fit: FitFinished, defects: Table) -> str:

@@ -38,7 +38,9 @@ SAMPLED = 4
 LABEL_DISTANCE_PX = 44.0
 """Distance between labels of neighbouring spots."""
 LEADER_PX = (8.0, 40.0)
-"""Ends of the line from a spot to its label, below the spot."""
+"""Ends of the line from a spot to its label: distances from the spot along columns."""
+LABEL_HEIGHT_PX = 12.0
+"""Height that a label takes below the end of its line."""
 PREDICTED_PX = 7.0
 """Half diagonal of the mark at a predicted spot."""
 _LINE = rr.Radius.ui_points(0.75)
@@ -52,6 +54,7 @@ def log_series_styles(stream: Stream, colors: Mapping[str, at.Rgb]) -> None:
         for laser, color in colors.items():
             style = rr.SeriesPoints(colors=color, names=laser, markers="circle", marker_sizes=3.0)
             stream.log(at.under(at.SPOTS, quantity, laser), style, static=True)
+    stream.log(at.AMBIENT, rr.SeriesLines(colors=at.WHITE, names="ambient"), static=True)
 
 
 def log_scanlines(stream: Stream, lines: Mapping[str, FloatArray], colors: Mapping[str, at.Rgb]) -> None:
@@ -97,9 +100,18 @@ def log_image(stream: Stream, on: Image, off: Image, full_scale: int) -> None:
     log_frame(stream, cv2.imencode(".png", on)[1].tobytes(), off, full_scale)
 
 
+def log_ambient(stream: Stream, dark: Image) -> None:
+    """Log the room light: the median of a frame with the lasers off, DN."""
+    stream.log(at.AMBIENT, rr.Scalars(_median_dn(dark)))
+
+
+def _median_dn(frame: Image) -> float:
+    return float(np.median(frame[::SAMPLED, ::SAMPLED]))
+
+
 def white_level(off: Image | None, full_scale: int) -> float:
     """Value that is shown as white, as Rerun takes it: of 8 bits a share of full scale, of 16 bits in DN."""
-    ambient = 0.0 if off is None else float(np.median(off[::SAMPLED, ::SAMPLED]))
+    ambient = 0.0 if off is None else _median_dn(off)
     white = 1.0 if off is None else min(1.0, max(LEAST_WHITE, ambient / full_scale / AMBIENT_SHARE))
     return white if full_scale <= 255 else white * full_scale
 
@@ -112,9 +124,25 @@ def log_predicted(stream: Stream, spots: Mapping[str, FloatArray], colors: Mappi
     stream.log(at.PREDICTED_SPOTS, rr.LineStrips2D(strips, colors=faint, radii=_LINE if strips else None))
 
 
-def log_spots(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
-    """Log the spots of one capture, as marks in the picture and as numbers for curves."""
-    _draw(stream, spots, colors)
+def log_predicted_ellipses(
+    stream: Stream, outlines: Mapping[str, FloatArray], colors: Mapping[str, at.Rgb]
+) -> None:
+    """Log the outline (N, 2), px, of the uncertainty of each expected spot."""
+    strips = [outline + RERUN_PIXEL_CENTRE for outline in outlines.values()]
+    faint = [(*colors[laser], 110) for laser in outlines]
+    stream.log(at.PREDICTED_ELLIPSES, rr.LineStrips2D(strips, colors=faint, radii=_LINE if strips else None))
+
+
+def log_spots(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb], height_px: int) -> None:
+    """Log the spots of one capture, as marks in the picture and as numbers for curves.
+
+    Args:
+        stream: recording.
+        spots: spots as found.
+        colors: colours by laser.
+        height_px: height of the frame; the label of a spot near its lower edge is above the spot.
+    """
+    _draw(stream, spots, colors, height_px)
     _log_curves(stream, spots)
     if spots:
         stream.log(at.SPOTS_RECORD, rr.AnyValues(drop_untyped_nones=True, **_record(spots)))
@@ -141,7 +169,11 @@ def _record(spots: Sequence[Spot]) -> dict[str, list[float] | list[str]]:
 
 
 def log_assigned(
-    stream: Stream, found: Sequence[Spot], spots: Sequence[Spot], colors: Mapping[str, at.Rgb]
+    stream: Stream,
+    found: Sequence[Spot],
+    spots: Sequence[Spot],
+    colors: Mapping[str, at.Rgb],
+    height_px: int,
 ) -> None:
     """Draw the spots of a frame again, and log the curves of those that a reading has assigned to lasers.
 
@@ -150,8 +182,9 @@ def log_assigned(
         found: spots as found, already logged.
         spots: the same spots with the lasers of the reading.
         colors: colours by laser.
+        height_px: height of the frame.
     """
-    _draw(stream, spots, colors)
+    _draw(stream, spots, colors, height_px)
     _log_curves(stream, [new for old, new in zip(found, spots, strict=True) if new != old])
 
 
@@ -176,15 +209,11 @@ def _curve(quantity: str, laser: str | None) -> str:
     return at.under(at.SPOTS, quantity, laser)
 
 
-def _draw(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -> None:
-    """Lines from each spot to a label below it; the labels do not overlap."""
+def _draw(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb], height_px: int) -> None:
+    """Lines from each spot to a label below it, or above it near the lower edge; labels do not overlap."""
     ordered = sorted(spots, key=lambda spot: spot.u_px)
     columns = label_columns([spot.u_px for spot in ordered])
-    near, far = LEADER_PX
-    leaders = [
-        [(spot.u_px, spot.v_px + near), (spot.u_px, spot.v_px + far / 2), (column, spot.v_px + far)]
-        for spot, column in zip(ordered, columns, strict=True)
-    ]
+    leaders = [leader(spot, column, height_px) for spot, column in zip(ordered, columns, strict=True)]
     drawn = [colors.get(spot.laser_id or at.UNASSIGNED, at.WHITE) for spot in ordered]
     lines = [[(u + RERUN_PIXEL_CENTRE, v + RERUN_PIXEL_CENTRE) for u, v in leader] for leader in leaders]
     stream.log(at.LEADERS_IN_IMAGE, rr.LineStrips2D(lines, colors=drawn, radii=_LINE if lines else None))
@@ -198,6 +227,17 @@ def _draw(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb]) -
             radii=_NO_DOT if lines else None,
         ),
     )
+
+
+def leader(spot: Spot, column_px: float, height_px: int) -> list[tuple[float, float]]:
+    """Points of the line from a spot to its label in a column: down, or up where the frame ends below."""
+    near, far = LEADER_PX
+    way = 1.0 if spot.v_px + far + LABEL_HEIGHT_PX <= height_px else -1.0
+    return [
+        (spot.u_px, spot.v_px + way * near),
+        (spot.u_px, spot.v_px + way * far / 2),
+        (column_px, spot.v_px + way * far),
+    ]
 
 
 def label_columns(columns: Sequence[float]) -> list[float]:

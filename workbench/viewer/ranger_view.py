@@ -64,7 +64,7 @@ class RangerView:
         reading = shown.reading
         frame.log_image(self._stream, shown.on, shown.off, self._full_scale)
         spots = frame.assigned(shown.spots, reading.lasers)
-        frame.log_assigned(self._stream, shown.spots, spots, self._colors)
+        frame.log_assigned(self._stream, shown.spots, spots, self._colors, shown.on.shape[0])
         self._crops.take(shown.on, shown.off, spots, {})
         text = rr.TextDocument(answer_text(reading), media_type=rr.MediaType.MARKDOWN)
         self._stream.log(ANSWER, text)

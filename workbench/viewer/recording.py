@@ -5,43 +5,21 @@ Journal and frames are the record. A damaged or incomplete recording can be made
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from functools import singledispatchmethod
-from hashlib import sha256
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
 
-import rerun as rr
-
 from workbench.model import event as ev
-from workbench.model.arrays import FloatArray, Image
-from workbench.model.calibration import load_calibration
-from workbench.model.errors import BadInputError
-from workbench.model.reading_text import reading_remark
+from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
-from workbench.model.spot import Failure, Spot
-from workbench.model.target import BoardTarget, FlatTarget, Placement
-from workbench.viewer import documents, fit, frame, scene, steps
 from workbench.viewer import entities as at
-from workbench.viewer.advice import AdviceView
 from workbench.viewer.blueprint import blueprint
-from workbench.viewer.captures import CaptureLog, capture_record
-from workbench.viewer.crops import Crops
-from workbench.viewer.geometry import Geometry
-from workbench.viewer.stream import Moment, Stream
-from workbench.viewer.trial import TrialView, tabs
+from workbench.viewer.compaction import compact
+from workbench.viewer.open_recording import OpenRecording
+from workbench.viewer.stream import Stream
 from workbench.viewer.window import free_port
 
 RECORDING_FILE = "recording.rrd"
-OF_NO_STANDOFF = (
-    ev.ProcedureStarted,
-    ev.StepStarted,
-    ev.FitFinished,
-    ev.CalibrationExported,
-    ev.CalibrationLoaded,
-    ev.SessionFinished,
-)
-"""Events between placements. At the standoff of the last one they would cover what was captured there."""
 
 
 class RecordingConsumer:
@@ -55,6 +33,7 @@ class RecordingConsumer:
 
     Raises:
         BadInputError: a frame of a record is missing in the session folder, or has changed.
+        OSError: the file cannot be written (disk full); found at the end of a capture.
     """
 
     def __init__(
@@ -73,17 +52,31 @@ class RecordingConsumer:
             if not isinstance(record.event, ev.SessionStarted):
                 raise ValueError(f"expected session_started as the first record, got {record.event.kind}")
             port = None if self._watch is None else free_port()
-            stream = Stream(self._out, record.event.session, blueprint(self._rig), port)
+            stream = Stream(
+                self._out, record.event.session, blueprint(self._rig, calibrates=False, live=True), port
+            )
             self._open = OpenRecording(stream, self._session_dir, self._rig)
             if self._watch is not None and port is not None:
                 self._watch(port)
         self._open.take(record)
+        if isinstance(record.event, ev.SpotsFound):
+            self._open.stream.check_written()
+
+    def show_prompt(self, prompt: Prompt) -> None:
+        """Show an open prompt until the next event; it is not kept in the recording."""
+        if self._open is not None:
+            self._open.show_task(prompt)
 
     def close(self) -> None:
-        """Flush and close the file; a second call has no effect."""
-        if self._open is not None:
-            self._open.stream.close()
-            self._open = None
+        """Flush, close and compact the file; a second call has no effect.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        recording, self._open = self._open, None
+        if recording is not None:
+            recording.stream.close()
+            compact(self._out, recording.layout)
 
     def __enter__(self) -> RecordingConsumer:
         return self
@@ -108,277 +101,3 @@ def rebuild(session_dir: Path, rig: Rig, records: Iterable[ev.Record], out: Path
         partial.replace(out)
     finally:
         partial.unlink(missing_ok=True)
-
-
-class OpenRecording:
-    """Open recording, with the state that later records need."""
-
-    def __init__(self, stream: Stream, session_dir: Path, rig: Rig) -> None:
-        self.stream = stream
-        self._session_dir = session_dir
-        self._rig = rig
-        self._colors = at.laser_colors(rig.laser_ids)
-        self._geometry = Geometry.of_rig(rig)
-        self._crops = Crops(stream, self._colors)
-        self._advice = AdviceView(stream)
-        self._trials: list[TrialView] = []
-        self._placement: Placement | None = None
-        self._captures = CaptureLog()
-        self._exposure = Moment(0, 0, 0)
-        self._frames: tuple[Image, Image | None] | None = None
-        self._spots: tuple[Spot, ...] = ()
-        self._title = ""
-        self._capture = 1
-        self._steps = 0
-
-    def take(self, record: ev.Record) -> None:
-        """Log one record at its position on the timelines."""
-        self._advance(record.event)
-        placement = None if isinstance(record.event, OF_NO_STANDOFF) else self._placement
-        standoff_mm = None if placement is None else placement.standoff_mm
-        moment = Moment(self._capture, max(self._steps, 1), record.time_ns, standoff_mm)
-        self.stream.at(moment)
-        self._log(record.event, moment)
-
-    def _advance(self, event: object) -> None:
-        """Count captures and steps, and note the placement.
-
-        Preparations of a capture (a step, a placement) have the number of the next capture. With the number
-        of the previous one, the last picture of a standoff would show the target of the next standoff.
-        """
-        taken = len(self._captures.numbers)
-        if isinstance(event, ev.StepStarted):
-            self._steps += 1
-        if isinstance(event, ev.TargetPlaced):
-            self._placement = event.placement
-        if isinstance(event, ev.CaptureTaken | ev.StepStarted | ev.TargetPlaced):
-            self._capture = taken + 1
-
-    @singledispatchmethod
-    def _log(self, event: object, moment: Moment) -> None:
-        raise TypeError(f"no handler for {type(event).__name__}")
-
-    @_log.register
-    def _(self, event: ev.SessionStarted, moment: Moment) -> None:
-        rig = self._rig
-        self.stream.describe("session", id=event.session, rig=event.rig, serial=rig.serial)
-        self._show_sensor()
-        frame.log_series_styles(self.stream, self._colors)
-        self._advice.start()
-        fit.log_series_styles(self.stream, self._colors)
-        fit.log_no_fit_yet(self.stream)
-        self._crops.log_none()
-        steps.log_text(self.stream, f"Session {event.session} on {event.rig}: {', '.join(event.procedures)}")
-
-    @_log.register
-    def _(self, event: ev.ProcedureStarted, moment: Moment) -> None:
-        steps.lane(self.stream, at.LANE_PROCEDURE, event.procedure)
-        steps.log_text(self.stream, f"{event.procedure}: {event.title} ({event.length})")
-
-    @_log.register
-    def _(self, event: ev.StepStarted, moment: Moment) -> None:
-        self._title = event.title
-        self._note(f"**{event.title}**")
-        steps.lane(self.stream, at.LANE_STEP, event.title)
-        if event.shots == 0:
-            steps.lane(self.stream, at.LANE_LASER, steps.LASERS_OFF)
-        steps.log_text(self.stream, f"Step {event.index}: {event.title}")
-
-    @_log.register
-    def _(self, event: ev.StepFinished, moment: Moment) -> None:
-        steps.log_text(self.stream, f"Step {event.index} done: {event.outcome}")
-
-    @_log.register
-    def _(self, event: ev.TargetPlaced, moment: Moment) -> None:
-        self._show_sensor()
-        self._crops.log_none()
-        frame.log_predicted(self.stream, self._expected(), self._colors)
-        steps.log_text(self.stream, f"Target placed at {event.placement.standoff_mm:g} mm")
-
-    @_log.register
-    def _(self, event: ev.Answered, moment: Moment) -> None:
-        answer = event.answer
-        text = answer.action if answer.value is None else answer.value
-        steps.log_text(self.stream, f"{event.question} {text} {answer.reason or ''}".rstrip())
-
-    @_log.register
-    def _(self, event: ev.PlacementFinished, moment: Moment) -> None:
-        steps.lane(self.stream, at.LANE_DARK, "no beam stuck")
-
-    @_log.register
-    def _(self, event: ev.SetAside, moment: Moment) -> None:
-        steps.log_text(self.stream, f"Placement {event.text}", steps.WARN)
-
-    @_log.register
-    def _(self, event: ev.SessionResumed, moment: Moment) -> None:
-        steps.log_text(self.stream, f"Resumed by {event.operator} at {event.created}", steps.WARN)
-
-    @_log.register
-    def _(self, event: ev.CaptureTaken, moment: Moment) -> None:
-        self._exposure = Moment(moment.capture, moment.step, event.on.time_ns, event.standoff_mm)
-        self._captures.add(event, self._placement, self._exposure)
-        self.stream.at(self._exposure)
-        self._show_frame(event)
-        self.stream.log(at.CAPTURE_RECORD, rr.AnyValues(drop_untyped_nones=True, **capture_record(event)))
-        self._note(documents.capture_line(moment.capture, event, self._title))
-        steps.lane(self.stream, at.LANE_LASER, event.laser_id)
-
-    @_log.register
-    def _(self, event: ev.SpotsFound, moment: Moment) -> None:
-        capture = self._captures.taken[event.key]
-        placement = self._captures.placements[event.key]
-        self.stream.at(self._captures.moments[event.key])
-        self._spots = event.spots
-        if capture.laser_id in self._colors:
-            self._captures.spots[event.key] = event.spots
-        frame.log_spots(self.stream, event.spots, self._colors)
-        if capture.laser_id in self._colors:
-            self._show_crops(event.spots, [capture.laser_id])
-        saturated = any(Failure.SATURATED in spot.flags for spot in event.spots)
-        steps.lane(self.stream, at.LANE_SATURATION, "saturated" if saturated else "no pixel saturated")
-        if placement is not None:
-            scene.log_spots_on_target(self.stream, event.spots, placement, self._geometry, self._colors)
-        for failure in event.failures:
-            steps.log_text(self.stream, f"Capture {event.key}: {failure}", steps.WARN)
-
-    @_log.register
-    def _(self, event: ev.LimitChecked, moment: Moment) -> None:
-        value = "not measured" if event.value is None else f"{event.value:.4g}"
-        text = f"{event.of}: {event.quantity} {value}, limit {event.limit}: {event.verdict}"
-        steps.log_text(self.stream, text, steps.INFO if event.verdict == "pass" else steps.WARN)
-
-    @_log.register
-    def _(self, event: ev.LatencyMeasured, moment: Moment) -> None:
-        steps.log_text(self.stream, f"Camera latency: {event.frames} frames")
-
-    @_log.register
-    def _(self, event: ev.ExposureSet, moment: Moment) -> None:
-        steps.log_text(self.stream, event.text, steps.INFO if event.verdict == "good" else steps.WARN)
-        steps.lane(self.stream, at.LANE_EXPOSURE, f"{event.exposure:g} {event.unit}".rstrip())
-
-    @_log.register
-    def _(self, event: ev.StandoffAdvised, moment: Moment) -> None:
-        steps.log_text(self.stream, f"After {event.placements} placements, {event.text}")
-        self._advice.take(event)
-
-    @_log.register
-    def _(self, event: ev.FitFinished, moment: Moment) -> None:
-        self._geometry = self._geometry.fitted(event.parameters)
-        self._show_sensor()
-        fit.log_fit(self.stream, event, self._captures, moment, self._colors)
-        self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "fit"))
-        good = event.verdict == "accepted"
-        steps.log_text(
-            self.stream,
-            f"Calibration {event.verdict}, residual {event.rms_px:.3f} px rms. {' '.join(event.reasons)}",
-            steps.INFO if good else steps.ERROR,
-        )
-        for warning in event.warnings:
-            steps.log_text(self.stream, warning, steps.WARN)
-
-    @_log.register
-    def _(self, event: ev.CalibrationExported, moment: Moment) -> None:
-        steps.log_text(self.stream, f"Calibration written to {event.path}")
-
-    @_log.register
-    def _(self, event: ev.CalibrationLoaded, moment: Moment) -> None:
-        calibration = load_calibration(self._session_dir / event.path)
-        self._geometry = self._geometry.calibrated(calibration)
-        self._show_sensor()
-        steps.log_text(self.stream, event.text)
-
-    @_log.register
-    def _(self, event: ev.ReadingTaken, moment: Moment) -> None:
-        self.stream.at(self._exposure)
-        spots = frame.assigned(self._spots, event.lasers)
-        frame.log_assigned(self.stream, self._spots, spots, self._colors)
-        self._show_crops(spots, [laser for laser in self._colors if laser not in event.left_off])
-        if self._placement is not None:
-            scene.log_ranged(self.stream, event.lasers, self._placement, self._geometry, self._colors)
-        self._trial(event.trial).take(event, self._exposure)
-        self.stream.at(moment)
-        if remark := reading_remark(event):
-            steps.log_text(self.stream, remark, steps.WARN)
-
-    @_log.register
-    def _(self, event: ev.TrialFinished, moment: Moment) -> None:
-        trial = self._trial(event.trial)
-        trial.finish(event)
-        self.stream.at(moment)
-        self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "trial"))
-        steps.log_text(self.stream, f"Trial {event.trial} finished, {len(event.tables)} tables")
-
-    @_log.register
-    def _(self, event: ev.TrialProgress, moment: Moment) -> None:
-        steps.log_text(self.stream, event.text)
-
-    @_log.register
-    def _(self, event: ev.SessionFinished, moment: Moment) -> None:
-        for trial in self._trials:
-            trial.stop()
-        self.stream.at(moment)
-        steps.end_all(self.stream)
-        level = steps.INFO if event.exit_code == 0 else steps.ERROR
-        steps.log_text(self.stream, f"Session ended ({event.exit_code}): {event.message}", level)
-
-    def _trial(self, name: str) -> TrialView:
-        """View of a trial; the first mention adds its tab."""
-        for trial in self._trials:
-            if trial.trial == name:
-                return trial
-        trial = TrialView(self.stream, self._colors, name)
-        trial.start()
-        self._trials.append(trial)
-        self.stream.lay_out(blueprint(self._rig, tabs(self._trials), "trial"))
-        return trial
-
-    def _note(self, markdown: str) -> None:
-        self.stream.log(at.NOW, rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN))
-
-    def _show_sensor(self) -> None:
-        """Log camera, rays and scanlines with the present parameters."""
-        scene.log_camera(self.stream, self._rig.camera, self._geometry)
-        if self._placement is not None:
-            scene.log_placement(self.stream, self._placement, self._geometry, self._colors)
-        lines = {laser: self._geometry.scanline(laser, self._rig.bench.reach_mm) for laser in self._colors}
-        frame.log_scanlines(self.stream, lines, self._colors)
-
-    def _show_frame(self, event: ev.CaptureTaken) -> None:
-        """Log the lit frame of a capture; a row of a captures file may state positions without any."""
-        if not event.on.path:
-            self._frames = None
-            return
-        png, on = frame.as_png(self._read(event.on))
-        off = None if event.off is None else frame.as_png(self._read(event.off))[1]
-        self._frames = on, off
-        frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
-
-    def _show_crops(self, spots: Sequence[Spot], lasers: Sequence[str]) -> None:
-        if self._frames is not None:
-            expected = {laser: spot for laser, spot in self._expected().items() if laser in lasers}
-            self._crops.take(*self._frames, spots, expected)
-
-    def _expected(self) -> dict[str, FloatArray]:
-        """Expected spot (2,), px, of each laser on a flat at the present placement; empty without one."""
-        placement = self._placement
-        if placement is None or not isinstance(placement.target, FlatTarget | BoardTarget):
-            return {}
-        target, standoff_mm = placement.target, placement.standoff_mm
-        return {laser: self._geometry.spot_on(laser, target, standoff_mm) for laser in self._colors}
-
-    def _read(self, frame: ev.FrameRef) -> bytes:
-        path = self._session_dir / frame.path
-        try:
-            png = path.read_bytes()
-        except OSError as error:
-            raise BadInputError(
-                f"{path}: the frame of a journal record cannot be read ({error.strerror}); "
-                "restore it from a copy of the session folder"
-            ) from None
-        # The viewer would show a damaged picture, or none, without an error.
-        if frame.sha256 and sha256(png).hexdigest() != frame.sha256:
-            raise BadInputError(
-                f"{path}: the frame has changed since it was captured (expected sha256"
-                f" {frame.sha256[:12]}...); restore it from a copy of the session folder"
-            )
-        return png

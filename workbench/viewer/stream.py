@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
+from errno import EIO
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +18,8 @@ from workbench.viewer.entities import APPLICATION, CAPTURE, STANDOFF, STEP, WALL
 from workbench.viewer.window import LOOPBACK
 
 FLUSH_SECONDS = 20.0
+STALL_S = 60.0
+"""Longest time between checks for which a served recording may not grow; a viewer that hangs delays it."""
 SERVER_MEMORY = "256MiB"
 """Memory that the server keeps for a viewer that has not yet come."""
 
@@ -38,11 +44,18 @@ class Stream:
         layout: first layout.
         port: port on loopback at which a viewer may watch; None: none may. The recording does not wait for a
             viewer: one that hangs, or never comes, costs memory up to a limit.
+
+    Raises:
+        OSError: the file cannot be written.
     """
 
     def __init__(
         self, path: Path | None, session: str, layout: rrb.Blueprint, port: int | None = None
     ) -> None:
+        self._path, self._served = path, port is not None
+        self._size = 0
+        self._stalled_since: float | None = None
+        """Time of the first check at which the file had its present size."""
         self._recording = rr.RecordingStream(
             APPLICATION,
             recording_id=session,
@@ -56,7 +69,8 @@ class Stream:
         sinks: list[rr.FileSink | rr.GrpcServerSink] = [] if path is None else [rr.FileSink(str(path))]
         if port is not None:
             sinks.append(rr.GrpcServerSink(bind_ip=LOOPBACK, port=port, server_memory_limit=SERVER_MEMORY))
-        self._recording.set_sinks(*sinks, default_blueprint=layout)
+        with self._named():
+            self._recording.set_sinks(*sinks, default_blueprint=layout)
         self._recording.send_recording_name(session)
         self._prefix = ""
 
@@ -93,7 +107,45 @@ class Stream:
         properties = rr.AnyValues(drop_untyped_nones=True, **values)
         self._recording.send_property(f"{self._prefix.replace('/', '_')}{name}", properties)
 
+    def check_written(self) -> None:
+        """Raise if the file cannot be written; called now and then, after something was logged.
+
+        A served stream is not flushed, which would wait for a viewer that hangs: its file must grow.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        if not self._served or self._path is None:
+            self.flush()
+            return
+        size, now = self._path.stat().st_size, time.monotonic()
+        if size != self._size or self._stalled_since is None:
+            self._size, self._stalled_since = size, None if size != self._size else now
+        elif now - self._stalled_since > STALL_S:
+            cause = f"the recording has not grown for {STALL_S:g} s; check the free space of the disk"
+            raise OSError(EIO, cause, str(self._path))
+
+    def flush(self) -> None:
+        """Write buffered data.
+
+        Raises:
+            OSError: the file cannot be written. Logging itself does not report it.
+        """
+        with self._named():
+            self._recording.flush(timeout_sec=FLUSH_SECONDS)
+
     def close(self) -> None:
-        """Write buffered data and the footer of the file."""
-        self._recording.flush(timeout_sec=FLUSH_SECONDS)
-        self._recording.disconnect()
+        """Write buffered data and the footer of the file; raises the errors of `flush`."""
+        try:
+            self.flush()
+        finally:
+            self._recording.disconnect()
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Errors of Rerun as errors of the file."""
+        try:
+            yield
+        except RuntimeError as error:
+            cause = f"the recording has failed ({error}); check the free space of the disk"
+            raise OSError(EIO, cause, str(self._path)) from error

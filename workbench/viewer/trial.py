@@ -40,7 +40,8 @@ class TrialView:
     def tab(self) -> TrialTab:
         """The trial's part of the layout."""
         charts = [(chart.name, chart.title or chart.name) for chart in self.charts]
-        return TrialTab(self.trial, tuple(charts) or ((LIVE_CHART, "Errors so far"),))
+        reads = bool(self.readings) or not self.charts
+        return TrialTab(self.trial, tuple(charts) or ((LIVE_CHART, "Errors so far"),), reads)
 
     def start(self) -> None:
         """Log notes in the views that the first reading does not fill."""

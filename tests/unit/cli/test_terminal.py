@@ -93,8 +93,11 @@ def test_a_consumer_that_fails_is_told_once_and_asked_never_again() -> None:
 
     there, stream = console()
     consumer = FaultTolerantConsumer(fails, "drawing", there)
-    for record in records((0, STARTED), (1, STARTED)):
-        consumer(record)
+    first, second = records((0, STARTED), (1, STARTED))
+    with pytest.raises(ev.ConsumerFailedError) as failed:
+        consumer(first)
+    assert failed.value.incident == ev.Incident(of="drawing", message="disk full")
+    consumer(second)
     assert calls == [0]
     assert stream.getvalue().count("disk full") == 1
 

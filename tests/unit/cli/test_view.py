@@ -112,6 +112,14 @@ def test_more_than_fits_on_a_screen_is_refused(
         recording_of(Request(what, Path("sessions"), None, without), tmp_path)
 
 
+@pytest.mark.parametrize(
+    "what", [(Path("any.rrd"),), (WEBCAM,), (SESSION / "calibration.yaml",), (SESSION, SESSION)]
+)
+def test_only_the_recording_of_one_session_can_be_made_again(tmp_path: Path, what: tuple[Path, ...]) -> None:
+    with pytest.raises(BadInputError, match="--rebuild"):
+        recording_of(asked(*what, rebuild=True), tmp_path)
+
+
 def test_a_recording_is_shown_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "any.rrd"
     assert recording_of(asked(path), tmp_path) == path

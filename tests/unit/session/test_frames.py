@@ -15,7 +15,7 @@ import pytest
 
 from workbench.model.arrays import Image
 from workbench.model.errors import BadInputError, StoppedError
-from workbench.session.frames import FrameStore, read_image
+from workbench.session.frames import FrameStore, read_image, recent_image
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
@@ -38,6 +38,21 @@ def test_a_full_disk_leaves_no_half_frame(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(StoppedError, match=r"00-on\.png.*No space left"):
         FrameStore(tmp_path).save("p/00", "on", np.zeros((4, 4), np.uint8), 0)
     assert list((tmp_path / "frames/p").iterdir()) == []
+
+
+def test_the_last_frames_are_known_by_the_hash_of_their_file(tmp_path: Path) -> None:
+    store = FrameStore(tmp_path)
+    image = np.arange(48, dtype=np.uint8).reshape(6, 8)
+    refs = []
+    for n in range(30):
+        image += 1  # as of a camera that reuses its buffer
+        refs.append((store.save(f"p/{n:02d}", "on", image, n), image.copy()))
+    ref, stored = refs[-3]
+    found = recent_image(ref.sha256)
+    assert found is not None
+    np.testing.assert_array_equal(found, stored)
+    assert recent_image(refs[0][0].sha256) is None
+    assert recent_image("") is None
 
 
 def image_file(path: Path, extension: str = ".png") -> bytes:

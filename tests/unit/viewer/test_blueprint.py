@@ -135,3 +135,38 @@ def test_the_peaks_are_shown_up_to_full_scale() -> None:
     assert isinstance(axis, rrb.ScalarAxis)
     assert axis.range is not None
     assert axis.range.as_arrow_array().to_pylist() == [[0.0, 4096.0]]
+
+
+def test_a_session_that_does_not_calibrate_has_no_screens_of_a_fit() -> None:
+    root = blueprint(a_rig(), TRIALS, "trial", calibrates=False).root_container
+    assert isinstance(root, rrb.Tabs)
+    found = by_screen(root)
+    assert list(found) == ["Captures", "accuracy", "round", "3D"]
+    assert not any(
+        str(view.origin).startswith(("fit", "progress")) for views in found.values() for view in views
+    )
+    assert isinstance(root.active_tab, int)
+    assert list(found)[root.active_tab] == "round"
+
+
+def test_the_task_is_shown_on_the_screens_of_a_running_session_only() -> None:
+    for live in (True, False):
+        root = blueprint(a_rig(), TRIALS, live=live).root_container
+        assert isinstance(root, rrb.Tabs)
+        found = by_screen(root)
+        for name in ("Captures", "Calibration: which standoff?", "accuracy", "round"):
+            assert ("task" in {view.origin for view in found[name]}) == live
+
+
+def test_a_session_without_captures_has_no_frames() -> None:
+    """As a simulation, whose charts fill the screen."""
+    charts = tuple((f"c{n}", f"Chart {n}") for n in range(5))
+    trials = [TrialTab("simulation", charts, reads=False)]
+    root = blueprint(a_rig(), trials, "trial", captures=False, calibrates=False).root_container
+    assert isinstance(root, rrb.Tabs)
+    found = by_screen(root)
+    assert list(found) == ["Steps", "simulation"]
+    assert root.active_tab == 1
+    origins = {str(view.origin) for views in found.values() for view in views}
+    assert origins >= {f"trials/simulation/pictures/{name}" for name, _ in charts}
+    assert not origins & {"frame", "crops", "bench", "spots/peak_dn"}

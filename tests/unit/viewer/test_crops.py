@@ -9,8 +9,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tests.support.viewer_stream import (
     COLORS,
@@ -114,28 +112,29 @@ def test_a_second_peak_that_the_fit_ignores_is_bright_in_the_residual(tmp_path: 
     assert abs(int(residual[HALF, HALF]) - MIDDLE) <= 2
 
 
-@given(
-    centre=st.tuples(st.floats(0.0, 639.0), st.floats(0.0, 479.0)),
-    sd=st.tuples(st.floats(1e-4, 50.0), st.floats(1e-4, 50.0)),
-)
-def test_marks_are_within_their_square(centre: tuple[float, float], sd: tuple[float, float]) -> None:
-    left, top = (round(value) - HALF for value in centre)
-    spot = replace(a_spot("L1", *centre), u_sd_px=sd[0], v_sd_px=sd[1])
-    marks = crops.marks(Crop(np.zeros((SIDE_PX, SIDE_PX)), left, top, spot))
-    assert len(marks) == 5
-    for strip in marks:
-        assert strip.min() >= -0.5
-        assert strip.max() <= SIDE_PX - 0.5
-
-
-def test_marks_are_about_the_centre_and_leave_it_free() -> None:
-    spot = replace(a_spot("L1", 100.25, 50.5), u_sd_px=0.5, v_sd_px=0.3)
-    *arms, ellipse = crops.marks(Crop(np.zeros((SIDE_PX, SIDE_PX)), 80, 30, spot))
-    centre = np.array([20.25, 20.5])
-    distances = np.hypot(*(np.concatenate(arms) - centre).T)
+def test_the_cross_is_about_the_centre_and_leaves_it_free() -> None:
+    spot = a_spot("L1", 100.25, 50.5)
+    distances = np.hypot(*(np.concatenate(crops.cross(spot)) - np.array([100.25, 50.5])).T)
     assert distances.min() == pytest.approx(crops.CROSS_PX[0])
-    np.testing.assert_allclose(ellipse.max(axis=0) - centre, [5.0, 3.0])
-    np.testing.assert_allclose(ellipse.min(axis=0) - centre, [-5.0, -3.0])
+
+
+def test_ellipses_have_one_and_ten_standard_deviations() -> None:
+    spot = replace(a_spot("L1", 100.25, 50.5), u_sd_px=0.5, v_sd_px=0.3)
+    for ellipse, sd in zip(crops.ellipses(spot), (1.0, 10.0), strict=True):
+        np.testing.assert_allclose(ellipse.max(axis=0) - [100.25, 50.5], [0.5 * sd, 0.3 * sd])
+        np.testing.assert_allclose(ellipse.min(axis=0) - [100.25, 50.5], [-0.5 * sd, -0.3 * sd])
+
+
+@pytest.mark.parametrize("sd_px", [1e-4, 0.3, 50.0])
+def test_outlines_end_at_the_edge_of_their_square(tmp_path: Path, sd_px: float) -> None:
+    on = np.full((480, 640), 50, np.uint16)
+    spot = replace(a_spot("L1", 300.0, 200.0), u_sd_px=sd_px, v_sd_px=sd_px)
+    ((_, strips),) = taken(tmp_path, on, on, spot).values("/crops/ellipses", STRIPS)
+    column, row = cell_corner(0, len(LASERS))
+    points = np.concatenate(strips) - np.array([column, row])
+    assert points.min() >= 0.0
+    assert points.max() <= SIDE_PX
+    assert len(strips) == 2
 
 
 def test_marks_are_drawn_at_the_square_of_their_laser(tmp_path: Path) -> None:

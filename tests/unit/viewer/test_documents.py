@@ -5,9 +5,10 @@ from __future__ import annotations
 from tests.support.viewer_stream import a_reading, a_spot
 from tests.viewer.session import a_fit
 from workbench.model.event import CaptureTaken, Fault, FrameRef
+from workbench.model.prompt import Prompt
 from workbench.model.spot import Failure
 from workbench.viewer.captures import CaptureLog
-from workbench.viewer.documents import MOST_LINES, capture_line, fit_summary, without_range
+from workbench.viewer.documents import MOST_LINES, capture_line, fit_summary, task_text, without_range
 from workbench.viewer.stream import Moment
 
 SOUND = CaptureLog().defects()
@@ -103,3 +104,12 @@ def test_readings_without_a_range_are_listed_with_standoff_and_cause() -> None:
 def test_where_all_have_a_range_nothing_is_said() -> None:
     assert without_range([a_reading(300.0, 301.0)]) == ""
     assert without_range([]) == ""
+
+
+def test_the_task_is_the_step_with_the_open_prompt() -> None:
+    assert task_text("**Step 1**", None) == "**Step 1**"
+    prompt = Prompt(key="k", do="Place the target.", expect="It is square.", otherwise="Abort.")
+    text = task_text("**Step 1**", prompt)
+    for part in ("Step 1", prompt.do, prompt.expect, prompt.otherwise):
+        assert part in text
+    assert "Otherwise" not in task_text("", Prompt(key="k", do="Go on?"))

@@ -95,7 +95,7 @@ SPOTS = (a_spot("L2", 310.0), a_spot("L1", 300.25, 241.0), a_spot(None, 500.0, 1
 
 
 def test_leaders_do_not_touch_their_spots_and_end_at_the_labels(tmp_path: Path) -> None:
-    contents = logged(tmp_path, lambda stream: frame.log_spots(stream, SPOTS, COLORS))
+    contents = logged(tmp_path, lambda stream: frame.log_spots(stream, SPOTS, COLORS, 480))
     ((_, leaders),) = contents.values("/frame/leaders", STRIPS)
     ((_, places),) = contents.values("/frame/spots", "Points2D:positions")
     ordered = sorted(SPOTS, key=lambda spot: spot.u_px)
@@ -110,11 +110,39 @@ def test_leaders_do_not_touch_their_spots_and_end_at_the_labels(tmp_path: Path) 
         assert colors[:2] == [packed(COLORS["L1"]), packed(COLORS["L2"])]
 
 
+def test_the_label_of_a_spot_near_the_lower_edge_is_above_it() -> None:
+    near, far = LEADER_PX
+    for v_px in (0.0, 200.0, 420.0, 440.0, 479.0):
+        points = frame.leader(a_spot("L1", 300.0, v_px), 310.0, 480)
+        way = -1 if v_px > 420.0 else 1
+        assert points == [
+            (300.0, v_px + way * near),
+            (300.0, v_px + way * far / 2),
+            (310.0, v_px + way * far),
+        ]
+        assert 0 <= points[-1][1] < 480
+
+
+def test_the_outlines_of_expected_spots_are_an_entity_of_their_own(tmp_path: Path) -> None:
+    outline = np.array([(10.0, 20.0), (12.0, 24.0)])
+    contents = logged(tmp_path, lambda stream: frame.log_predicted_ellipses(stream, {"L2": outline}, COLORS))
+    ((_, (strip,)),) = contents.values("/frame/predicted_ellipses", STRIPS)
+    np.testing.assert_allclose(strip, outline + 0.5)
+
+
+@pytest.mark.parametrize("ambient_dn", [0, 7, 300])
+def test_ambient_light_is_the_median_of_the_dark_frame(tmp_path: Path, ambient_dn: int) -> None:
+    dark = np.full((48, 64), ambient_dn, np.uint16)
+    dark[:10] = 4000  # a window
+    contents = logged(tmp_path, lambda stream: frame.log_ambient(stream, dark))
+    assert contents.values("/ambient", SCALARS) == [(1, [float(ambient_dn)])]
+
+
 def test_a_capture_without_spots_removes_the_marks_of_the_last_one(tmp_path: Path) -> None:
     def log(stream: Stream) -> None:
-        frame.log_spots(stream, SPOTS, COLORS)
+        frame.log_spots(stream, SPOTS, COLORS, 480)
         stream.at(Moment(2, 1, HERE.time_ns + 1))
-        frame.log_spots(stream, (), COLORS)
+        frame.log_spots(stream, (), COLORS, 480)
 
     contents = logged(tmp_path, log)
     for entity, component in (("/frame/leaders", STRIPS), ("/frame/spots", "Points2D:positions")):
@@ -134,7 +162,7 @@ def test_the_record_of_the_spots_is_exact_to_the_last_bit(tmp_path: Path, seed: 
         drawn_spot(random, None),
         drawn_spot(random, "L4"),
     ]
-    contents = logged(tmp_path, lambda stream: frame.log_spots(stream, spots, COLORS))
+    contents = logged(tmp_path, lambda stream: frame.log_spots(stream, spots, COLORS, 480))
     for name in ("u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "peak_dn"):
         assert contents.values("/spots/record", name) == [(1, [getattr(spot, name) for spot in spots])]
     assert contents.values("/spots/record", "laser_id") == [(1, ["L1", "", "L4"])]
@@ -143,7 +171,7 @@ def test_the_record_of_the_spots_is_exact_to_the_last_bit(tmp_path: Path, seed: 
 
 def test_each_laser_has_its_curves_and_others_have_common_ones(tmp_path: Path) -> None:
     spots = [a_spot("L1", 1.25), a_spot(None, 2.5), a_spot(None, 3.5)]
-    contents = logged(tmp_path, lambda stream: frame.log_spots(stream, spots, COLORS))
+    contents = logged(tmp_path, lambda stream: frame.log_spots(stream, spots, COLORS, 480))
     assert contents.values("/spots/u_px/L1", SCALARS) == [(1, [1.25])]
     assert contents.values("/spots/v_px/L1", SCALARS) == [(1, [240.0])]
     assert contents.values("/spots/peak_dn/L1", SCALARS) == [(1, [80.0])]
@@ -161,9 +189,9 @@ def test_spots_that_a_reading_assigns_are_drawn_again_and_join_their_lasers_curv
     found = [a_spot(None, 100.0), a_spot(None, 200.0), a_spot("L3", 300.0)]
 
     def log(stream: Stream) -> None:
-        frame.log_spots(stream, found, COLORS)
+        frame.log_spots(stream, found, COLORS, 480)
         assigned = frame.assigned(found, (a_range("L2", 500.0, u_px=200.0),))
-        frame.log_assigned(stream, found, assigned, COLORS)
+        frame.log_assigned(stream, found, assigned, COLORS, 480)
 
     contents = logged(tmp_path, log)
     assert contents.values("/frame/spots", "Points2D:labels")[-1] == (1, ["?", "L2", "L3"])

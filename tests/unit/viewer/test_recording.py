@@ -28,10 +28,13 @@ from workbench.model import event as ev
 from workbench.model.chart import laser_colors
 from workbench.model.errors import BadInputError
 from workbench.model.fit_charts import residual_chart
-from workbench.viewer.recording import OpenRecording, RecordingConsumer, rebuild
+from workbench.model.prompt import Prompt
+from workbench.viewer.open_recording import OpenRecording
+from workbench.viewer.recording import RecordingConsumer, rebuild
 from workbench.viewer.scene import BEYOND, DRAWN_DEPTH_MM
 from workbench.viewer.table_text import table_text
 
+DATA = Path(__file__).parents[3] / "data"
 IMAGE, FRAME = "/frame/image", "EncodedDepthImage:blob"
 CAPTURES = len(LASERS) * len(STANDOFFS) * REPEATS + len(TRIAL_STANDOFFS) * READINGS
 
@@ -153,6 +156,54 @@ def test_a_session_of_a_trial_alone_has_curves_of_its_spots(recorded: Recorded, 
     assert len(views) >= 6
     for view in views:
         assert has_content(contents, view, "capture", 1), view.name
+
+
+def test_a_session_with_an_existing_calibration_has_no_screens_of_a_fit(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    first, *others = recorded.records
+    (start,) = (n for n, record in enumerate(others) if _starts_trial(record.event))
+    copy = Path("existing.yaml")
+    (recorded.folder / copy).write_bytes((DATA / "session-0.1.0/calibration.yaml").read_bytes())
+    loaded = ev.CalibrationLoaded(file="c", path=str(copy), sha256="", made="", age_days=None)
+    record = ev.Record(n=1, time_ns=first.time_ns, event=loaded)
+    out = recording_of(recorded, [first, record, *others[start:]], tmp_path / "trial.rrd")
+    assert not any(view.origin.startswith(("/fit", "/progress")) for view in layout_views(out))
+    assert Contents(out).values("/frame/predicted_ellipses", "LineStrips2D:strips")
+
+
+def test_a_simulation_has_no_screens_of_captures(recorded: Recorded, tmp_path: Path) -> None:
+    first, *others = recorded.records
+    kinds = (ev.ProcedureStarted, ev.StepStarted, ev.TrialFinished, ev.SessionFinished)
+    (start,) = (n for n, record in enumerate(others) if _starts_trial(record.event))
+    kept = [record for record in others[start:] if isinstance(record.event, kinds)]
+    out = recording_of(recorded, [first, *kept], tmp_path / "simulation.rrd")
+    contents, views = Contents(out), layout_views(out)
+    assert front_tab(out) == TRIAL
+    assert {view.origin for view in views} >= {f"/trials/{TRIAL}/tables", "/steps/log"}
+    for view in views:
+        assert has_content(contents, view, "capture", 1), view.name
+
+
+def test_the_open_prompt_is_shown_until_the_next_event(recorded: Recorded, tmp_path: Path) -> None:
+    prompt = Prompt(key="k", do="Place the target at 200 mm.")
+    out = tmp_path / "part.rrd"
+    with RecordingConsumer(recorded.folder, recorded.rig, out) as consumer:
+        for record in recorded.records:
+            if isinstance(record.event, ev.TargetPlaced):
+                consumer.show_prompt(prompt)
+            consumer(record)
+            if isinstance(record.event, ev.CaptureTaken):
+                break
+    texts = [text for (text,) in Contents(out).static("/task", "TextDocument:text")]
+    asked = [prompt.do in text for text in texts]
+    assert asked == [False, True, False]
+    assert texts[0] == "**Step 1 of 6: Capture at 200 mm**"
+    assert texts[0] == texts[2]
+
+
+def test_a_finished_recording_shows_no_task(recorded: Recorded) -> None:
+    assert "/task" not in {view.origin for view in layout_views(recorded.recording)}
 
 
 def _starts_trial(event: object) -> bool:

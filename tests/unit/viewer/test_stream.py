@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
@@ -13,6 +14,7 @@ from tests.viewer.readback import front_tab, layout_views
 from tests.viewer.session import a_rig
 from workbench.viewer.blueprint import TrialTab, blueprint
 from workbench.viewer.stream import Moment, Stream
+from workbench.viewer.window import free_port
 
 SCALARS = "Scalars:scalars"
 
@@ -76,3 +78,30 @@ def test_the_last_layout_is_the_one_that_the_file_opens_with(tmp_path: Path) -> 
     logged(tmp_path, lambda stream: stream.lay_out(blueprint(a_rig(), [trial], "trial")))
     assert front_tab(tmp_path / "part.rrd") == "t"
     assert "Errors so far" in {view.name for view in layout_views(tmp_path / "part.rrd")}
+
+
+def check_often(stream: Stream) -> None:
+    for _ in range(3):
+        stream.check_written()
+
+
+def test_a_served_recording_that_does_not_grow_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "part.rrd"
+    stream = Stream(path, "part", blueprint(a_rig()), free_port())
+    monkeypatch.setattr("workbench.viewer.stream.STALL_S", 0.0)
+    stream.flush()
+    for _ in range(5):  # grows
+        with path.open("ab") as file:
+            file.write(b"x")
+        stream.check_written()
+    stream.check_written()
+    with pytest.raises(OSError, match=r"part\.rrd"):
+        check_often(stream)
+    stream.close()
+
+
+def test_a_file_that_cannot_be_written_is_named() -> None:
+    with pytest.raises(OSError, match="/dev/full"):
+        Stream(Path("/dev/full"), "part", blueprint(a_rig()))

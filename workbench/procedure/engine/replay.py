@@ -41,6 +41,8 @@ class ReplayingJournal:
         self._kept = deque(safe_part(before))
         self._from_n = 0
         self._resumed = resumed if before else None
+        self._incidents: list[ev.Incident] = []
+        """Incidents to journal with the next new event; replayed events have no place for them."""
         self._complete = {
             key: captures for key, captures in placement_captures(before).items() if captures.complete
         }
@@ -88,7 +90,11 @@ class ReplayingJournal:
             resumed = self._resumed.model_copy(update={"from_n": self._from_n})
             self._resumed = None
             self._show(self._journal.append(resumed))
-        return self._show(self._journal.append(event))
+        self._journal_incidents()
+        record = self._show(self._journal.append(event))
+        if not isinstance(event, ev.SessionFinished):  # the last record of a session
+            self._journal_incidents()
+        return record
 
     def complete_placement(self, key: str) -> PlacementCaptures | None:
         """Captures at a placement that was complete before the resumption and counts; None for others."""
@@ -115,7 +121,7 @@ class ReplayingJournal:
         self._answers = {k: e for k, e in self._answers.items() if k != key and not k.startswith(f"{key}/")}
 
     def _show_notes(self) -> None:
-        """Pass on records that no step emits again: resumptions, repairs, repetitions, confirmed safety."""
+        """Pass on records that no step emits again: resumptions, repairs, repetitions, incidents, safety."""
         while self._kept and _is_note(self._kept[0].event):
             self._show(self._kept.popleft())
 
@@ -125,8 +131,15 @@ class ReplayingJournal:
 
     def _pass_on(self, record: ev.Record) -> ev.Record:
         for consumer in self._consumers:
-            consumer(record)
+            try:
+                consumer(record)
+            except ev.ConsumerFailedError as error:
+                self._incidents.append(error.incident)
         return record
+
+    def _journal_incidents(self) -> None:
+        while self._incidents:
+            self._show(self._journal.append(self._incidents.pop(0)))
 
 
 def _what(started: ev.Event) -> str:
@@ -140,6 +153,5 @@ def _is_retry(event: ev.Event) -> TypeGuard[ev.SetAside]:
 
 
 def _is_note(event: ev.Event) -> bool:
-    return isinstance(event, ev.SessionResumed | ev.SessionRepaired | ev.SetAside) or (
-        isinstance(event, ev.Answered) and event.key == SAFETY
-    )
+    notes = ev.SessionResumed | ev.SessionRepaired | ev.SetAside | ev.Incident
+    return isinstance(event, notes) or (isinstance(event, ev.Answered) and event.key == SAFETY)

@@ -13,7 +13,7 @@ from workbench.model.errors import BadInputError
 from workbench.model.prompt import Answer
 from workbench.model.target import Placement
 from workbench.procedure.engine.replay import ReplayingJournal
-from workbench.session.journal import JOURNAL, Journal
+from workbench.session.journal import JOURNAL, Journal, read_journal
 
 STARTED = ev.SessionStarted(session="s", rig="r", procedures=("p",))
 STEP = ev.StepStarted(procedure="p", index=1, step="fit", title="Fit", shots=0)
@@ -117,3 +117,55 @@ def test_placements_taken_again_are_known_before_and_after_a_resumption(tmp_path
         for event in (second, other):
             recorder.emit(event)
         assert recorder.set_aside("p.1/") == [first, second]
+
+
+def fails_once() -> ev.Consumer:
+    """A consumer that fails at the first record."""
+    failures = iter([ev.ConsumerFailedError("the recording", "disk full")])
+
+    def consumer(record: ev.Record) -> None:
+        if (failure := next(failures, None)) is not None:
+            raise failure
+
+    return consumer
+
+
+INCIDENT = ev.Incident(of="the recording", message="disk full")
+
+
+def test_a_consumer_that_fails_is_an_incident_in_the_journal(tmp_path: Path) -> None:
+    shown: list[ev.Record] = []
+    with Journal(tmp_path) as journal:
+        recorder = ReplayingJournal(journal, [fails_once(), shown.append])
+        for event in (STARTED, STEP):
+            recorder.emit(event)
+    assert [record.event for record in read_journal(tmp_path)] == [STARTED, INCIDENT, STEP]
+    assert [record.event for record in shown] == [STARTED, INCIDENT, STEP]
+
+
+def test_an_incident_among_replayed_events_is_journalled_with_the_next_new_one(tmp_path: Path) -> None:
+    with Journal(tmp_path) as journal:
+        for event in (STARTED, STEP):
+            journal.append(event)
+    reopened, before = Journal.reopen(tmp_path)
+    with reopened:
+        recorder = ReplayingJournal(reopened, [fails_once()], before, RESUMED)
+        for again in (STARTED, STEP, DONE):
+            recorder.emit(again)
+    events = [record.event for record in read_journal(tmp_path)]
+    assert events == [STARTED, STEP, RESUMED.model_copy(update={"from_n": 2}), INCIDENT, DONE]
+
+
+def test_a_resumed_session_passes_an_incident_over(tmp_path: Path) -> None:
+    with replay(tmp_path, [STARTED, INCIDENT, STEP]) as (recorder, shown):
+        for event in (STARTED, STEP):
+            recorder.emit(event)
+        assert [record.event for record in shown] == [STARTED, INCIDENT, STEP]
+        assert lines(tmp_path) == 3
+
+
+def test_the_end_of_a_session_stays_its_last_record(tmp_path: Path) -> None:
+    end = ev.SessionFinished(exit_code=0, message="done")
+    with Journal(tmp_path) as journal:
+        ReplayingJournal(journal, [fails_once()]).emit(end)
+    assert [record.event for record in read_journal(tmp_path)] == [end]
