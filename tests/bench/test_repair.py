@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -70,7 +71,7 @@ def copy(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return tmp_path / "f" / "s"
 
 
-def repair(folder: Path, stop_after: int | None = None, **decisions: object) -> list[ev.Event]:
+def repair(folder: Path, stop_after: int | None = None, **decisions: Any) -> list[ev.Event]:
     """Repair a session and return its valid events; `stop_after` captures it is stopped."""
     taken: list[ev.Record] = []
 
@@ -82,7 +83,7 @@ def repair(folder: Path, stop_after: int | None = None, **decisions: object) -> 
             taken.append(record)
 
     before = list(read_journal(folder))[-1].n
-    resume(folder, [count], RESUMER, stopping, repair=Repair("because", **decisions))  # type: ignore[arg-type]
+    resume(folder, [count], RESUMER, stopping, repair=Repair("because", **decisions))
     return [record.event for record in effective(read_journal(folder))]
 
 
@@ -161,9 +162,7 @@ def test_a_standoff_is_added_to_a_finished_session(copy: Path) -> None:
         {"restore": ("300",)},
     ],
 )
-def test_a_repair_that_cannot_be_leaves_the_session_as_it_was(
-    copy: Path, decisions: dict[str, object]
-) -> None:
+def test_a_repair_that_cannot_be_leaves_the_session_as_it_was(copy: Path, decisions: dict[str, Any]) -> None:
     before = (copy / "journal.jsonl").read_bytes()
     with pytest.raises(BadInputError, match="repair"):
         repair(copy, **decisions)

@@ -1,4 +1,4 @@
-"""What can be done about a session whose calibration is refused."""
+"""Repairs offered for a session with a refused calibration."""
 
 from __future__ import annotations
 
@@ -27,9 +27,11 @@ def refused_fit(session_dir: Path) -> ev.FitFinished | None:
 
 
 def suspects(fit: ev.FitFinished) -> list[str]:
-    """Keys of the placements that a fit names as wrong, or else of those with an alarm."""
+    """Keys of the placements that a fit names as wrong, else of those with an alarm, else of the worst."""
     named = [fault.placement for fault in fit.faults if fault.placement is not None]
-    return list(dict.fromkeys(named)) or [one.placement for one in fit.left_out if one.alarm]
+    alarms = [one.placement for one in fit.left_out if one.alarm]
+    worst = sorted(fit.left_out, key=lambda one: -abs(one.z))[:1]
+    return list(dict.fromkeys(named)) or alarms or [one.placement for one in worst]
 
 
 def repair_commands(session_dir: Path, fit: ev.FitFinished) -> list[str]:
@@ -45,8 +47,17 @@ def repair_commands(session_dir: Path, fit: ev.FitFinished) -> list[str]:
         for option in ("--recapture", "--leave-out")
         if suspects(fit)
     ]
+    if (advised := _advised_mm(session_dir)) is not None:
+        commands.append([*start, "--add", f"{advised:g}", "--reason", "the most informative standoff"])
     commands.append([*start, "--accept", "--reason", "the failed limit does not matter here"])
     return [shlex.join(command) for command in commands]
+
+
+def _advised_mm(session_dir: Path) -> float | None:
+    """Standoff that the session has advised last."""
+    events = [r.event for r in effective(read_journal(session_dir))]
+    advised = [event.next_standoff_mm for event in events if isinstance(event, ev.StandoffAdvised)]
+    return advised[-1] if advised else None
 
 
 def ask_for_repair(fit: ev.FitFinished, why: str, operator: Operator) -> Repair | None:

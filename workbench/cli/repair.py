@@ -41,7 +41,7 @@ def repair(
     no_input: NoInput = False,
     view: View = None,
 ) -> None:
-    """Repair an ended session: capture placements again, leave out, restore or add them; then go on."""
+    """Repair an ended session: capture placements again, leave out, restore or add them."""
     from workbench.cli.run import Answers, repair_session
     from workbench.cli.sessions import find_session
     from workbench.procedure.engine.repair import Repair

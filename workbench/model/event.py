@@ -150,7 +150,7 @@ class SessionRepaired(FileModel):
     recapture: tuple[str, ...] = ()
     """To be captured again; the captures so far do not count."""
     leave_out: tuple[str, ...] = ()
-    """Not to be used; the captures stay on disk."""
+    """To be ignored; the captures stay on disk."""
     restore: tuple[str, ...] = ()
     """To be used again after all, or captured if they were skipped."""
     add_mm: tuple[float, ...] = ()

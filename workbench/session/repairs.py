@@ -11,7 +11,7 @@ from workbench.model import event as ev
 
 @dataclass
 class Repairs:
-    """What the repairs of a session have decided; of each placement, the last decision."""
+    """Decisions of all repairs of a session; of each placement, the last one."""
 
     left_out: dict[str, str] = field(default_factory=dict)
     """Reasons by the keys of placements that do not count."""

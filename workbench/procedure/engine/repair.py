@@ -40,8 +40,8 @@ class Repair:
             caller: invocation of the repair.
 
         Raises:
-            BadInputError: there is no decision, a name is that of no placement or of several, two decisions
-                contradict each other, nothing can be restored, or there is no grid to add to.
+            BadInputError: no decision, or two that contradict each other; a name of no placement or of several;
+                nothing to restore; no grid to add to.
         """
         keys = placement_keys(plan, records)
         recapture, leave_out, restore = (

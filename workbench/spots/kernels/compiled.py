@@ -21,7 +21,7 @@ def compiled(function: F) -> F:
 
     Numba compiles it again when that source changes, but not when the source of a function that it calls
     changes. After such a change remove `__pycache__` of this folder. Where no folder can be written, it
-    compiles in each run, and a warning says so once.
+    compiles in each run, and warns once.
     """
     try:
         return cast(F, numba.njit(function, cache=True, fastmath=_FAST, error_model="numpy"))
