@@ -147,7 +147,7 @@ def precision(runs: int) -> Iterator[Figure]:
 
 def budget(runs: int) -> Iterator[Figure]:
     """Alarm of the repeatability trial's budget, three standoffs together, and coverage."""
-    for placements in (8, 12):
+    for placements in (8, 10):
         for unknown in (0.0, 1.0):
             alarms, inside = [], []
             for seed in range(runs):
@@ -155,7 +155,7 @@ def budget(runs: int) -> Iterator[Figure]:
                 alarms.append(bool(rows[-1]["alarm"]))
                 inside += [row["coverage"] for row in rows[:-1]]
             text = "with as much left out" if unknown else "of a complete budget"
-            bounds = (0.8, 1.0) if unknown and placements == 12 else (0.5, 1.0) if unknown else (0.0, 0.05)
+            bounds = (0.8, 1.0) if unknown and placements == 10 else (0.5, 1.0) if unknown else (0.0, 0.05)
             yield Figure(
                 "repeatability", f"alarm {text}, {placements} placements", _mean(alarms), bounds, runs
             )

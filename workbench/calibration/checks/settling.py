@@ -2,12 +2,12 @@
 
 A camera that warms up shifts the image by a exp(-t / tau), t from 0 at the first capture to 1 at the last. A
 steady drift is its limit for a large tau, so that one likelihood covers both. All parameters but the drift
-are marginalised: the residuals r at the prior means, in standard deviations, have the covariance
-R = 1 + J J^T. A shape W of the drift, one column for u and one for v, explains
+are marginalised. The residuals r at the prior means are in standard deviations, with the covariance
+R = 1 + J J^T. Of their chi-square a shape W of the drift, one column for u and one for v, explains
 
-    gain(tau) = (W^T R^-1 r)^T (W^T R^-1 W)^-1 (W^T R^-1 r)
+    gain(tau) = (W^T R^-1 r)^T (W^T R^-1 W)^-1 (W^T R^-1 r).
 
-of their chi-square, at its best amplitudes. The profile of gain over tau gives the estimate and its 95 %
+The amplitudes are those of least squares. The profile of gain over tau gives the estimate and its 95 %
 interval. A time constant is stated where the steady drift is contradicted. Time is the order of the
 captures, taken to be evenly spaced.
 """
@@ -112,7 +112,7 @@ def warm_up_advice(fitted: CalibrationFit) -> str:
     """Advice in words for a fit with a drift: duration of the warm-up, or that the drift has not settled."""
     found = settling(fitted)
     if found is None:
-        return "No settling shows: a warm-up takes longer than this session. Do: warm up longer, or fix the camera"
+        return "No settling shows: it takes longer than the session. Do: warm up longer, or fix the camera"
     # A shift below the deviation of a single mean position is one that no spot shows.
     limit_px = float(np.nanmedian(fitted.cells.sd_px)) * fitted.noise_scale
     low, high = found.interval

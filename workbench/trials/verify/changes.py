@@ -1,9 +1,9 @@
 """Changes of a sensor since its calibration that explain the errors of its lasers, each alone.
 
 A change of parameters moves the whitened scores s along the columns of D. Its amount by least squares is
-F D' s, with F = (D' D)^-1. It lowers chi-square by s' D F D' s, its gain, which of a valid calibration has a
-chi-square distribution of as many degrees of freedom as the change has parameters: the most powerful test
-that does not depend on the amount. Changes whose gains are alike cannot be distinguished.
+F D' s, with F = (D' D)^-1. It lowers chi-square by its gain, s' D F D' s. With a valid calibration the gain
+has a chi-square distribution of as many degrees of freedom as the change has parameters. No test that does
+not depend on the amount is more powerful. Changes whose gains are alike cannot be distinguished.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ the point (x, y) of a beam is s + B b, with b = (ruler_scale, m, n) and B = (s, 
 with the error -G d, where d is the error of the calibration's parameters. Measured - standoff is therefore
 B b - G d: all placements and lasers share b and d.
 
-Of the bench of the calibration, b is known by the calibration itself, and correlated with d: a ruler that is
-long by 0.1 % gives a calibration whose ranges are too, and the two cancel. Of any other bench, b has the
+Of the bench of the calibration, b is known by the calibration itself, and correlated with d. A ruler that is
+long by 0.1 % gives a calibration whose ranges are long too, and the two cancel. Of any other bench, b has the
 priors of the rig file and is independent of d. The variance of the errors is then larger in every direction
 that the two share. A bench taken for another one refuses fewer valid calibrations, never more; another bench
 taken for that of the calibration refuses more.

@@ -1,9 +1,8 @@
 """Verdict on a calibration: the lasers against each other, then all errors of a verification together.
 
-Tests of different power share a probability of 5 % to refuse a valid calibration (Bonferroni's inequality):
-the test that is the most powerful for each change of the sensor, and one for any other error. A focal length
-that has changed is the hardest to see, because ruler and baselines move the ranges likewise: it has the
-largest share.
+The tests share a probability of 5 % to refuse a valid calibration (Bonferroni's inequality). They are the
+most powerful one for each change of the sensor, and one for any other error. A focal length that has changed
+is the hardest to see, because ruler and baselines move the ranges likewise: it has the largest share.
 """
 
 from __future__ import annotations
