@@ -3,8 +3,9 @@
 A camera that warms up shifts the image by a exp(-t / tau), t from 0 at the first capture to 1 at the last. A
 steady drift is its limit for a large tau, so that one likelihood covers both. All parameters but the drift
 are marginalised. The residuals r at the prior means, in standard deviations, have the covariance
-R = 1 + J J^T. A shape W of the drift has one column for u and one for v.
-Of chi-square it explains
+R = 1 + J J^T.
+
+A shape W of the drift has one column for u and one for v. Of chi-square it explains
 
     gain(tau) = (W^T R^-1 r)^T (W^T R^-1 W)^-1 (W^T R^-1 r)
 
