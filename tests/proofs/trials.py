@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
+from tests.proofs.rendered import CHANGES, verifications
 from tests.support.accuracy_runs import accuracy_run
 from tests.support.rangers import thesis_ranger
 from tests.support.rigs import thesis_rig
@@ -51,13 +52,6 @@ RESULTS = ROOT / "docs" / "benchmarks"
 COVERAGE = (0.93, 0.97)
 STANDOFFS_MM = (140.0, 180.0, 250.0, 350.0, 500.0, 750.0, 1100.0, 1700.0, 2000.0, 2700.0, 3800.0)
 VERIFIED_MM = (200.0, 300.0, 500.0, 800.0, 1200.0, 2000.0)
-CHANGES: dict[str, tuple[dict[str, float], str]] = {
-    "one laser turned by 1 mrad": ({"L2.tx": 0.001}, "L2 turned"),
-    "focal length 0.3 %": ({"f_px": 0.003 * 533.3}, "focal length"),
-    "one baseline 0.3 mm": ({"L3.x_mm": 0.3}, "L3 displaced"),
-    "camera turned by 2 mrad": ({"cx_px": 1.07}, "camera turned"),
-    "lens refocused: 0.5 %, pinhole 2 mm": ({"f_px": 0.005 * 533.3, "offset_mm": 2.0}, "refocused"),
-}
 UNKNOWN_CHANGE = 0.12
 """Power that a verification may lose against the test that knows the change: it looks for a dozen changes."""
 
@@ -251,6 +245,16 @@ def verify(runs: int) -> Iterator[Figure]:
             yield Figure("verify", f"named where refused: {text}, {where}", right, (0.7, 1), runs)
 
 
+def rendered(_: int) -> Iterator[Figure]:
+    """Verifications on the virtual bench, one of a valid calibration and one of each change."""
+    valid, *changed = verifications({"": {}} | {text: change for text, (change, _) in CHANGES.items()})
+    yield Figure("verify", "valid calibration refused, rendered", valid.refused, (0, 0), 1)
+    for one in changed:
+        yield Figure("verify", f"refused: {one.change}, rendered", one.refused, (1, 1), 1)
+        named = float(CHANGES[one.change][1] in one.verdict)
+        yield Figure("verify", f"named: {one.change}, rendered", named, (0, 1), 1)
+
+
 def target_check(runs: int) -> Iterator[Figure]:
     """False alarms about the target asked for, over all kinds of targets and ranges."""
     specs: tuple[TargetSpec, ...] = (
@@ -278,6 +282,7 @@ PROOFS: tuple[Proof, ...] = (
     cylinder,
     missing_spots,
     verify,
+    rendered,
     target_check,
 )
 

@@ -64,7 +64,11 @@ def _at_placement(reference: Reference, check: PlacementCheck) -> tuple[FloatArr
     """Errors (n,), derivatives by the true parameters (n, P + 3), and covariance (n, n) by the placement."""
     expected_mm = check.standoff_mm + check.by_shared @ reference.shared
     ratio = (expected_mm + reference.offset_mm) / (check.laser_mm + reference.offset_mm)
-    gradient = reference.gradient(ratio[:, None] ** 2 * check.by_parameter, check.by_shared)
-    own = np.diag((ratio**2 * check.spot_sd_mm) ** 2) + check.reference_sd_mm**2
-    own += reference.tilt_sd**2 * check.place_mm @ check.place_mm.T
+    by_parameter = ratio[:, None] ** 2 * check.by_parameter
+    # A shift of all ranges is ratio x shift, however large: an unmeasured standoff hides the pinhole's.
+    by_parameter[:, reference.offset_column] /= ratio
+    gradient = reference.gradient(by_parameter, ratio[:, None] * check.by_shared)
+    place_mm = ratio[:, None] * check.place_mm
+    own = np.diag((ratio**2 * check.spot_sd_mm) ** 2) + check.reference_sd_mm**2 * np.outer(ratio, ratio)
+    own += reference.tilt_sd**2 * place_mm @ place_mm.T
     return ratio * (check.laser_mm - expected_mm), gradient, own

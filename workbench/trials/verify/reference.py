@@ -26,6 +26,7 @@ from workbench.sensor.calibrated import CalibratedSensor
 
 SHARED = ("ruler_scale", *TARGET_TILT)
 """Parameters of the bench that all placements share."""
+OFFSET = "offset_mm"
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class Reference:
     """1 sigma of the tilt of one placement about each axis, rad."""
     offset_mm: float
     """Distance of the pinhole behind the plane from which standoffs count, by the calibration."""
+    offset_column: int
+    """Index of this parameter."""
 
     @classmethod
     def own(cls, sensor: CalibratedSensor, bench: BenchSpec) -> Reference:
@@ -50,7 +53,9 @@ class Reference:
         covariance[:count, :count] = sensor.covariance
         covariance[count:, count:] = np.diag([prior.sd**2 for prior in priors])
         expected = np.array([prior.value for prior in priors])
-        return cls(expected, covariance, radians(bench.tilt_sd_deg), sensor.offset_mm)
+        return cls(
+            expected, covariance, radians(bench.tilt_sd_deg), sensor.offset_mm, _names(sensor).index(OFFSET)
+        )
 
     @classmethod
     def of_calibration(cls, sensor: CalibratedSensor, bench: BenchSpec) -> Reference:
@@ -72,6 +77,7 @@ class Reference:
             sensor.covariance[np.ix_(order, order)],
             radians(bench.tilt_sd_deg),
             sensor.offset_mm,
+            _names(sensor).index(OFFSET),
         )
 
     def gradient(self, by_parameter: FloatArray, by_shared: FloatArray) -> FloatArray:
@@ -82,3 +88,7 @@ class Reference:
             by_shared: (n, 3) standoff, x and y of each range, mm.
         """
         return np.concatenate([-by_parameter, by_shared], axis=1)
+
+
+def _names(sensor: CalibratedSensor) -> tuple[str, ...]:
+    return sensor.calibration.laser_ranger.parameters.names

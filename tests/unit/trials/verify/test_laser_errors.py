@@ -9,6 +9,7 @@ from tests.support.rangers import thesis_ranger
 from tests.support.rigs import thesis_rig
 from tests.support.simulated_trials import SimulatedBench
 from workbench.procedure.engine.step import flat_placement
+from workbench.trials.verify.changes import changes
 from workbench.trials.verify.laser_errors import LaserErrors, laser_errors
 from workbench.trials.verify.reference import Reference
 from workbench.trials.verify.statistics import check_placement
@@ -48,6 +49,16 @@ def test_a_change_moves_the_scores_along_its_derivative() -> None:
             0.002, abs=4 / float(np.linalg.norm(along))
         )
         assert moved.chi2 > 900
+
+
+def test_a_standoff_that_is_not_measured_hides_the_pinhole() -> None:
+    """A turned laser at one placement is not taken for a displaced pinhole."""
+    one = SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1, {"L2.tx": 0.002}, same_bench=True)
+    check = check_placement(SENSOR, one.spot_readings("v", flat_placement("v", 600.0), 5), 600.0)
+    found = changes(SENSOR, laser_errors(Reference.own(SENSOR, one.rig.bench), [check]))
+    gains = {change.parameters: change.gain for change in found}
+    assert gains["L2.tx",] > 50
+    assert gains["offset_mm",] < 4
 
 
 def test_without_a_spot_there_are_no_errors() -> None:
