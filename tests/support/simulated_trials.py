@@ -10,7 +10,7 @@ import numpy as np
 
 from tests.support.drawn_sensors import changed_sensor, drawn_values
 from workbench.model.arrays import FloatArray
-from workbench.model.event import ReadingTaken
+from workbench.model.event import LaserRange, ReadingTaken
 from workbench.model.rig import Rig
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 from workbench.optics.rays import RAY
@@ -95,6 +95,31 @@ class SimulatedBench:
             ids = [self.true.ids[n] for n in seen]
             reading = self.ranger.read_known(scene, len(self.true.ids), ids, px[seen], sd[seen])
             found.append((reading_taken(self.rig, name, placement, number, reading, closest), reading))
+        return found
+
+    def spot_readings(self, name: str, placement: Placement, count: int) -> list[ReadingTaken]:
+        """`readings` of every laser's spot alone: without the ranger, whose ranges are not needed."""
+        still = self._still_px(placement)
+        sd = self.ranger.calibration.laser_ranger.noise.spot_sd_px
+        found = []
+        for number in range(count):
+            px = still + self.random.normal(0.0, hypot(sd, self.unknown_noise_px), still.shape)
+            lasers = tuple(
+                LaserRange(laser_id=i, range_mm=placement.standoff_mm, sigma_mm=1.0, u_px=u, v_px=v)
+                for i, (u, v) in zip(self.true.ids, px.tolist(), strict=True)
+            )
+            found.append(
+                ReadingTaken(
+                    trial=name,
+                    scene=f"{placement.key}/{number:02d}",
+                    standoff_mm=placement.standoff_mm,
+                    reading=number,
+                    status="done",
+                    range_mm=placement.standoff_mm,
+                    sigma_mm=1.0,
+                    lasers=lasers,
+                )
+            )
         return found
 
     def _still_px(self, placement: Placement) -> FloatArray:

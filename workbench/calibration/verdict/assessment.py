@@ -14,6 +14,7 @@ from workbench.calibration.checks.faults import find_faults, refuses
 from workbench.calibration.checks.priors import contradicted_priors, doubted_priors
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.checks.residuals import explain, residual_tests
+from workbench.calibration.checks.settling import warm_up_advice
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.selection.drift import drift_test, fits_drift
 from workbench.calibration.verdict.observability import NullDirection, direction_lines
@@ -138,7 +139,7 @@ def _missed_limits(fit: CalibrationFit, limits: Acceptance, max_relative_range_s
     if not np.abs(fit.drift_px).max() <= limits.max_drift_px:
         reasons.append(
             f"the image drifted by {_drift_text(fit)} from the first capture to the last, expected at most"
-            f" {limits.max_drift_px:g} px. Do: warm up longer, fix the camera and capture again"
+            f" {limits.max_drift_px:g} px. {warm_up_advice(fit)}, and capture again"
         )
     if not fit.placement_scale <= limits.max_placement_scale:
         reasons.append(
@@ -266,8 +267,7 @@ def _warnings(fit: CalibrationFit) -> list[str]:
     if np.any(fit.drift_px):
         warnings.append(
             f"the image drifted by {_drift_text(fit)} from the first capture to the last; the fit allows for"
-            " it, and the sd of the image centre includes half the drift. Do: warm up longer, or fix the"
-            " camera."
+            f" it, and the sd of the image centre includes half the drift. {warm_up_advice(fit)}."
         )
     if fit.noise_scale > 1:
         warnings.append(

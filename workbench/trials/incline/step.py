@@ -36,6 +36,8 @@ class InclineTrialStep(TrialStepModel):
     """Closest ranges over the front, at which the near end of the target is placed."""
     targets: Annotated[tuple[InclineSpec, ...], Field(min_length=1)]
     readings: Count
+    same_bench: bool = False
+    """Whether the target turns on the mount of the calibration, whose common tilt is then measured."""
     limits: InclineLimits = InclineLimits()
 
     @model_validator(mode="after")
@@ -84,4 +86,4 @@ class InclineTrialStep(TrialStepModel):
         # Imported here: checking a file must not import the ranger.
         from workbench.trials.incline.trial import run_trial
 
-        return run_trial(context, name, self.set_ups(name, context.rig), self.readings, self.limits)
+        return run_trial(context, name, self)

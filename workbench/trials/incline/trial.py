@@ -17,7 +17,7 @@ from workbench.trials.errors import (
     missing_table,
     quantity_chart,
 )
-from workbench.trials.incline.set_up import SetUp
+from workbench.trials.incline.common_tilt import CommonTilt, InclinePoints, common_tilts
 from workbench.trials.incline.statistics import (
     AngleDifference,
     AngleLine,
@@ -26,9 +26,10 @@ from workbench.trials.incline.statistics import (
     angle_lines,
     incline_row,
 )
-from workbench.trials.incline.step import InclineLimits
+from workbench.trials.incline.step import InclineTrialStep
 from workbench.trials.limits import Result, check_results, error_result, range_results, require_readings
 from workbench.trials.readings import ClosestRange, take_readings
+from workbench.trials.target_check import Points
 from workbench.trials.trial_run import TrialRun
 
 SET_UP = (
@@ -39,10 +40,8 @@ SET_UP = (
 U_CAPTION = "U: expanded uncertainty (k = 2) of the error, by sensor and reference"
 
 
-def run_trial(
-    context: Context, name: str, set_ups: Sequence[SetUp], count: int, limits: InclineLimits
-) -> str:
-    """Take `count` readings at each set-up; returns the outcome in one line.
+def run_trial(context: Context, name: str, step: InclineTrialStep) -> str:
+    """Take the readings at each set-up; returns the outcome in one line.
 
     Raises:
         BadInputError: there is no calibration.
@@ -50,13 +49,13 @@ def run_trial(
         WorkbenchError: see `TrialRun.visit`.
     """
     run = TrialRun(context, name)
-    ranger = run.ranger
+    ranger, set_ups = run.ranger, step.set_ups(name, context.rig)
     by_key = {set_up.placement.key: set_up for set_up in set_ups}
 
     def work(placed: Placement) -> tuple[InclineRow, list[ReadingTaken]]:
         set_up = by_key[placed.key]
         closest = ClosestRange.of(set_up.target, placed, ranger.sensor, context.rig)
-        readings = take_readings(context, ranger, name, placed, count, closest)
+        readings = take_readings(context, ranger, name, placed, step.readings, closest)
         return incline_row(set_up.target, set_up.range_mm, readings), readings
 
     taken = run.visit([set_up.placement for set_up in set_ups], work)
@@ -65,15 +64,47 @@ def run_trial(
     tables = [
         *incline_tables(name, rows, angle_differences(rows)),
         *line_table(name, angle_lines(rows)),
+        *(tilt_table(name, _common_tilts(run, taken)) if step.same_bench else []),
         *missing_table(name, readings),
         *missing_table(name, readings, "angle", "angle_deg"),
     ]
     charts = [error_chart(f"{name}-errors", readings), angle_chart(name, taken)]
     run.finish(tables, charts)
     require_readings(name, [of for _, of in taken])
-    check_results(context, name, [one for row, of in taken for one in incline_results(row, of)], limits)
+    check_results(context, name, [one for row, of in taken for one in incline_results(row, of)], step.limits)
     angles = sum(row.angle.n for row in rows)
     return f"{len(readings)} readings, {angles} with an angle, tables in {name}.csv and {name}-angle.csv"
+
+
+def _common_tilts(
+    run: TrialRun, taken: Sequence[tuple[InclineRow, Sequence[ReadingTaken]]]
+) -> list[CommonTilt]:
+    sensor = run.ranger.sensor
+    found = [(row.target, Points.of(sensor, readings)) for row, readings in taken]
+    set_ups = [InclinePoints(target, points) for target, points in found if points is not None]
+    return common_tilts(sensor, set_ups, run.context.rig.bench) if set_ups else []
+
+
+def tilt_table(name: str, tilts: Sequence[CommonTilt]) -> list[Table]:
+    """Table of the tilt of the target's mount; empty list without any."""
+    if not tilts:
+        return []
+    columns = (
+        Column(key="axis", name="axis"),
+        Column(key="tilt_deg", name="tilt", unit="deg", format="digits of sd_deg"),
+        Column(key="sd_deg", name="sd", unit="deg", format="sd"),
+        Column(key="known_sd_deg", name="sd by calibration", unit="deg", format="sd"),
+        Column(key="rig_keys", name="bench in the rig file"),
+    )
+    return [
+        Table(
+            name=f"{name}-tilt",
+            title="Incline: tilt common to all placements on the mount of the calibration",
+            columns=columns,
+            rows=tuple(tuple(getattr(one, column.key) for column in columns) for one in tilts),
+            caption="for the next calibration, by new captures; of two axes the larger sd counts",
+        )
+    ]
 
 
 def incline_results(row: InclineRow, readings: Sequence[ReadingTaken]) -> list[Result]:

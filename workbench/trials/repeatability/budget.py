@@ -10,6 +10,7 @@ import pandas as pd
 from workbench.model.table import Cell, Column, Table
 from workbench.model.trial_event import COVERAGE_FACTOR
 from workbench.trials.reading_frame import dependence, levels, table_of
+from workbench.trials.repeatability.step import JOINT_ALARM
 from workbench.trials.statistics.autocorrelation import Autocorrelation
 from workbench.trials.statistics.coverage import interval_coverage
 from workbench.trials.statistics.error_budget import ErrorBudget, budget_test
@@ -113,7 +114,7 @@ def _total(budgets: Sequence[ErrorBudget]) -> list[dict[str, Cell]]:
         {
             "degrees_of_freedom": test.degrees_of_freedom,
             "variance_ratio": test.ratio,
-            "alarm": test.alarm,
+            "alarm": test.probability < JOINT_ALARM,
             "note": f"all standoffs: p = {test.probability:.2g}",
         }
     ]

@@ -11,6 +11,7 @@ from workbench.model.fields import Standoffs, require_different
 from workbench.model.limit import Limit
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
+from workbench.model.stats import chi2_isf, chi2_sf
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
@@ -18,6 +19,8 @@ from workbench.procedure.engine.step import flat_placement
 from workbench.trials.dither import dither_prompts
 from workbench.trials.trial_step import ResultLimits, TrialStepModel
 
+JOINT_ALARM = 0.05
+"""Probability of an alarm of the error budget of all standoffs together where its sources are complete."""
 MOST = 1000
 """Largest number of placements or repeats."""
 
@@ -54,8 +57,20 @@ class RepeatabilityTrialStep(TrialStepModel):
         return (
             f"Repeatability, {len(self.standoffs_mm)} standoffs x {each} placements x {self.repeats} repeats:"
             f" separates {repeats} ({each * (self.repeats - 1)} degrees of freedom) and re-placements"
-            f" ({each - 1}), not sessions"
+            f" ({each - 1}), not sessions; a source as large as all stated ones is found in"
+            f" {100 * self.budget_power:.0f} %"
         )
+
+    @property
+    def budget_power(self) -> float:
+        """Least probability that the budget's alarm finds a source as large as all stated ones together.
+
+        The observed variance is then twice the stated one. If all standoffs have this ratio, chi-square
+        over standoffs x (placements - 1) degrees of freedom is the most powerful test (Neyman and Pearson).
+        A source of the placements alone, beside noise that the repeats average, has a larger ratio.
+        """
+        freedom = len(self.standoffs_mm) * (self.placements_each - 1)
+        return float(chi2_sf(chi2_isf(JOINT_ALARM, freedom) / 2.0, freedom))
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
         """Every standoff once, then every standoff again: the target is moved between its placements."""

@@ -15,6 +15,7 @@ from typing import Literal
 
 from workbench.model.event import ReadingTaken
 from workbench.trials.errors import ErrorStatistics
+from workbench.trials.limits import Result
 from workbench.trials.thesis_hardware.quantities import (
     ANGLE,
     CLOSEST_RANGE,
@@ -119,6 +120,20 @@ class Row:
 def compare(readings: Sequence[ReadingTaken]) -> list[Row]:
     """Rows of every claim, and of the errors with lasers left off relative to those of all lasers."""
     return [*(_row(claim, readings) for claim in CLAIMS), *(_missing_row(n, readings) for n in (1, 3))]
+
+
+def comparison_results(rows: Sequence[Row]) -> list[Result]:
+    """Quantities of the rows with readings, for limits; a row whose readings lack the quantity fails them."""
+    found, seen = [], [row for row in rows if row.ours is not None or row.missing]
+    for row in seen:
+        of = " ".join(
+            part for part in (row.target, row.quantity, row.to_mm and f"to {row.to_mm:g} mm") if part
+        )
+        for quantity, reference in (("goal_ratio", row.goal), ("thesis_ratio", row.thesis)):
+            if reference is not None:
+                found.append(Result(quantity, of, None if row.ours is None else row.ours / reference))
+    missed = sum(row.is_reached is False for row in seen)
+    return [*found, Result("goals_missed", f"{len(seen)} rows", float(missed) if seen else None)]
 
 
 def _row(claim: Claim, readings: Sequence[ReadingTaken]) -> Row:

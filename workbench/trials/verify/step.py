@@ -37,6 +37,8 @@ class VerifyTrialStep(TrialStepModel):
     readings: Count
     reference_sd_mm: NonNegativeFloat | None = None
     """Standard uncertainty of the standoffs; None: the rig's `placement_sd_mm`."""
+    same_bench: bool = False
+    """Whether ruler, rail and the target's mount are those of the calibration, unchanged since."""
     compare_with: Path | None = None
     """Another calibration of the sensor, an old or a new one, whose errors stand beside; None: none."""
     limits: VerifyLimits = VerifyLimits()

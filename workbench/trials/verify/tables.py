@@ -9,7 +9,10 @@ from workbench.model.calibration import Calibration, CrossValidatedRange
 from workbench.model.table import Cell, Column, Table
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.reading_frame import table_of
-from workbench.trials.verify.statistics import Change, PlacementCheck, Verdict, predicted_mm
+from workbench.trials.verify.changes import Change
+from workbench.trials.verify.reference import Reference
+from workbench.trials.verify.statistics import PlacementCheck, predicted_mm
+from workbench.trials.verify.verdict import Verdict
 
 COLUMNS = (
     Column(key="standoff_mm", name="true", unit="mm"),
@@ -26,29 +29,31 @@ OTHER = (
     Column(key="other_expanded_mm", name="other's U", unit="mm", format=".2f"),
 )
 CAPTION = (
-    "predicted U: expanded uncertainty (k = 2) by calibration, spots and reference; cross-val.: error of the"
-    " calibration's placement nearest to this range, by the fit without it"
+    "predicted U: expanded uncertainty (k = 2) by calibration, spots, standoff, ruler and tilt; cross-val.:"
+    " error of the calibration's placement nearest to this range, by the fit without it"
 )
 MOST_CHANGES = 5
+Measured = tuple[Reference, Sequence[PlacementCheck]]
+"""Ruler and rail of a calibration's verification, and the placements by that calibration."""
 
 
 def verify_tables(
     name: str,
     sensor: CalibratedSensor,
-    checks: Sequence[PlacementCheck],
+    measured: Measured,
     verdict: Verdict,
-    other: tuple[CalibratedSensor, Sequence[PlacementCheck]] | None = None,
+    other: Measured | None = None,
 ) -> list[Table]:
     """Verdict with its action, and table of predicted, observed and cross-validated errors.
 
     Args:
         name: name of the step.
         sensor: sensor of the calibration.
-        checks: measured placements.
+        measured: ruler and rail, and the measured placements.
         verdict: verdict on the calibration.
-        other: sensor of another calibration, and the same placements by that one.
+        other: the same placements by another calibration.
     """
-    rows = [_row(sensor, check) for check in checks]
+    rows = [_row(sensor, measured[0], check) for check in measured[1]]
     if other is not None:
         for row, check in zip(rows, other[1], strict=True):
             row["other_error_mm"] = check.error_mm
@@ -104,14 +109,14 @@ def nearest_cross_validation(calibration: Calibration, standoff_mm: float) -> Cr
     return min(placements, key=lambda one: abs(log(one.standoff_mm / standoff_mm)), default=None)
 
 
-def _row(sensor: CalibratedSensor, check: PlacementCheck) -> dict[str, Cell]:
+def _row(sensor: CalibratedSensor, reference: Reference, check: PlacementCheck) -> dict[str, Cell]:
     row: dict[str, Cell] = {"standoff_mm": check.standoff_mm, "readings": check.readings}
     if (nearest := nearest_cross_validation(sensor.calibration, check.standoff_mm)) is not None:
         row |= {"cross_validated_mm": nearest.error_mm, "cross_validated_at_mm": nearest.standoff_mm}
     error_mm = check.error_mm
     if error_mm is None:
         return row
-    expanded_mm = predicted_mm(sensor, check)
+    expanded_mm = predicted_mm(reference, check)
     return row | {
         "error_mm": error_mm,
         "expanded_mm": expanded_mm,

@@ -12,6 +12,8 @@ from tests.support.running import Scripted
 from tests.support.steps import parse_step
 from workbench.model.event import ReadingTaken
 from workbench.model.prompt import Answer
+from workbench.trials.incline.common_tilt import CommonTilt
+from workbench.trials.incline.trial import tilt_table
 
 TEXT = (
     "step: incline_trial, ranges_mm: [300, 400], readings: 2,"
@@ -40,3 +42,12 @@ def test_range_and_angle_are_those_of_the_target(tmp_path: Path) -> None:
     assert [chart.name for chart in event.charts] == ["p.1-errors", "p.1-angles"]
     assert [one.true.angle_deg for one in taken if one.true is not None] == [30.0] * 4 + [-50.0] * 2
     assert session.context.readings == taken
+
+
+def test_the_tilt_of_the_mount_stands_with_the_keys_of_the_rig_file() -> None:
+    tilt = CommonTilt("vertical", 0.62, 0.16, 0.31)
+    (table,) = tilt_table("p.1", [tilt])
+    (row,) = table.records()
+    assert (table.name, row["tilt_deg"], row["sd_deg"]) == ("p.1-tilt", 0.62, 0.16)
+    assert row["rig_keys"] == tilt.rig_keys
+    assert tilt_table("p.1", []) == []

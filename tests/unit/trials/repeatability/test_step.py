@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from tests.support.running import two_laser_rig
 from tests.support.steps import parse_step, wrong_keys
+from workbench.procedure.engine.procedure_file import load_procedure
+from workbench.trials.repeatability.step import JOINT_ALARM, RepeatabilityTrialStep
+
+PROCEDURE = Path(__file__).parents[4] / "procedures/repeatability.yaml"
 
 
 @pytest.mark.parametrize(
@@ -51,6 +59,22 @@ def test_title_gives_the_degrees_of_freedom_of_each_component() -> None:
     dithered = parse_step("step: repeatability_trial, standoffs_mm: [300], dither_mm: 2")
     assert "speckle" in dithered.title
     assert "speckle" not in step.title
+
+
+@pytest.mark.parametrize(("standoffs_mm", "placements"), [("[300]", 8), ("[300, 800, 2000]", 10)])
+def test_the_power_of_the_budget_is_that_of_drawn_variances(standoffs_mm: str, placements: int) -> None:
+    """20 000 draws of twice the stated variance: the sd of their share is 0.004 at most."""
+    step = parse_step(f"step: repeatability_trial, standoffs_mm: {standoffs_mm}, placements: {placements}")
+    assert isinstance(step, RepeatabilityTrialStep)
+    freedom = len(step.standoffs_mm) * (placements - 1)
+    drawn = 2.0 * np.random.default_rng(8).chisquare(freedom, 20_000)
+    assert step.budget_power == pytest.approx(np.mean(chi2.sf(drawn, freedom) < JOINT_ALARM), abs=0.016)
+
+
+def test_the_procedure_has_placements_enough_for_a_power_of_80_percent() -> None:
+    (step,) = load_procedure(PROCEDURE).steps
+    assert isinstance(step, RepeatabilityTrialStep)
+    assert step.budget_power > 0.8
 
 
 def test_dither_prompts_can_be_answered_in_advance() -> None:

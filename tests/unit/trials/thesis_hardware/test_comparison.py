@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.four_lasers import reading
 from workbench.model.event import ReadingTaken, TrueValues
-from workbench.trials.thesis_hardware.comparison import CLAIMS, Row, compare
+from workbench.trials.thesis_hardware.comparison import CLAIMS, Row, compare, comparison_results
 
 
 def flats(true_mm: float, *errors_mm: float, left_off: tuple[str, ...] = ()) -> list[ReadingTaken]:
@@ -62,3 +62,15 @@ def test_without_readings_no_goal_is_reached() -> None:
     assert len(rows) == len(CLAIMS) + 2
     assert {one.ours for one in rows} == {None}
     assert all(one.is_reached is (None if one.goal is None else False) for one in rows)
+
+
+def test_results_are_those_of_rows_with_readings() -> None:
+    results = comparison_results(compare([*flats(400.0, 4.0), reading(None, range_mm=None)]))
+    found = {(one.quantity, one.of): one.value for one in results}
+    assert found["goal_ratio", "flat closest range error to 2000 mm"] == pytest.approx(0.01 / 0.005)
+    assert found["thesis_ratio", "flat mean range error to 2000 mm"] is None  # its reading has no range
+    assert not any("cylinder" in of for _, of in found)
+    assert results[-1].quantity == "goals_missed"
+    assert results[-1].value is not None
+    assert results[-1].value >= 1.0
+    assert [one.value for one in comparison_results(compare([]))] == [None]

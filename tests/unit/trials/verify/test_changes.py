@@ -7,18 +7,22 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from tests.support.drawn_sensors import drawn_sensor, flat_readings
-from tests.support.four_lasers import reading
 from tests.support.rangers import thesis_ranger
-from tests.support.rigs import thesis_rig
+from tests.support.rigs import prior, thesis_rig
 from workbench.sensor.calibrated import CalibratedSensor
-from workbench.trials.verify.changes import changes, named
-from workbench.trials.verify.statistics import Change, check_placement
+from workbench.trials.verify.changes import Change, changes, named
+from workbench.trials.verify.laser_errors import laser_errors
+from workbench.trials.verify.reference import Reference
+from workbench.trials.verify.statistics import check_placement
 
 STANDOFFS_MM = (200.0, 300.0, 500.0, 800.0, 1200.0, 2000.0)
 PLACEMENT_SD_MM = 0.3
-BENCH = thesis_rig().bench.model_copy(update={"tilt_sd_deg": 0.0, "target_tilt_sd_deg": 0.0})
+BENCH = thesis_rig().bench.model_copy(
+    update={"tilt_sd_deg": 0.0, "target_tilt_sd_deg": 0.0, "ruler_scale": prior(0.0, 0.0)}
+)
 RUNS = 12
 
 
@@ -34,7 +38,7 @@ def found(change: Mapping[str, float], seed: int) -> list[Change]:
         check_placement(sensor(), flat_readings(true, mm, 5, random, PLACEMENT_SD_MM), PLACEMENT_SD_MM)
         for mm in STANDOFFS_MM
     ]
-    return changes(sensor(), checks, BENCH)
+    return changes(sensor(), laser_errors(Reference.own(sensor(), BENCH), checks))
 
 
 @pytest.mark.parametrize(
@@ -74,6 +78,13 @@ def test_two_changes_are_explained_by_no_single_one() -> None:
     assert texts == {"no single change of the sensor explains the errors"}
 
 
-def test_without_a_laser_there_is_no_change() -> None:
-    assert changes(sensor(), [check_placement(sensor(), [reading(None)], 0.3)], BENCH) == []
+def test_the_p_value_is_that_of_the_gain() -> None:
+    alone = [one for one in found({"L2.tx": 0.0001}, 1) if len(one.parameters) == 1]
+    assert len(alone) > 8
+    for one in alone:
+        assert one.p == pytest.approx(chi2.sf(one.gain, 1))
+
+
+def test_without_errors_there_is_no_change() -> None:
+    assert changes(sensor(), None) == []
     assert named([]) == ""

@@ -7,10 +7,15 @@ import pytest
 
 from tests.support.drawn_sensors import flat_readings
 from tests.support.rangers import thesis_ranger
-from workbench.trials.verify.statistics import Change, Verdict, check_placement, predicted_mm
+from tests.support.rigs import thesis_rig
+from workbench.trials.verify.changes import Change
+from workbench.trials.verify.reference import Reference
+from workbench.trials.verify.statistics import check_placement, predicted_mm
 from workbench.trials.verify.tables import change_table, nearest_cross_validation, verify_tables
+from workbench.trials.verify.verdict import Verdict
 
 SENSOR = thesis_ranger().sensor
+REFERENCE = Reference.own(SENSOR, thesis_rig().bench)
 VERDICT = Verdict(True, "the ranges agree", "keep the calibration")
 CHECKS = [
     check_placement(SENSOR, flat_readings(SENSOR, mm, 3, np.random.default_rng(1), 0.3), 0.3)
@@ -19,17 +24,17 @@ CHECKS = [
 
 
 def test_the_verdict_comes_first_and_errors_stand_beside_cross_validation() -> None:
-    first, errors = verify_tables("v.1", SENSOR, CHECKS, VERDICT)
+    first, errors = verify_tables("v.1", SENSOR, (REFERENCE, CHECKS), VERDICT)
     assert (first.name, errors.name) == ("v.1-verdict", "v.1")
     rows = errors.records()
     assert [row["cross_validated_at_mm"] for row in rows] == [280.0, 900.0]
     validated = {one.standoff_mm: one for one in SENSOR.calibration.laser_ranger.fit.cross_validation}
     assert rows[0]["cross_validated_mm"] == validated[280.0].error_mm
-    assert rows[0]["expanded_mm"] == pytest.approx(predicted_mm(SENSOR, CHECKS[0]))
+    assert rows[0]["expanded_mm"] == pytest.approx(predicted_mm(REFERENCE, CHECKS[0]))
 
 
 def test_errors_by_another_calibration_stand_beside() -> None:
-    _, errors = verify_tables("v.1", SENSOR, CHECKS, VERDICT, (SENSOR, CHECKS))
+    _, errors = verify_tables("v.1", SENSOR, (REFERENCE, CHECKS), VERDICT, (REFERENCE, CHECKS))
     for row in errors.records():
         assert row["other_error_mm"] == row["error_mm"]
         assert row["other_expanded_mm"] == row["expanded_mm"]
@@ -43,6 +48,6 @@ def test_a_calibration_without_cross_validation_has_empty_cells() -> None:
 
 
 def test_the_best_changes_are_listed() -> None:
-    found = [Change(f"L{n} turned", (f"L{n}.tx",), 1.0, 0.1, "mrad", 50.0 - n, 0.5) for n in range(9)]
+    found = [Change(f"L{n} turned", (f"L{n}.tx",), 1.0, 0.1, "mrad", 50.0 - n, 1e-9, 0.5) for n in range(9)]
     table = change_table("v.1", found)
     assert [row["change"] for row in table.records()] == [f"L{n} turned" for n in range(5)]

@@ -11,7 +11,7 @@ from tests.support.exact import calibration_of
 from tests.support.four_lasers import calibrated, finished
 from tests.support.steps import parse_step
 from workbench.model.calibration import Calibration
-from workbench.model.errors import LimitFailedError
+from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.event import TargetPlaced, TrialProgress
 
 TEXT = "step: verify_trial, standoffs_mm: [300, 500], readings: 2, reference_sd_mm: 0.5"
@@ -54,3 +54,11 @@ def test_a_laser_that_has_turned_ends_it_before_a_target_is_measured(tmp_path: P
     assert caught.value.exit_code == 3
     assert placed == ["p.1/unmeasured-600mm"]
     assert verdict["valid"].tolist() == ["NO"]
+
+
+def test_a_calibration_without_its_bench_is_refused_before_a_target_is_placed(tmp_path: Path) -> None:
+    with calibrated(tmp_path) as session:
+        session.context.calibration = with_noise(calibration_of(session.context.rig))
+        with pytest.raises(BadInputError):
+            parse_step(f"{TEXT}, same_bench: true").run(session.context, "p.1")
+        assert not any(isinstance(one, TargetPlaced) for one in session.events)

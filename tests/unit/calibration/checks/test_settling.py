@@ -1,0 +1,77 @@
+"""Time constant of a drift, on simulated residuals of a fit: bias, coverage, false statements."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.support.rigs import World, thesis_rig
+from workbench.calibration.checks.settling import DriftProfile, Settling, settling_of, warm_up_advice
+from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.calibration.selection.drift import with_drift
+from workbench.model.arrays import FloatArray
+from workbench.procedure.engine.visiting_order import shuffled
+
+RUNS = 60
+RIG = thesis_rig(0.05, 0.048)
+
+
+def fitted(u_px: float, time_constant: float) -> CalibrationFit:
+    """Fit with a drift of a session in shuffled order whose image settles by `u_px`."""
+    seen = World(RIG, 1).observations()
+    order = shuffled(tuple({s.standoff_mm for s in seen}))
+    seen = sorted(seen, key=lambda s: order.index(s.standoff_mm))
+    shifts = u_px * np.exp(-np.linspace(0, 1, len(seen)) / time_constant)
+    moved = [replace(s, u_px=s.u_px + shift) for s, shift in zip(seen, shifts.tolist(), strict=True)]
+    return fit(with_drift(RIG), moved)
+
+
+@cache
+def steady() -> DriftProfile:
+    return DriftProfile.of(fitted(0.0, 1.0))
+
+
+def drawn(shape: FloatArray, u_px: float) -> list[Settling | None]:
+    """Settling of simulated residuals: noise, parameters drawn from their priors, a drift in u and v."""
+    random, profile = np.random.default_rng(3), steady()
+    measured = (profile.inverse_sd > 0).ravel()
+    shift = (profile.inverse_sd * shape[:, None] * [u_px, -u_px / 2]).ravel()
+    found = []
+    for _ in range(RUNS):
+        noise = random.standard_normal(len(shift)) * measured
+        parameters = profile.jacobian @ random.standard_normal(profile.jacobian.shape[1])
+        found.append(settling_of(replace(profile, residual=noise + parameters - shift)))
+    return found
+
+
+@pytest.mark.parametrize("time_constant", [0.1, 0.25])
+def test_the_time_constant_is_unbiased_and_its_interval_covers(time_constant: float) -> None:
+    """Of 60 intervals with 95 %, 52 or fewer cover with a probability of 4e-3."""
+    found = [one for one in drawn(np.exp(-steady().time / time_constant), 1.0) if one is not None]
+    assert len(found) == RUNS
+    ratio = np.log([one.time_constant / time_constant for one in found])
+    assert abs(ratio.mean()) < 4 * ratio.std() / RUNS**0.5 + 0.01
+    grid = 1.03
+    inside = [one.interval[0] / grid <= time_constant <= one.interval[1] * grid for one in found]
+    assert sum(inside) > 52
+    warm_up = time_constant * np.log(np.hypot(1.0, 0.5) / 0.05)
+    assert np.median([one.warm_up(0.05) for one in found]) == pytest.approx(warm_up, rel=0.1)
+
+
+@pytest.mark.parametrize("u_px", [0.0, 0.5])
+def test_a_steady_drift_has_no_time_constant(u_px: float) -> None:
+    """Of 60 at 1 %, more than 3 occur with a probability of 3e-3."""
+    assert sum(one is not None for one in drawn(1.0 - steady().time, u_px)) <= 3
+
+
+def test_a_shift_below_the_limit_needs_no_warm_up() -> None:
+    assert Settling(0.2, (0.1, 0.3), 0.04).warm_up(0.05) == 0.0
+
+
+def test_the_advice_of_a_session_follows_from_its_own_settling() -> None:
+    settles, still = warm_up_advice(fitted(1.0, 0.15)), warm_up_advice(fitted(0.0, 1.0))
+    assert "times the duration of this session" in settles
+    assert settles != still

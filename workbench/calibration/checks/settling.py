@@ -1,0 +1,125 @@
+"""Settling of a drift: its time constant, and the warm-up that would have avoided it.
+
+A camera that warms up shifts the image by a exp(-t / tau), t from 0 at the first capture to 1 at the last. A
+steady drift is its limit for a large tau, so that one likelihood covers both. All parameters but the drift
+are marginalised. The residuals r at the prior means, in standard deviations, have the covariance
+R = 1 + J J^T.
+
+A shape W of the drift has one column for u and one for v. Of chi-square it explains
+
+    gain(tau) = (W^T R^-1 r)^T (W^T R^-1 W)^-1 (W^T R^-1 r)
+
+The amplitudes are those of least squares. The profile of gain over tau gives the estimate and its 95 %
+interval. A time constant is stated where the steady drift is contradicted. Time is the order of the
+captures, taken to be evenly spaced.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+
+from workbench.calibration.estimation.fit import CalibrationFit
+from workbench.calibration.estimation.refit import optimum_of, problem_of
+from workbench.model.arrays import FloatArray
+
+TIME_CONSTANTS = np.geomspace(0.02, 20.0, 121)
+"""Grid, in durations of the session: below, one capture in fifty shifts; above, the drift is steady."""
+STEADY_GAIN = 6.63
+"""Gain over the steady drift above which a time constant is stated: chi-square of one degree, 1 %."""
+INTERVAL_GAIN = 3.84
+"""Loss of gain at the ends of the 95 % interval."""
+LEAST_INFORMATION = 1e-6
+"""Information on a drift, 1/px^2, below which its axis is not estimated."""
+
+
+@dataclass(frozen=True)
+class Settling:
+    """Drift that settles exponentially; times in durations of the session."""
+
+    time_constant: float
+    interval: tuple[float, float]
+    """95 %."""
+    amplitude_px: float
+    """Shift from the first capture to the end of the settling."""
+
+    def warm_up(self, limit_px: float) -> float:
+        """Warm-up after which at most `limit_px` of the shift remains."""
+        return max(0.0, self.time_constant * log(self.amplitude_px / limit_px))
+
+
+@dataclass(frozen=True)
+class DriftProfile:
+    """Linearised residuals of a fit without its drift; R rows, two for each of M spots and corners."""
+
+    residual: FloatArray
+    """(R,) predicted - measured at the prior means, in standard deviations."""
+    jacobian: FloatArray
+    """(R, P) by all parameters but the drift, in units of their priors."""
+    covariance: FloatArray
+    """(P, P) of these parameters."""
+    inverse_sd: FloatArray
+    """(M, 2) 0 where a coordinate was not measured."""
+    time: FloatArray
+    """(M,) 0 first capture, 1 last."""
+
+    @classmethod
+    def of(cls, fitted: CalibrationFit) -> DriftProfile:
+        """Linearisation at the optimum of a fit with a drift."""
+        problem, optimum = problem_of(fitted), optimum_of(fitted)
+        residual, jacobian = problem.linearise(optimum, fitted.noise_scale)
+        residual = residual - jacobian @ optimum
+        drift = fitted.layout.drift
+        jacobian = np.delete(jacobian, range(drift.start, drift.stop), axis=1)
+        information = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+        covariance = np.asarray(np.linalg.inv(information), np.float64)
+        data = problem.data
+        time = np.concatenate([np.asarray(data.spots.time, float), np.asarray(data.corners.time, float)])
+        inverse_sd = np.asarray(data.inverse_sd, np.float64) / fitted.noise_scale
+        return cls(residual, jacobian, covariance, inverse_sd, 0.5 + time)
+
+    def gain(self, shape: FloatArray) -> tuple[float, FloatArray]:
+        """Gain of a drift of this shape (M,), and its amplitudes (2,) in u and v, px."""
+        columns = np.zeros((len(self.residual), 2))
+        columns[0::2, 0], columns[1::2, 1] = (self.inverse_sd * shape[:, None]).T
+        along = self.jacobian.T @ columns
+        information = columns.T @ columns - along.T @ self.covariance @ along
+        score = along.T @ self.covariance @ (self.jacobian.T @ self.residual) - columns.T @ self.residual
+        values, vectors = np.linalg.eigh(information)
+        known = values > LEAST_INFORMATION
+        amplitude = (vectors[:, known] / values[known]) @ vectors[:, known].T @ score
+        return float(score @ amplitude), np.asarray(amplitude, np.float64)
+
+
+def settling(fitted: CalibrationFit) -> Settling | None:
+    """Time constant of the drift that a fit has; None where the drift is steady, or hidden by the order."""
+    return settling_of(DriftProfile.of(fitted))
+
+
+def settling_of(profile: DriftProfile) -> Settling | None:
+    """`settling` by the linearised residuals of a fit."""
+    gains = np.array([profile.gain(np.exp(-profile.time / tau))[0] for tau in TIME_CONSTANTS])
+    best = int(np.argmax(gains))
+    if gains[best] < profile.gain(profile.time)[0] + STEADY_GAIN:
+        return None
+    inside = np.flatnonzero(gains >= gains[best] - INTERVAL_GAIN)
+    _, amplitude_px = profile.gain(np.exp(-profile.time / TIME_CONSTANTS[best]))
+    low, high = TIME_CONSTANTS[inside[[0, -1]]].tolist()
+    return Settling(float(TIME_CONSTANTS[best]), (low, high), float(np.hypot(*amplitude_px)))
+
+
+def warm_up_advice(fitted: CalibrationFit) -> str:
+    """Advice in words for a fit with a drift: duration of the warm-up, or that the drift has not settled."""
+    found = settling(fitted)
+    if found is None:
+        return "No settling shows: it takes longer than the session. Do: warm up longer, or fix the camera"
+    # A shift below the deviation of a single mean position is one that no spot shows.
+    limit_px = float(np.nanmedian(fitted.cells.sd_px)) * fitted.noise_scale
+    low, high = found.interval
+    return (
+        f"It settles with a time constant of {found.time_constant:.2g} ({low:.2g} to {high:.2g}) of the"
+        f" session, by {found.amplitude_px:.2g} px in all. Do: let the camera warm up for"
+        f" {found.warm_up(limit_px):.2g} times the duration of this session before the first capture"
+    )
