@@ -217,11 +217,13 @@ def test_the_moments_of_the_lag_are_those_of_a_quadratic_form_in_gaussian_noise(
     left = np.eye(count) - np.outer(direction, direction)
     deviation = left @ rng.normal(size=count)
     repeats = residuals._Repeats(0, 0, deviation, direction)
-    neighbours = sum(np.outer(np.eye(count)[n], np.eye(count)[n + 1]) for n in range(count - 1))
-    of_lag = np.linalg.eigvalsh(left @ (neighbours + neighbours.T) @ left / 2)
+    neighbours = np.zeros((count, count))
+    for n in range(count - 1):
+        neighbours[n, n + 1] = neighbours[n + 1, n] = 0.5
+    of_lag = np.linalg.eigvalsh(left @ neighbours @ left)
     assert repeats.lag_mean() == pytest.approx(of_lag.sum())
     mean = 0.3
-    eigenvalues = np.linalg.eigvalsh(left @ ((neighbours + neighbours.T) / 2 - mean * np.eye(count)) @ left)
+    eigenvalues = np.linalg.eigvalsh(left @ (neighbours - mean * np.eye(count)) @ left)
     value = float((deviation[:-1] * deviation[1:]).sum() - mean * deviation @ deviation)
     expected = (value, 2 * (eigenvalues**2).sum(), 8 * (eigenvalues**3).sum())
     assert repeats.lag(mean) == pytest.approx(expected)
