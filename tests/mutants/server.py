@@ -41,15 +41,19 @@ LIBRARIES = (
     "typer",
 )
 """Imported before the fork; none of them imports the workbench or starts a thread."""
+SET_PDEATHSIG = 1
+"""Option of prctl(2): the signal that the caller gets when its parent ends."""
 SET_CHILD_SUBREAPER = 36
 """Option of prctl(2): orphans become children of the caller."""
 
 
 def main() -> None:
     """Answer requests until the end of standard input."""
+    prctl = ctypes.CDLL(None).prctl
+    prctl(SET_PDEATHSIG, signal.SIGKILL)
+    prctl(SET_CHILD_SUBREAPER, 1)
     for name in LIBRARIES:
         import_module(name)
-    ctypes.CDLL(None).prctl(SET_CHILD_SUBREAPER, 1)
     for line in sys.stdin:
         print(json.dumps(_answer(json.loads(line))), flush=True)
 
@@ -80,6 +84,7 @@ def _run(request: dict[str, Any]) -> None:
     """Run pytest, in a process group of its own, and exit."""
     code = 1
     try:
+        ctypes.CDLL(None).prctl(SET_PDEATHSIG, signal.SIGKILL)
         os.setpgid(0, 0)
         nothing = os.open(os.devnull, os.O_RDWR)
         for stream in range(3):
