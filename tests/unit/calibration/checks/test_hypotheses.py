@@ -86,6 +86,25 @@ def test_a_wrong_standoff_is_found_in_noise_larger_than_stated(seed: int) -> Non
     assert is_improbable(found.state)
 
 
+@pytest.mark.parametrize(
+    ("scale", "probable", "kept"), [(2.0, False, False), (5.0, False, True), (15.0, True, True)]
+)
+def test_what_leaves_the_data_improbable_must_explain_most(
+    scale: float, probable: bool, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Speckle twenty times what is stated; the only candidate lowers the cost as another noise would."""
+    fitted = fit(thesis_rig(0.02, 0.008), World(thesis_rig(0.02, 0.16), 2).observations())
+    problem = problem_of(fitted)
+    before = refit(problem, measured(problem), optimum_of(fitted))
+    after = before.at(scale)
+    one = hypotheses.Hypothesis("standoff", (0,), after, 99.0, True)
+    monkeypatch.setattr(hypotheses, "_candidates", lambda fit, state, first: iter([one] if first else []))
+    excess = [state.cost - state.used.sum() for state in (before, after)]
+    assert (excess[1] <= 0.1 * excess[0]) == kept
+    assert is_improbable(after) != probable
+    assert explain_misfit(fitted) == ((one,) if kept else ())
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_wrong_spots_are_left_out_and_the_rest_fits(seed: int) -> None:
     observations = shifted(World(RIG, seed).observations(), "L2", 600.0, 12.0)

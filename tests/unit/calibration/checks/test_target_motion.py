@@ -72,6 +72,15 @@ def test_a_step_that_sets_one_laser_apart_may_be_a_wrong_spot(after: int) -> Non
     assert find_target_motion(fitted, [STANDOFFS_MM.index(900.0)]) == ()
 
 
+@pytest.mark.parametrize("after", [2, 18])
+def test_two_captures_on_one_side_are_enough(after: int) -> None:
+    world = World(RIG, 1)
+    fitted = fit(RIG, moved(world, world.observations(), 160.0, after, 2.0))
+    (found,) = find_target_motion(fitted, [STANDOFFS_MM.index(160.0)])
+    assert (found.before, found.captures) == (after, 20)
+    assert found.step_mm == pytest.approx(2.0, abs=4 * found.sd_mm)
+
+
 def test_a_step_needs_two_captures_on_either_side() -> None:
     world = World(RIG, 1)
     few = [s for s in world.observations(repeats=1) if s.standoff_mm != 400.0 or s.laser_id != "L1"]

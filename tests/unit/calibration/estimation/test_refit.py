@@ -126,8 +126,10 @@ class Saturated:
 
     centre = np.array([0.5, -0.8, 0.3])
     slope = np.array([3.0, 1.0, 0.2])
+    evaluations = 0
 
     def linearise(self, y: FloatArray, scale: float) -> tuple[FloatArray, FloatArray]:
+        self.evaluations += 1
         at = self.slope * (y - self.centre)
         return 10.0 * np.arctan(at) / scale, np.diag(10.0 * self.slope / (1.0 + at**2)) / scale
 
@@ -150,8 +152,10 @@ def test_steps_that_would_ascend_are_damped(start: tuple[float, ...], scale: flo
 
 
 def test_a_refit_from_its_optimum_stays_there() -> None:
-    problem = cast(LeastSquaresProblem, Saturated())
-    once = refit(problem, np.ones(3, bool), np.zeros(3))
-    again = refit(problem, once.used, once.y)
+    problem = Saturated()
+    once = refit(cast(LeastSquaresProblem, problem), np.ones(3, bool), np.zeros(3))
+    problem.evaluations = 0
+    again = refit(cast(LeastSquaresProblem, problem), once.used, once.y)
+    assert problem.evaluations == 2  # at the start and after the last step
     np.testing.assert_allclose(again.y, once.y, atol=1e-6)
     assert again.cost <= once.cost
