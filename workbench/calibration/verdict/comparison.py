@@ -52,9 +52,9 @@ class Comparison:
     """Whether the differences are significant."""
     explanations: tuple[str, ...]
     """Parameters each of which explains the differences alone, the most likely first; empty: none does."""
-    identical: bool
+    identical: bool = False
     """Whether both have the same numbers to the last digit, as copies of one calibration have."""
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
     """Reservations about the verdict."""
 
 
