@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 import pytest
 
-from tests.support.corrupted_data import exchanged, mirrored, shifted, stated_as
+from tests.support.corrupted_data import exchanged, mirrored, shifted, stated_as, turned_at
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.checks import hypotheses
 from workbench.calibration.checks.cross_validation import rows_at
-from workbench.calibration.checks.hypotheses import explain_misfit, is_improbable
+from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit, is_improbable
 from workbench.calibration.data.observations import Observation
-from workbench.calibration.estimation.fit import fit
-from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit
+from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit
 from workbench.calibration.selection.outliers import fit_without_outliers
 
 RIG = thesis_rig()
@@ -64,6 +66,29 @@ def test_a_mirrored_picture_is_the_only_account(seed: int) -> None:
     np.testing.assert_allclose(
         found.state.problem.data.position_px, fit(RIG, sound).cells.position_px, rtol=1e-9
     )
+
+
+@pytest.mark.parametrize("account", [hypotheses._flipped_images, hypotheses._exchanged_lasers])
+def test_an_account_costs_the_choice_among_its_alternatives(
+    account: Callable[[CalibrationFit, Refit], Iterator[Hypothesis]],
+) -> None:
+    """Each is as likely as the others before the data: twice the logarithm of their number."""
+    fitted = fit(RIG, World(RIG, 1).observations())
+    problem = problem_of(fitted)
+    state = refit(problem, measured(problem), optimum_of(fitted))
+    found = list(account(fitted, state))
+    assert len(found) in (3, 6)
+    for h in found:
+        noise = max(1.0, h.state.chi2 / h.state.freedom)
+        assert h.score == pytest.approx((state.cost - h.state.cost) / noise - 2 * np.log(len(found)))
+        assert not h.significant
+
+
+def test_a_turned_target_is_the_only_account() -> None:
+    fitted = fit(RIG, turned_at(World(RIG, 1), 280.0, 25.0))
+    (found,) = explain_misfit(fitted)
+    assert found.kind == "tilted"
+    assert fitted.cells.placements[found.subject[0]].standoff_mm == 280.0
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from tests.support.rigs import STANDOFFS_MM, World, prior, thesis_rig
 from workbench.calibration.checks import residuals
 from workbench.calibration.checks.residuals import alarms, explain, residual_tests
 from workbench.calibration.data.observations import Observation
-from workbench.calibration.estimation.fit import fit
+from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.model.fit_event import ResidualTest
 
 RIG = thesis_rig()
@@ -241,3 +242,37 @@ def test_one_of_a_hundred_sound_fits_has_an_alarm(count: int) -> None:
         one = ResidualTest(name="u", p=share * 0.01 / count)
         rest = (ResidualTest(name="v", p=0.5),) * (count - 1)
         assert alarms((*rest, one)) == ((one,) if alarm else ())
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_drift_along_either_axis_is_an_order_of_captures(axis: int, seed: int) -> None:
+    """Two hundred captures; one coordinate wanders, the other has the noise that is stated."""
+    rng = np.random.default_rng(seed)
+    both = rng.normal(size=(200, 2))
+    both[:, axis] = np.convolve(rng.normal(size=204), np.full(5, 5**-0.5), "valid")
+    count = both.size
+    spots = residuals._Spots(
+        residual=both.ravel(),
+        covariance=np.eye(count),
+        sd_px=np.ones(count),
+        laser=np.zeros(count, int),
+        axis=np.tile([0, 1], 200),
+        outward=np.zeros(count),
+        distance=np.zeros(count),
+        place=np.zeros((count, 2)),
+    )
+    name, p = next(residuals._of_spots(cast(CalibrationFit, None), spots))
+    assert name == "order"
+    assert p < 1e-3
+    white = replace(spots, residual=rng.normal(size=count))
+    assert next(residuals._of_spots(cast(CalibrationFit, None), white))[1] > 1e-3
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_more_repeats_at_far_standoffs_are_no_larger_variance(seed: int) -> None:
+    observations = [
+        s for s in World(RIG, seed).observations(repeats=12) if s.standoff_mm > 900 or s.repeat < 2
+    ]
+    p_values = {test.name: test.p for test in residual_tests(fit(RIG, observations))}
+    assert p_values["repeats: over standoff"] > 1e-3
