@@ -164,3 +164,9 @@ def test_a_fit_far_worse_than_its_noise_is_improbable() -> None:
     state = refit(problem, measured(problem), optimum_of(fitted))
     assert not is_improbable(state)
     assert is_improbable(state.at(0.5))
+
+
+def test_a_wrong_spot_costs_the_choice_among_all_positions_in_the_image() -> None:
+    """Twice the logarithm of the image's area over that of a spot's deviations, to odds of five to one."""
+    places = RIG.camera.width_px * RIG.camera.height_px / RIG.noise.spot_sd_px**2
+    assert pytest.approx(2 * np.log(places), abs=2 * np.log(5)) == hypotheses.SPOT_COST

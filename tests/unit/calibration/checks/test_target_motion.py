@@ -38,6 +38,10 @@ def test_a_step_is_found_with_its_place_and_its_size(
     assert (found.last_before, found.first_after) == (sources[after - 1], sources[after])
     assert found.step_mm == pytest.approx(step_mm, abs=4 * found.sd_mm)
     assert found.sd_mm < 0.1 * abs(step_mm)
+    if standoff_mm < 200:
+        # Twice the logarithm of some centimetres over the deviation of a near step, to odds of five to one.
+        cost = 2 * np.log(50.0 / found.sd_mm)
+        assert pytest.approx(cost, abs=2 * np.log(5)) == target_motion.STEP_COST
 
 
 @pytest.mark.parametrize("seed", SEEDS)
