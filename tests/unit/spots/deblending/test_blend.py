@@ -11,7 +11,9 @@ import pytest
 
 from tests.support.draw import Drawn, Sensor, draw, profile
 from tests.support.spot_models import fitted_spot, pixel_noise, scene_of
+from workbench.model.arrays import FloatArray
 from workbench.spots import Failure, Scanline, find_spots
+from workbench.spots.deblending import blend
 from workbench.spots.deblending.blend import (
     Blend,
     _Candidates,
@@ -22,7 +24,7 @@ from workbench.spots.deblending.blend import (
     split_elongated,
     with_hidden_spots,
 )
-from workbench.spots.deblending.joint_fit import JointFit, fit_joint
+from workbench.spots.deblending.joint_fit import JointFit, fit_joint, pair_guess
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.columns import FLUX, LN_SU, U
 from workbench.spots.measure import FittedSpot
@@ -271,3 +273,19 @@ def test_elongated_members_of_a_cluster_are_guessed_as_pairs() -> None:
     assert guesses[2:, U].mean() == pytest.approx(16.0)
     assert guesses[2:, FLUX].sum() == pytest.approx(800.0)
     np.testing.assert_allclose(np.exp(guesses[:, LN_SU:]), 1.5)
+
+
+@pytest.mark.parametrize(("ratio", "tried"), [(1.0, False), (1.3, True)])
+def test_only_an_elongated_spot_is_tried_as_two(
+    ratio: float, tried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, (one,) = scene_with(Drawn(60.0, 30.0, 4e4, 1.3 * ratio, 1.3), seed=1)
+    guesses = []
+
+    def guessed(params: FloatArray) -> FloatArray:
+        guesses.append(params)
+        return pair_guess(params)
+
+    monkeypatch.setattr(blend, "pair_guess", guessed)
+    split_elongated([scene], one, [])
+    assert len(guesses) == tried
