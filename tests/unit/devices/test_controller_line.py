@@ -58,3 +58,14 @@ def test_an_alarm_while_lighting_puts_off_at_once(controller: Controller, port: 
         line.light(0b11, 60_000)
     assert controller.lit() == ()
     line.close()
+
+
+def test_a_closed_line_asks_nothing_more(controller: Controller, port: str) -> None:
+    line = ControllerLine(SerialBlock(port=port), 4, lambda: False)
+    assert line.state() == (0, True)
+    line.close()
+    with pytest.raises(RigNotReadyError):
+        line.state()
+    again = ControllerLine(SerialBlock(port=port), 4, lambda: False)
+    assert again.state() == (0, True)
+    again.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
 
 import pytest
@@ -57,3 +58,18 @@ def test_a_record_that_cannot_be_written_stops_the_session(tmp_path: Path) -> No
     with pytest.raises(StoppedError, match="no/a") as caught:
         write_record(tmp_path / "no/a", b"")
     assert caught.value.exit_code == 5
+
+
+def test_the_content_is_on_disk_before_the_rename_and_the_rename_after_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, synced = tmp_path / "a", []
+    fsync = os.fsync
+
+    def recorded(handle: int) -> None:
+        synced.append((stat.S_ISDIR(os.fstat(handle).st_mode), path.exists()))
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", recorded)
+    write_atomically(path, b"new")
+    assert synced == [(False, False), (True, True)]
