@@ -16,6 +16,8 @@ from py_compile import PycInvalidationMode
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
+IMPORTED = ("-W", "ignore:Module already imported:pytest.PytestAssertRewriteWarning")
+"""The server has imported plugins of pytest; their asserts are not rewritten."""
 PROGRAMS = "laser-range-workbench/programs"
 """Folder of traced programs below that of caches."""
 SPARE_TIME = 3.0
@@ -120,13 +122,10 @@ class Project:
     def _pytest(
         self, arguments: Sequence[str], environment: dict[str, str], limit_s: float, cpu_limit_s: float
     ) -> dict[str, Any]:
-        """Run pytest, with the same random examples each time and without a limit to the time of one.
-
-        Asserts are not rewritten: that takes time at import and changes no result.
-        """
+        """Run pytest, with the same random examples each time and without a limit to the time of one."""
         assert self.server.stdin is not None
         assert self.server.stdout is not None
-        usual = ["-n", "0", "-x", "-q", "-p", "no:cacheprovider", "--assert=plain", "--hypothesis-profile=ci"]
+        usual = ["-n", "0", "-x", "-q", "-p", "no:cacheprovider", "--hypothesis-profile=ci", *IMPORTED]
         request = {
             "arguments": [*usual, f"--basetemp={self.folder / '.temporary'}", *arguments],
             "environment": environment,
