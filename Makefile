@@ -18,7 +18,7 @@ help:
 	@echo "make quick  lint, type check and the fast unit tests (a minute and a half)"
 	@echo "make bench  accuracy, speed and detection of spots, kept in docs/benchmarks (about ten minutes)"
 	@echo "make prove  stated uncertainties compared with simulated calibrations, shapes and trials (an hour)"
-	@echo "make mutants  200 wrong versions of the core; the tests must find nine of ten (hours)"
+	@echo "make mutants  200 wrong versions of the core; the tests must find nine of ten (an hour or two)"
 	@echo "make crash  a session of 10 000 captures with random faults; none may be lost (a quarter of an hour)"
 	@echo "make wheel  build the wheel, install it with the run-time dependencies only, run a session (two minutes)"
 	@echo "make lint   only the linters and the type checker"

@@ -55,9 +55,9 @@ def test_every_package_of_the_core_has_tests_of_its_own() -> None:
 def test_a_change_inside_a_function_is_tested_by_the_files_that_execute_it() -> None:
     mutant = next(m for m in drawn(["model"], 40, 1) if first_line_of_function(m.mutation) is not None)
     function = f"{mutant.module}:{first_line_of_function(mutant.mutation)}"
-    slow, fast = (UnitTestFile(Path(f"{t}.py"), t, frozenset({function})) for t in (2.0, 1.0))
-    other = UnitTestFile(Path("other.py"), 0.1, frozenset())
-    own = UnitTestFile(mutant.own_test, 9.0, frozenset())
+    slow, fast = (UnitTestFile(Path(f"{t}.py"), t, t, frozenset({function})) for t in (2.0, 1.0))
+    other = UnitTestFile(Path("other.py"), 0.1, 0.1, frozenset())
+    own = UnitTestFile(mutant.own_test, 9.0, 9.0, frozenset())
     assert other_tests(mutant, [slow, other, own, fast]) == [fast, slow]
     assert other_tests(mutant, [other, own]) == [other]
 

@@ -96,3 +96,14 @@ def test_another_user_cannot_open_the_port_while_it_is_held(port: str) -> None:
     free = subprocess.run(opening, capture_output=True, text=True)
     assert (held.returncode, free.returncode) == (1, 0), free.stderr
     assert "busy" in held.stderr
+
+
+def test_a_closed_line_asks_nothing_more(controller: Controller, port: str) -> None:
+    line = ControllerLine(SerialBlock(port=port), 4, lambda: False)
+    assert line.state() == (0, True)
+    line.close()
+    with pytest.raises(RigNotReadyError):
+        line.state()
+    again = ControllerLine(SerialBlock(port=port), 4, lambda: False)
+    assert again.state() == (0, True)
+    again.close()

@@ -15,7 +15,7 @@ import pytest
 from pydantic import ValidationError
 
 from tests.support.mjpeg import Picture, Stream
-from workbench.devices.opencv_camera import OpenCvBlock, OpenCvCamera
+from workbench.devices.opencv_camera import BACKLOG, OpenCvBlock, OpenCvCamera
 from workbench.devices.placed_by_hand import PlacedByHand
 from workbench.devices.protocols import Bench, Frame, LaserState, StreamingCamera
 from workbench.model.arrays import Image
@@ -181,6 +181,22 @@ def test_a_file_gives_its_frames_one_by_one_and_ends(tmp_path: Path) -> None:
     with pytest.raises(RigNotReadyError, match="the end of the file"):
         camera.grab()
     camera.close()
+
+
+def test_a_file_waits_for_its_reader(tmp_path: Path) -> None:
+    """More frames than are kept of a live camera; the reader begins when all could have been decoded."""
+    path, count = tmp_path / "recorded.avi", 3 * BACKLOG
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, (WIDTH, HEIGHT))
+    for number in range(count):
+        writer.write(cv2.cvtColor(flat(2 * number), cv2.COLOR_GRAY2BGR))
+    writer.release()
+    camera, again = camera_of(str(path)), cv2.VideoCapture(str(path))
+    while again.read()[0]:
+        pass
+    again.release()
+    found = [level(camera.read().image) for _ in range(count - 1)]
+    camera.close()
+    assert found == pytest.approx([2 * number for number in range(1, count)], abs=3)
 
 
 class Device:

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from tests.support.rigs import thesis_rig
 from workbench.model.errors import BadInputError
 from workbench.model.nested import fix_parameters
-from workbench.model.rig import BenchSpec, LaserSpec, Prior, Rig, load_rig
+from workbench.model.rig import BenchSpec, CameraSpec, LaserSpec, Prior, Rig, load_rig
 
 RIG = """\
 format: 1
@@ -112,6 +112,17 @@ def test_a_prior_is_known_exactly_or_to_a_deviation_that_can_be_computed_with(
     else:
         with pytest.raises(ValidationError):
             Prior.model_validate({"value": value, "sd": sd})
+
+
+@pytest.mark.parametrize(("f_px", "good"), [(-305.0, False), (0.0, False), (0.5, True), (1e4, True)])
+def test_a_focal_length_is_above_zero(f_px: float, good: bool) -> None:
+    data = thesis_rig().camera.model_dump(exclude_unset=True) | {"f_px": {"value": f_px, "sd": 25.0}}
+    if good:
+        assert CameraSpec.model_validate(data).f_px.value == f_px
+    else:
+        with pytest.raises(ValidationError) as caught:
+            CameraSpec.model_validate(data)
+        assert [error["loc"] for error in caught.value.errors()] == [("f_px",)]
 
 
 @pytest.mark.parametrize(

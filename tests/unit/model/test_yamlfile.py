@@ -91,6 +91,16 @@ def test_what_is_no_rig_at_all(tmp_path: Path, content: bytes | None) -> None:
         load_rig(path)
 
 
+@pytest.mark.parametrize("content", ["format: 1\nprocedure: p\nsteps: []\n", "- 1\n", "a: 1\n"])
+def test_a_file_of_another_kind_is_one_mistake(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(content)
+    with pytest.raises(BadInputError) as caught:
+        load_rig(path)
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(f"{path}:1: ")
+
+
 def test_tags_that_build_objects_stay_text(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text("!!python/object/apply:os.system ['touch " + str(tmp_path / "owned") + "']\n")

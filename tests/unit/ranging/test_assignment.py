@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from itertools import permutations
+from math import log, sqrt
+from typing import cast
 
 import numpy as np
 import pytest
 
 from tests.support.rangers import IDS, X_MM, positions, ranger_in
 from tests.support.rigs import World, thesis_rig
-from workbench.ranging.assignment import assign, pair_up
+from workbench.model.arrays import FloatArray
+from workbench.ranging.assignment import LaserSpotPairs, assign, pair_up
 from workbench.ranging.ranger import Ranger
+from workbench.sensor.calibrated import RangeEstimates
 
 
 def dealt(ranger: Ranger, pixels: np.ndarray, sd_px: float = 0.05) -> tuple[str, ...] | None:
@@ -97,3 +101,51 @@ def test_on_one_line_three_spots_of_a_flat_are_told_and_two_are_not(coplanar: Ra
 def test_more_spots_than_lasers_are_not_dealt(coplanar: Ranger) -> None:
     flat = positions(coplanar, dict.fromkeys(IDS, 900.0))
     assert dealt(coplanar, np.vstack((flat, flat[:1] + np.array([9.0, 0.0])))) is None
+
+
+def lasers_of(misfit_sd: FloatArray, inverse_depth: FloatArray) -> tuple[int, ...] | None:
+    """Laser of each spot, (L, S) pairs given; None where the assignment is ambiguous."""
+    pairs = LaserSpotPairs(cast(RangeEstimates, None), inverse_depth, misfit_sd)
+    found = assign(pairs, np.arange(len(misfit_sd)))
+    return None if found is None else tuple(found[0].tolist())
+
+
+@pytest.mark.parametrize(("p", "assigned"), [(1.1e-4, True), (0.9e-4, False)])
+def test_distances_from_the_lines_are_a_chi_square(p: float, assigned: bool) -> None:
+    """Of two equal distances d: exp(-d^2) is the probability of larger ones."""
+    distance = sqrt(-log(p))
+    misfit = np.where(np.eye(2, dtype=bool), distance, np.inf)
+    assert lasers_of(misfit, np.ones((2, 2))) == ((0, 1) if assigned else None)
+
+
+def test_a_spot_off_all_lines_is_other_light_and_one_hardly_on_a_line_is_improbable() -> None:
+    assert lasers_of(np.array([[6.1], [9.0]]), np.ones((2, 1))) == ()
+    assert lasers_of(np.array([[5.9], [9.0]]), np.ones((2, 1))) is None
+
+
+@pytest.mark.parametrize(("ratio", "assigned"), [(1.9, False), (2.1, True)])
+def test_of_two_assignments_the_even_surface_is_clearly_more_even(ratio: float, assigned: bool) -> None:
+    even, uneven = 0.02, 0.02 * ratio
+    inverse_depth = np.array([[1.0 - even, 1.0 + uneven], [1.0 - uneven, 1.0 + even]])
+    assert lasers_of(np.zeros((2, 2)), inverse_depth) == ((0, 1) if assigned else None)
+    assert lasers_of(np.zeros((2, 2)), inverse_depth[::-1]) == ((1, 0) if assigned else None)
+
+
+@pytest.mark.parametrize(
+    ("spots", "spread", "assigned"), [(3, 0.045, True), (3, 0.055, False), (2, 0.001, False)]
+)
+def test_where_spots_are_missing_three_lie_on_an_even_surface(
+    spots: int, spread: float, assigned: bool
+) -> None:
+    """Relative spread of the inverse depths of the first lasers; all others are far from even."""
+    inverse_depth = np.outer(2.0 ** np.arange(1, 5), 3.0 ** np.arange(1, spots + 1))
+    steps = np.linspace(-1.0, 1.0, spots)
+    np.fill_diagonal(inverse_depth, 1.0 + spread * steps / steps.std())
+    expected = tuple(range(spots)) if assigned else None
+    assert lasers_of(np.zeros((4, spots)), inverse_depth) == expected
+
+
+@pytest.mark.parametrize(("lasers", "assigned"), [(6, True), (7, False)])
+def test_six_lasers_are_told_apart_at_most(lasers: int, assigned: bool) -> None:
+    misfit = np.where(np.eye(lasers, dtype=bool), 0.0, np.inf)
+    assert lasers_of(misfit, np.ones((lasers, lasers))) == (tuple(range(lasers)) if assigned else None)

@@ -9,7 +9,15 @@ from scipy.stats import multivariate_normal, norm
 
 from tests.support.surfaces import X, flat, incline, seen
 from workbench.model.arrays import FloatArray
-from workbench.ranging.mixture_kernels import lowest, posterior, quantiles
+from workbench.ranging.mixture_kernels import (
+    _back,
+    _cholesky,
+    _forward,
+    _merged,
+    lowest,
+    posterior,
+    quantiles,
+)
 from workbench.ranging.points import interval_mm
 from workbench.ranging.polynomial import fit_polynomial
 
@@ -26,6 +34,41 @@ def test_the_minimum_of_a_polynomial_is_that_of_a_fine_grid(degree: int, seed: i
         value, at = lowest(amplitudes, degree)
         assert value == pytest.approx(values.min(), abs=(1e-7 if degree < 4 else 1e-3) * size)
         assert np.polynomial.polynomial.polyval(at, [0.0, *amplitudes[1:]]) == pytest.approx(value)
+
+
+@pytest.mark.parametrize("at", [-0.713, 0.004, 0.642])
+def test_between_the_steps_of_its_grid_a_search_follows_the_parabola(at: float) -> None:
+    """A quadratic that is searched as a polynomial of degree 4: its vertex is found to rounding."""
+    amplitudes = np.array([0.0, -2.0 * at, 1.0, 0.0, 0.0])
+    assert lowest(amplitudes, 4) == pytest.approx((-(at**2), at), abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [1, 2, 4])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_leading_block_of_a_system_is_solved_and_the_rest_stays(size: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    drawn, vector = rng.normal(size=(5, 8)), rng.normal(size=5)
+    matrix, root = drawn @ drawn.T, np.full((5, 5), 7.0)
+    assert _cholesky(matrix, size, root)
+    expected = vector.copy()
+    expected[:size] = np.linalg.solve(matrix[:size, :size], vector[:size])
+    _forward(root, size, vector)
+    _back(root, size, vector)
+    np.testing.assert_allclose(vector, expected)
+    matrix[size - 1, size - 1] = -1.0
+    assert not _cholesky(matrix, size, root)
+
+
+@pytest.mark.parametrize("sd_mm", [0.5, 10.0])
+def test_nodes_closer_than_their_deviation_are_merged_and_keep_their_moments(sd_mm: float) -> None:
+    depth, weight = 1000.0 + sd_mm * np.array([5.0, 0.1, 0.0, 1.0]), np.array([0.1, 0.2, 0.3, 0.4])
+    sd = sd_mm * np.array([1.0, 1.5, 1.0, 2.0])
+    found, found_sd, total = _merged(depth, sd, weight)
+    assert total == pytest.approx([0.5, 0.4, 0.1])
+    mean = np.average(depth[[1, 2]], weights=weight[[1, 2]])
+    square = np.average(sd[[1, 2]] ** 2 + (depth[[1, 2]] - mean) ** 2, weights=weight[[1, 2]])
+    assert found == pytest.approx([mean, depth[3], depth[0]], rel=1e-12)
+    assert found_sd == pytest.approx([np.sqrt(square), sd[3], sd[0]], rel=1e-6)
 
 
 @pytest.mark.parametrize("sd", [1.0, 100.0, 300.0])

@@ -51,6 +51,11 @@ def test_ends_of_an_interval_are_symmetric_in_inverse_depth(
     assert stats.norm.cdf(COVERAGE_FACTOR) == pytest.approx(0.975)
 
 
+def test_without_an_offset_the_pinhole_lies_in_the_reference_plane() -> None:
+    assert interval_mm(500.0, 30.0) == interval_mm(500.0, 30.0, 0.0)
+    assert interval_mm(0.0, 1.0) == (0.0, np.inf)
+
+
 def test_behind_the_pinhole_anything_before_it_is_possible() -> None:
     assert interval_mm(-30.0, 1.0, 20.0) == (-20.0, np.inf)
     assert interval_mm(-20.0, 1.0, 20.0) == (-20.0, np.inf)

@@ -202,6 +202,21 @@ def test_derivatives_of_the_closest_range(surface: Surface) -> None:
     assert shape.closest_sigma_mm == pytest.approx(np.sqrt(variance), rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("count", "tried"),
+    [
+        (1, ()),
+        (2, ("degree 0", "degree 1")),
+        (3, ("degree 0", "degree 1", "degree 2", "cylinder")),
+        (4, ("degree 0", "degree 1", "degree 2", "degree 3", "cylinder")),
+    ],
+)
+def test_shapes_with_as_many_parameters_as_spots_are_tried(count: int, tried: tuple[str, ...]) -> None:
+    """A circle has three parameters."""
+    x = X[:count]
+    assert tuple(test.name for test in fit_shape(seen(x, cylinder(150.0, -20.0)(x))).tried) == tried
+
+
 def test_three_two_and_one_laser() -> None:
     three = fit_shape(seen(X[:3], incline(500.0, 45.0)(X[:3])))
     assert (three.kind, three.tried[1].freedom) == ("incline", 1)

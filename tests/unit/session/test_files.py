@@ -73,3 +73,18 @@ def test_a_new_file_follows_the_umask_and_an_existing_one_keeps_its_mode(tmp_pat
     assert stat.S_IMODE((tmp_path / "new").stat().st_mode) == 0o666 & ~umask
     assert stat.S_IMODE((tmp_path / "old").stat().st_mode) == 0o640
     assert sorted(path.name for path in tmp_path.iterdir()) == ["new", "old"]
+
+
+def test_the_content_is_on_disk_before_the_rename_and_the_rename_after_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, synced = tmp_path / "a", []
+    fsync = os.fsync
+
+    def recorded(handle: int) -> None:
+        synced.append((stat.S_ISDIR(os.fstat(handle).st_mode), path.exists()))
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", recorded)
+    write_atomically(path, b"new")
+    assert synced == [(False, False), (True, True)]

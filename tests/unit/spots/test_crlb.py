@@ -18,6 +18,14 @@ def test_information_of_a_pixel_is_at_least_the_inverse_variance(electrons: floa
     assert least * (1 - 1e-3) <= information < 1.06 * least
 
 
+@pytest.mark.parametrize("step", [1.0, 30.0, 90.0])
+def test_rounding_counts_as_noise_evenly_spread_over_a_step(step: float) -> None:
+    """Its variance is that of a uniform distribution."""
+    offsets = np.linspace(-0.5, 0.5, 100_001) * step
+    camera = CameraNoise(electrons_per_dn=step, read_sd_electrons=5.0, background_electrons=0.0)
+    assert pixel_information(1000.0, camera) == pytest.approx(1.0 / (1000.0 + 25.0 + offsets.var()), rel=1e-4)
+
+
 def test_information_of_a_pixel_agrees_with_the_score_of_simulated_numbers() -> None:
     rng, trials, step = np.random.default_rng(2), 400_000, 0.5
     camera = CameraNoise(1.0, 2.0, 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.draw import Drawn, profile
-from workbench.spots.detect import COARSE_PX, FINE_PX, find_peaks, smoothed_sd
+from workbench.spots.detect import COARSE_PX, FINE_PX, PEAK_SD, find_peaks, smoothed_sd
 from workbench.spots.strip import Strip
 
 SHAPE = (60, 120)
@@ -35,6 +35,21 @@ def test_white_noise_has_the_stated_deviation_after_smoothing(scale_px: float) -
     # Neighbouring pixels share their noise: some 4 pi scale^2 of them make one independent value.
     independent = smooth.size / (4.0 * np.pi * scale_px**2)
     assert smoothed_sd(9.0, scale_px) == pytest.approx(smooth.std(), rel=4 / np.sqrt(2 * independent))
+
+
+@pytest.mark.parametrize(("scale_px", "width_px"), [(FINE_PX, 0.8), (COARSE_PX, 3.0)])
+@pytest.mark.parametrize(("ratio", "found"), [(1.1, True), (0.9, False)])
+def test_each_search_finds_spots_of_its_width_near_the_limit_of_a_matched_filter(
+    scale_px: float, width_px: float, ratio: float, found: bool
+) -> None:
+    """Without noise. The flux over sqrt(4 pi) widths is the signal-to-noise ratio of a matched filter."""
+    width = np.sqrt(width_px**2 + 1.0 / 12.0)
+    snr = ratio * PEAK_SD / (2.0 * scale_px * width / (scale_px**2 + width**2))
+    flux = snr * np.sqrt(4.0 * np.pi) * width
+    signal = profile(SHAPE, Drawn(50.0, 30.0, flux, width_px, width_px)).astype(np.float32)
+    assert bool(find_peaks(signal, WHOLE, 1.0, scale_px).rows.size) == found
+    # A filter of nearly the spot's width loses 3 % of the ratio at most.
+    assert PEAK_SD * ratio / snr > 0.97
 
 
 def test_noise_alone_has_no_peak() -> None:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.support.draw import Drawn, draw
+from tests.support.draw import draw
 from workbench.model.errors import BadInputError
-from workbench.spots import SpotFinder, find_spots, is_compiled
-
-
-def rng(seed: int = 0) -> np.random.Generator:
-    return np.random.default_rng(seed)
-
+from workbench.spots import SpotFinder, is_compiled
 
 NOISE = draw([], np.random.default_rng(8))
+LOOP = """
+from workbench.spots.kernels.compiled import compiled
+
+@compiled
+def plus_one(x):
+    return x + 1.0
+"""
 
 
 def test_a_finder_refuses_another_size() -> None:
@@ -24,8 +27,12 @@ def test_a_finder_refuses_another_size() -> None:
         SpotFinder((10, 10)).find(NOISE)
 
 
-def test_it_is_known_whether_the_loops_are_compiled(tmp_path: Path) -> None:
+def test_it_is_known_whether_the_loops_are_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The technician sees the reason for the wait before the first capture."""
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", "")
+    monkeypatch.setattr("numba.core.config.CACHE_LOCATOR_CLASSES", "")
     assert not is_compiled(tmp_path)
-    find_spots(draw([Drawn(60, 30)], rng()))
-    assert is_compiled()
+    loop = tmp_path / "loop.py"
+    loop.write_text(LOOP)
+    assert runpy.run_path(str(loop))["plus_one"](1.0) == 2.0
+    assert is_compiled(tmp_path)

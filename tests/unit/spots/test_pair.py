@@ -8,7 +8,7 @@ import pytest
 from tests.support.draw import Drawn, Sensor, draw
 from tests.support.spot_models import scene_of
 from workbench.spots import Failure, Scanline, find_spots
-from workbench.spots.pair import Pair
+from workbench.spots.pair import Pair, _share_of_off
 from workbench.spots.strip import Strip
 
 ROW = [Scanline(0, 30, 1, 0, 3)]
@@ -97,3 +97,12 @@ def test_a_frame_without_its_dark_one_loses_its_level() -> None:
     assert not found.ambient_changed
     # Shot and read noise and rounding, DN^2.
     assert found.variance == pytest.approx((800.0 + 36.0) / 64.0 + 1.0 / 12.0, rel=0.25)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_spots_of_a_few_dn_on_bright_pixels_do_not_change_the_share(seed: int) -> None:
+    """Whole numbers: beside rounding nothing scatters, and 4 DN are far out."""
+    off = np.random.default_rng(seed).uniform(0.0, 200.0, 10_000)
+    on = np.rint(0.8 * off) + 4.0 * (off > 196.0)
+    # A spot on 2 % of the pixels would add 0.0023.
+    assert _share_of_off(on, off) == pytest.approx(0.8, abs=0.25 * 0.0023)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,18 @@ def test_the_clear_ones_need_no_second_look() -> None:
     )
     assert len(lights) == 2
     assert not is_same_spot(*lights)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.9, np.pi / 2])
+@pytest.mark.parametrize(("sd_px", "limit_px"), [(0.0, 3.0), (0.5, 7.0)])
+def test_one_spot_lies_within_three_pixels_and_four_deviations(
+    angle: float, sd_px: float, limit_px: float
+) -> None:
+    """The deviations of both positions add up in squares: four of half a pixel are one pixel."""
+    spot = Spot(100.0, 80.0, sd_px, sd_px, flux_dn=1e3, width_px=1.3, peak_dn=90.0)
+    for distance_px, same in ((0.98 * limit_px, True), (1.02 * limit_px, False)):
+        u_px, v_px = 100.0 + distance_px * np.cos(angle), 80.0 + distance_px * np.sin(angle)
+        assert is_same_spot(spot, replace(spot, u_px=u_px, v_px=v_px)) == same
 
 
 def test_a_faint_one_beside_a_clear_one_is_a_light_as_well() -> None:

@@ -40,7 +40,7 @@ class Repair:
             caller: invocation of the repair.
 
         Raises:
-            BadInputError: no decision, or two that contradict each other; a name of no placement or of several;
+            BadInputError: no decision, or two for one placement; a name of no placement or of several;
                 nothing to restore; no grid to add to.
         """
         keys = placement_keys(plan, records)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 import pytest
 
-from tests.support.corrupted_data import exchanged, mirrored, shifted, stated_as
+from tests.support.corrupted_data import exchanged, mirrored, shifted, stated_as, turned_at
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.checks import hypotheses
 from workbench.calibration.checks.cross_validation import rows_at
-from workbench.calibration.checks.hypotheses import explain_misfit, is_improbable
+from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit, is_improbable
 from workbench.calibration.data.observations import Observation
-from workbench.calibration.estimation.fit import fit
-from workbench.calibration.estimation.refit import measured, optimum_of, problem_of, refit
+from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit
 from workbench.calibration.selection.outliers import fit_without_outliers
 
 RIG = thesis_rig()
@@ -66,6 +68,29 @@ def test_a_mirrored_picture_is_the_only_account(seed: int) -> None:
     )
 
 
+@pytest.mark.parametrize("account", [hypotheses._flipped_images, hypotheses._exchanged_lasers])
+def test_an_account_costs_the_choice_among_its_alternatives(
+    account: Callable[[CalibrationFit, Refit], Iterator[Hypothesis]],
+) -> None:
+    """Each is as likely as the others before the data: twice the logarithm of their number."""
+    fitted = fit(RIG, World(RIG, 1).observations())
+    problem = problem_of(fitted)
+    state = refit(problem, measured(problem), optimum_of(fitted))
+    found = list(account(fitted, state))
+    assert len(found) in (3, 6)
+    for h in found:
+        noise = max(1.0, h.state.chi2 / h.state.freedom)
+        assert h.score == pytest.approx((state.cost - h.state.cost) / noise - 2 * np.log(len(found)))
+        assert not h.significant
+
+
+def test_a_turned_target_is_the_only_account() -> None:
+    fitted = fit(RIG, turned_at(World(RIG, 1), 280.0, 25.0))
+    (found,) = explain_misfit(fitted)
+    assert found.kind == "tilted"
+    assert fitted.cells.placements[found.subject[0]].standoff_mm == 280.0
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_wrong_standoff_is_freed_to_where_the_target_stood(seed: int) -> None:
     fitted = fit(RIG, stated_as(World(RIG, seed).observations(), 600.0, 6000.0))
@@ -84,6 +109,25 @@ def test_a_wrong_standoff_is_found_in_noise_larger_than_stated(seed: int) -> Non
     (found,) = explain_misfit(fit(RIG, stated_as(louder.observations(), 600.0, 6000.0)))
     assert found.kind == "standoff"
     assert is_improbable(found.state)
+
+
+@pytest.mark.parametrize(
+    ("scale", "probable", "kept"), [(2.0, False, False), (5.0, False, True), (15.0, True, True)]
+)
+def test_what_leaves_the_data_improbable_must_explain_most(
+    scale: float, probable: bool, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Speckle twenty times what is stated; the only candidate lowers the cost as another noise would."""
+    fitted = fit(thesis_rig(0.02, 0.008), World(thesis_rig(0.02, 0.16), 2).observations())
+    problem = problem_of(fitted)
+    before = refit(problem, measured(problem), optimum_of(fitted))
+    after = before.at(scale)
+    one = hypotheses.Hypothesis("standoff", (0,), after, 99.0, True)
+    monkeypatch.setattr(hypotheses, "_candidates", lambda fit, state, first: iter([one] if first else []))
+    excess = [state.cost - state.used.sum() for state in (before, after)]
+    assert (excess[1] <= 0.1 * excess[0]) == kept
+    assert is_improbable(after) != probable
+    assert explain_misfit(fitted) == ((one,) if kept else ())
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -120,3 +164,9 @@ def test_a_fit_far_worse_than_its_noise_is_improbable() -> None:
     state = refit(problem, measured(problem), optimum_of(fitted))
     assert not is_improbable(state)
     assert is_improbable(state.at(0.5))
+
+
+def test_a_wrong_spot_costs_the_choice_among_all_positions_in_the_image() -> None:
+    """Twice the logarithm of the image's area over that of a spot's deviations, to odds of five to one."""
+    places = RIG.camera.width_px * RIG.camera.height_px / RIG.noise.spot_sd_px**2
+    assert pytest.approx(2 * np.log(places), abs=2 * np.log(5)) == hypotheses.SPOT_COST

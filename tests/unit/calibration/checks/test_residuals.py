@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from tests.support.rigs import STANDOFFS_MM, World, prior, thesis_rig
 from workbench.calibration.checks import residuals
 from workbench.calibration.checks.residuals import alarms, explain, residual_tests
 from workbench.calibration.data.observations import Observation
-from workbench.calibration.estimation.fit import fit
+from workbench.calibration.estimation.fit import CalibrationFit, fit
+from workbench.model.fit_event import ResidualTest
 
 RIG = thesis_rig()
 FITS = 40
@@ -202,3 +204,75 @@ def test_an_unmeasured_coordinate_has_the_place_where_the_fit_puts_it(seed: int)
     # The other lasers say where the lens is; the prior of the pointing where L2 goes: within some 15 px.
     assert np.abs((spots.place[mine, 0] + 1) * 320 - seen).max() < 15
     assert np.ptp(spots.place[mine, 0]) > 0.2
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("count", [2, 3, 8])
+def test_the_moments_of_the_lag_are_those_of_a_quadratic_form_in_gaussian_noise(
+    count: int, seed: int
+) -> None:
+    """Cumulants are sums of powers of the eigenvalues, on the space that subtracting the mean leaves."""
+    rng = np.random.default_rng(seed)
+    direction = rng.uniform(0.5, 2.0, count)
+    direction /= np.linalg.norm(direction)
+    left = np.eye(count) - np.outer(direction, direction)
+    deviation = left @ rng.normal(size=count)
+    repeats = residuals._Repeats(0, 0, deviation, direction)
+    neighbours = np.zeros((count, count))
+    for n in range(count - 1):
+        neighbours[n, n + 1] = neighbours[n + 1, n] = 0.5
+    of_lag = np.linalg.eigvalsh(left @ neighbours @ left)
+    assert repeats.lag_mean() == pytest.approx(of_lag.sum())
+    mean = 0.3
+    eigenvalues = np.linalg.eigvalsh(left @ (neighbours - mean * np.eye(count)) @ left)
+    value = float((deviation[:-1] * deviation[1:]).sum() - mean * deviation @ deviation)
+    expected = (value, 2 * (eigenvalues**2).sum(), 8 * (eigenvalues**3).sum())
+    assert repeats.lag(mean) == pytest.approx(expected)
+
+
+def test_values_are_spread_over_two() -> None:
+    np.testing.assert_allclose(residuals._spread(np.array([3.0, 5.0, 4.0, 3.5])), [-1.0, 1.0, 0.0, -0.5])
+    np.testing.assert_array_equal(residuals._spread(np.array([3.0, 3.0])), [0.0, 0.0])
+
+
+@pytest.mark.parametrize("count", [1, 10])
+def test_one_of_a_hundred_sound_fits_has_an_alarm(count: int) -> None:
+    """Bonferroni: the rates of all tests add up to a hundredth."""
+    for share, alarm in ((0.95, True), (1.05, False)):
+        one = ResidualTest(name="u", p=share * 0.01 / count)
+        rest = (ResidualTest(name="v", p=0.5),) * (count - 1)
+        assert alarms((*rest, one)) == ((one,) if alarm else ())
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_drift_along_either_axis_is_an_order_of_captures(axis: int, seed: int) -> None:
+    """Two hundred captures; one coordinate wanders, the other has the noise that is stated."""
+    rng = np.random.default_rng(seed)
+    both = rng.normal(size=(200, 2))
+    both[:, axis] = np.convolve(rng.normal(size=204), np.full(5, 5**-0.5), "valid")
+    count = both.size
+    spots = residuals._Spots(
+        residual=both.ravel(),
+        covariance=np.eye(count),
+        sd_px=np.ones(count),
+        laser=np.zeros(count, int),
+        axis=np.tile([0, 1], 200),
+        outward=np.zeros(count),
+        distance=np.zeros(count),
+        place=np.zeros((count, 2)),
+    )
+    name, p = next(residuals._of_spots(cast(CalibrationFit, None), spots))
+    assert name == "order"
+    assert p < 1e-3
+    white = replace(spots, residual=rng.normal(size=count))
+    assert next(residuals._of_spots(cast(CalibrationFit, None), white))[1] > 1e-3
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_more_repeats_at_far_standoffs_are_no_larger_variance(seed: int) -> None:
+    observations = [
+        s for s in World(RIG, seed).observations(repeats=12) if s.standoff_mm > 900 or s.repeat < 2
+    ]
+    p_values = {test.name: test.p for test in residual_tests(fit(RIG, observations))}
+    assert p_values["repeats: over standoff"] > 1e-3

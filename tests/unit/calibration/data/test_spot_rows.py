@@ -11,7 +11,12 @@ import pytest
 from tests.support.rigs import FISHEYE_STANDOFFS_MM, PROVENANCE, World, fisheye_rig, prior, thesis_rig
 from workbench.calibration.data import spot_rows
 from workbench.calibration.data.observations import PlacementInfo
-from workbench.calibration.data.spot_rows import BEAM_HALF_WIDTH_PX, observations_of_rows, prior_scanline
+from workbench.calibration.data.spot_rows import (
+    BEAM_HALF_WIDTH_PX,
+    PRIOR_REACH_SD,
+    observations_of_rows,
+    prior_scanline,
+)
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
@@ -57,6 +62,21 @@ def test_a_straight_line_has_the_width_of_its_beam() -> None:
     fitted = fit(thesis_rig(), World(thesis_rig(), 1).observations())
     ranger = Ranger(calibrate(fitted, Acceptance(), PROVENANCE)[0])
     assert [line.half_width_px for line in ranger.scanlines] == [SCANLINE_HALF_WIDTH_PX] * 4
+
+
+@pytest.mark.parametrize("baseline_mm", [(30.0, 40.0), (-50.0, 0.0), (0.0, 20.0)])
+def test_a_band_is_wider_by_what_is_uncertain_across_the_baseline(baseline_mm: tuple[float, float]) -> None:
+    """Principal point and pointing move a line along u and v; the covariance is projected on the normal."""
+    rig = thesis_rig()
+    x_mm, y_mm = baseline_mm
+    camera = rig.camera.model_copy(update={"cx_px": prior(319.5, 4.0), "cy_px": prior(239.5, 1.0)})
+    update = {"x_mm": prior(x_mm, 0.1), "y_mm": prior(y_mm, 0.1), "tx": prior(0, 0.01), "ty": prior(0, 0.03)}
+    laser = rig.lasers[0].model_copy(update=update)
+    normal = np.array([-y_mm, x_mm]) / np.hypot(x_mm, y_mm)
+    by_pointing = rig.camera.f_px.value * np.array([0.01, 0.03])
+    sd_px = np.sqrt(normal @ np.diag(np.array([4.0, 1.0]) ** 2 + by_pointing**2) @ normal)
+    line = prior_scanline(rig.model_copy(update={"camera": camera}), laser)
+    assert line.half_width_px == pytest.approx(BEAM_HALF_WIDTH_PX + PRIOR_REACH_SD * sd_px)
 
 
 def row(number: int, laser_id: str, standoff_mm: float | None, **cells: Any) -> CaptureRow:

@@ -10,7 +10,7 @@ import pytest
 from tests.proofs import simulate, study
 from tests.support.rigs import STANDOFFS_MM, thesis_rig
 from workbench.calibration.design.expectation import Expectation
-from workbench.calibration.design.forecast import RANGES_MM, forecast
+from workbench.calibration.design.forecast import RANGES_MM, CalibrationForecast, forecast
 from workbench.calibration.design.standoffs import (
     DRAWS,
     RangeGoals,
@@ -43,9 +43,15 @@ def fits() -> tuple[list[str], np.ndarray, np.ndarray]:
     return names, fitted.sd[fair][:, free], relative.reshape(len(relative), len(RANGES_MM), -1)
 
 
-def test_predicted_deviations_are_those_of_fits(fits: tuple[list[str], np.ndarray, np.ndarray]) -> None:
+@pytest.fixture(scope="module")
+def predicted() -> CalibrationForecast:
+    return forecast(RIG, SHIPPED, 10)
+
+
+def test_predicted_deviations_are_those_of_fits(
+    predicted: CalibrationForecast, fits: tuple[list[str], np.ndarray, np.ndarray]
+) -> None:
     names, sd, relative = fits
-    predicted = forecast(RIG, SHIPPED, 10)
     assert [p.name for p in predicted.parameters] == names
     typical = np.median(sd, axis=0)
     # Two medians of deviations that scatter from sensor to sensor, 4 sigma; 1 % for the estimate's own place.
@@ -59,6 +65,16 @@ def test_predicted_deviations_are_those_of_fits(fits: tuple[list[str], np.ndarra
     np.testing.assert_allclose(
         np.array(far, float), np.nanmedian(relative, axis=0).ravel()[2 * lasers :], rtol=0.03
     )
+
+
+def test_null_directions_are_those_of_the_geometry(predicted: CalibrationForecast) -> None:
+    """A spot of a flat depends on f_px x_mm, and on cx_px + f_px tx of each laser."""
+    change = {next(iter(direction.change)): direction.change for direction in predicted.directions}
+    f_px = RIG.camera.f_px.value
+    for laser in RIG.lasers:
+        scaled = change["f_px"][f"{laser.id}.x_mm"] / laser.x_mm.value
+        assert scaled == pytest.approx(-change["f_px"]["f_px"] / f_px, rel=0.02)
+        assert change["cx_px"][f"{laser.id}.tx"] == pytest.approx(-change["cx_px"]["cx_px"] / f_px, rel=0.02)
 
 
 def test_repeats_share_their_speckle() -> None:

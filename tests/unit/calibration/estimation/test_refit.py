@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.estimation.fit import fit
@@ -17,6 +20,7 @@ from workbench.calibration.estimation.refit import (
     refit_with_scale,
     rows_of,
 )
+from workbench.model.arrays import FloatArray
 
 RIG = thesis_rig()
 
@@ -115,3 +119,43 @@ def test_other_numbers_in_unused_rows_leave_the_optimum_alone(whole: Refit) -> N
     assert np.array_equal(other.covariance, left.covariance)
     shift = 5.0 * np.asarray(whole.problem.data.inverse_sd)[0]
     np.testing.assert_allclose(other.residual[:2], left.residual[:2] - shift, rtol=1e-6)
+
+
+class Saturated:
+    """Residuals that flatten out on both sides of `centre`, where a Gauss-Newton step is far too long."""
+
+    centre = np.array([0.5, -0.8, 0.3])
+    slope = np.array([3.0, 1.0, 0.2])
+    evaluations = 0
+
+    def linearise(self, y: FloatArray, scale: float) -> tuple[FloatArray, FloatArray]:
+        self.evaluations += 1
+        at = self.slope * (y - self.centre)
+        return 10.0 * np.arctan(at) / scale, np.diag(10.0 * self.slope / (1.0 + at**2)) / scale
+
+
+@pytest.mark.parametrize("start", [(3.0, -4.0, 6.0), (-2.0, 5.0, 0.0), (0.0, 0.0, -9.0)])
+@pytest.mark.parametrize("scale", [1.0, 3.0])
+def test_steps_that_would_ascend_are_damped(start: tuple[float, ...], scale: float) -> None:
+    problem = Saturated()
+
+    def cost(y: FloatArray) -> float:
+        residual, _ = problem.linearise(y, scale)
+        return float(residual @ residual + y @ y)
+
+    found = refit(cast(LeastSquaresProblem, problem), np.ones(3, bool), np.array(start), scale)
+    expected = minimize(cost, problem.centre, method="BFGS").x
+    # The last step is a thousandth of a posterior deviation, which here is below that of the prior.
+    np.testing.assert_allclose(found.y, expected, atol=1e-3)
+    np.testing.assert_array_equal(found.residual, problem.linearise(found.y, scale)[0])
+    assert found.cost == pytest.approx(cost(found.y))
+
+
+def test_a_refit_from_its_optimum_stays_there() -> None:
+    problem = Saturated()
+    once = refit(cast(LeastSquaresProblem, problem), np.ones(3, bool), np.zeros(3))
+    problem.evaluations = 0
+    again = refit(cast(LeastSquaresProblem, problem), once.used, once.y)
+    assert problem.evaluations == 2  # at the start and after the last step
+    np.testing.assert_allclose(again.y, once.y, atol=1e-6)
+    assert again.cost <= once.cost

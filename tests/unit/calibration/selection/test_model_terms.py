@@ -121,6 +121,16 @@ def test_the_shift_of_a_range_is_that_of_two_fits(seed: int) -> None:
     assert stated == pytest.approx(np.concatenate(shifts).max(), rel=0.1)
 
 
+@pytest.mark.parametrize("standoffs_mm", [(70.0, 125.0, 400.0, 2000.0), (125.0, 400.0, 2000.0)])
+def test_ranges_whose_spots_lie_outside_the_image_do_not_count(standoffs_mm: tuple[float, ...]) -> None:
+    fitted = fit(thesis_rig(), World(thesis_rig(), 3).observations(standoffs_mm))
+    sensor = CalibratedSensor(calibrate(fitted, Acceptance(), PROVENANCE)[0])
+    grid = np.geomspace(min(standoffs_mm), max(standoffs_mm), model_terms.GRID)
+    seen = sum(int(sensor.in_frame(laser, grid).sum()) for laser in sensor.ids)
+    gradient, own_sd = model_terms._range_gradients(fitted)
+    assert len(gradient) == len(own_sd) == seen < len(sensor.ids) * len(grid)
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_spots_that_the_model_lacks_a_term_for_are_not_thrown_out(seed: int) -> None:
     rig = lens(thesis_rig(), k2=0.0)

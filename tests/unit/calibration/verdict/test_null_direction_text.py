@@ -105,6 +105,12 @@ def test_all_lasers_are_not_listed_and_some_are() -> None:
     assert "L1, L4" in describe(RIG, of_two, ("L1", "L4"))
 
 
+def test_several_parameters_are_a_list() -> None:
+    groups = group_by_kind([change("k1", 10.0), change("k2", 9.0), change("cx_px", 8.0)])
+    assert describe(RIG, groups).startswith("k1, k2 and cx_px ")
+    assert describe(RIG, groups[:2]).startswith("k1 and k2 ")
+
+
 def test_a_better_ruler_is_the_remedy_wherever_a_length_s_scale_takes_part() -> None:
     groups = group_by_kind([change("f_px", 3.0), change("ruler_scale", 3.0), change("L1.x_mm", 3.0)])
     assert (remedy(groups),) == REMEDIES["ruler_scale"]

@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.support.draw import Drawn, Sensor, draw, profile
-from tests.support.spot_models import fitted_spot, scene_of
+from tests.support.spot_models import fitted_spot, pixel_noise, scene_of
+from workbench.model.arrays import FloatArray
 from workbench.spots import Failure, Scanline, find_spots
-from workbench.spots.deblending.blend import Blend, fit_blends, split_elongated, with_hidden_spots
-from workbench.spots.deblending.joint_fit import fit_joint
+from workbench.spots.deblending import blend
+from workbench.spots.deblending.blend import (
+    Blend,
+    _Candidates,
+    _elongated_as_pairs,
+    _is_significant,
+    _least_significant,
+    fit_blends,
+    split_elongated,
+    with_hidden_spots,
+)
+from workbench.spots.deblending.joint_fit import JointFit, fit_joint, pair_guess
+from workbench.spots.fit import Windows
+from workbench.spots.kernels.columns import FLUX, LN_SU, U
 from workbench.spots.measure import FittedSpot
 from workbench.spots.pair import PairSignal
 
@@ -153,3 +168,124 @@ def test_a_member_that_is_not_there_is_dropped_and_a_hidden_one_is_found(seed: i
     assert sorted(round(t.spot.u_px) for t in kept) == [60, 65]
     more = with_hidden_spots([scene], group[:1], [])
     assert sorted(round(t.spot.u_px) for t in more) == [60, 65]
+
+
+WIDE = Windows(np.zeros((1, 20, 30)), np.ones((1, 20, 30), bool), np.full((1, 20, 30), np.inf))
+PIXELS = 30
+"""Few, so that the number of parameters counts."""
+
+
+def joint_of(*spots: tuple[float, float, float], width_px: float = 1.5, **changed: Any) -> JointFit:
+    """A fit with spots (u, v, flux) known to 1 DN, and chi2 as expected."""
+    weight = np.zeros((20, 30))
+    weight.flat[:PIXELS] = 1.0
+    params = np.array([[0.0, flux, u, v, *[np.log(width_px)] * 2] for u, v, flux in spots])
+    k = len(spots)
+    fitted = JointFit(
+        params=params,
+        sd=np.ones((k, 3)),
+        speckle_sd=np.zeros((k, 2)),
+        chi2=PIXELS - 3.0 - 3.0 * k,
+        signal=np.zeros_like(weight),
+        residual=np.zeros_like(weight),
+        weight=weight,
+        noise=pixel_noise(1.0, 0.01),
+        converged=True,
+    )
+    return replace(fitted, **changed)
+
+
+def is_significant(two: JointFit, f: float = 20.0, min_share: float = 0.1) -> bool:
+    """Whether the second of several spots is significant where it lowers chi2 by three times `f`."""
+    one = replace(two, chi2=two.chi2 + 3.0 * f)
+    return _is_significant(one, two, WIDE, _Candidates([1], min_share))
+
+
+CLEAR = ((10.0, 9.0, 1000.0), (16.0, 9.0, 800.0))
+
+
+@pytest.mark.parametrize(
+    ("second", "significant"),
+    [
+        ((16.0, 9.0, 800.0), True),
+        # Centres nearer than a width.
+        ((11.6, 9.0, 800.0), True),
+        ((11.4, 9.0, 800.0), False),
+        ((10.0, 10.4, 800.0), False),
+        # A share of the strongest.
+        ((16.0, 9.0, 105.0), True),
+        ((16.0, 9.0, 95.0), False),
+        # Centres outside the window of 20 x 30.
+        ((-0.1, 9.0, 800.0), False),
+        ((29.9, 19.9, 800.0), True),
+        ((30.1, 9.0, 800.0), False),
+        ((16.0, 20.1, 800.0), False),
+    ],
+)
+def test_a_second_spot_is_apart_bright_and_inside(
+    second: tuple[float, float, float], significant: bool
+) -> None:
+    assert is_significant(joint_of(CLEAR[0], second)) == significant
+
+
+def test_a_second_spot_exceeds_its_noise() -> None:
+    two = joint_of(*CLEAR)
+    assert is_significant(replace(two, sd=np.array([[1.0] * 3, [800.0 / 5.1] * 3])))
+    assert not is_significant(replace(two, sd=np.array([[1.0] * 3, [800.0 / 4.9] * 3])))
+    assert not is_significant(replace(two, converged=False))
+
+
+@pytest.mark.parametrize("spots", [CLEAR, (*CLEAR, (22.0, 9.0, 900.0))])
+def test_a_second_spot_lowers_the_misfit_by_an_f_test(spots: tuple[tuple[float, float, float], ...]) -> None:
+    """Three parameters more; what is left is as large as its degrees of freedom."""
+    assert is_significant(joint_of(*spots), f=10.2)
+    assert not is_significant(joint_of(*spots), f=9.8)
+
+
+@pytest.mark.parametrize(("removable", "dropped"), [([0, 1, 2], 1), ([0, 2], 2), ([0], 0)])
+def test_the_faintest_spot_over_its_noise_is_dropped_first(removable: list[int], dropped: int) -> None:
+    full = joint_of((5.0, 9.0, 900.0), (12.0, 9.0, 500.0), (20.0, 9.0, 600.0))
+    full.sd[:, 0] = 30.0, 50.0, 25.0
+    assert _least_significant(full, full.params, removable) == dropped
+
+
+@pytest.mark.parametrize(
+    ("removable", "dropped"), [([0, 1, 2, 3], 1), ([2], 2), ([0, 3], 0), ([1, 3], 1), ([3], 3)]
+)
+def test_without_a_sound_fit_the_fainter_of_the_nearest_two_is_dropped(
+    removable: list[int], dropped: int
+) -> None:
+    """By the first guesses: the fit ran away."""
+    start = joint_of((5.0, 9.0, 900.0), (7.0, 9.0, 500.0), (12.0, 9.0, 600.0), (25.0, 9.0, 100.0)).params
+    failed = replace(joint_of(*[(float("nan"), 0.0, 1.0)] * 4), converged=False)
+    assert _least_significant(failed, start, removable) == dropped
+
+
+def test_elongated_members_of_a_cluster_are_guessed_as_pairs() -> None:
+    start = joint_of(*CLEAR, (22.0, 9.0, 900.0)).params
+    start[1, LN_SU] += np.log(1.35)
+    start[2, LN_SU] += np.log(1.25)
+    alone = np.array([True, False, True])
+    guesses, isolated = _elongated_as_pairs(start, alone)
+    assert len(guesses) == 4
+    assert isolated.tolist() == [True, True, False, False]
+    np.testing.assert_allclose(guesses[:2, U], [10.0, 22.0])
+    assert guesses[2:, U].mean() == pytest.approx(16.0)
+    assert guesses[2:, FLUX].sum() == pytest.approx(800.0)
+    np.testing.assert_allclose(np.exp(guesses[:, LN_SU:]), 1.5)
+
+
+@pytest.mark.parametrize(("ratio", "tried"), [(1.0, False), (1.3, True)])
+def test_only_an_elongated_spot_is_tried_as_two(
+    ratio: float, tried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, (one,) = scene_with(Drawn(60.0, 30.0, 4e4, 1.3 * ratio, 1.3), seed=1)
+    guesses = []
+
+    def guessed(params: FloatArray) -> FloatArray:
+        guesses.append(params)
+        return pair_guess(params)
+
+    monkeypatch.setattr(blend, "pair_guess", guessed)
+    split_elongated([scene], one, [])
+    assert len(guesses) == tried

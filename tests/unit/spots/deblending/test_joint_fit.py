@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from tests.support.spot_models import jacobian_of, pixel_noise
-from workbench.spots.deblending.joint_fit import fit_joint
+from workbench.spots.deblending.joint_fit import fit_joint, pair_guess
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.columns import FLUX, LN_SU, LN_SV, U, V
 
@@ -27,6 +27,22 @@ def two_spots(rng: np.random.Generator) -> np.ndarray:
     true[:, U] = HALF + rng.uniform(-0.5, 0.5) + np.array([-0.5, 0.5]) * APART * WIDTH
     true[:, U + 1] = HALF + rng.uniform(-0.5, 0.5)
     return true
+
+
+@pytest.mark.parametrize("apart_px", [2.0, 5.0])
+@pytest.mark.parametrize(("along", "across"), [(U, V), (V, U)])
+def test_two_like_spots_are_guessed_from_the_widths_of_their_sum(
+    along: int, across: int, apart_px: float
+) -> None:
+    """Two halves at both sides of the middle add the square of their distance from it to the variance."""
+    summed = np.array([3.0, 1000.0, 0.0, 0.0, np.log(1.4), np.log(1.4)])
+    summed[[along, across]] = 20.0, 30.0
+    summed[LN_SU + along - U] = 0.5 * np.log(1.4**2 + apart_px**2)
+    start = pair_guess(summed)
+    assert sorted(start[:, along].tolist()) == pytest.approx([20.0 - apart_px, 20.0 + apart_px])
+    np.testing.assert_allclose(start[:, across], 30.0)
+    np.testing.assert_allclose(start[:, FLUX], 500.0)
+    np.testing.assert_allclose(np.exp(start[:, LN_SU:]), 1.4)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

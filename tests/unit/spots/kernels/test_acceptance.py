@@ -17,16 +17,30 @@ from workbench.spots.kernels.acceptance import (
     NEXT_HALF,
     PEAK,
     U_SD,
+    U_SPECKLE_SD,
     V_SD,
+    V_SPECKLE_SD,
+    _fill_row,
+    _is_spot,
     _take_floor_from_rim,
     fit_group,
     without_outliers,
 )
 from workbench.spots.kernels.columns import (
     FLUX,
+    FLUX_DEVIATION,
+    INFORMATION,
+    LN_SU,
+    LN_SV,
+    PEAK_DN,
     RIM_NOISE,
     RIM_PIXELS,
+    SHEAR,
     STATISTIC_COLUMNS,
+    U_DEVIATION,
+    U_SPECKLE,
+    V_DEVIATION,
+    V_SPECKLE,
     WORST_EXCESS,
     U,
     V,
@@ -153,3 +167,101 @@ def test_a_few_pixels_that_no_spot_explains_are_left_out(outliers: int, dropped:
     assert (~kept).sum() == dropped
     assert usable.all()
     assert kept[0].all()
+
+
+IMAGE = (60, 90)
+SHARP = {FLUX: 100.0, U: 20.0, V: 30.0, LN_SU: np.log(1.2), LN_SV: np.log(1.2)}
+CERTAIN = {INFORMATION: 1e4, FLUX_DEVIATION: 1.0, RIM_NOISE: 1.0}
+
+
+def is_spot(params: dict[int, float], statistics: dict[int, float]) -> bool:
+    """Whether a fit counts as a spot that differs in some columns from a clear one."""
+    row, own = np.zeros(7), np.zeros(STATISTIC_COLUMNS)
+    for filled, values in ((row, SHARP | params), (own, CERTAIN | statistics)):
+        filled[list(values)] = list(values.values())
+    return bool(_is_spot(row, own, IMAGE))
+
+
+@pytest.mark.parametrize(
+    ("params", "good"),
+    [
+        ({}, True),
+        ({FLUX: -100.0}, False),
+        ({U: -0.4}, True),
+        ({U: -0.6}, False),
+        ({V: -0.4}, True),
+        ({V: -0.6}, False),
+        ({U: 89.4}, True),
+        ({U: 89.6}, False),
+        ({V: 59.4}, True),
+        ({V: 59.6}, False),
+        # 0.6 px is the narrowest that a lens is specified with; a hot pixel is narrower.
+        ({LN_SU: np.log(0.6), LN_SV: np.log(0.6)}, True),
+        ({LN_SU: np.log(0.4), LN_SV: np.log(0.4)}, False),
+        # The mean of both widths counts.
+        ({LN_SU: np.log(0.3), LN_SV: np.log(1.2)}, True),
+        ({LN_SU: np.log(6.0), LN_SV: np.log(6.0)}, True),
+        ({LN_SU: np.log(8.0), LN_SV: np.log(8.0)}, False),
+    ],
+)
+def test_a_spot_is_light_of_a_lens_s_width_inside_the_image(params: dict[int, float], good: bool) -> None:
+    assert is_spot(params, {}) == good
+
+
+@pytest.mark.parametrize(
+    ("statistics", "good"),
+    [
+        # The signal-to-noise ratio of a matched filter exceeds 6, in the noise of the rim if that is higher.
+        ({INFORMATION: 5.9**2}, False),
+        ({INFORMATION: 6.1**2}, True),
+        ({INFORMATION: 2 * 5.9**2, RIM_NOISE: 2.0}, False),
+        ({INFORMATION: 2 * 6.1**2, RIM_NOISE: 2.0}, True),
+        ({INFORMATION: 5.9**2, RIM_NOISE: 0.5}, False),
+        # The flux exceeds three standard deviations with the background free.
+        ({FLUX_DEVIATION: 100.0 / 2.9}, False),
+        ({FLUX_DEVIATION: 100.0 / 3.1}, True),
+    ],
+)
+def test_a_spot_exceeds_the_noise(statistics: dict[int, float], good: bool) -> None:
+    assert is_spot({}, statistics) == good
+
+
+@pytest.mark.parametrize("information", [50.0, 1e3, 1e9])
+def test_all_deviations_of_a_row_are_inflated_alike(information: float) -> None:
+    """By the next order of 1 / A, whose factor for a position is 13 (docs/spots.md)."""
+    columns = {
+        FLUX_SD: FLUX_DEVIATION,
+        U_SD: U_DEVIATION,
+        V_SD: V_DEVIATION,
+        U_SPECKLE_SD: U_SPECKLE,
+        V_SPECKLE_SD: V_SPECKLE,
+    }
+    statistics, row = np.zeros(STATISTIC_COLUMNS), np.full(COLUMNS, -1.0)
+    statistics[[*columns.values()]] = (20.0, 0.02, 0.03, 0.05, 0.07)
+    statistics[INFORMATION], statistics[PEAK_DN] = information, 300.0
+    params = np.array([2.0, 900.0, 20.0, 30.0, 0.1, 0.2])
+    _fill_row(params, statistics, 0.4, 0.01, row)
+    variances = (row[[*columns]] / statistics[[*columns.values()]]) ** 2
+    np.testing.assert_allclose(variances, 1.0 + 13.0 / information)
+    np.testing.assert_array_equal(row[:6], params)
+    assert (row[SHEAR], row[PEAK], row[IS_SPOT], row[NEXT_HALF]) == (0.0, 300.0, 1.0, -1.0)
+
+
+def test_turned_ellipses_of_a_group_are_fitted_each_in_its_own_window() -> None:
+    """The shear of an ellipse is covariance over variance along v; a round spot in between has none."""
+    angles, peaks, side = (0.6, 0.0, -0.6), ((20.0, 15.0), (50.0, 25.0), (70.0, 40.0)), 15
+    spots = [Drawn(7.1, 6.9, 4e4, 2.0 if angle else 1.5, 1.5, angle) for angle in angles]
+    rng = np.random.default_rng(1)
+    data = np.array([profile((side, side), spot) for spot in spots])
+    data += rng.normal(0.0, np.sqrt(1.0 + 0.01 * data))
+    cols, rows = np.array(peaks).T
+    start = np.array([[0.0, 3e4, u, v, 0.5, 0.5] for u, v in peaks])
+    found, usable, clip = np.zeros((3, COLUMNS)), np.ones(data.shape, bool), np.full(data.shape, np.inf)
+    fit_group(data, usable, clip, np.arange(3), rows, cols, start, 1.0, 0.01, 0.0, (60, 90), found)
+    for row, (u, v), spot in zip(found, peaks, spots, strict=True):
+        turn = np.array([[np.cos(spot.angle), -np.sin(spot.angle)], [np.sin(spot.angle), np.cos(spot.angle)]])
+        covariance = turn @ np.diag([spot.su**2, spot.sv**2]) @ turn.T
+        assert row[IS_SPOT] == 1.0
+        assert row[SHEAR] == pytest.approx(covariance[0, 1] / covariance[1, 1], abs=0.05)
+        assert row[U] == pytest.approx(u + 0.1, abs=4.5 * row[U_SD])
+        assert row[V] == pytest.approx(v - 0.1, abs=4.5 * row[V_SD])

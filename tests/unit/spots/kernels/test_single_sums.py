@@ -20,6 +20,12 @@ def test_the_inverse_is_that_of_linear_algebra(k: int) -> None:
     np.testing.assert_allclose(found / scale, theirs / scale, atol=1e-7)
 
 
+def test_a_small_pivot_is_exchanged_for_a_larger_one() -> None:
+    found = np.empty((2, 2))
+    invert(np.array([[0.0, 2.0], [4.0, 1.0]]), found)
+    np.testing.assert_allclose(found @ np.array([[0.0, 2.0], [4.0, 1.0]]), np.eye(2), atol=1e-9)
+
+
 def test_two_spots_at_one_place_have_a_finite_inverse() -> None:
     found = np.empty((2, 2))
     invert(np.ones((2, 2)), found)

@@ -100,6 +100,20 @@ def test_a_clipped_pixel_within_two_widths_counts(row: int, col: int, seen: bool
     assert codes[0] == 2 * seen
 
 
+@pytest.mark.parametrize(
+    ("u_px", "v_px", "code"),
+    [(20.0, 15.0, 0), (33.0, 15.0, 0), (20.0, 27.5, 1), (37.5, 15.0, 1), (1.5, 15.0, 1), (20.0, 1.5, 1)],
+)
+@pytest.mark.parametrize("clipped", [False, True])
+def test_codes_tell_the_border_from_clipping(u_px: float, v_px: float, code: int, clipped: bool) -> None:
+    """In an image of 30 rows and 40 columns."""
+    frame = np.zeros((30, 40), np.uint8)
+    frame[round(v_px), round(u_px)] = 255 if clipped else 254
+    codes = np.empty(1, np.intp)
+    flag_codes(frame, 255.0, np.array([[0.0, 1e4, u_px, v_px, 0.0, 0.0]]), codes)
+    assert codes[0] == code + 2 * clipped
+
+
 def test_marks_of_discs_are_those_of_numpy() -> None:
     lights = np.array([[103.2, 55.1, 4.3], [96.0, 48.0, 2.0], [125.0, 60.0, 7.5], [300.0, 0.0, 5.0]])
     marked = np.zeros((20, 30), bool)
