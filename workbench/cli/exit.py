@@ -1,16 +1,21 @@
-"""Termination of the program."""
+"""Termination of the program: message, exit code, last output."""
 
 from __future__ import annotations
 
 import errno
 import os
 import sys
+import traceback
 from contextlib import suppress
 from typing import NoReturn
 
+from workbench.cli.console import print_message
 from workbench.cli.stopping import ignore_signals
-from workbench.model.errors import StoppedError
+from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
 
+INTERNAL_ERROR = 1
+WRITE_FAILURES = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+"""Errors of a full disk, an exceeded quota or file size, and a failed device."""
 hung = False
 """Whether a thread hangs in a library, or may, for which the interpreter would wait at the end."""
 
@@ -36,3 +41,38 @@ def exit_program(code: int, at_once: bool = False) -> NoReturn:
     if at_once:
         os._exit(code)
     sys.exit(code)
+
+
+def report(error: BaseException) -> int:
+    """Print the cause of the end of a command; returns its exit code."""
+    chain = _chain(error)
+    # An unconfirmed laser-off comes first, even if a later error (a stop, a full disk) covers it.
+    if unsafe := [e for e in chain if isinstance(e, LaserOffNotConfirmedError)]:
+        print_message(f"error: {unsafe[0]}", red=True)
+        return LaserOffNotConfirmedError.exit_code
+    if isinstance(error, SystemExit):
+        if any(isinstance(e, BrokenPipeError) for e in chain):  # as with `| head`; typer turns it into 1
+            return StoppedError.exit_code
+        return error.code if isinstance(error.code, int) else int(error.code is not None)
+    if isinstance(error, WorkbenchError):
+        print_message(f"error: {error}")
+        return error.exit_code
+    if isinstance(error, OSError) and error.errno in WRITE_FAILURES:
+        print_message(f"error: {error.filename or 'output'}: cannot be written: {error.strerror}")
+        return StoppedError.exit_code
+    with suppress(OSError):
+        traceback.print_exception(error)
+    print_message("internal error: this is a defect of the workbench; report it with the lines above")
+    return INTERNAL_ERROR
+
+
+def _chain(error: BaseException) -> list[BaseException]:
+    """The error with all its causes and contexts."""
+    found: list[BaseException] = []
+    remaining: list[BaseException | None] = [error]
+    while remaining:
+        each = remaining.pop()
+        if each is not None and each not in found:
+            found.append(each)
+            remaining += [each.__context__, each.__cause__]
+    return found

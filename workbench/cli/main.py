@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import errno
 import gc
 import os
-import traceback
-from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -14,12 +11,20 @@ from typing import Annotated
 import typer
 
 from workbench.cli.console import print_message, print_warnings_as_notes
-from workbench.cli.exit import exit_program
-from workbench.cli.option_types import AnswersFile, NoInput, Sessions, View, millimetres, reason, whole
+from workbench.cli.exit import exit_program, report
+from workbench.cli.option_types import (
+    AcceptChanges,
+    AnswersFile,
+    NoInput,
+    Sessions,
+    View,
+    millimetres,
+    reason,
+    whole,
+)
 from workbench.cli.repair import repair
 from workbench.cli.stdio import fill_closed_streams
 from workbench.cli.stopping import ignore_signals, stop_at_once
-from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
 
 app = typer.Typer(
     help="Calibration and lab-measurement workbench for laser-spot range sensors.",
@@ -33,9 +38,6 @@ lasers = typer.Typer(help="Control a rig's lasers without a session.", no_args_i
 app.add_typer(lasers, name="lasers")
 app.command()(repair)
 
-INTERNAL_ERROR = 1
-WRITE_FAILURES = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
-"""Errors of a full disk, an exceeded quota or file size, and a failed device."""
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 
 
@@ -92,12 +94,7 @@ def resume(
         Path | None, typer.Argument(help="Session folder or name. Default: the last unfinished session.")
     ] = None,
     sessions: Sessions = Path("sessions"),
-    accept_changes: Annotated[
-        str | None,
-        typer.Option(
-            metavar="REASON", callback=reason, help="Resume although rig, procedures or versions changed."
-        ),
-    ] = None,
+    accept_changes: AcceptChanges = None,
     answers: AnswersFile = None,
     no_input: NoInput = False,
     view: View = None,
@@ -370,39 +367,4 @@ def main() -> None:
         app()
     except (Exception, SystemExit) as error:
         ignore_signals()  # a further signal must not replace the message
-        exit_program(_report(error))
-
-
-def _report(error: BaseException) -> int:
-    """Print why the command ends; returns its exit code."""
-    chain = _chain(error)
-    # An unconfirmed laser-off comes first, even if a later error (a stop, a full disk) covers it.
-    if unsafe := [e for e in chain if isinstance(e, LaserOffNotConfirmedError)]:
-        print_message(f"error: {unsafe[0]}", red=True)
-        return LaserOffNotConfirmedError.exit_code
-    if isinstance(error, SystemExit):
-        if any(isinstance(e, BrokenPipeError) for e in chain):  # as with `| head`; typer turns it into 1
-            return StoppedError.exit_code
-        return error.code if isinstance(error.code, int) else int(error.code is not None)
-    if isinstance(error, WorkbenchError):
-        print_message(f"error: {error}")
-        return error.exit_code
-    if isinstance(error, OSError) and error.errno in WRITE_FAILURES:
-        print_message(f"error: {error.filename or 'output'}: cannot be written: {error.strerror}")
-        return StoppedError.exit_code
-    with suppress(OSError):
-        traceback.print_exception(error)
-    print_message("internal error: this is a defect of the workbench; report it with the lines above")
-    return INTERNAL_ERROR
-
-
-def _chain(error: BaseException) -> list[BaseException]:
-    """The error with all its causes and contexts."""
-    found: list[BaseException] = []
-    remaining: list[BaseException | None] = [error]
-    while remaining:
-        each = remaining.pop()
-        if each is not None and each not in found:
-            found.append(each)
-            remaining += [each.__context__, each.__cause__]
-    return found
+        exit_program(report(error))

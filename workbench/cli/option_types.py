@@ -59,3 +59,11 @@ def reason(given: str | None) -> str | None:
     if given is not None and not given.strip():
         raise typer.BadParameter("expected a reason in words, got a blank")
     return given
+
+
+AcceptChanges = Annotated[
+    str | None,
+    typer.Option(
+        metavar="REASON", callback=reason, help="Continue although rig, procedures or versions changed."
+    ),
+]

@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from workbench.cli.option_types import AnswersFile, NoInput, Sessions, View, millimetres, reason
+from workbench.cli.option_types import (
+    AcceptChanges,
+    AnswersFile,
+    NoInput,
+    Sessions,
+    View,
+    millimetres,
+    reason,
+)
 
 
 def repair(
@@ -36,6 +44,7 @@ def repair(
     accept: Annotated[
         bool, typer.Option("--accept", help="Accept a calibration that fails its limits.")
     ] = False,
+    accept_changes: AcceptChanges = None,
     sessions: Sessions = Path("sessions"),
     answers: AnswersFile = None,
     no_input: NoInput = False,
@@ -54,4 +63,6 @@ def repair(
         add_mm=tuple(add or ()),
         accept=accept,
     )
-    repair_session(find_session(session, sessions), decisions, Answers(answers, no_input), view)
+    repair_session(
+        find_session(session, sessions), decisions, Answers(answers, no_input), view, accept_changes
+    )

@@ -93,15 +93,22 @@ def resume_session(
         resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes)
 
 
-def repair_session(session_dir: Path, repair: Repair, answers: Answers, view: bool | None = None) -> None:
+def repair_session(
+    session_dir: Path,
+    repair: Repair,
+    answers: Answers,
+    view: bool | None = None,
+    accept_changes: str | None = None,
+) -> None:
     """Repair a session that has ended, and run its procedures again.
 
     Raises:
         WorkbenchError: see `workbench.procedure.engine.resume.resume`.
     """
-    plan = plan_of(session_dir, load_manifest(session_dir))
+    now, _ = files_now(session_dir, load_manifest(session_dir))
+    plan = plan_of(session_dir, now)
     with _repairable(session_dir, plan, answers, view) as ui:
-        resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, repair=repair)
+        resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes, repair)
 
 
 @contextmanager

@@ -64,7 +64,7 @@ def resume(
     if changes and accepted_because is None:
         raise BadInputError(
             "\n".join(f"{session_dir}: {change}" for change in changes)
-            + '\nundo the changes, or resume with --accept-changes "reason why they are harmless"'
+            + '\nundo the changes, or add --accept-changes "reason why they are harmless"'
         )
     plan = plan_of(session_dir, now)
     with ExitStack() as stack:
