@@ -131,4 +131,4 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 def listed(folder: Path) -> str:
     done = subprocess.run([SCRIPT, "sessions"], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    return done.stderr
+    return done.stdout

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from dataclasses import asdict
 from pathlib import Path
 from textwrap import shorten
@@ -11,7 +12,9 @@ from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
+from workbench.cli.refusal import refused_fit, repair_commands
 from workbench.model.errors import BadInputError
+from workbench.model.number_text import counted
 from workbench.session.manifest import MANIFEST
 from workbench.session.state import SessionStatus, session_status, session_statuses
 
@@ -24,7 +27,7 @@ CUT_AT = 20
 
 
 def list_sessions(sessions: Path, as_json: bool) -> None:
-    """Print the status of every session, and the command that resumes the last unfinished one.
+    """Print the status of every session, and the commands that continue unfinished ones.
 
     Args:
         sessions: folder of sessions, or the folder of one session.
@@ -39,15 +42,14 @@ def list_sessions(sessions: Path, as_json: bool) -> None:
         for each in found:
             print(json.dumps(asdict(each) | {"session_dir": str(each.session_dir)}))
         return
-    console = Console(stderr=True, markup=False)
+    console = Console(markup=False, highlight=False)
     if not found:
         console.print(f"no sessions in {sessions}")
         return
-    _show(found[-SHOWN:], console)
+    for each in found[-SHOWN:]:
+        _show(each, console)
     if len(found) > SHOWN:
         console.print(f"and {len(found) - SHOWN} older ones")
-    if unfinished := [each for each in found if each.unfinished]:
-        console.print(f"resume: workbench resume {unfinished[-1].session_dir}", soft_wrap=True)
 
 
 def find_session(name: Path | None, sessions: Path) -> Path:
@@ -74,17 +76,23 @@ def find_session(name: Path | None, sessions: Path) -> Path:
     return unfinished[-1].session_dir
 
 
-def _show(found: list[SessionStatus], console: Console) -> None:
-    """Print one line per session, two for a long name, and the cause of the end of unfinished ones."""
-    columns = [
-        f"{each.state:{max(len(e.state) for e in found)}}  {each.captures:6} captures" for each in found
-    ]
-    room = console.width - max(map(len, columns)) - 2
-    names = [each.session_dir.name for each in found]
-    width = max((len(name) for name in names if len(name) <= room), default=0)
-    for each, name, rest in zip(found, names, columns, strict=True):
-        line = f"{name:{width}}  {rest}" if len(name) <= room else f"{name}\n    {rest}"
-        console.print(line, highlight=False, soft_wrap=True)
-        if each.state != "finished":
-            why = shorten(each.why, WHY_LINES * (console.width - 4) - CUT_AT, placeholder=" ...")
-            console.print(Padding(Text(why), (0, 0, 0, 4)))
+def _show(one: SessionStatus, console: Console) -> None:
+    """Print a session: what it is, how it ended, and the command that continues it."""
+    columns = [one.session_dir.name, one.rig, counted(one.captures, "capture"), one.state]
+    console.print("  ".join(filter(None, columns)))
+    accepted = one.calibration.startswith("accepted")
+    lines = [one.calibration if accepted else "", "" if one.state == "finished" else one.why]
+    for line in filter(None, lines):
+        room = WHY_LINES * (console.width - 4) - CUT_AT
+        console.print(Padding(Text(shorten(line, room, placeholder=" ...")), (0, 0, 0, 4)))
+    if (command := next_command(one)) is not None:
+        console.print(f"    {command}", soft_wrap=True)
+
+
+def next_command(one: SessionStatus) -> str | None:
+    """Command that continues or repairs a session; None if there is nothing to do."""
+    if not one.unfinished:
+        return None
+    if (fit := refused_fit(one.session_dir)) is not None:
+        return repair_commands(one.session_dir, fit)[0]
+    return shlex.join(["workbench", "resume", str(one.session_dir)])

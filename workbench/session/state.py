@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -98,6 +99,9 @@ class SessionStatus:
     captures: int
     why: str
     """Cause of the end in one line."""
+    rig: str = ""
+    calibration: str = ""
+    """Outcome of the last fit in one line; empty without one."""
 
     @property
     def unfinished(self) -> bool:
@@ -127,11 +131,32 @@ def session_status(session_dir: Path) -> SessionStatus:
     first, last = (events[0], events[-1]) if events else (None, None)
     procedures = first.procedures if isinstance(first, ev.SessionStarted) else ()
     captures = sum(isinstance(event, ev.CaptureTaken) for event in events)
+    rig = first.rig if isinstance(first, ev.SessionStarted) else ""
+    status = partial(
+        SessionStatus,
+        session_dir,
+        procedures=procedures,
+        captures=captures,
+        rig=rig,
+        calibration=_outcome_of_fit(events),
+    )
     if is_running(session_dir):
-        return SessionStatus(session_dir, "running", procedures, captures, "running in another program")
+        return status(state="running", why="running in another program")
     if not isinstance(last, ev.SessionFinished):
-        return SessionStatus(session_dir, "interrupted", procedures, captures, "kill or power failure")
+        return status(state="interrupted", why="kill or power failure")
     why = (last.message.splitlines() or [""])[0]
     if last.exit_code == AnswerNeededError.exit_code:
         why = f"for an answer to {why.removeprefix('prompt ').partition(' -- ')[0]}"
-    return SessionStatus(session_dir, STATES.get(last.exit_code, "failed"), procedures, captures, why)
+    return status(state=STATES.get(last.exit_code, "failed"), why=why)
+
+
+def _outcome_of_fit(events: Sequence[ev.Event]) -> str:
+    """Outcome of the last fit: that of its step if it is accepted."""
+    outcome = ""
+    fitted = False
+    for event in events:
+        if isinstance(event, ev.FitFinished):
+            outcome, fitted = f"{event.verdict}: rms {event.rms_px:.3f} px", True
+        elif isinstance(event, ev.StepFinished) and fitted:
+            outcome, fitted = event.outcome, False
+    return outcome

@@ -16,40 +16,35 @@ from workbench.session.state import SessionStatus
 LONG_WHY = "laser controller at /dev/ttyACM0: request '!': expected 'OK OFF', got a line failure; check it"
 
 
-def test_sessions_are_listed_with_whole_names(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    names = ["20261122-214141-calibrate-flat", "20261122-214142-calibrate-flat-of-the-long-rig-2"]
-    found = [
-        SessionStatus(Path("sessions") / names[0], "finished", ("p",), 440, "done"),
-        SessionStatus(Path("sessions") / names[1], "failed", ("p",), 12, LONG_WHY),
-    ]
+def listed(
+    found: list[SessionStatus], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> list[str]:
+    """Lines on standard output at 80 columns."""
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
     list_sessions(Path("sessions"), as_json=False)
-    printed = capsys.readouterr().err.splitlines()
-    assert max(map(len, printed[:-1])) <= 80
-    assert printed[0].split() == [names[0], "finished", "440", "captures"]
-    assert printed[1].split() == [names[1], "failed", "12", "captures"]
-    assert " ".join(line.strip() for line in printed[2:-1]) == LONG_WHY
-    assert printed[-1] == f"resume: workbench resume sessions/{names[1]}"
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return captured.out.splitlines()
 
 
-def test_a_session_with_a_name_as_long_as_the_line_has_two(
+def test_sessions_are_listed_with_result_cause_and_command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    folder = Path("sessions")
     names = ["20261122-214141-calibrate-flat", "20261122-214142-" + "calibrate-" * 6 + "x"]
-    found = [SessionStatus(Path("sessions") / name, "finished", ("p",), 440, "done") for name in names]
-    monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
-    list_sessions(Path("sessions"), as_json=False)
-    printed = capsys.readouterr().err.splitlines()
-    assert max(map(len, printed)) <= 80
-    assert [line.split() for line in printed] == [
-        [names[0], "finished", "440", "captures"],
-        [names[1]],
-        ["finished", "440", "captures"],
+    found = [
+        SessionStatus(
+            Path("sessions") / names[0], "finished", ("p",), 440, "done", "thesis", "accepted: rms 0.04 px"
+        ),
+        SessionStatus(folder / names[1], "failed", ("p",), 12, LONG_WHY, "thesis"),
     ]
+    printed = listed(found, monkeypatch, capsys)
+    assert printed[0].split() == [names[0], "thesis", "440", "captures", "finished"]
+    assert printed[1].strip() == "accepted: rms 0.04 px"
+    whole = " ".join(" ".join(printed[2:]).split())
+    assert whole == f"{names[1]} thesis 12 captures failed {LONG_WHY} workbench resume sessions/{names[1]}"
+    assert printed[-1].strip() == f"workbench resume sessions/{names[1]}", "to be copied in one piece"
 
 
 def test_a_session_is_found_by_the_folder_that_one_stands_in(
@@ -68,10 +63,7 @@ def test_how_a_session_ended_takes_two_lines_at_most(
 ) -> None:
     why = "the calibration is refused: " + "; ".join(f"laser L{n} was seen at 2 standoffs" for n in range(9))
     found = [SessionStatus(Path("sessions/a"), "failed", ("p",), 12, why)]
-    monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
-    list_sessions(Path("sessions"), as_json=False)
-    printed = capsys.readouterr().err.splitlines()
+    printed = listed(found, monkeypatch, capsys)
     assert len(printed) == 4
     assert printed[2].rstrip().endswith("...")
     list_sessions(Path("sessions"), as_json=True)
