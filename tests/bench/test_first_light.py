@@ -190,8 +190,8 @@ def test_fit_and_range_on_the_session_s_images_give_the_session_s_results(demo: 
         scene = alone or scenes[reading.scene]
         assert scene["status"] == "done"
         ours = {laser["id"]: laser["range_mm"] for laser in scene["lasers"]}
-        # The last digits depend on how many spots the compiled program ranges at once.
-        assert ours == pytest.approx({laser.laser_id: laser.range_mm for laser in reading.lasers}, rel=1e-9)
+        # The session searches spots with the speckle of the rig file, `range` with that of the calibration.
+        assert ours == pytest.approx({laser.laser_id: laser.range_mm for laser in reading.lasers}, rel=1e-6)
         compared += 1
     assert compared == 55
 
@@ -215,6 +215,8 @@ def test_a_reader_written_from_the_format_s_description_ranges_alike(demo: Demo,
     records = [r.event for r in read_journal(demo.folder)]
     found = [s for event in records if isinstance(event, SpotsFound) for s in event.spots]
     spots = {(s.u_px, s.v_px): f"{s.u_px!r},{s.v_px!r},{s.u_sd_px!r},{s.v_sd_px!r}" for s in found}
+    sds = {(s.u_px, s.v_px): (s.u_sd_px, s.v_sd_px) for s in found}
+    sensor = CalibratedSensor(load_calibration(demo.folder / "calibration.yaml"))
     lasers = [laser for event in records if isinstance(event, ReadingTaken) for laser in event.lasers]
     rows = [f"{laser.laser_id},{spots[laser.u_px or 0.0, laser.v_px or 0.0]}" for laser in lasers]
     table = tmp_path / "spots.csv"
@@ -227,7 +229,11 @@ def test_a_reader_written_from_the_format_s_description_ranges_alike(demo: Demo,
     assert len(lasers) >= 200
     for (_, range_mm, sigma_mm), laser in zip(theirs, lasers, strict=True):
         assert float(range_mm) == pytest.approx(laser.range_mm, rel=1e-6)
-        assert float(sigma_mm) == pytest.approx(laser.sigma_mm, rel=1e-6)
+        (u_px, v_px), sd_px = (laser.u_px, laser.v_px), sds[laser.u_px or 0.0, laser.v_px or 0.0]
+        expected = sensor.ranges([laser.laser_id], np.array([[u_px, v_px]], float), np.array([sd_px]))
+        assert float(sigma_mm) == pytest.approx(expected.sigma_mm[0], rel=1e-6)
+        # A reading has the speckle that its own spots state, which depends on their brightness.
+        assert float(sigma_mm) == pytest.approx(laser.sigma_mm, rel=0.3)
 
 
 def test_the_recording_is_a_view_that_can_be_made_again(demo: Demo, tmp_path: Path) -> None:

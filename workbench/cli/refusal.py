@@ -18,20 +18,24 @@ CONTRADICTION = "contradicts the other placements"
 
 
 def refused_fit(session_dir: Path) -> ev.FitFinished | None:
-    """Last fit of a session if it was refused; None otherwise."""
+    """Fit that ended a session because it was refused; None otherwise."""
     try:
-        fits = [r.event for r in effective(read_journal(session_dir)) if isinstance(r.event, ev.FitFinished)]
+        events = [r.event for r in effective(read_journal(session_dir))]
     except BadInputError:
         return None
-    return fits[-1] if fits and fits[-1].verdict == "refused" else None
+    found = None
+    for event in events:
+        if isinstance(event, ev.FitFinished):
+            found = event if event.verdict == "refused" else None
+        elif isinstance(event, ev.StepFinished):  # the fit was accepted with a reason
+            found = None
+    return found
 
 
 def suspects(fit: ev.FitFinished) -> list[str]:
-    """Keys of the placements that a fit names as wrong, else of those with an alarm, else of the worst."""
+    """Keys of the placements that a fit names as wrong, or else of those with an alarm."""
     named = [fault.placement for fault in fit.faults if fault.placement is not None]
-    alarms = [one.placement for one in fit.left_out if one.alarm]
-    worst = sorted(fit.left_out, key=lambda one: -abs(one.z))[:1]
-    return list(dict.fromkeys(named)) or alarms or [one.placement for one in worst]
+    return list(dict.fromkeys(named)) or [one.placement for one in fit.left_out if one.alarm]
 
 
 def repair_commands(session_dir: Path, fit: ev.FitFinished) -> list[str]:
@@ -47,6 +51,10 @@ def repair_commands(session_dir: Path, fit: ev.FitFinished) -> list[str]:
         for option in ("--recapture", "--leave-out")
         if suspects(fit)
     ]
+    if not commands and fit.left_out:
+        # No evidence against it: it is offered to be captured again, never to be left out.
+        worst = max(fit.left_out, key=lambda one: abs(one.z))
+        commands.append([*start, "--recapture", worst.placement, "--reason", "largest residual, no alarm"])
     if (advised := _advised_mm(session_dir)) is not None:
         commands.append([*start, "--add", f"{advised:g}", "--reason", "the most informative standoff"])
     commands.append([*start, "--accept", "--reason", "the failed limit does not matter here"])

@@ -20,7 +20,7 @@ from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 REPLY_S = 1.0
 """Longest wait for a reply, s. Controllers answer within milliseconds; a busy computer may add delay."""
 LONGEST_REPLY = 200
-STATE = b"OK STATE "
+STATE, INTERLOCK = b"OK STATE ", b"OK INTERLOCK "
 OFF = b"OK OFF\n"
 LOOK_S = 0.02
 """Time between two calls of `alarm` while a reply is awaited, s."""
@@ -153,7 +153,7 @@ class ControllerLine:
         Late replies to earlier requests that switch nothing on are skipped.
         """
         received, end, wanted = b"", b"\n", head.encode()
-        late = (STATE, OFF) if wanted.startswith(STATE) else STATE
+        late = (STATE, INTERLOCK, OFF) if wanted.startswith(STATE) else (STATE, INTERLOCK)
         deadline = time.monotonic() + REPLY_S
         while time.monotonic() < deadline:
             while end == b"\n" in received and received.startswith(late) and not received.startswith(wanted):

@@ -157,8 +157,12 @@ class Lease:
 class Guardian:
     """Server of one workbench on one device."""
 
-    def __init__(self, workbench: Workbench, line: CheckedLine, answers: int, hang_s: float) -> None:
+    def __init__(
+        self, workbench: Workbench, line: CheckedLine, answers: int, hang_s: float, *, watches: bool
+    ) -> None:
         self._workbench, self._line, self._answers, self._hang_s = workbench, line, answers, hang_s
+        self._watches = watches
+        """Whether to look for emission that another program has switched on."""
         self._lease: Lease | None = None
         self._failure: WorkbenchError | None = None
         """Cause of an off that the workbench does not know of; reported with the next OFF."""
@@ -188,7 +192,7 @@ class Guardian:
                 self._end_of_lease(self._lease)
             elif self._lease is None and self._may_be_on:
                 self._put_off(self._failure)
-            elif self._lease is None:
+            elif self._lease is None and self._watches:
                 self._look_for_strangers()
 
     def _look_for_strangers(self) -> None:
@@ -205,10 +209,10 @@ class Guardian:
                 )
             )
 
-    def _wait_s(self) -> float:
-        """Time until the next check, s."""
+    def _wait_s(self) -> float | None:
+        """Time until the next check, s; None: none."""
         if self._lease is None:
-            return LOOK_S if self._may_be_on else WATCH_S
+            return LOOK_S if self._may_be_on else WATCH_S if self._watches else None
         return min(LOOK_S, max(0.0, self._lease.held_until - time.monotonic()))
 
     def _obey(self, command: str) -> None:
@@ -227,6 +231,8 @@ class Guardian:
     def _light(self, mask: int, lease_ms: int) -> None:
         if self._workbench.end_signal is not None:
             raise self._stopped()
+        if self._workbench.suspended:
+            raise RigNotReadyError(f"{SWITCHED_OFF}: the workbench was suspended. {AGAIN}")
         if self._failure is not None:
             self._off()
         self._lease = Lease(mask, time.monotonic() + lease_ms / 1000)
@@ -364,7 +370,9 @@ def public_name(error: WorkbenchError) -> str:
     return next(kind.__name__ for kind in type(error).__mro__ if kind.__module__ == WorkbenchError.__module__)
 
 
-def main(line: str, settings: str, lasers: int, boot_s: float, hang_s: float, signals: int) -> int:
+def main(
+    line: str, settings: str, lasers: int, boot_s: float, hang_s: float, signals: int, watches: bool
+) -> int:
     """Hold the device until the workbench ends; returns the exit code."""
     # Signals that a terminal or a system shutdown sends to all processes: only the workbench's end counts.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
@@ -380,7 +388,7 @@ def main(line: str, settings: str, lasers: int, boot_s: float, hang_s: float, si
     code = answer(answers, 0, connect)
     if code not in {0, LaserOffNotConfirmedError.exit_code} or not opened:
         return code
-    guardian = Guardian(workbench, opened[0], answers, hang_s)
+    guardian = Guardian(workbench, opened[0], answers, hang_s, watches=watches)
     return guardian.leave() if code else guardian.serve()
 
 
@@ -400,5 +408,5 @@ def _keep_answers() -> int:
 
 
 if __name__ == "__main__":
-    _, line, settings, lasers, boot_s, hang_s, signals = sys.argv
-    sys.exit(main(line, settings, int(lasers), float(boot_s), float(hang_s), int(signals)))
+    _, line, settings, lasers, boot_s, hang_s, signals, watches = sys.argv
+    sys.exit(main(line, settings, int(lasers), float(boot_s), float(hang_s), int(signals), watches == "1"))

@@ -50,7 +50,8 @@ class GuardianClient:
             lasers: number of lasers.
             boot_s: time in which the device must answer, s.
             hang_s: time without a beat after which lasers are switched off, s.
-            virtual: whether the beams are simulated; the guardian then writes nothing to the terminal.
+            virtual: whether the beams are simulated. The guardian then writes nothing to the terminal, and
+                does not look for other programs' emission: the session itself answers, and may be computing.
 
         Raises:
             BadInputError: the device has fewer outputs than there are `lasers`.
@@ -63,7 +64,7 @@ class GuardianClient:
         signals, self._signals = os.pipe()
         os.set_blocking(self._signals, False)
         line = [line_reference(line_type), settings.model_dump_json(by_alias=True, exclude_unset=True)]
-        call = [*line, str(lasers), str(boot_s), str(hang_s), str(signals)]
+        call = [*line, str(lasers), str(boot_s), str(hang_s), str(signals), str(int(not virtual))]
         # -P excludes the current folder from imports. A new session shields it from the terminal's signals.
         messages = os.open(os.devnull, os.O_WRONLY) if virtual else _open_terminal()
         self._process = subprocess.Popen(  # noqa: S603 - this very program

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from ruamel.yaml.scalarint import ScalarInt
 
 from workbench.model.board import Board
 from workbench.model.bounds import prior_within, within
@@ -22,7 +23,9 @@ def _as_name(value: object) -> object:
     """Text of a number: YAML reads `id: 1` as a number; to the workbench an id is a name."""
     if not isinstance(value, int) or isinstance(value, bool):
         return value
-    if type(value) is not int:  # its digits are lost, as of 01, 0x10 and 1_0
+    width, underscore = getattr(value, "_width", None), getattr(value, "_underscore", None)
+    plain = type(value) in (int, ScalarInt) and width in (None, len(str(int(value)))) and underscore is None
+    if not plain:  # its digits are lost, as of 01, 0x10 and 1_0
         raise ValueError(
             f"expected text; YAML reads this as the number {int(value)}: write the text in quotes"
         )

@@ -22,7 +22,8 @@ class Repairs:
     added_mm: list[float] = field(default_factory=list)
     """Standoffs of additional placements."""
     accepted_because: str | None = None
-    """Reason to accept a calibration that fails its limits."""
+    """Reason to accept a calibration that fails its limits, by the last repair: after other changes it must
+    be accepted again."""
 
     def counts(self, key: str, n: int) -> bool:
         """Whether an answer with a key, in record `n`, is not older than the decision about its placement."""
@@ -43,6 +44,5 @@ def repairs_of(records: Iterable[ev.Record]) -> Repairs:
         found.attempts.update(event.recapture)
         found.left_out |= dict.fromkeys(event.leave_out, event.reason)
         found.added_mm += event.add_mm
-        if event.accept:
-            found.accepted_because = event.reason
+        found.accepted_because = event.reason if event.accept else None
     return found

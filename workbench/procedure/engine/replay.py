@@ -38,6 +38,8 @@ class ReplayingJournal:
             resumed: event that is journalled before the first new one of a resumed session.
         """
         self._journal, self._consumers = journal, consumers
+        self.repairs = repairs_of(before)
+        """Decisions of the session's repairs."""
         self._kept = deque(safe_part(before))
         self._from_n = 0
         self._resumed = resumed if before else None
@@ -47,15 +49,15 @@ class ReplayingJournal:
             key: captures for key, captures in placement_captures(before).items() if captures.complete
         }
         """Complete placements by key, which are not captured again."""
-        self.repairs = repairs_of(before)
-        """Decisions of the session's repairs."""
         self._answers = {
             r.event.key: r.event
             for r in self._kept
             if isinstance(r.event, ev.Answered) and self.repairs.counts(r.event.key, r.n)
         }
         self._set_aside = [r.event for r in effective(before) if isinstance(r.event, ev.SetAside)]
-        self._retries = Counter(r.event.key for r in before if _is_retry(r.event))
+        self._retries = Counter(
+            r.event.key for r in before if _is_retry(r.event) and self.repairs.counts(r.event.key, r.n)
+        )
         measured = [e for e in (r.event for r in self._kept) if isinstance(e, ev.LatencyMeasured)]
         self.latency = measured[-1].frames if measured else None
         """Latency in frames as measured before the session ended early; None if it was not measured."""
