@@ -44,7 +44,7 @@ def list_sessions(sessions: Path, as_json: bool) -> None:
         return
     console = Console(markup=False, highlight=False)
     if not found:
-        console.print(f"no sessions in {sessions}")
+        Console(stderr=True, markup=False).print(f"no sessions in {sessions}")
         return
     for each in found[-SHOWN:]:
         _show(each, console)
