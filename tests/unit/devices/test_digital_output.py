@@ -122,10 +122,12 @@ def test_off_when_the_workbench_gets_no_turn_to_end(log: Path, how: signal.Signa
 
 def test_off_when_the_workbench_hangs(log: Path) -> None:
     """Half a second from the last beat, by the guardian's own clock: a board has no lease."""
-    suspended = measure(log, "bank.beat()", signal.SIGSTOP)
-    assert suspended[0] > 300
-    assert suspended[-1] <= HANG_MS
-    assert measure(log, "pass", None)[-1] <= HANG_MS
+    hung = measure(log, "pass", None)
+    assert hung[-1] <= HANG_MS
+
+
+def test_off_at_once_when_the_workbench_is_suspended(log: Path) -> None:
+    assert measure(log, "bank.beat()", signal.SIGSTOP)[-1] <= END_MS
 
 
 def measure(log: Path, beat: str, how: signal.Signals | None) -> list[float]:
