@@ -44,7 +44,7 @@ class FittedSpot(NamedTuple):
     reach_px: float
     """The larger of both widths."""
     flux_snr: float
-    """Flux over its standard deviation."""
+    """Flux over its standard deviation by noise, without speckle, which is light."""
     scene: PairSignal
     """The strip that it was found in."""
 
@@ -118,8 +118,8 @@ def _fitted_spots(scene: PairSignal, found: FloatArray) -> list[FittedSpot]:
     for params, row, its_flags in zip(found, found.tolist(), flags, strict=True):
         _, flux, u, v, ln_su, ln_sv, _, u_sd, v_sd, u_speckle, v_speckle, *rest, is_spot, _ = row
         if is_spot:
-            flux_sd, peak, slope, contrast2 = rest
+            _, flux_noise_sd, peak, slope, contrast2 = rest
             width, reach = math.exp(0.5 * (ln_su + ln_sv)), math.exp(max(ln_su, ln_sv))
             spot = Spot(u, v, u_sd, v_sd, flux, width, peak, its_flags, None, u_speckle, v_speckle)
-            fits.append(FittedSpot(spot, params[:U_SD], slope, contrast2, reach, flux / flux_sd, scene))
+            fits.append(FittedSpot(spot, params[:U_SD], slope, contrast2, reach, flux / flux_noise_sd, scene))
     return fits

@@ -11,6 +11,7 @@ from workbench.spots.kernels.strip_pixels import level_of
 
 _SAMPLES = 1200
 _CLIP_SD = 4.0
+_INVERSION_STEPS = 30
 # Variance of rounding to whole numbers.
 ROUNDING_DN2 = 1.0 / 12.0
 
@@ -45,11 +46,14 @@ def level_and_variance(values: Float32Array) -> tuple[float, float]:
 def stated_contrast2(speckle_sd_px: float) -> float:
     """Squared contrast of speckle in a pixel, from the deviation of a centre that it causes.
 
-    That of a centroid is c / sqrt(8 pi) for any width, where c^2 is the area of a grain in pixels. The
-    maximum-likelihood centre is better where the spot is bright, and worse where it is dim.
+    That of a centroid is sqrt(a / 8 pi) for any width, where a = c^2 (1 + 1.3 c) is the area of a grain in
+    pixels. The maximum-likelihood centre is better where the spot is bright, and worse where it is dim.
     """
     area = 8.0 * math.pi * speckle_sd_px**2
-    return area / shared_grains(area)
+    contrast2 = area
+    for _ in range(_INVERSION_STEPS):  # each divides the error by four or more
+        contrast2 = area / shared_grains(contrast2)
+    return contrast2
 
 
 def measure_noise(

@@ -98,3 +98,11 @@ def test_the_speckle_of_a_centroid_gives_the_contrast_of_its_grains() -> None:
     found = stated_contrast2(grain_px / (np.sqrt(2.0) * np.pi))
     # The exact contrast, averaged over a pixel, is that of test_photon_transfer.
     assert found == pytest.approx(0.0312, rel=0.04)
+
+
+@pytest.mark.parametrize("speckle_sd_px", [0.0, 0.01, 0.037, 0.05, 0.1, 0.15])
+def test_the_contrast_gives_back_the_stated_speckle(speckle_sd_px: float) -> None:
+    """A centroid moves by sqrt(a / 8 pi), with a = c^2 (1 + 1.3 c)."""
+    contrast = np.sqrt(stated_contrast2(speckle_sd_px))
+    area = contrast**2 * (1.0 + 1.3 * contrast)
+    assert np.sqrt(area / (8.0 * np.pi)) == pytest.approx(speckle_sd_px, rel=1e-12)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.support.draw import Drawn, draw
+from tests.support.draw import Drawn, Sensor, draw, profile
 from workbench.spots import Failure, Scanline, find_spots
 
 ROW = [Scanline(0, 30, 1, 0, 3)]
+SENSOR_8_BIT = Sensor(bits=8)
 
 
 def rng(seed: int = 0) -> np.random.Generator:
@@ -83,3 +84,18 @@ def test_a_spot_at_the_edge_is_honest() -> None:
         assert Failure.AT_EDGE in spot.flags
         z.append((spot.u_px - 0.4) / spot.u_sd_px)
     assert np.std(z) == pytest.approx(1.0, abs=0.05 + 4 / np.sqrt(80))
+
+
+@pytest.mark.parametrize("width_px", [0.95, 1.5])
+def test_a_spot_clipped_two_hundred_times_over_is_found_and_called_saturated(width_px: float) -> None:
+    """With speckle, whose contrast leaves its flux uncertain: only the rim is below full scale."""
+    grains, contrast = rng(3), 0.167
+    electrons = SENSOR_8_BIT.electrons_per_dn * 200 * 255 * 2 * np.pi * width_px**2
+    for seed in range(20):
+        light = profile((60, 90), Drawn(45.3, 30.2, electrons, width_px, width_px))
+        light *= grains.gamma(contrast**-2, contrast**2, light.shape)
+        frames = [SENSOR_8_BIT.expose(each, rng(seed)) for each in (light, np.zeros_like(light))]
+        finding = find_spots(*frames, scanlines=ROW, expected=1, speckle_sd_px=0.037)
+        (spot,) = finding.spots
+        assert abs(spot.u_px - 45.3) < 0.3
+        assert Failure.SATURATED in spot.flags

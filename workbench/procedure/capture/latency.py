@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -70,7 +71,12 @@ def _count(
     lasers: LaserBank, camera: StreamingCamera, rig: Rig, most_frames: int, phase: float
 ) -> int | None:
     first = rig.lasers[0]
-    scanlines = [prior_scanline(rig, first)]
+    find = partial(
+        find_spots,
+        scanlines=[prior_scanline(rig, first)],
+        expected=1,
+        speckle_sd_px=rig.noise.speckle_sd_px,
+    )
     # Drop buffered frames, then frames that were exposed before this call.
     camera.grab()
     for _ in range(most_frames + 1):
@@ -82,7 +88,7 @@ def _count(
     before: Spot | None = None
     with lasers.lit([first.id], for_s=LEASE_S):
         for frames in range(most_frames + 2):
-            spots = find_spots(camera.read().image, dark, scanlines=scanlines, expected=1).spots
+            spots = find(camera.read().image, dark).spots
             if before and spots:
                 counted = frames - 1 if _is_whole(before, spots[0]) else frames
                 return counted if counted <= most_frames else None

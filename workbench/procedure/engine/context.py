@@ -112,13 +112,23 @@ class Context:
             off,
             scanlines=scanlines,
             expected=len(laser_ids),
-            speckle_sd_px=self.rig.noise.speckle_sd_px,
+            speckle_sd_px=self._speckle_sd_px(scene),
         )
         self.emit(spots_found(key, finding, laser_ids))
         self.pairs.check_dark(key, off, finding, scanlines)
         self.captures.append(taken)
         self.findings[key] = finding
         return finding
+
+    def _speckle_sd_px(self, scene: str | None) -> float:
+        """Deviation of a centre by speckle, as stated for a capture.
+
+        A trial has that of its calibration, as `workbench range` has; captures of a calibration have that
+        of the rig file.
+        """
+        if scene is not None and self.calibration is not None:
+            return self.calibration.laser_ranger.noise.speckle_sd_px
+        return self.rig.noise.speckle_sd_px
 
     def capture_room_light(self, key: str, placement: Placement, repeat: int) -> Image:
         """Take a frame of the board with all lasers off, and store it.

@@ -13,6 +13,7 @@ from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U, V
 from workbench.spots.kernels.joint import joint_fisher_scoring
 from workbench.spots.kernels.joint_sums import OWN, SHARED
 from workbench.spots.kernels.photon_transfer import shared_grains
+from workbench.spots.kernels.single import LEAST_NOISE_SHARE
 from workbench.spots.noise import PixelNoise, measure_noise
 from workbench.spots.psf import principal_axes
 
@@ -90,7 +91,8 @@ def fit_joint(
         )
     else:
         by_noise = variance[:, 1:]
-    by_speckle = np.maximum(variance[:, 1:] - by_noise, 0.0) * shared_grains(contrast2)
+    by_noise = np.clip(by_noise, LEAST_NOISE_SHARE * variance[:, 1:], variance[:, 1:])  # against rounding
+    by_speckle = (variance[:, 1:] - by_noise) * shared_grains(contrast2)
     return JointFit(
         params,
         np.column_stack([np.sqrt(variance[:, 0]), np.sqrt(by_noise) * widened]),

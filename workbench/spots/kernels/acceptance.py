@@ -20,6 +20,7 @@ from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.spots.kernels.columns import (
     FLUX,
     FLUX_DEVIATION,
+    FLUX_NOISE,
     INFORMATION,
     LN_SU,
     LN_SV,
@@ -44,8 +45,20 @@ from workbench.spots.noise import ROUNDING_DN2
 
 # Columns of a table of spots, one row each. The first seven are the parameters as in `columns`, in pixels of
 # the image; the next half-width is 0 where the window suits the spot.
-U_SD, V_SD, U_SPECKLE_SD, V_SPECKLE_SD, FLUX_SD, PEAK, SLOPE, CONTRAST2, IS_SPOT, NEXT_HALF = range(7, 17)
-COLUMNS: Final = 17
+(
+    U_SD,
+    V_SD,
+    U_SPECKLE_SD,
+    V_SPECKLE_SD,
+    FLUX_SD,
+    FLUX_NOISE_SD,
+    PEAK,
+    SLOPE,
+    CONTRAST2,
+    IS_SPOT,
+    NEXT_HALF,
+) = range(7, 18)
+COLUMNS: Final = 18
 # Below the narrowest spot of a lens (0.6 px is the least specified): a hot pixel.
 _MIN_WIDTH_PX: Final = 0.5
 _MAX_WIDTH_PX: Final = 7.0
@@ -123,8 +136,9 @@ def _is_spot(params: FloatArray, statistics: FloatArray, shape: tuple[int, int])
         params[FLUX] > 0.0
         # Detection does not depend on how well the width is determined.
         and statistics[INFORMATION] > _MIN_MATCHED_SNR**2 * max(statistics[RIM_NOISE], 1.0)
-        # Excludes a swelling of the background, whose flux and background are correlated.
-        and params[FLUX] > _MIN_FLUX_SNR * statistics[FLUX_DEVIATION]
+        # Excludes a swelling of the background, whose flux and background are correlated. Speckle is light: a
+        # clipped spot, whose flux is that of its rim alone, is not missed for it.
+        and params[FLUX] > _MIN_FLUX_SNR * statistics[FLUX_NOISE]
         and _MIN_WIDTH_PX <= mean_width <= _MAX_WIDTH_PX
         and -0.5 <= params[U] <= shape[1] - 0.5
         and -0.5 <= params[V] <= shape[0] - 0.5
@@ -187,6 +201,7 @@ def _fill_row(
         statistics[V_SPECKLE] * inflation,
     )
     row[FLUX_SD] = statistics[FLUX_DEVIATION] * inflation
+    row[FLUX_NOISE_SD] = statistics[FLUX_NOISE] * inflation
     row[PEAK], row[SLOPE], row[CONTRAST2], row[IS_SPOT] = statistics[PEAK_DN], slope, contrast2, 1.0
 
 

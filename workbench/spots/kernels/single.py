@@ -12,6 +12,7 @@ from workbench.spots.kernels.columns import (
     BACKGROUND,
     FLUX,
     FLUX_DEVIATION,
+    FLUX_NOISE,
     INFORMATION,
     LN_SU,
     LN_SV,
@@ -48,7 +49,7 @@ _STEPS_TO_SETTLE: Final = 6
 # by the data would be a choice by noise.
 _CLIP_MARGIN_SD: Final = 2.0
 # Least share of noise in the variance of a position.
-_LEAST_SHARE: Final = 1e-6
+LEAST_NOISE_SHARE: Final = 1e-6
 
 
 @compiled
@@ -212,6 +213,23 @@ def _fill_statistics(
 
 
 @compiled
+def _variance_by_noise(cov: FloatArray, information: FloatArray, parameter: int) -> float:
+    """Part of a parameter's variance in the covariance `cov` (k, k) that is due to noise.
+
+    Args:
+        cov: Covariance by noise and speckle.
+        information: (k, k) sums of the derivatives with the weights W N W, where N is the variance of noise.
+        parameter: Index of the parameter.
+    """
+    variance = 0.0
+    for a in range(len(cov)):
+        for b in range(len(cov)):
+            variance += cov[parameter, a] * information[a, b] * cov[parameter, b]
+    total = max(cov[parameter, parameter], 0.0)
+    return min(max(variance, LEAST_NOISE_SHARE * total), total)  # against rounding
+
+
+@compiled
 def _fill_deviations(
     along_u: FloatArray,
     along_v: FloatArray,
@@ -223,7 +241,7 @@ def _fill_deviations(
     contrast2: float,
     out: FloatArray,
 ) -> None:
-    """Fill the deviations of the position among a window's statistics, by noise and by speckle.
+    """Fill the deviations of position and flux among a window's statistics, by noise and by speckle.
 
     The covariance `cov` is the sum of both (sandwich formula, docs/spots.md). That of noise is
     `cov (J^T W N W J) cov` with the weights W and the variance N of noise alone, a share of 1 / W.
@@ -235,14 +253,10 @@ def _fill_deviations(
     else:
         separable_sums(along_u, along_v, noise, by_speckle, information, gradient)
     flux2, grains = max(params[FLUX], 1e-12) ** 2, shared_grains(contrast2)
+    out[FLUX_NOISE] = math.sqrt(_variance_by_noise(cov, information, FLUX))
     for axis in range(2):
-        variance = 0.0
-        for a in range(params.size):
-            for b in range(params.size):
-                variance += cov[U + axis, a] * information[a, b] * cov[U + axis, b]
-        total = max(cov[U + axis, U + axis], 0.0)
-        variance = min(max(variance, _LEAST_SHARE * total), total)  # against rounding
-        speckle = grains * (total - variance)
+        variance = _variance_by_noise(cov, information, U + axis)
+        speckle = grains * (max(cov[U + axis, U + axis], 0.0) - variance)
         out[U_DEVIATION + axis] = math.sqrt(variance / flux2)
         out[U_SPECKLE + axis] = math.sqrt(speckle / flux2)
 

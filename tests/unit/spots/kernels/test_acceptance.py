@@ -12,6 +12,7 @@ from workbench.spots import find_spots
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.acceptance import (
     COLUMNS,
+    FLUX_NOISE_SD,
     FLUX_SD,
     IS_SPOT,
     NEXT_HALF,
@@ -29,6 +30,7 @@ from workbench.spots.kernels.acceptance import (
 from workbench.spots.kernels.columns import (
     FLUX,
     FLUX_DEVIATION,
+    FLUX_NOISE,
     INFORMATION,
     LN_SU,
     LN_SV,
@@ -171,7 +173,7 @@ def test_a_few_pixels_that_no_spot_explains_are_left_out(outliers: int, dropped:
 
 IMAGE = (60, 90)
 SHARP = {FLUX: 100.0, U: 20.0, V: 30.0, LN_SU: np.log(1.2), LN_SV: np.log(1.2)}
-CERTAIN = {INFORMATION: 1e4, FLUX_DEVIATION: 1.0, RIM_NOISE: 1.0}
+CERTAIN = {INFORMATION: 1e4, FLUX_NOISE: 1.0, RIM_NOISE: 1.0}
 
 
 def is_spot(params: dict[int, float], statistics: dict[int, float]) -> bool:
@@ -218,8 +220,9 @@ def test_a_spot_is_light_of_a_lens_s_width_inside_the_image(params: dict[int, fl
         ({INFORMATION: 2 * 6.1**2, RIM_NOISE: 2.0}, True),
         ({INFORMATION: 5.9**2, RIM_NOISE: 0.5}, False),
         # The flux exceeds three standard deviations with the background free.
-        ({FLUX_DEVIATION: 100.0 / 2.9}, False),
-        ({FLUX_DEVIATION: 100.0 / 3.1}, True),
+        ({FLUX_NOISE: 100.0 / 2.9}, False),
+        ({FLUX_NOISE: 100.0 / 3.1}, True),
+        ({FLUX_DEVIATION: 100.0}, True),
     ],
 )
 def test_a_spot_exceeds_the_noise(statistics: dict[int, float], good: bool) -> None:
@@ -231,13 +234,14 @@ def test_all_deviations_of_a_row_are_inflated_alike(information: float) -> None:
     """By the next order of 1 / A, whose factor for a position is 13 (docs/spots.md)."""
     columns = {
         FLUX_SD: FLUX_DEVIATION,
+        FLUX_NOISE_SD: FLUX_NOISE,
         U_SD: U_DEVIATION,
         V_SD: V_DEVIATION,
         U_SPECKLE_SD: U_SPECKLE,
         V_SPECKLE_SD: V_SPECKLE,
     }
     statistics, row = np.zeros(STATISTIC_COLUMNS), np.full(COLUMNS, -1.0)
-    statistics[[*columns.values()]] = (20.0, 0.02, 0.03, 0.05, 0.07)
+    statistics[[*columns.values()]] = (20.0, 15.0, 0.02, 0.03, 0.05, 0.07)
     statistics[INFORMATION], statistics[PEAK_DN] = information, 300.0
     params = np.array([2.0, 900.0, 20.0, 30.0, 0.1, 0.2])
     _fill_row(params, statistics, 0.4, 0.01, row)

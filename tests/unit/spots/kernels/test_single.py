@@ -13,6 +13,7 @@ from workbench.spots.kernels.columns import (
     BACKGROUND,
     FLUX,
     FLUX_DEVIATION,
+    FLUX_NOISE,
     INFORMATION,
     PEAK_DN,
     RIM_NOISE,
@@ -64,6 +65,8 @@ def test_the_fit_solves_its_equations_as_the_written_out_sums_state_them(
     np.testing.assert_allclose(fit.cov, cov, rtol=1e-4)
     by_speckle = noise.contrast2[:, None] * square / variance
     share = cov @ (rows * (weight * by_speckle)[:, None]) @ rows.transpose(0, 2, 1) @ cov
+    flux_noise = cov[:, FLUX, FLUX] - share[:, FLUX, FLUX]
+    np.testing.assert_allclose(fit.statistics[:, FLUX_NOISE] ** 2, flux_noise, rtol=1e-3)
     for column, of_speckle, parameter in ((U_DEVIATION, U_SPECKLE, U), (V_DEVIATION, V_SPECKLE, V)):
         flux2 = fit.params[:, FLUX] ** 2
         total = cov[:, parameter, parameter] / flux2
