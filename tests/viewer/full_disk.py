@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from tests.viewer.session import MadeUpSession, a_rig
-from workbench.cli.background import Background
+from workbench.cli import background
 from workbench.cli.exit import exit_program
 from workbench.model.event import StepFinished
 from workbench.procedure.engine.replay import ReplayingJournal
@@ -25,7 +25,8 @@ STEPS = 2
 def main(session: Path) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, resource.RLIM_INFINITY))
     recording = RecordingConsumer(session, a_rig())
-    beside = Background(recording, session / RECORDING_FILE, Console(file=io.StringIO()))
+    background.SETTLE_S = 60.0  # the recording fails within the step, also beside other programs
+    beside = background.Background(recording, session / RECORDING_FILE, Console(file=io.StringIO()))
     steps = 0
     with beside, Journal(session) as journal:
         recorder = ReplayingJournal(journal, [beside])

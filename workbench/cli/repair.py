@@ -51,7 +51,7 @@ def repair(
     view: View = None,
 ) -> None:
     """Repair an ended session: capture placements again, leave out, restore or add them."""
-    from workbench.cli.run import Answers, repair_session
+    from workbench.cli.run import Answers, resume_session
     from workbench.cli.sessions import find_session
     from workbench.procedure.engine.repair import Repair
 

@@ -80,27 +80,13 @@ def run_procedures(
 
 
 def resume_session(
-    session_dir: Path, accept_changes: str | None, answers: Answers, view: bool | None = None
-) -> None:
-    """Resume a session that ended early.
-
-    Raises:
-        WorkbenchError: see `workbench.procedure.engine.resume.resume`.
-    """
-    now, _ = files_now(session_dir, load_manifest(session_dir))
-    plan = plan_of(session_dir, now)
-    with _repairable(session_dir, plan, answers, view) as ui:
-        resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes)
-
-
-def repair_session(
     session_dir: Path,
-    repair: Repair,
+    accept_changes: str | None,
     answers: Answers,
     view: bool | None = None,
-    accept_changes: str | None = None,
+    repair: Repair | None = None,
 ) -> None:
-    """Repair a session that has ended, and run its procedures again.
+    """Resume a session that ended early, or repair one that has ended.
 
     Raises:
         WorkbenchError: see `workbench.procedure.engine.resume.resume`.
@@ -130,7 +116,7 @@ def _repairable(
         repair = ask_for_repair(fit, str(refused), person)
         if repair is None:
             raise
-        repair_session(session_dir, repair, answers, view)
+        resume_session(session_dir, None, answers, view, repair)
 
 
 @contextmanager

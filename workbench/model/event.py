@@ -1,8 +1,8 @@
 """Events of a session, one typed record each: the journal's lines and the viewer's only input.
 
 A consumer is anything callable with a `Record`. Records refer to frames by their path in the session folder,
-so every view (recording, table, report) can be made again from the folder alone. Events of fits and trials
-are defined in modules of their own and exported here.
+so every view (recording, table, report) can be made again from the folder alone. Events of fits, of
+trials, and about the records themselves are defined in modules of their own and exported here.
 """
 
 from __future__ import annotations
@@ -24,6 +24,10 @@ from workbench.model.fit_event import ResidualTest as ResidualTest
 from workbench.model.legacy_events import upgraded
 from workbench.model.limit import Verdict
 from workbench.model.prompt import Answer, By
+from workbench.model.session_event import Incident as Incident
+from workbench.model.session_event import SessionRepaired as SessionRepaired
+from workbench.model.session_event import SessionResumed as SessionResumed
+from workbench.model.session_event import SetAside as SetAside
 from workbench.model.spot import Spot
 from workbench.model.target import Placement
 from workbench.model.trial_event import LaserRange as LaserRange
@@ -102,77 +106,6 @@ class PlacementFinished(FileModel):
 
     kind: Literal["placement_finished"] = "placement_finished"
     key: str
-
-
-class SetAside(FileModel):
-    """The records from `from_n` on are void: a placement is captured again or skipped."""
-
-    kind: Literal["set_aside"] = "set_aside"
-    key: str
-    """Key of the placement."""
-    from_n: int
-    reason: str
-    retry: bool = False
-    """Whether a failed limit with `on_fail: retry` is the cause; the number of such retries is limited."""
-    left_out: bool = False
-    """Whether the placement is skipped instead of captured again."""
-
-    @property
-    def text(self) -> str:
-        """Summary in one line."""
-        return f"{self.key} is {'skipped' if self.left_out else 'captured again'}: {self.reason}"
-
-
-class SessionResumed(FileModel):
-    """A session that ended early is resumed; its records from `from_n` on are void."""
-
-    kind: Literal["session_resumed"] = "session_resumed"
-    from_n: int
-    operator: str
-    command: str
-    created: str
-    changes: tuple[str, ...] = ()
-    """Differences from the session's start: rig file, procedure files, versions."""
-    accepted_because: str | None = None
-
-
-class SessionRepaired(FileModel):
-    """Decisions about placements of a session that has ended; its procedures then run again.
-
-    The later of two decisions about a placement counts. Placements are named by their keys.
-    """
-
-    kind: Literal["session_repaired"] = "session_repaired"
-    operator: str
-    command: str
-    created: str
-    reason: str
-    recapture: tuple[str, ...] = ()
-    """To be captured again; the captures so far do not count."""
-    leave_out: tuple[str, ...] = ()
-    """To be ignored; the captures stay on disk."""
-    restore: tuple[str, ...] = ()
-    """To be used again after all, or captured if they were skipped."""
-    add_mm: tuple[float, ...] = ()
-    """Standoffs of additional placements in the last grid before the fit."""
-    accept: bool = False
-    """Whether a calibration that fails its limits is accepted."""
-
-    @property
-    def text(self) -> str:
-        """Summary in one line."""
-        parts = [
-            f"{what} {', '.join(keys)}"
-            for what, keys in (
-                ("capture again", self.recapture),
-                ("leave out", self.leave_out),
-                ("restore", self.restore),
-                ("add", tuple(f"{standoff:g} mm" for standoff in self.add_mm)),
-                ("accept the calibration", ("although it fails its limits",) * self.accept),
-            )
-            if keys
-        ]
-        return f"{'; '.join(parts)}: {self.reason}"
 
 
 class ExposureSet(FileModel):
@@ -355,16 +288,6 @@ class CalibrationLoaded(FileModel):
         made = f"made {self.made}" if self.made else "of unknown date"
         age = "age unknown" if self.age_days is None else f"{self.age_days:.1f} days old"
         return f"calibration {self.file}, {made}, {age}"
-
-
-class Incident(FileModel):
-    """A view of the session has failed. Captures continue, because frames and journal are the record."""
-
-    kind: Literal["incident"] = "incident"
-    of: str
-    """The view: the recording, the figures, the progress on the terminal."""
-    message: str
-    """Cause in one line."""
 
 
 class SessionFinished(FileModel):

@@ -187,21 +187,22 @@ def measure_variance(
     """See `noise.measure_noise`; replaces the assumed `slope` and `contrast2` (n,) by the measured ones."""
     n = len(signal)
     assumed_slope = slope.copy()
-    moments, pool = np.empty((n, _MOMENTS)), np.zeros(_MOMENTS)
-    for i in range(n):
-        _fill_moments(
-            signal[i],
-            mean_square[i],
-            residual[i],
-            weight[i],
-            leverage[i],
-            floor[i],
-            slope[i],
-            contrast2[i],
-            moments[i],
-        )
-    consistent = _consistent(moments, signal)
+    moments, pool, consistent = np.empty((n, _MOMENTS)), np.zeros(_MOMENTS), np.ones(n, np.bool_)
     for turn in range(_ROUNDS + 1):
+        for i in range(n):
+            _fill_moments(
+                signal[i],
+                mean_square[i],
+                residual[i],
+                weight[i],
+                leverage[i],
+                floor[i],
+                slope[i],
+                contrast2[i],
+                moments[i],
+            )
+        if turn == 0:
+            consistent = _consistent(moments, signal)
         pool[:] = 0.0
         for i in range(n):
             if consistent[i]:
@@ -213,15 +214,3 @@ def measure_variance(
             if turn == _ROUNDS:
                 factor = _student(own, before, stated_contrast2)
                 slope[i], contrast2[i] = factor * slope[i], factor * contrast2[i]
-            else:
-                _fill_moments(
-                    signal[i],
-                    mean_square[i],
-                    residual[i],
-                    weight[i],
-                    leverage[i],
-                    floor[i],
-                    slope[i],
-                    contrast2[i],
-                    moments[i],
-                )

@@ -226,7 +226,8 @@ def _variance_by_noise(cov: FloatArray, information: FloatArray, parameter: int)
         for b in range(len(cov)):
             variance += cov[parameter, a] * information[a, b] * cov[parameter, b]
     total = max(cov[parameter, parameter], 0.0)
-    return min(max(variance, LEAST_NOISE_SHARE * total), total)  # against rounding
+    bounded: float = min(max(variance, LEAST_NOISE_SHARE * total), total)  # against rounding
+    return bounded
 
 
 @compiled
