@@ -63,6 +63,5 @@ def repair(
         add_mm=tuple(add or ()),
         accept=accept,
     )
-    repair_session(
-        find_session(session, sessions), decisions, Answers(answers, no_input), view, accept_changes
-    )
+    folder = find_session(session, sessions)
+    resume_session(folder, accept_changes, Answers(answers, no_input), view, decisions)

@@ -1,4 +1,4 @@
-"""Process that started the guardian, as the kernel sees it. It imports little, because the guardian needs it."""
+"""Process that started the guardian, as the kernel sees it. It imports little: the guardian needs it."""
 
 from __future__ import annotations
 

@@ -15,6 +15,9 @@ from workbench.trials.errors import EXPANSION
 from workbench.trials.target_check import Points, fit_plane
 from workbench.trials.verify.reference import Reference
 
+MARGIN = 0.03
+"""Relative error of a standoff for which a spot that must be seen is still in the picture."""
+
 
 @dataclass(frozen=True)
 class PlacementCheck:
@@ -35,6 +38,8 @@ class PlacementCheck:
     """(n, 2) x and y of the spots."""
     lasers_p: float | None
     """P value of the lasers' agreement with a plane; None with too few lasers."""
+    missing: tuple[str, ...] = ()
+    """Lasers without a range, although their spots must be in the picture by the calibration."""
 
     @property
     def weight(self) -> FloatArray:
@@ -73,11 +78,14 @@ def check_placement(
     standoff_mm = readings[0].standoff_mm
     by_laser = {i: [r for one in readings for r in one.lasers if r.laser_id == i] for i in sensor.ids}
     ids = [i for i in sensor.ids if by_laser[i]]
+    missing = tuple(i for i in sensor.ids if i not in ids and _must_be_seen(sensor, i, standoff_mm))
     counted = sum(one.range_mm is not None for one in readings)
     if not ids:
         none = np.zeros((0, len(sensor.covariance)))
         empty = np.zeros(0)
-        return PlacementCheck(standoff_mm, reference_sd_mm, 0, empty, none, empty, np.zeros((0, 2)), None)
+        return PlacementCheck(
+            standoff_mm, reference_sd_mm, 0, empty, none, empty, np.zeros((0, 2)), None, missing
+        )
     position = np.array([_mean_px(by_laser[i]) for i in ids])
     spot_sd_px = sensor.calibration.laser_ranger.noise.spot_sd_px
     sd = np.array([[spot_sd_px / sqrt(len(by_laser[i]))] * 2 for i in ids])
@@ -92,7 +100,15 @@ def check_placement(
         ranges.spot_sd_mm,
         np.column_stack([sensor.places(ids, axis, ranges)[0] for axis in ("u", "v")]),
         None if points is None else fit_plane(points).probability,
+        missing,
     )
+
+
+def _must_be_seen(sensor: CalibratedSensor, laser_id: str, standoff_mm: float) -> bool:
+    """Whether a laser's spot lies in the picture for all ranges about a standoff that is calibrated."""
+    nearest, farthest = sensor.calibration.laser_ranger.validity.standoff_mm
+    about_mm = standoff_mm * np.array([1.0 - MARGIN, 1.0, 1.0 + MARGIN])
+    return nearest <= standoff_mm <= farthest and bool(sensor.in_frame(laser_id, about_mm).all())
 
 
 def predicted_mm(reference: Reference, check: PlacementCheck) -> float:

@@ -58,7 +58,7 @@ def run_trial(context: Context, name: str, step: VerifyTrialStep) -> str:
             found = changes(sensor, laser_errors(reference, [one.check]))
             return _finish(run, step, [], explained(verdict, found))
     checked = run.visit(measured, work)
-    verdict = ranges_verdict(sensor, reference, [one.check for one in (*first, *checked)])
+    verdict = ranges_verdict(sensor, reference, [one.check for one in checked], [one.check for one in first])
     return _finish(run, step, checked, verdict)
 
 

@@ -43,7 +43,11 @@ def lasers_verdict(check: PlacementCheck) -> Verdict:
     """Verdict on the lasers against each other at a placement whose distance need not be known."""
     if check.range_mm is None:
         return Verdict(False, "no laser was ranged", "check the lasers, their exposure and the target")
-    if check.lasers_p is None or check.lasers_p >= LASERS_ALARM:
+    if check.missing:
+        return _without_range([check])
+    if check.lasers_p is None:
+        return Verdict(True, "too few lasers to compare them with one another", "measure the target")
+    if check.lasers_p >= LASERS_ALARM:
         return Verdict(True, "the lasers agree", "measure the target")
     return Verdict(
         False,
@@ -53,25 +57,40 @@ def lasers_verdict(check: PlacementCheck) -> Verdict:
 
 
 def ranges_verdict(
-    sensor: CalibratedSensor, reference: Reference, checks: Sequence[PlacementCheck]
+    sensor: CalibratedSensor,
+    reference: Reference,
+    checks: Sequence[PlacementCheck],
+    unmeasured: Sequence[PlacementCheck] = (),
 ) -> Verdict:
     """Verdict on the ranges of all lasers at all placements.
 
     Args:
         sensor: the calibrated sensor.
         reference: ruler and rail.
-        checks: placements with measured standoffs; others, with a large uncertainty, add the agreement of
-            their lasers.
+        checks: placements with measured standoffs.
+        unmeasured: others, whose large uncertainty leaves the agreement of their lasers.
     """
-    errors = laser_errors(reference, checks)
-    if errors is None:
+    errors = laser_errors(reference, [*unmeasured, *checks])
+    if errors is None or not any(one.readings for one in checks):
         return Verdict(False, "no range at any standoff", "check the target and the exposure; verify again")
+    if any(one.missing for one in checks):
+        return _without_range(checks)
     found = changes(sensor, errors)
     p = _joint_p(found, errors.probability)
     if p >= ALARM:
         return Verdict(True, f"the ranges agree (p = {p:.2g})", "keep the calibration")
     text = f"the ranges disagree with the target (p = {p:.2g})"
     return explained(Verdict(False, text, MEASURE_AGAIN), found)
+
+
+def _without_range(checks: Sequence[PlacementCheck]) -> Verdict:
+    where = "; ".join(f"{', '.join(one.missing)} at {one.standoff_mm:g} mm" for one in checks if one.missing)
+    return Verdict(
+        False,
+        f"lasers without a range, whose spots must be in the picture: {where}",
+        "check that these lasers light the target, and their exposure; if they do, they are turned: calibrate"
+        " again",
+    )
 
 
 def explained(verdict: Verdict, found: Iterable[Change]) -> Verdict:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,7 +99,10 @@ def test_one_laser_can_be_verified() -> None:
     ]
     reference = Reference.own(SENSOR, BENCH)
     verdicts = [
-        ranges_verdict(SENSOR, reference, [check_placement(SENSOR, each, 0.3) for each in one])
+        # As of a sensor with one laser, of which none is missing.
+        ranges_verdict(
+            SENSOR, reference, [replace(check_placement(SENSOR, each, 0.3), missing=()) for each in one]
+        )
         for one in (readings, wrong)
     ]
     assert [one.valid for one in verdicts] == [True, False]
@@ -123,3 +127,49 @@ def _long_ruler(standoff_mm: float, factor: float) -> PlacementCheck:
     return check_placement(
         sensor, [one.model_copy(update={"standoff_mm": standoff_mm}) for one in taken], PLACEMENT_SD_MM
     )
+
+
+def without(laser_id: str, standoff_mm: float, sd_mm: float) -> PlacementCheck:
+    """Check of a placement at which a laser has no range."""
+    one = SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1, {}, same_bench=False)
+    taken = one.spot_readings("v", flat_placement("v", standoff_mm), READINGS)
+    left = [
+        each.model_copy(update={"lasers": tuple(r for r in each.lasers if r.laser_id != laser_id)})
+        for each in taken
+    ]
+    return check_placement(SENSOR, left, sd_mm)
+
+
+def test_a_laser_that_has_no_range_makes_no_calibration_valid() -> None:
+    """A laser knocked so far that its spot is on no line leaves the others in agreement."""
+    unmeasured, *measured = [
+        without("L3", mm, 600.0 if mm == 600.0 else 0.3) for mm in (600.0, *STANDOFFS_MM)
+    ]
+    assert all(one.missing == ("L3",) for one in (unmeasured, *measured))
+    assert "L3" in lasers_verdict(unmeasured).text
+    verdict = ranges_verdict(SENSOR, Reference.own(SENSOR, BENCH), measured, [unmeasured])
+    assert not verdict.valid
+    assert "L3" in verdict.text
+
+
+@pytest.mark.parametrize(
+    ("standoff_mm", "missing"), [(40.0, False), (70.0, False), (100.0, True), (5000.0, False)]
+)
+def test_a_spot_out_of_the_picture_or_the_calibrated_range_is_not_missed(
+    standoff_mm: float, missing: bool
+) -> None:
+    """Of a calibration from 50 to 4500 mm, whose outer spots leave the picture below 80 mm."""
+    calibration = SENSOR.calibration
+    validity = calibration.laser_ranger.validity.model_copy(update={"standoff_mm": (50.0, 4500.0)})
+    ranger = calibration.laser_ranger.model_copy(update={"validity": validity})
+    sensor = CalibratedSensor(calibration.model_copy(update={"laser_ranger": ranger}))
+    none = reading(None).model_copy(update={"standoff_mm": standoff_mm})
+    assert ("L1" in check_placement(sensor, [none], 0.3).missing) == missing
+
+
+def test_without_a_measured_placement_nothing_is_verified() -> None:
+    one = SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1, {}, same_bench=False)
+    taken = one.spot_readings("v", flat_placement("v", 600.0), READINGS)
+    unmeasured = check_placement(SENSOR, taken, 600.0)
+    assert lasers_verdict(unmeasured).valid
+    assert not ranges_verdict(SENSOR, Reference.own(SENSOR, BENCH), [], [unmeasured]).valid
