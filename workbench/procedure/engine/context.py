@@ -73,7 +73,7 @@ class Context:
             StoppedError: the operator aborts.
             LaserOffNotConfirmedError: a beam stays on.
         """
-        answer = self.recorder.answer(prompt.key) or self.ask_now(prompt)
+        answer = self.recorder.answer(prompt.key, prompt.do) or self.ask_now(prompt)
         self.emit(ev.Answered(key=prompt.key, question=prompt.do, answer=answer))
         return answer
 

@@ -162,7 +162,7 @@ def settle(context: Context, prompt: Prompt, failed: str) -> None:
         RetakeError: the placement must be captured again.
         AnswerNeededError, StoppedError, LaserOffNotConfirmedError: see `Context.ask`.
     """
-    answer = context.recorder.answer(prompt.key) or context.ask_now(prompt)
+    answer = context.recorder.answer(prompt.key, prompt.do) or context.ask_now(prompt)
     if answer.action == "redo":
         raise RetakeError(f"{failed}: {answer.reason}")
     if answer.action == "skip":

@@ -110,12 +110,20 @@ class ReplayingJournal:
         """Placements by the beginning of their key that were captured again or skipped in this session."""
         return [event for event in self._set_aside if event.key.startswith(prefix)]
 
-    def answer(self, key: str) -> Answer | None:
-        """Answer that was given before the session ended early, or by a repair; None if there is none."""
+    def answer(self, key: str, question: str | None = None) -> Answer | None:
+        """Answer that was given before the session ended early, or by a repair; None if there is none.
+
+        Args:
+            key: key of the prompt or the placement.
+            question: the question as it is now, which an answer to another one does not settle: a repair may
+                have changed the result that it is about. None: any.
+        """
         if (reason := self.repairs.left_out.get(key)) is not None:
             return Answer(action="skip", reason=reason)
         given = self._answers.get(key)
-        return None if given is None or key == SAFETY else given.answer
+        if given is None or key == SAFETY or question not in {None, given.question}:
+            return None
+        return given.answer
 
     def forget(self, key: str) -> None:
         """Drop captures and answers of a placement that is captured again."""

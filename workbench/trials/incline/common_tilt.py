@@ -13,15 +13,16 @@ sides separate it. On another mount, with the tilt t', the error is t' + (c - t)
 on t that t' does not hide.
 
 The estimate is the mean of t given the ranges of all lasers, from the joint Gaussian of the calibration's
-parameters and its tilt. The distance of every set-up is free. The estimate contains the information of the
-calibration: it is a prior for new captures, not for those of the calibration.
+parameters and its tilt. The distance of every set-up is free. Its angle is measured anew: the uncertainties
+of the angles are independent. The estimate contains the information of the calibration: it is a prior for new
+captures, not for those of the calibration.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan, degrees, radians
+from math import atan, ceil, degrees, radians
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -60,7 +61,8 @@ class CommonTilt:
     def rig_keys(self) -> str:
         """Keys of `bench` in the rig file of the next calibration; empty where nothing was added."""
         key = "target_yaw_deg" if self.axis == "vertical" else "target_pitch_deg"
-        values = f"{key}: {self.tilt_deg:.2f}, target_tilt_sd_deg: {self.sd_deg:.2f}"
+        # Rounded up: 0 would state an exactly known tilt.
+        values = f"{key}: {self.tilt_deg:.3f}, target_tilt_sd_deg: {ceil(1000 * self.sd_deg) / 1000:.3f}"
         return values if self.is_measured else ""
 
     @property

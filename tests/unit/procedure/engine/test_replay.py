@@ -53,6 +53,12 @@ def test_what_the_journal_has_is_shown_and_not_written_again(tmp_path: Path) -> 
         assert resumed.from_n == 2
 
 
+def test_an_answer_settles_only_the_question_that_was_asked(tmp_path: Path) -> None:
+    with replay(tmp_path, [STARTED, STEP, CARD]) as (recorder, _):
+        assert recorder.answer("p.1", "?") == recorder.answer("p.1") == CARD.answer
+        assert recorder.answer("p.1", "another result?") is None
+
+
 def test_from_the_first_difference_on_nothing_of_before_counts(tmp_path: Path) -> None:
     other = STEP.model_copy(update={"title": "Other"})
     with replay(tmp_path, [STARTED, STEP, DONE]) as (recorder, shown):
