@@ -108,6 +108,8 @@ def test_a_spoilt_placement_is_captured_again_and_nothing_else(copy: Path) -> No
     assert {
         path.name: path.read_bytes() for path in copy.rglob("*.png") if "300mm" not in str(path)
     } == before
+    order = pd.read_csv(copy / "captures.csv")["standoff_mm"].drop_duplicates().tolist()
+    assert order == [200.0, 450.0, 700.0, 1100.0, 1500.0, 300.0], "in the order of time, for a drift"
     kept = sorted(path.read_bytes() for path in (copy / "set-aside").rglob("*.png"))
     assert kept == old, "the captures that do not count are kept"
 
@@ -169,7 +171,7 @@ def test_a_repair_that_cannot_be_leaves_the_session_as_it_was(copy: Path, decisi
     assert (copy / "journal.jsonl").read_bytes() == before
 
 
-KEYS = ["p.1/280mm", "p.1/2800mm", "p.1/02-2800mm", "q.1/280mm"]
+KEYS = ["p.1/280mm", "p.1/450mm", "p.1/2800mm", "p.1/02-2800mm", "q.1/280mm"]
 
 
 @pytest.mark.parametrize(
@@ -178,6 +180,8 @@ KEYS = ["p.1/280mm", "p.1/2800mm", "p.1/02-2800mm", "q.1/280mm"]
         ("2800mm", None),
         ("p.1/280mm", "p.1/280mm"),
         ("02-2800mm", "p.1/02-2800mm"),
+        ("450.0", "p.1/450mm"),
+        ("4.5e2 mm", "p.1/450mm"),
         ("280", None),
         ("28", None),
     ],

@@ -175,8 +175,44 @@ class _Constructor(RoundTripConstructor):
         self.doubled: list[Mistake] = []
 
     def construct_document(self, node: Any) -> Any:
-        _count_values(node, {})
+        self._count_values(node, {})
         return super().construct_document(node)
+
+    def _count_values(self, node: Any, counts: dict[int, int]) -> int:
+        """Number of values of a node with its aliases written out; checks what a file may contain.
+
+        Args:
+            node: node of the file.
+            counts: numbers of the nodes counted so far, by identity; 0 while a node is being counted.
+
+        Raises:
+            ConstructorError: a tag, a key that is a list or mapping, a list or mapping that contains itself,
+                or more than MOST_VALUES values.
+        """
+        if (known := counts.get(id(node))) is not None:
+            if known:
+                return known
+            raise _not_accepted("an alias of a list or mapping that contains it; write its values out", node)
+        if str(node.ctag) != self._plain_tag(node):
+            raise _not_accepted(f"the tag {node.ctag}; remove it (text: in quotes)", node)
+        counts[id(node)] = 0
+        total = 1
+        if isinstance(node, MappingNode):
+            for key, value in node.value:
+                if not isinstance(key, ScalarNode):
+                    raise _not_accepted("a key that is a list or mapping", key)
+                total += self._count_values(key, counts) + self._count_values(value, counts)
+        elif isinstance(node, SequenceNode):
+            total += sum(self._count_values(value, counts) for value in node.value)
+        if total > MOST_VALUES:
+            raise _not_accepted(f"more than {MOST_VALUES} values", node)
+        counts[id(node)] = total
+        return total
+
+    def _plain_tag(self, node: Any) -> str:
+        """Tag of a node that states none."""
+        is_plain = isinstance(node, ScalarNode) and node.style is None
+        return str(self.resolver.resolve(type(node), node.value if is_plain else None, (is_plain, True)))
 
     def construct_scalar(self, node: Any) -> Any:
         value = super().construct_scalar(node)
@@ -189,38 +225,6 @@ class _Constructor(RoundTripConstructor):
         line = key_node.start_mark.line + 1
         self.doubled.append(Mistake(line, f"{key}: duplicate key, first on line {first}; remove one of them"))
         return False
-
-
-def _count_values(node: Any, counts: dict[int, int]) -> int:
-    """Number of values of a node with its aliases written out; checks what a file may contain.
-
-    Args:
-        node: node of the file.
-        counts: numbers of the nodes counted so far, by identity; 0 while a node is being counted.
-
-    Raises:
-        ConstructorError: a tag, a key that is a list or mapping, a list or mapping that contains itself, or
-            more than MOST_VALUES values.
-    """
-    if (known := counts.get(id(node))) is not None:
-        if known:
-            return known
-        raise _not_accepted("an alias of a list or mapping that contains it; write its values out", node)
-    if node.ctag.handle is not None:
-        raise _not_accepted(f"the tag {node.ctag}; remove it (text: in quotes)", node)
-    counts[id(node)] = 0
-    total = 1
-    if isinstance(node, MappingNode):
-        for key, value in node.value:
-            if not isinstance(key, ScalarNode):
-                raise _not_accepted("a key that is a list or mapping", key)
-            total += _count_values(key, counts) + _count_values(value, counts)
-    elif isinstance(node, SequenceNode):
-        total += sum(_count_values(value, counts) for value in node.value)
-    if total > MOST_VALUES:
-        raise _not_accepted(f"more than {MOST_VALUES} values", node)
-    counts[id(node)] = total
-    return total
 
 
 def _not_accepted(what: str, node: Any) -> ConstructorError:

@@ -57,7 +57,7 @@ def write_atomically(path: Path, content: bytes) -> None:
     An existing file keeps its mode.
 
     Raises:
-        OSError: the file could not be written; `path` is unchanged.
+        OSError: the file could not be written and `path` is unchanged, or its folder could not be synced.
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     # As any program creates a file: its mode follows from the umask.

@@ -70,6 +70,7 @@ class FrameStore:
         try:
             (aside / str(number) / placement_key).parent.mkdir(parents=True)
             there.rename(aside / str(number) / placement_key)
+            sync_folder((aside / str(number) / placement_key).parent)
             sync_folder(there.parent)
         except OSError as error:
             raise StoppedError(f"{there}: cannot be moved aside: {error.strerror}") from error

@@ -89,9 +89,10 @@ class CaptureGridStep(StepModel):
     def _added(self, context: Context, name: str) -> list[Placement]:
         """Placements that repairs have added, in the last grid before the fit."""
         upcoming = _next_fit(context.steps, context.step_index)
+        if upcoming is None:
+            return []
         later = context.steps[context.step_index + 1 :]
-        until = later if upcoming is None else later[: later.index(upcoming[1])]
-        if any(isinstance(step, CaptureGridStep) for step in until):
+        if any(isinstance(step, CaptureGridStep) for step in later[: later.index(upcoming[1])]):
             return []
         visited = list(self.visits_mm)
         added = []

@@ -46,7 +46,10 @@ class FitStep(StepModel):
         from workbench.model.fit_event import Rejected
         from workbench.procedure.engine.observed import observe_capture
 
-        captures = [c for c in context.captures if c.purpose == "calibration"]
+        # In the order of time, which a drift follows: after a repair it is not that of the procedure.
+        captures = sorted(
+            (c for c in context.captures if c.purpose == "calibration"), key=lambda one: one.on.time_ns
+        )
         if not captures:
             raise BadInputError(f"step {name}: no captures to fit; expected a capture_grid step before it")
         sha256 = write_capture_table(context.session_dir / CALIBRATION_TABLE, captures)

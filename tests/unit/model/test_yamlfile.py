@@ -158,6 +158,10 @@ LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
     [
         *((f"a: 1\nb: {value}\n", 2) for value in ("!!bool x", "!!int _", "!!set x", "!!omap x", "!x y")),
         ("a: !!str 01\n", 1),
+        ("a: !<tag:yaml.org,2002:bool> x\n", 1),
+        ("a: !<tag:yaml.org,2002:set> x\n", 1),
+        ("a: !<foo> {b: 1}\n", 1),
+        ("%TAG ! tag:x,2000:\n---\na: !bool x\n", 3),
         ("a: 1\n? [[a]]\n: 2\n", 2),
         ("a: 1\n? {b: 1}\n: 2\n", 2),
         ("a: &a [1, *a]\n", 1),

@@ -139,11 +139,12 @@ def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Recor
     """Place the target and journal it; frames of an earlier attempt are moved aside."""
     if context.pairs.replayed is not None:
         return context.emit(context.pairs.replayed.placed), context.pairs.replayed.placed.placement
-    FrameStore(context.session_dir).set_aside(asked.key)
     measured = answer.value if isinstance(answer.value, float) else asked.standoff_mm
     attempt = 1 + context.recorder.repairs.attempts[asked.key]
     wanted = asked.model_copy(update={"standoff_mm": measured, "attempt": attempt})
     placed = context.bench.target.place(wanted)
+    # Not before the target stands there: until then the frames so far belong to valid records.
+    FrameStore(context.session_dir).set_aside(asked.key)
     return context.emit(ev.TargetPlaced(placement=placed, by=answer.by)), placed
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
     from workbench.procedure.engine.run import Invocation
 
 
-GRID = "capture_grid"
-"""Kind of the step that takes additional standoffs."""
+GRID, FIT = "capture_grid", "fit"
+"""Kinds of the steps that take additional standoffs, and use them."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,12 @@ class Repair:
         if wrong := [key for key in restore if key not in out]:
             those = ", ".join(sorted(out)) or "none"
             raise BadInputError(f"repair: {wrong[0]} is neither left out nor skipped; those are: {those}")
-        if self.add_mm and not any(step.step == GRID for p in plan.procedures for step in p.steps):
-            raise BadInputError("repair: expected a step capture_grid, to which a standoff can be added")
+        fitted = [p for p in plan.procedures if {GRID, FIT} <= {step.step for step in p.steps}]
+        if self.add_mm and len(fitted) != 1:
+            names = ", ".join(procedure.procedure for procedure in fitted) or "none"
+            raise BadInputError(
+                f"repair: --add: expected one procedure with {GRID} and {FIT} in the session, got {names}"
+            )
         return ev.SessionRepaired(
             operator=caller.operator,
             command=caller.command,
@@ -99,6 +104,8 @@ def find_placement(name: str, keys: Sequence[str]) -> str:
     if name in keys:
         return name
     place = name.strip().removesuffix("mm").strip()
+    with suppress(ValueError):
+        place = f"{float(place):.12g}"
     ends = (f"/{place}mm", f"-{place}mm", f"/{name}")
     found = [key for key in keys if key.endswith(ends)]
     if len(found) == 1:
