@@ -106,8 +106,8 @@ def _coverage_cells(used: pd.DataFrame) -> dict[str, Cell]:
 
 
 def _total(budgets: Sequence[ErrorBudget]) -> list[dict[str, Cell]]:
-    """Row of all standoffs together; none for fewer than two."""
-    if len(budgets) < 2:
+    """Row of all standoffs together, also of a single one: its alarm has the power that the step states."""
+    if not budgets:
         return []
     test = budget_test(budgets)
     return [

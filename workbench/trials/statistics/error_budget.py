@@ -59,7 +59,7 @@ class BudgetTest:
 
     @property
     def alarm(self) -> bool:
-        """Whether the sources do not explain the observed variance."""
+        """Whether the sources do not explain the observed variance, beside a second test: both share 5 %."""
         return self.probability < ALARM_PROBABILITY
 
 

@@ -44,7 +44,7 @@ def test_a_negative_component_is_not_truncated() -> None:
     """Equal means of 8 placements with 3 repeats: 2/3 of the variance within them."""
     frame = drawn_levels(1, [300.0])
     frame = frame.assign(error_mm=0.3 * (frame["repeat"] - 1))
-    (row,) = budget_table("t", stated(frame)).records()
+    row, _ = budget_table("t", stated(frame)).records()
     assert row["observed_sd_mm"] == pytest.approx(0.3 * (2 / 3) ** 0.5)
 
 
