@@ -13,7 +13,7 @@ sides separate it. On another mount, with the tilt t', the error is t' + (c - t)
 on t that t' does not hide.
 
 The estimate is the mean of t given the ranges of all lasers, from the joint Gaussian of the calibration's
-parameters and its tilt. The distance of every set-up is free. Its angle is measured anew: the uncertainties
+parameters and its tilt. The distance of every set-up is free. Its angle is measured again: the uncertainties
 of the angles are independent. The estimate contains the information of the calibration: it is a prior for new
 captures, not for those of the calibration.
 """
