@@ -18,9 +18,9 @@ from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 
 REPLY_S = 2.5
-"""Longest wait for a reply, s. Controllers answer within milliseconds, but a busy computer delivers late: bytes
-of a serial line pass a kernel thread of ordinary priority. This took up to 1.6 s at a load of 20 on two cores.
-The controller's leases are shorter, so that no emission lasts longer for it."""
+"""Longest wait for a reply, s. Controllers answer within milliseconds, but a busy computer delivers late.
+Bytes of a serial line pass a kernel thread of ordinary priority, which took up to 1.6 s at a load of 20 on
+two cores. The controller's leases are shorter, so that no emission lasts longer for it."""
 BOOT_REPLY_S = 1.0
 """Longest wait for a reply of a controller that may be booting, and is asked again, s."""
 LONGEST_REPLY = 200
