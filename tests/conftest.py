@@ -81,7 +81,7 @@ SLOW = {
     "tests/unit/viewer/test_trial.py",
     "tests/unit/viewer/test_window.py",
 }
-"""Unit tests of processes or the viewer, or of more than 3 s of processor time per file; not in `make quick`."""
+"""Unit tests of processes or the viewer, or of more than 3 s of processor time; not in `make quick`."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
