@@ -63,7 +63,7 @@ class Browser:
             if shows(picture):
                 return picture
             time.sleep(0.5)
-        raise AssertionError(f"after {within_s} s: {self.driver.get_log('browser')}")
+        raise AssertionError(f"after {within_s} s")
 
 
 @contextmanager
@@ -83,7 +83,6 @@ def headless_browser(folder: Path, width_px: int = 1280, height_px: int = 720) -
         f"--user-data-dir={folder / 'browser'}",
     ):
         options.add_argument(option)
-    options.set_capability("goog:loggingPrefs", {"browser": "SEVERE"})
     chrome = webdriver.Chrome(options=options, service=Service(driver))
     try:
         yield Browser(chrome)
