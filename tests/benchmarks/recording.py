@@ -85,8 +85,8 @@ def captures(
 ) -> list[tuple[ev.CaptureTaken, ev.SpotsFound]]:
     """Captures of each laser in turn with their spots, stored as a session stores them.
 
-    One picture of each scene recurs, so that `recent_image` has all of them, as in a session, without storing at
-    the same time.
+    One picture of each scene recurs, so that `recent_image` has all of them, as in a session, without storing
+    at the same time.
     """
     camera.where = bench.target.place(Placement(key="p/1", standoff_mm=STANDOFF_MM)).standoff_mm
     store, taken = FrameStore(session), []
