@@ -164,7 +164,7 @@ class Crops:
             strips += [*lines]
             colors += [color] * len(lines)
         # As one array it is converted ten times faster.
-        drawn_strips = np.array(strips)
+        drawn_strips = np.array(strips, dtype=np.float32)
         self.stream.log(entity, rr.LineStrips2D(drawn_strips, colors=colors, radii=_THIN if strips else None))
 
 
