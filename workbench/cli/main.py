@@ -66,11 +66,17 @@ ExistingCalibration = Annotated[
 
 
 @app.command()
-def new(folder: Annotated[Path, typer.Argument(help="New or empty folder.")]) -> None:
-    """Lay out a laboratory's own folder: procedures, rigs, firmware."""
+def new(
+    folder: Annotated[Path, typer.Argument(help="New or empty folder.")],
+    no_input: Annotated[
+        bool, typer.Option("--no-input", help="Do not ask: write procedures, example rigs, firmware alone.")
+    ] = False,
+) -> None:
+    """Lay out a laboratory's own folder: procedures, rigs, firmware, and the rig file of its sensor."""
+    from workbench.cli.dialogue import is_interactive
     from workbench.cli.new import lay_out
 
-    print_message(lay_out(folder))
+    print_message(lay_out(folder, ask=is_interactive() and not no_input))
 
 
 @app.command()

@@ -84,14 +84,14 @@ def ask_for_repair(fit: ev.FitFinished, operator: Operator) -> Repair | None:
     keys = named or ((worst,) if worst is not None else ())
     if not keys:
         return None
-    places = ", ".join(key.rpartition("/")[2] for key in keys)
+    places = ", ".join(key.rpartition("/")[2].replace("mm", " mm") for key in keys)
     may: dict[Action, str] = {"redo": f"capture {places} again now"}
     if named:
         may["skip"] = f"leave {places} out"
     prompt = Prompt(
         key="repair",
-        do=f"Repair {places} now?",
-        yes="end here; the session can be repaired later",
+        do="End the session here, with its calibration refused?",
+        yes="end; it can be repaired later",
         may=may,
     )
     try:

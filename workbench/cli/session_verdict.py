@@ -48,7 +48,7 @@ def _finished(session_dir: Path, events: Sequence[ev.Event], notes: Sequence[str
         headline=headline,
         facts=facts,
         notes=notes,
-        labelled=[*_where(session_dir)],
+        labelled=[*_files(session_dir, events), *_where(session_dir)],
     )
 
 
@@ -94,6 +94,11 @@ def _outcomes(events: Sequence[ev.Event]) -> list[str]:
             found.append(f"{event.procedure}: {event.outcome.removeprefix('accepted: ')}")
             has_result = False
     return found
+
+
+def _files(session_dir: Path, events: Sequence[ev.Event]) -> list[tuple[str, str]]:
+    exported = dict.fromkeys(event.path for event in events if isinstance(event, ev.CalibrationExported))
+    return [("file:", f"{session_dir / path} written") for path in exported]
 
 
 def _where(session_dir: Path) -> list[tuple[str, str]]:
