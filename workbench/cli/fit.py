@@ -271,7 +271,6 @@ def _verdict(found: FittedSource, request: Request, details: bool) -> Verdict:
             word="REFUSED",
             headline=and_more(assessment.reasons),
             action=split_reason(assessment.reasons[0])[1],
-            facts=[result],
             notes=notes,
             labelled=[("file:", f"{request.output} is not written")],
         )

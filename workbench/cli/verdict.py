@@ -52,12 +52,12 @@ def show_verdict(verdict: Verdict) -> None:
     with suppress(OSError):  # a closed terminal
         typer.echo(err=True)
         _print(verdict.word, verdict.headline, COLOURS[verdict.word])
-        for fact in verdict.facts:
-            _print("", fact)
         if verdict.action:
             _print("do:", verdict.action)
         for number, command in enumerate(verdict.commands):
             _print_command("or:" if number or verdict.action else "do:", command)
+        for fact in verdict.facts:
+            _print("", fact)
         for note in verdict.notes:
             _print("note:", note, "yellow")
         for label, text in verdict.labelled:
