@@ -7,8 +7,8 @@ their priors), spot noise and speckle. Spots too far from their prediction raise
 Let d be the residuals of n spot coordinates in standard deviations of their noise, J their derivatives by the
 parameters, C the covariance of the fit without them. Then d has the covariance V = 1 + J C J^T. A wrong
 standoff moves the residuals in the direction w. The generalised least-squares estimate of that shift,
-w V^-1 d / (w V^-1 w), is to first order the range error of all spots together; its variance is
-1 / (w V^-1 w), and their quotient is tested. Spots are linear in the inverse depth, far better than in the
+w V^-1 d / (w V^-1 w), is to first order the range error of all spots together. Its variance is
+1 / (w V^-1 w); the quotient is tested. Spots are linear in the inverse depth, far better than in the
 range: the range itself is found by steps in the inverse depth, and may lie beyond infinity. The test of all
 coordinates is d V^-1 d, chi-square with n degrees of freedom (C. E. Rasmussen, C. K. I. Williams,
 Gaussian Processes for Machine Learning, 2006, chapter 5.4.2).

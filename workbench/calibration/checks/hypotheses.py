@@ -29,8 +29,7 @@ from workbench.calibration.checks.cross_validation import (
 )
 from workbench.calibration.checks.hypothesis import DECISIVE, Hypothesis, from_priors, scored
 from workbench.calibration.checks.mistaken_data import (
-    UNIT_COST,
-    UNIT_LIKELY,
+    PULLED_SD,
     exchanged_coordinates,
     exchanged_lasers,
     flipped_images,
@@ -81,9 +80,9 @@ LEAST_NARROWING = 1e-9
 def explain_misfit(fit: CalibrationFit) -> tuple[Hypothesis, ...]:
     """Hypotheses that together explain the misfit, in the order of adoption; none for a sound fit.
 
-    Outliers (`spot`), and the unit of the standoffs, which is compared at the noise of the residuals, are reported
-    whether or not the rest is explained; all others only where everything together explains EXPLAINED of the
-    excess misfit.
+    Outliers (`spot`) and the unit of the standoffs are reported whether or not the rest is explained: the
+    unit is compared at the noise of the residuals. All others are reported only where everything together
+    explains EXPLAINED of the excess misfit.
     """
     problem = problem_of(fit)
     state = refit(problem, measured(problem), optimum_of(fit))
@@ -149,7 +148,8 @@ def _candidates(fit: CalibrationFit, state: Refit, first: bool) -> Iterator[Hypo
         yield from flipped_images(fit, state)
         yield from exchanged_coordinates(fit, state)
         yield from exchanged_lasers(fit, state)
-    if first and (improbable or state.y @ state.y > UNIT_COST + UNIT_LIKELY):
+    pulled = np.abs(state.y[fit.table.is_sensor]).max() > PULLED_SD
+    if first and (improbable or pulled):
         yield from other_units(state)
     if improbable or first:
         yield from _wrong_standoffs(fit, state)

@@ -19,6 +19,9 @@ UNIT_LIKELY = 6.0
 """Score from which a unit of all standoffs is adopted. Centimetres are a usual mistake, and cost no more than
 a factor of 3: odds of 20 to 1 are enough. By Markov's inequality at most 1 in 20 sound fits scores as much;
 by chance alone it takes a prior that is wrong by three of its deviations."""
+PULLED_SD = 2.0
+"""Distance of a parameter of the sensor from its prior, in its deviations, below which no unit could score
+UNIT_LIKELY."""
 UNIT_COST = 2 * log(len(UNITS))
 """Occam factor of the unit of all standoffs."""
 
@@ -54,7 +57,7 @@ def exchanged_coordinates(fit: CalibrationFit, state: Refit) -> Iterator[Hypothe
 def other_units(state: Refit) -> Iterator[Hypothesis]:
     """All standoffs read in another unit than millimetres; the subject is the index of the unit.
 
-    What tells the units apart is the pull of the priors. It is compared at the noise that the residuals have
+    The pull of the priors distinguishes the units. It is compared at the noise that the residuals have
     with that unit: their excess over the stated noise, which no unit explains, must not count against it. No
     parameter is added, but the data determine other combinations: the log determinants of the covariances
     belong to the evidence.
@@ -64,7 +67,7 @@ def other_units(state: Refit) -> Iterator[Hypothesis]:
         in_unit = data._replace(standoff_mm=unit_mm * np.asarray(data.standoff_mm))
         after = from_priors(LeastSquaresProblem(state.problem.layout, in_unit), state.used)
         noise = max(1.0, after.chi2 / max(after.freedom, 1.0)) ** 0.5
-        before, scaled = state.at(noise), after.at(noise)
+        before, scaled = (state.at(noise), after.at(noise)) if noise > 1 else (state, after)
         wider = np.linalg.slogdet(scaled.covariance)[1] - np.linalg.slogdet(before.covariance)[1]
         score = before.cost - scaled.cost + float(wider) - UNIT_COST
         yield Hypothesis("unit", (index,), after, score, score > UNIT_LIKELY)
