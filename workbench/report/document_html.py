@@ -1,0 +1,89 @@
+"""HTML page of a document: self-contained, every text escaped, equal documents give equal pages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from workbench.figures.figure import svg
+from workbench.model.chart import Chart
+from workbench.model.table import ALARM, Table
+from workbench.model.table_layout import TextColumn, text_columns
+from workbench.report.document import Document, Fact
+from workbench.report.terminal_table import blocks
+
+TEMPLATE, STYLE = "document.html.j2", "document.css"
+WIDTH_CHARACTERS = 104
+"""Width of a page in characters of a table; wider tables are split into blocks of columns."""
+HASH_KEY = "sha256"
+
+
+@dataclass(frozen=True)
+class HtmlColumn:
+    """One column of a block."""
+
+    name: str
+    unit: str
+    cells: tuple[str, ...]
+    is_number: bool
+    kind: str
+    """Class of its cells: `number`, `hash`, `alarm` or none."""
+
+
+def document_html(document: Document, printed: str) -> str:
+    """The page.
+
+    Args:
+        document: the document.
+        printed: time of printing, the only part that differs between two prints.
+    """
+    folder = Path(__file__).parent
+    environment = Environment(
+        loader=FileSystemLoader(folder), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.filters |= {
+        "svg": partial(_svg, document),
+        "rows": _rows,
+        "column_blocks": _column_blocks,
+    }
+    details = [table for section in document.sections for table in section.tables if table.is_detail]
+    return environment.get_template(TEMPLATE).render(
+        document=document,
+        details=details,
+        printed_fact=Fact("Issued", printed),
+        style=Markup((folder / STYLE).read_text(encoding="utf-8")),  # noqa: S704 - our own file
+    )
+
+
+def _svg(document: Document, chart: Chart) -> Markup:
+    """Chart as an element of the page. Its texts are outlines; matplotlib escapes their copies."""
+    text = svg(chart, document.colors).decode()
+    return Markup(text[text.index("<svg") :])  # noqa: S704 - matplotlib's output
+
+
+def _column_blocks(table: Table) -> Iterator[list[HtmlColumn]]:
+    """Columns of a table in blocks that fit on a page; each block repeats the first column."""
+    texts = text_columns(table)
+    described = {id(text): _html_column(table, index, text) for index, text in enumerate(texts)}
+    for block in blocks(texts, WIDTH_CHARACTERS):
+        yield [described[id(text)] for text in block]
+
+
+def _html_column(table: Table, index: int, text: TextColumn) -> HtmlColumn:
+    column = table.columns[index]
+    kind = "number" if text.is_number else "hash" if column.key == HASH_KEY else ""
+    if any(cell == ALARM for cell in text.cells):
+        kind = "alarm"
+    name, unit = (column.name, column.unit) if column.name else (column.unit, "")
+    return HtmlColumn(name, unit, text.cells, text.is_number, kind)
+
+
+def _rows(columns: Sequence[HtmlColumn]) -> Iterator[list[tuple[HtmlColumn, str]]]:
+    """Rows of a block, each cell with its column."""
+    for cells in zip(*(column.cells for column in columns), strict=True):
+        yield list(zip(columns, cells, strict=True))
