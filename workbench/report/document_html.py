@@ -15,7 +15,7 @@ from workbench.model.chart import Chart
 from workbench.model.table import ALARM, Table
 from workbench.model.table_layout import TextColumn, text_columns
 from workbench.report.document import Document, Fact
-from workbench.report.terminal_table import blocks
+from workbench.report.terminal_table import GAP, blocks
 
 TEMPLATE, STYLE = "document.html.j2", "document.css"
 WIDTH_CHARACTERS = 104
@@ -66,12 +66,15 @@ def _svg(document: Document, chart: Chart) -> Markup:
     return Markup(text[text.index("<svg") :])  # noqa: S704 - matplotlib's output
 
 
-def _column_blocks(table: Table) -> Iterator[list[HtmlColumn]]:
-    """Columns of a table in blocks that fit on a page; each block repeats the first column."""
+def _column_blocks(table: Table) -> list[list[HtmlColumn]]:
+    """Columns of a table in blocks that fit on a page; each block repeats the columns that name its rows."""
     texts = text_columns(table)
     described = {id(text): _html_column(table, index, text) for index, text in enumerate(texts)}
-    for block in blocks(texts, WIDTH_CHARACTERS):
-        yield [described[id(text)] for text in block]
+    first, *others = texts
+    named = others[:1] if len(set(first.cells)) < len(first.cells) else []
+    width = WIDTH_CHARACTERS - sum(text.width + GAP for text in named)
+    parts = blocks([first, *others[len(named) :]], width)
+    return [[described[id(text)] for text in (first, *named, *part[1:])] for part in parts]
 
 
 def _html_column(table: Table, index: int, text: TextColumn) -> HtmlColumn:

@@ -58,6 +58,7 @@ def sensor_section(rig: Rig) -> Section:
 def conditions_section(lab: Laboratory, session: SessionRecord) -> Section:
     """Ambient conditions, warm-up and target, as stated and as answered in the session."""
     bench, ambient = session.rig.bench, lab.ambient
+    outcomes = {f"{one.procedure}.{one.index}": one.outcome for one in session.events(ev.StepFinished)}
     tilt = (
         f"square to the optical axis within {bench.target_tilt_sd_deg:g} deg (1 sigma, all placements), with"
         f" {bench.tilt_sd_deg:g} deg at each placement; measured yaw {bench.target_yaw_deg:g} deg, pitch"
@@ -80,7 +81,7 @@ def conditions_section(lab: Laboratory, session: SessionRecord) -> Section:
             Column(key="by", name="answered by"),
         ),
         rows=tuple(
-            (one.question, _answer_text(one), one.answer.by)
+            (one.question, outcomes.get(one.key) or _answer_text(one), one.answer.by)
             for one in session.events(ev.Answered)
             if one.key != "safety"
         ),
@@ -170,16 +171,16 @@ def _minutes(minutes: float | None) -> str:
 
 
 def _warm_up(session: SessionRecord) -> str:
-    """Duration of the warm-up steps of the session."""
+    """Outcomes and durations of the warm-up steps of the session."""
     began: int | None = None
-    total_s = 0.0
+    found = []
     for record in session.records:
         if isinstance(record.event, ev.StepStarted):
             began = record.time_ns if record.event.step == "warm_up" else None
         elif isinstance(record.event, ev.StepFinished) and began is not None:
-            total_s += (record.time_ns - began) / 1e9
+            found.append(f"{record.event.outcome} in {duration((record.time_ns - began) / 1e9)}")
             began = None
-    return duration(total_s) if total_s else "no warm-up step"
+    return ", ".join(found) or "no warm-up step"
 
 
 def _answer_text(one: ev.Answered) -> str:

@@ -72,7 +72,7 @@ def uncertainty_table(found: Sequence[RangeUncertainty]) -> Table:
             Column(key="remark", name="remark"),
         ),
         rows=tuple(_row(one, shown) for one in found),
-        caption="-: no spot in the image. Ranges outside the covered standoffs are not certified.",
+        caption="-: no spot in the image. Extrapolated: outside the covered standoffs, not certified.",
     )
 
 
@@ -136,7 +136,7 @@ def _row(one: RangeUncertainty, shown: Sequence[str]) -> tuple[float | str | Non
         _expanded(min(lasers, default=None)),
         _expanded(max(lasers, default=None)),
         *(_expanded(one.laser_sd_mm[i]) for i in shown),
-        "" if one.inside else "not certified",
+        "" if one.inside else "extrapolated",
     )
 
 
