@@ -13,8 +13,8 @@ import pytest
 def read_dcc(path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Read a certificate with pydcc.
 
-    Its package `certvalidator` does not know the version numbers of OpenSSL from 3.0.10 on and fails on import;
-    its schema validator downloads PTB's list of releases. Neither takes part in reading an unsigned certificate.
+    Its package `certvalidator` does not know the version numbers of OpenSSL from 3.0.10 on and fails on
+    import; its schema validator downloads PTB's list of releases. Neither reads an unsigned certificate.
     """
     stub = ModuleType("certvalidator")
     for name in ("CertificateValidator", "ValidationContext", "errors"):

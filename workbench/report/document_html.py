@@ -21,6 +21,8 @@ TEMPLATE, STYLE = "document.html.j2", "document.css"
 WIDTH_CHARACTERS = 104
 """Width of a page in characters of a table; wider tables are split into blocks of columns."""
 HASH_KEY = "sha256"
+MOST_ROWS = 600
+"""Largest number of rows of a table on the page; `workbench export` writes all."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ def document_html(document: Document, printed: str) -> str:
     return environment.get_template(TEMPLATE).render(
         document=document,
         details=details,
+        most_rows=MOST_ROWS,
         printed_fact=Fact("Issued", printed),
         style=Markup((folder / STYLE).read_text(encoding="utf-8")),  # noqa: S704 - our own file
     )
@@ -68,7 +71,7 @@ def _svg(document: Document, chart: Chart) -> Markup:
 
 def _column_blocks(table: Table) -> list[list[HtmlColumn]]:
     """Columns of a table in blocks that fit on a page; each block repeats the columns that name its rows."""
-    texts = text_columns(table)
+    texts = text_columns(table.model_copy(update={"rows": table.rows[:MOST_ROWS]}))
     described = {id(text): _html_column(table, index, text) for index, text in enumerate(texts)}
     first, *others = texts
     named = others[:1] if len(set(first.cells)) < len(first.cells) else []

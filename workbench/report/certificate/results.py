@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from statistics import fmean
 
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration
-from workbench.model.chart import Axis, Chart, Series
+from workbench.model.chart import Axis, Band, Chart, Series
 from workbench.model.fit_charts import residual_chart
 from workbench.model.fit_event import CrossValidatedPlacement
 from workbench.model.fit_tables import (
@@ -18,6 +19,7 @@ from workbench.model.fit_tables import (
 from workbench.model.rig import ImageAxis
 from workbench.model.table import Column, Table
 from workbench.report.certificate.range_uncertainty import (
+    MOST_LASERS,
     RangeUncertainty,
     curve_mm,
     range_uncertainties,
@@ -27,6 +29,8 @@ from workbench.report.certificate.range_uncertainty import (
 from workbench.report.certificate.session_record import SessionRecord
 from workbench.report.document import Fact, Section
 
+MOST_POINTS = 1500
+"""Largest number of residuals that are drawn one by one."""
 COVERAGE = (
     "Expanded uncertainties U are standard uncertainties u times the coverage factor k = 2, which for a"
     " normal distribution gives a coverage probability of about 95 %, as in the GUM (JCGM 100). Where a"
@@ -81,8 +85,8 @@ def validation_section(fit: ev.FitFinished | None) -> Section:
     if fit is None:
         return Section(key, title, texts=("The session has no fit of its own.",))
     axes: tuple[ImageAxis, ImageAxis] = ("u", "v")
-    charts = [chart for axis in axes if not (chart := residual_chart(fit, axis)).is_empty]
-    tables = [cross_validation_table(fit.left_out), _test_table(fit)]
+    charts = [chart for axis in axes if not (chart := _residual_chart(fit, axis)).is_empty]
+    tables = [cross_validation_table(_without_many_lasers(fit.left_out)), _test_table(fit)]
     if fit.left_out:
         charts.append(_cross_validation_chart(fit.left_out))
     text = "Each placement is ranged by a fit without it. Bars and u are one standard deviation."
@@ -140,6 +144,40 @@ def _calibration_facts(session: SessionRecord, calibration: Calibration | None) 
         if ours.fit.accepted_because:
             facts.append(Fact("Accepted in spite of failed limits because", ours.fit.accepted_because))
     return tuple(facts)
+
+
+def _residual_chart(fit: ev.FitFinished, axis: ImageAxis) -> Chart:
+    """Residuals of each laser; of many lasers, or with many points, their mean and span at each standoff."""
+    lasers = {one.laser_id for one in fit.residuals}
+    if len(lasers) <= MOST_LASERS and len(fit.residuals) <= MOST_POINTS:
+        return residual_chart(fit, axis)
+    by_standoff: dict[float, list[float]] = {}
+    for one in fit.residuals:
+        if (value := one.u_px if axis == "u" else one.v_px) is not None:
+            by_standoff.setdefault(one.standoff_mm, []).append(value)
+    at = tuple(sorted(by_standoff))
+    return Chart(
+        name=f"residuals_{axis}",
+        title=f"Residuals along {axis} of {len(lasers)} lasers",
+        x=Axis(label="standoff", unit="mm", scale="log"),
+        y=Axis(label=f"residual {axis}", unit="px"),
+        series=(Series(name="mean", x=at, y=tuple(fmean(by_standoff[mm]) for mm in at), style="line"),),
+        bands=(
+            Band(
+                name="lowest to highest",
+                x=at,
+                low=tuple(min(by_standoff[mm]) for mm in at),
+                high=tuple(max(by_standoff[mm]) for mm in at),
+            ),
+        ),
+    )
+
+
+def _without_many_lasers(placements: Sequence[CrossValidatedPlacement]) -> Sequence[CrossValidatedPlacement]:
+    """Placements without the errors of single lasers, where those need more columns than a page has."""
+    if all(len(one.lasers) <= MOST_LASERS for one in placements):
+        return placements
+    return [one.model_copy(update={"lasers": ()}) for one in placements]
 
 
 def _test_table(fit: ev.FitFinished) -> Table:

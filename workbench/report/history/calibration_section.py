@@ -26,7 +26,7 @@ def calibration_section(calibrations: Sequence[DatedCalibration]) -> Section:
         found = None if n == 0 else compared(calibrations[n - 1].calibration, one.calibration)
         verdict = "first" if n == 0 else "not comparable" if found is None else verdict_text(found)
         by_range = {change.range_mm: change for change in changes[n]}
-        cells = [by_range[mm].change_mm / mm if mm in by_range else None for mm in ranges]
+        cells = [by_range[mm].change_mm / mm if n and mm in by_range else None for mm in ranges]
         rows.append((one.session, one.day, *cells, verdict))
     table = Table(
         name="calibrations",

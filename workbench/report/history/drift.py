@@ -53,25 +53,25 @@ class DistanceHistory:
 
 
 def distance_histories(checked: Sequence[Verification]) -> tuple[DistanceHistory, ...]:
-    """Charts at the distances that all sessions share; they share the probability of a false alarm."""
+    """Charts at the distances that most sessions share; they share the probability of a false alarm."""
     ranges = monitored_mm(checked)
     return tuple(_history(checked, mm, len(ranges)) for mm in ranges)
 
 
-def _history(checked: Sequence[Verification], range_mm: float, charts: int) -> DistanceHistory:
-    found = [check for one in checked if (check := one.at(range_mm)) is not None]
-    errors = np.array([one.error for one in found])
-    scatter = np.array([one.scatter for one in found])
-    days = np.array([(one.time_ns - checked[0].time_ns) / DAY_NS for one in checked])
-    chart = control_chart(errors, scatter, min(one.readings for one in found), charts)
+def _history(every: Sequence[Verification], range_mm: float, charts: int) -> DistanceHistory:
+    pairs = [(one, check) for one in every if (check := one.at(range_mm)) is not None]
+    errors = np.array([check.error for _, check in pairs])
+    scatter = np.array([check.scatter for _, check in pairs])
+    days = np.array([(one.time_ns - every[0].time_ns) / DAY_NS for one, _ in pairs])
+    chart = control_chart(errors, scatter, min(check.readings for _, check in pairs), charts)
     return DistanceHistory(
         range_mm,
         days,
         errors,
         scatter,
         chart,
-        None if chart is None else _drift(chart, [one.day for one in checked]),
-        None if chart is None else _due(chart, days, checked[0].time_ns),
+        None if chart is None else _drift(chart, [one.day for one, _ in pairs]),
+        None if chart is None else _due(chart, days, every[0].time_ns),
     )
 
 

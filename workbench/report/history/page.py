@@ -117,9 +117,11 @@ def _key_numbers(history: SensorHistory) -> tuple[KeyNumber, ...]:
             "Recalibrate by", "-" if due is None else str(due[0]), "no rule" if due is None else due[1]
         ),
     ]
-    for one in history.distances[-1:]:
-        latest = f"{100 * float(one.errors[-1]):+.2g} %"
-        numbers.append(KeyNumber("Latest error", latest, f"mean error at {one.range_mm:g} mm, of the range"))
+    if history.distances:
+        worst = max(history.distances, key=lambda one: abs(float(one.errors[-1])))
+        latest = f"{100 * float(worst.errors[-1]):+.2g} %"
+        note = f"mean error of the last session at {worst.range_mm:g} mm, of the range"
+        numbers.append(KeyNumber("Largest latest error", latest, note))
     return tuple(numbers)
 
 

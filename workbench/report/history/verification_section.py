@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from workbench.model.chart import Axis, Chart, LimitLine, Series
 from workbench.model.table import Column, Table
 from workbench.report.document import Section
@@ -31,7 +33,7 @@ def _charts(one: DistanceHistory) -> list[Chart]:
     name = f"{one.range_mm:g}mm"
     day = Axis(label="days since the first verification", unit="d")
     errors = tuple((100 * one.errors).tolist())
-    days = tuple(one.days.tolist())
+    days = tuple(np.round(one.days).tolist())
     limits: tuple[LimitLine, ...] = ()
     if one.chart is not None:
         centre, half = 100 * one.chart.limits.centre, 100 * one.chart.limits.half_width
@@ -99,5 +101,6 @@ def _table(checked: Sequence[Verification], distances: Sequence[DistanceHistory]
         rows=tuple(
             (one.session, one.day, *(check.error if (check := one.at(mm)) else None for mm in ranges))
             for one in checked
+            if any(one.at(mm) for mm in ranges)
         ),
     )

@@ -19,6 +19,8 @@ DISTANCES = 5
 """Largest number of distances that are monitored."""
 SAME_DISTANCE = 0.05
 """Largest relative difference of two standoffs of one distance."""
+LEAST_SHARE = 0.8
+"""Least number of sessions with a monitored distance, as a share of those with the most frequent one."""
 LARGEST_REFERENCE_SD = 0.1
 """Largest relative reference uncertainty of a standoff that counts as known."""
 
@@ -69,16 +71,18 @@ def verifications(folder: Path, sessions: Iterable[IndexedSession]) -> tuple[Ver
 
 
 def monitored_mm(checked: Sequence[Verification]) -> tuple[float, ...]:
-    """Distances that all sessions share, at most `DISTANCES` of them, evenly by their ratio."""
-    if not checked:
-        return ()
-    ranges = [one.range_mm for one in checked[0].checks]
-    common = sorted(mm for mm in ranges if all(one.at(mm) is not None for one in checked))
+    """Distances that most sessions share, at most `DISTANCES` of them, evenly by their ratio."""
+    counts: dict[float, int] = {}
+    for one in checked:
+        for check in one.checks:
+            known = next((mm for mm in counts if is_same_distance(mm, check.range_mm)), check.range_mm)
+            counts[known] = counts.get(known, 0) + 1
+    most = max(counts.values(), default=0)
+    common = sorted(mm for mm, count in counts.items() if count >= LEAST_SHARE * most)
     if len(common) <= DISTANCES:
         return tuple(common)
-    wanted = np.geomspace(common[0], common[-1], DISTANCES).tolist()
     chosen: list[float] = []
-    for mm in wanted:
+    for mm in np.geomspace(common[0], common[-1], DISTANCES).tolist():
         free = [one for one in common if one not in chosen]
         chosen.append(min(free, key=lambda one: abs(log(one / mm))))
     return tuple(sorted(chosen))
