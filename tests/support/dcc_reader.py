@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -24,3 +25,8 @@ def read_dcc(path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(dcc, "DCCXMLValidator", SimpleNamespace)
     return dcc.DCC(str(path), signature_verification=False)
+
+
+def parsed(content: bytes) -> ET.Element:
+    """Root element of a certificate."""
+    return ET.fromstring(content)  # noqa: S314 - our own file

@@ -43,7 +43,7 @@ def put_in_force(name: Path, serial: str, reason: str, sessions: Path) -> None:
         return
     for change in range_changes(before, calibration):
         print_message(
-            f"  at {change.range_mm:g} mm: {change.change_mm:+.2f} mm against the one before"
+            f"  at {change.range_mm:g} mm: {round(change.change_mm, 2) + 0.0:+.2f} mm against the one before"
             f" (sd {change.sd_mm:.2g} mm)"
         )
 

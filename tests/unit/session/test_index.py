@@ -11,7 +11,7 @@ import pytest
 from tests.support.reference_session import copied
 from workbench.model.errors import BadInputError
 from workbench.session import index
-from workbench.session.index import INDEX, indexed_sessions
+from workbench.session.index import INDEX, IndexedSession, indexed_sessions
 from workbench.session.journal import JOURNAL, Journal
 from workbench.session.state import session_statuses
 
@@ -41,7 +41,12 @@ def test_only_changed_sessions_are_read_again(folder: Path, monkeypatch: pytest.
     before = indexed_sessions(folder)
     read: list[str] = []
     original = index.read_indexed
-    monkeypatch.setattr(index, "read_indexed", lambda path: read.append(path.name) or original(path))
+
+    def counted(path: Path) -> IndexedSession:
+        read.append(path.name)
+        return original(path)
+
+    monkeypatch.setattr(index, "read_indexed", counted)
     assert indexed_sessions(folder) == before
     assert read == []
     lines = (folder / "b" / JOURNAL).read_text().splitlines(keepends=True)

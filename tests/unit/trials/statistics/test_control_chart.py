@@ -85,7 +85,7 @@ def drawn(random: np.random.Generator, sessions: int, drift_sd: float) -> tuple[
 
 def run_length(values: FloatArray, scatter: FloatArray) -> int:
     """Number of sessions after the first k until the first alarm of any chart."""
-    ends = [values.shape[1]]
+    ends = [len(values[0])]
     for one, spread in zip(values, scatter, strict=True):
         chart = control_chart(one, spread, REPEATS, CHARTS)
         assert chart is not None
