@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -44,6 +45,10 @@ class Browser:
         """Open a page; returns when its document is loaded."""
         self.driver.get(url)
 
+    def value_of(self, expression: str) -> Any:
+        """Value of a JavaScript expression on the page."""
+        return self.driver.execute_script(f"return {expression}")
+
     def shot(self) -> Picture:
         """A screenshot (H, W, 3) BGR of the window."""
         png = np.frombuffer(self.driver.get_screenshot_as_png(), dtype=np.uint8)
@@ -63,7 +68,7 @@ class Browser:
             if shows(picture):
                 return picture
             time.sleep(0.5)
-        raise AssertionError(f"after {within_s} s")
+        raise AssertionError(f"the page does not show it after {within_s} s")
 
 
 @contextmanager
