@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from workbench.api.arguments import millimetres_of, names_of, path_of, rig_of, words_of
-from workbench.api.frames import DIFFERENCE_COLUMNS, PARAMETER_COLUMNS, UNCERTAINTY_COLUMNS, frame_of
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict import comparison
@@ -25,6 +24,7 @@ from workbench.model.captures import CaptureRow, check_images, parse_captures, r
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.nested import fix_parameters
 from workbench.model.rig import Rig
+from workbench.report.frames import DIFFERENCE_COLUMNS, PARAMETER_COLUMNS, UNCERTAINTY_COLUMNS, frame_of
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.session.caller import now, operator
 from workbench.session.manifest import workbench_version

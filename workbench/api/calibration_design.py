@@ -9,11 +9,11 @@ from pathlib import Path
 import pandas as pd
 
 from workbench.api.arguments import millimetres_of, rig_of, whole_of
-from workbench.api.frames import DESIGN_PARAMETER_COLUMNS, DESIGN_RANGE_COLUMNS, frame_of
 from workbench.calibration.design.forecast import forecast
 from workbench.calibration.design.standoffs import best_standoffs
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
+from workbench.report.frames import DESIGN_PARAMETER_COLUMNS, DESIGN_RANGE_COLUMNS, frame_of
 
 
 @dataclass(frozen=True)

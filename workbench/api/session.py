@@ -11,15 +11,6 @@ import pandas as pd
 
 from workbench.api.arguments import millimetres_of, path_of, whole_of, words_of
 from workbench.api.calibration import Calibration, load_calibration
-from workbench.api.frames import (
-    CAPTURE_COLUMNS,
-    READING_COLUMNS,
-    RESIDUAL_COLUMNS,
-    SESSION_COLUMNS,
-    SPOT_COLUMNS,
-    frame_of,
-    frame_of_table,
-)
 from workbench.model.arrays import Image
 from workbench.model.chart import Chart
 from workbench.model.errors import BadInputError
@@ -27,13 +18,11 @@ from workbench.model.event import (
     CalibrationExported,
     CalibrationLoaded,
     CaptureTaken,
-    FitFinished,
-    FrameRef,
-    ReadingTaken,
-    SpotsFound,
     TrialFinished,
 )
 from workbench.model.rig import Rig
+from workbench.report.frames import SESSION_COLUMNS, frame_of, frame_of_table
+from workbench.report.session_frames import captures_frame, readings_frame, residuals_frame, spots_frame
 from workbench.session.frames import read_image
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_manifest, load_session_rig
@@ -84,7 +73,7 @@ class Session:
     @cached_property
     def captures(self) -> pd.DataFrame:
         """One row per capture, in order of time; `on` and `off` are the paths of its frames."""
-        return frame_of((self._capture_row(event) for event in self._captures.values()), CAPTURE_COLUMNS)
+        return captures_frame(self.folder, self._events)
 
     @cached_property
     def spots(self) -> pd.DataFrame:
@@ -93,22 +82,17 @@ class Session:
         The origin is the centre of the top-left pixel. `laser_id` is that of the capture. It is empty
         where several lasers were on and the spot is not assigned. `flags` are names separated by spaces.
         """
-        found = {event.key: event for event in self._events if isinstance(event, SpotsFound)}
-        rows = (row for event in found.values() for row in self._spot_rows(event))
-        return frame_of(rows, SPOT_COLUMNS)
+        return spots_frame(self._events)
 
     @cached_property
     def residuals(self) -> pd.DataFrame:
         """Residuals of the last fit, observed - predicted: one row per laser and placement, px, 1 sigma."""
-        fits = [event for event in self._events if isinstance(event, FitFinished)]
-        rows = (record.model_dump() for record in (fits[-1].residuals if fits else ()))
-        return frame_of(rows, RESIDUAL_COLUMNS)
+        return residuals_frame(self._events)
 
     @cached_property
     def readings(self) -> pd.DataFrame:
         """Readings of all trials; mm, 1 sigma, error = measured - true."""
-        rows = (self._reading_row(event) for event in self._events if isinstance(event, ReadingTaken))
-        return frame_of(rows, READING_COLUMNS)
+        return readings_frame(self._events)
 
     @cached_property
     def trials(self) -> Mapping[str, Trial]:
@@ -200,51 +184,6 @@ class Session:
     def _captures(self) -> dict[str, CaptureTaken]:
         """By key."""
         return {event.key: event for event in self._events if isinstance(event, CaptureTaken)}
-
-    def _capture_row(self, event: CaptureTaken) -> dict[str, object]:
-        return {
-            "capture": event.key,
-            "purpose": event.purpose,
-            "placement": event.placement_key,
-            "scene": event.scene or "",
-            "laser_id": event.laser_id,
-            "standoff_mm": event.standoff_mm,
-            "standoff_sd_mm": event.standoff_sd_mm,
-            "repeat": event.repeat,
-            "exposure": event.exposure,
-            "exposure_unit": event.exposure_unit or "",
-            "time": pd.Timestamp(event.on.time_ns, unit="ns", tz="UTC"),
-            "on": self._path(event.on),
-            "off": self._path(event.off),
-        }
-
-    def _path(self, frame: FrameRef | None) -> str:
-        return "" if frame is None else str((self.folder / frame.path).resolve())
-
-    def _spot_rows(self, event: SpotsFound) -> list[dict[str, object]]:
-        capture = self._captures[event.key]
-        alone = capture.laser_id not in {"all", "board"}
-        return [
-            {
-                "capture": event.key,
-                "laser_id": spot.laser_id or (capture.laser_id if alone else ""),
-                "standoff_mm": capture.standoff_mm,
-                "repeat": capture.repeat,
-                "u_px": spot.u_px,
-                "v_px": spot.v_px,
-                "u_sd_px": spot.u_sd_px,
-                "v_sd_px": spot.v_sd_px,
-                "flux_dn": spot.flux_dn,
-                "width_px": spot.width_px,
-                "peak_dn": spot.peak_dn,
-                "flags": " ".join(sorted(spot.flags)),
-            }
-            for spot in event.spots
-        ]
-
-    def _reading_row(self, event: ReadingTaken) -> dict[str, object]:
-        shown = event.model_dump(include=set(READING_COLUMNS))
-        return shown | {"true_mm": event.reference_mm, "error_mm": event.error_mm, "cause": event.cause}
 
 
 def open_session(folder: str | Path) -> Session:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+from datetime import date
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -19,10 +20,12 @@ from workbench.cli.option_types import (
     NoInput,
     Sessions,
     View,
+    day,
     millimetres,
     reason,
     whole,
 )
+from workbench.cli.record_commands import export, history, report_, use
 from workbench.cli.repair import repair
 from workbench.cli.stdio import fill_closed_streams
 from workbench.cli.stopping import ignore_signals, stop_at_once
@@ -38,6 +41,9 @@ app = typer.Typer(
 lasers = typer.Typer(help="Control a rig's lasers without a session.", no_args_is_help=True)
 app.add_typer(lasers, name="lasers")
 app.command()(repair)
+app.command(name="report")(report_)
+for command in (export, history, use):
+    app.command()(command)
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 
@@ -116,18 +122,37 @@ def resume(
     resume_session(find_session(session, sessions), accept_changes, screen)
 
 
+class FitVerdict(StrEnum):
+    """Verdicts on the last fit of a session."""
+
+    ACCEPTED = "accepted"
+    EXCEPTION = "exception"
+    REFUSED = "refused"
+    NONE = "none"
+
+
 @app.command(name="sessions")
 def sessions_(
     folder: Annotated[
         Path | None, typer.Argument(help="Folder of sessions, or one session. Default: as --sessions.")
     ] = None,
     sessions: Sessions = Path("sessions"),
+    rig: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Sessions of this rig: name or serial number.")
+    ] = None,
+    since: Annotated[
+        date | None, typer.Option(metavar="DATE", parser=day, help="Sessions from this day on: 2026-11-30.")
+    ] = None,
+    verdict: Annotated[
+        FitVerdict | None, typer.Option(help="Sessions whose last fit has this verdict.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """List sessions with their states."""
-    from workbench.cli.sessions import list_sessions
+    from workbench.cli.sessions import Selection, list_sessions
 
-    list_sessions(sessions if folder is None else folder, json)
+    selection = Selection(rig, since, None if verdict is None else verdict.value)
+    list_sessions(sessions if folder is None else folder, json, selection)
 
 
 @app.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import date
 from math import isfinite
 from pathlib import Path
 from typing import Annotated
@@ -36,6 +37,14 @@ def whole(text: object) -> int:
     if value < 1:
         raise typer.BadParameter(f"expected a whole number of at least 1, such as 10, got {text}")
     return value
+
+
+def day(text: object) -> date:
+    """Parse a day, as 2026-11-30."""
+    try:
+        return date.fromisoformat(str(text))
+    except ValueError:
+        raise typer.BadParameter(f"expected a day, such as 2026-11-30, got {text}") from None
 
 
 def millimetres(least: float) -> Callable[[object], float]:

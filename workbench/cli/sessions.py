@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import shlex
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from datetime import date
 from pathlib import Path
 from textwrap import shorten
 
@@ -15,8 +16,9 @@ from rich.text import Text
 from workbench.cli.refusal import refused_fit, repair_commands
 from workbench.model.errors import BadInputError
 from workbench.model.number_text import counted
+from workbench.session.index import IndexedSession, indexed_sessions, read_indexed
 from workbench.session.manifest import MANIFEST
-from workbench.session.state import SessionStatus, session_status, session_statuses
+from workbench.session.state import SessionStatus, session_statuses
 
 SHOWN = 20
 """Number of latest sessions that are listed."""
@@ -26,30 +28,60 @@ CUT_AT = 20
 """Allowance in characters for lines that are broken between words."""
 
 
-def list_sessions(sessions: Path, as_json: bool) -> None:
+@dataclass(frozen=True)
+class Selection:
+    """Sessions to list; None: all."""
+
+    rig: str | None = None
+    """Name or serial number of the rig."""
+    since: date | None = None
+    verdict: str | None = None
+    """A key of `VERDICTS`."""
+
+    def includes(self, one: IndexedSession) -> bool:
+        """Whether a session is selected."""
+        return (
+            self.rig in {None, one.serial, one.status.rig}
+            and (self.since is None or one.began[:10] >= self.since.isoformat())
+            and self.verdict in {None, one.verdict}
+        )
+
+
+def list_sessions(sessions: Path, as_json: bool, selection: Selection = Selection()) -> None:
     """Print the status of every session, and the commands that continue unfinished ones.
 
     Args:
         sessions: folder of sessions, or the folder of one session.
         as_json: whether to print JSON.
+        selection: sessions to list.
 
     Raises:
         BadInputError: there is no such folder.
     """
-    single = (sessions / MANIFEST).is_file()
-    found = [session_status(find_session(sessions, sessions))] if single else session_statuses(sessions)
+    if (sessions / MANIFEST).is_file():
+        folder = find_session(sessions, sessions)
+        every = [read_indexed(folder)]
+    else:
+        every = indexed_sessions(sessions)
+    found = [one for one in every if selection.includes(one)]
     if as_json:
         for each in found:
-            print(json.dumps(asdict(each) | {"session_dir": str(each.session_dir)}))
+            print(json.dumps(_as_json(each)))
         return
     console = Console(markup=False, highlight=False)
     if not found:
-        Console(stderr=True, markup=False).print(f"no sessions in {sessions}")
+        which = "no sessions" if not every else f"none of {len(every)} sessions is selected"
+        Console(stderr=True, markup=False).print(f"{which} in {sessions}")
         return
     for each in found[-SHOWN:]:
-        _show(each, console)
+        _show(each.status, console)
     if len(found) > SHOWN:
         console.print(f"and {len(found) - SHOWN} older ones")
+
+
+def _as_json(one: IndexedSession) -> dict[str, object]:
+    fields = asdict(one.status) | {"session_dir": str(one.status.session_dir)}
+    return fields | {"serial": one.serial, "began": one.began, "verdict": one.verdict}
 
 
 def find_session(name: Path | None, sessions: Path) -> Path:

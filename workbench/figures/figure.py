@@ -19,6 +19,8 @@ TICK_DISTANCE = 0.07
 """Least distance between two labels of x, as a share of the axis."""
 LEGEND_CHARACTERS, SYMBOL_CHARACTERS = 100, 8
 """Width of a line of the legend and of a symbol with its gaps, in characters."""
+MOST_NAMES = 20
+"""Largest number of names in a legend."""
 MARKER_POINTS = 4
 OUTLIER_COLOR = "#d00000"
 ASIDE_POINTS = 3.0
@@ -60,9 +62,21 @@ def draw(chart: Chart, colors: Mapping[str, str], size_in: tuple[float, float] =
     names = [series.name for series in chart.series] + [band.name for band in chart.bands]
     names += [limit.name for limit in chart.limits]
     if len(names) > 1:
-        columns = max(1, LEGEND_CHARACTERS // (max(map(len, names)) + SYMBOL_CHARACTERS))
-        figure.legend(loc="outside lower left", ncols=columns, frameon=False)
+        _draw_legend(figure, axes)
     return figure
+
+
+def _draw_legend(figure: Figure, axes: Axes) -> None:
+    """Legend below the axes, each name once; of many names the first ones."""
+    handles, names = axes.get_legend_handles_labels()
+    named = dict(zip(reversed(names), reversed(handles), strict=True))
+    shown = list(dict.fromkeys(names))
+    more = len(shown) - MOST_NAMES
+    shown = shown[:MOST_NAMES]
+    labels = [*shown[:-1], f"{shown[-1]} and {more} more"] if more > 0 else shown
+    columns = max(1, LEGEND_CHARACTERS // (max(map(len, labels)) + SYMBOL_CHARACTERS))
+    marks = [named[name] for name in shown]
+    figure.legend(marks, labels, loc="outside lower left", ncols=columns, frameon=False)
 
 
 def _draw_axes(axes: Axes, chart: Chart) -> None:

@@ -31,6 +31,16 @@ def t_cdf(x: Any, df: Any) -> Any:
     return special.stdtr(df, x)
 
 
+def t_ppf(q: Any, df: Any) -> Any:
+    """The value that a Student t variable of `df` degrees of freedom is below with probability `q`."""
+    return special.stdtrit(df, q)
+
+
+def f_ppf(q: Any, dfn: Any, dfd: Any) -> Any:
+    """The value that an F variable of `dfn` and `dfd` degrees of freedom is below with probability `q`."""
+    return special.fdtri(dfn, dfd, q)
+
+
 def norm_cdf(x: Any) -> Any:
     """Probability that a standard normal variable is below `x`."""
     return special.ndtr(x)

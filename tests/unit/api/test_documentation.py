@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import workbench
-from workbench.api import frames
+from workbench.report import frames
 
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs/api.md"

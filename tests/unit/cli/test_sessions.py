@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
 
 from tests.support.command_line import Run, refused
+from tests.support.reference_session import REFERENCE, copied
 from workbench.cli import sessions
 from workbench.cli.sessions import find_session, list_sessions
+from workbench.session.index import IndexedSession
 from workbench.session.journal import Journal
 from workbench.session.state import SessionStatus
 
+OLD = Path(__file__).parents[3] / "data/session-0.1.0"
 LONG_WHY = "laser controller at /dev/ttyACM0: request '!': expected 'OK OFF', got a line failure; check it"
 
 
@@ -21,7 +25,8 @@ def listed(
 ) -> list[str]:
     """Lines on standard output at 80 columns."""
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(sessions, "session_statuses", lambda folder: found)
+    indexed = [IndexedSession(one, "s-1", "2026-11-22", "none") for one in found]
+    monkeypatch.setattr(sessions, "indexed_sessions", lambda folder: indexed)
     list_sessions(Path("sessions"), as_json=False)
     captured = capsys.readouterr()
     assert captured.err == ""
@@ -92,3 +97,22 @@ def test_a_folder_of_sessions_or_one_session_is_named_directly(
     (line,) = workbench("sessions", ".", "--json").out.splitlines()
     assert Path(json.loads(line)["session_dir"]) == data / "session-0.1.0"
     refused(workbench("sessions", data / "nowhere"), 2, data / "nowhere")
+
+
+def test_sessions_are_selected_by_rig_day_and_verdict(workbench: Run, tmp_path: Path) -> None:
+    copied(tmp_path)
+    shutil.copytree(OLD, tmp_path / OLD.name, ignore=shutil.ignore_patterns("frames"))
+    for options, names in (
+        ((), [REFERENCE.name, OLD.name]),
+        (("--rig", "reference-1"), [REFERENCE.name]),
+        (("--rig", "thesis-emulated"), [OLD.name]),
+        (("--since", "2026-11-30"), [REFERENCE.name]),
+        (("--verdict", "accepted"), [REFERENCE.name, OLD.name]),
+        (("--verdict", "refused"), []),
+    ):
+        listed = workbench("sessions", tmp_path, "--json", *options)
+        assert listed.code == 0
+        found = [json.loads(line) for line in listed.out.splitlines()]
+        assert [Path(one["session_dir"]).name for one in found] == names
+    assert workbench("sessions", tmp_path, "--since", "yesterday").code == 2
+    assert workbench("sessions", tmp_path, "--verdict", "good").code == 2

@@ -22,6 +22,8 @@ Q = np.array([1e-12, 0.001, 0.05, 0.5, 0.999])
         (stats.chi2_isf, scipy_stats.chi2.isf, Q, [(1,), (7,), (2.5,)]),
         (stats.f_sf, scipy_stats.f.sf, X, [(1, 5), (4, 30.5)]),
         (stats.t_cdf, scipy_stats.t.cdf, np.concatenate((-X, X)), [(1,), (12.5,)]),
+        (stats.t_ppf, scipy_stats.t.ppf, Q[1:], [(1,), (12.5,)]),
+        (stats.f_ppf, scipy_stats.f.ppf, Q[1:], [(1, 5), (4, 30.5)]),
         (stats.norm_cdf, scipy_stats.norm.cdf, np.concatenate((-X[:4], X)), [()]),
         (stats.norm_ppf, scipy_stats.norm.ppf, Q, [()]),
         (stats.gamma_cdf, scipy_stats.gamma.cdf, X, [(0.5,), (3.0,)]),

@@ -1,4 +1,4 @@
-"""Data frames of the public interface: their columns, and how records become rows."""
+"""Data frames of sessions and calibrations: their columns, and how records become rows."""
 
 from __future__ import annotations
 

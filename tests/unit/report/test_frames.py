@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from workbench.api.frames import frame_of, frame_of_table
 from workbench.model.table import Column, Table
+from workbench.report.frames import frame_of, frame_of_table
 
 
 def test_missing_numbers_are_nan_also_where_all_are_missing() -> None:

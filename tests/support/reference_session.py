@@ -1,0 +1,61 @@
+"""The reference session of this release, copied so that reports may be written beside it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from workbench.model.laboratory import Ambient, Laboratory, Party, Recalibration, Standard
+from workbench.report.certificate.assemble import Certificate, Sources, certificate_of
+from workbench.report.certificate.predecessor import Predecessor
+from workbench.report.certificate.session_record import SessionRecord, read_session
+from workbench.session.certificate_numbers import AssignedNumber
+
+REFERENCE = Path(__file__).parents[2] / "data/sessions/20261130-085045-reference"
+SERIAL = "reference-1"
+MARKUP = "<script>alert('x')</script> & <b>Sons</b>"
+NUMBER = AssignedNumber(number="2026-0001", session=REFERENCE.name, content_sha256="", assigned="")
+LABORATORY = Laboratory.model_validate(
+    {
+        "format": 1,
+        "laboratory": Party(name="Example laboratory", address="1 Example Road"),
+        "country": "DE",
+        "customer": Party(name=MARKUP, address="2 Sample Street"),
+        "received": "2026-11-25",
+        "authorised_by": "A. Example",
+        "standards": (
+            Standard.model_validate(
+                {
+                    "name": "steel rule",
+                    "serial": "SR-17",
+                    "certificate": "12345",
+                    "calibrated": "2026-05-04",
+                    "expanded_uncertainty": 0.1,
+                    "unit": "mm",
+                }
+            ),
+        ),
+        "ambient": Ambient(temperature_c=(20.5, 22.0)),
+        "warm_up_min": 30,
+        "target_material": "matt white card",
+        "recalibration": Recalibration(months=12, reason="agreed"),
+    }
+)
+
+
+def copied(folder: Path, name: str = REFERENCE.name, frames: bool = False) -> Path:
+    """Copy of the session in a folder of sessions, without frames unless they are asked for."""
+    ignored = shutil.ignore_patterns() if frames else shutil.ignore_patterns("frames", "set-aside")
+    return Path(shutil.copytree(REFERENCE, folder / name, ignore=ignored))
+
+
+def record(folder: Path = REFERENCE) -> SessionRecord:
+    return read_session(folder)
+
+
+def certificate(
+    laboratory: Laboratory = LABORATORY,
+    predecessor: Predecessor | None = None,
+    session: SessionRecord | None = None,
+) -> Certificate:
+    return certificate_of(Sources(session or record(), laboratory, predecessor), NUMBER)

@@ -1,0 +1,51 @@
+"""`workbench history`: verdict, page, notes; the sensor is named where there are several."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from tests.support.command_line import Run, refused
+from tests.support.reference_session import SERIAL, copied
+from tests.support.verified_sensor import verified_sensor
+
+
+def test_drift_is_printed_and_written(workbench: Run, tmp_path: Path) -> None:
+    errors = np.random.default_rng(7).normal(0.0, 0.001, (24, 3))
+    errors[10:, 1] += 0.0004 * np.arange(1, 15)
+    verified_sensor(tmp_path, errors)
+    page = tmp_path / "page.html"
+    done = workbench("history", "--sessions", tmp_path, "--html", page)
+    assert done.code == 0
+    assert "at 400 mm since" in done.out
+    assert "recalibrate by 2028-11-24" in done.out
+    assert page.exists()
+
+
+def test_notes_are_kept_and_escaped(workbench: Run, tmp_path: Path) -> None:
+    copied(tmp_path)
+    page = tmp_path / "page.html"
+    note = "<script>cleaned</script>"
+    done = workbench(
+        "history", "--sessions", tmp_path, "--rig", SERIAL, "--note", note, "--html", page, "--json"
+    )
+    assert done.code == 0
+    notes = next(one for one in json.loads(done.out)["sections"] if one["key"] == "notes")
+    assert [row["text"] for row in notes["tables"][0]["rows"]] == [note]
+    assert note not in page.read_text()
+    again = json.loads(workbench("history", "--sessions", tmp_path, "--json").out)
+    assert again["serial"] == SERIAL
+
+
+def test_the_sensor_must_be_known(workbench: Run, tmp_path: Path) -> None:
+    refused(workbench("history", "--sessions", tmp_path), 2, "--rig")
+    copied(tmp_path)
+    refused(workbench("history", "--sessions", tmp_path, "--rig", "other"), 2, SERIAL)
+    other = copied(tmp_path, "other") / "session.yaml"
+    other.write_text(other.read_text().replace("serial: reference-1", "serial: reference-2"))
+    refused(workbench("history", "--sessions", tmp_path), 2, "reference-1", "reference-2")
+    refused(workbench("history", "--sessions", tmp_path / "missing"), 2, "missing")
+    missing = tmp_path / "missing/page.html"
+    refused(workbench("history", "--sessions", tmp_path, "--rig", SERIAL, "--html", missing), 2, "page.html")

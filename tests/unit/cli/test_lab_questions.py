@@ -1,0 +1,69 @@
+"""Questions about the laboratory: asked once in a terminal, never without one."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from workbench.cli.lab_questions import QUESTIONS, laboratory_of
+from workbench.model.laboratory import Laboratory
+
+ANSWERS = {
+    "Name of the laboratory": "Lab: the <b>best</b>",
+    "Reference standard of the standoffs (for example a steel rule)": "steel rule",
+    "Day of its calibration, as 2026-11-30": "2026-05-04",
+    "Its expanded uncertainty (k = 2), mm": "0,1",
+    "Lowest temperature of the room, deg C": "22",
+    "Highest temperature of the room, deg C": "20",
+}
+
+
+class Person:
+    def __init__(self, answers: dict[str, str]) -> None:
+        self.answers = answers
+        self.asked: list[str] = []
+
+    def __call__(self, question: str) -> str:
+        self.asked.append(question)
+        return self.answers.get(question.partition(" (Enter")[0], "")
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CI", raising=False)
+    for stream in (sys.stdin, sys.stderr):
+        monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)
+
+
+def test_answers_are_written_and_not_asked_for_again(terminal: None, tmp_path: Path) -> None:
+    person = Person(ANSWERS)
+    lab = laboratory_of(tmp_path, False, person)
+    assert len(person.asked) == len(QUESTIONS)
+    assert lab.laboratory is not None
+    assert lab.laboratory.name == "Lab: the <b>best</b>"
+    assert (lab.customer, lab.authorised_by) == (None, "")
+    assert lab.standards[0].expanded_uncertainty == 0.1
+    assert lab.ambient.temperature_c == (20.0, 22.0)
+    assert laboratory_of(tmp_path, False, person) == lab
+    assert len(person.asked) == len(QUESTIONS)
+
+
+def test_no_answers_leave_every_item_open(terminal: None, tmp_path: Path) -> None:
+    assert laboratory_of(tmp_path, False, Person({})) == Laboratory(format=1)
+    assert (tmp_path / "lab.yaml").exists()
+
+
+@pytest.mark.parametrize("why", ["no terminal", "no input", "ci"])
+def test_without_a_person_nothing_is_asked_or_written(
+    why: str, terminal: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    if why == "ci":
+        monkeypatch.setenv("CI", "1")
+    if why == "no terminal":
+        monkeypatch.setattr(sys.stdin, "isatty", lambda: False, raising=False)
+    person = Person(ANSWERS)
+    assert laboratory_of(tmp_path, why == "no input", person) == Laboratory(format=1)
+    assert person.asked == []
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,47 @@
+"""`workbench use`: a calibration in force, with the change in mm; another sensor's is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from tests.support.command_line import Run, refused
+from tests.support.reference_session import REFERENCE, SERIAL, copied
+
+
+def in_force(workbench: Run, sessions: Path) -> str:
+    found = json.loads(workbench("history", "--sessions", sessions, "--rig", SERIAL, "--json").out)
+    return str(found["head"]["Calibration in force"])
+
+
+def test_roll_back_to_an_earlier_calibration(workbench: Run, tmp_path: Path) -> None:
+    copied(tmp_path, "a")
+    copied(tmp_path, "b")
+    assert in_force(workbench, tmp_path).startswith("b,")
+    options = ["--rig", SERIAL, "--sessions", tmp_path]
+    done = workbench("use", "a", "--reason", "the newer one is worse", *options)
+    assert done.code == 0
+    assert "at 500 mm: " in done.err
+    assert in_force(workbench, tmp_path).startswith("a,")
+    assert "the newer one is worse" in in_force(workbench, tmp_path)
+    assert workbench("use", tmp_path / "b/calibration.yaml", "--reason", "repaired", *options).code == 0
+    assert in_force(workbench, tmp_path).startswith("b,")
+
+
+def test_a_calibration_of_another_sensor_is_refused(workbench: Run, tmp_path: Path) -> None:
+    other = REFERENCE.parents[1] / "session-0.1.0/calibration.yaml"
+    done = workbench("use", other, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
+    refused(done, 2, SERIAL)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_refused_calibration_is_not_put_in_force(workbench: Run, tmp_path: Path) -> None:
+    path = copied(tmp_path) / "calibration.yaml"
+    path.write_text(path.read_text().replace('verdict: "accepted"', 'verdict: "refused"'))
+    refused(workbench("use", path, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path), 3, "refused")
+
+
+def test_a_reason_and_an_existing_calibration_are_needed(workbench: Run, tmp_path: Path) -> None:
+    assert workbench("use", "a", "--rig", SERIAL).code == 2
+    done = workbench("use", "a", "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
+    refused(done, 2, "a")

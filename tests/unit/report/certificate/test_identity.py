@@ -1,0 +1,60 @@
+"""Sections on laboratory, sensor, conditions and standards: stated items, and those that are not stated."""
+
+from __future__ import annotations
+
+from tests.support.reference_session import LABORATORY, MARKUP, record
+from workbench.model.laboratory import Laboratory
+from workbench.report.certificate.identity import (
+    conditions_section,
+    laboratory_section,
+    sensor_section,
+    standards_section,
+)
+from workbench.report.document import NOT_STATED, Section
+
+NOTHING = Laboratory(format=1)
+
+
+def facts(section: Section) -> dict[str, str]:
+    return {fact.name: fact.value for fact in section.facts}
+
+
+def test_items_of_the_laboratory_file_are_stated() -> None:
+    found = facts(laboratory_section(LABORATORY, record()))
+    assert found["Laboratory"] == "Example laboratory, 1 Example Road"
+    assert found["Place of the work"] == "1 Example Road"
+    assert found["Customer"].startswith(MARKUP)
+    assert found["Operator"] == "operator"
+    assert found["Measured"].startswith("2026-11-30 08:50 to 2026-11-30 08:50")
+
+
+def test_nothing_is_invented_without_a_laboratory_file() -> None:
+    found = facts(laboratory_section(NOTHING, record()))
+    open_items = {name for name, value in found.items() if value == NOT_STATED}
+    assert open_items == {"Laboratory", "Place of the work", "Customer", "Sensor received", "Authorised by"}
+    conditions = facts(conditions_section(NOTHING, record()))
+    assert conditions["Temperature, lowest and highest"] == conditions["Target material"] == NOT_STATED
+    assert standards_section(NOTHING, record().rig).tables == ()
+
+
+def test_answers_of_the_session_are_conditions() -> None:
+    section = conditions_section(LABORATORY, record())
+    found = facts(section)
+    assert found["Temperature, lowest and highest"] == "20.5 to 22 deg C"
+    assert found["Warm-up in the session"].startswith("3 frames")
+    (table,) = section.tables
+    assert table.records() == [
+        {"question": "Temperature of the room", "answer": "21.5 deg C", "by": "answers file"}
+    ]
+
+
+def test_sensor_and_standards_are_identified() -> None:
+    assert facts(sensor_section(record().rig))["Serial number"] == "reference-1"
+    (table,) = standards_section(LABORATORY, record().rig).tables
+    (row,) = table.records()
+    assert (row["name"], row["serial"], row["calibrated"], row["due"]) == (
+        "steel rule",
+        "SR-17",
+        "2026-05-04",
+        NOT_STATED,
+    )

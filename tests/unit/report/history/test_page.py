@@ -1,0 +1,58 @@
+"""Verdict of a history: in control, drifted, or not known yet; next calibration by the earliest rule."""
+
+from __future__ import annotations
+
+import json
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.reference_session import SERIAL
+from tests.support.verified_sensor import verified_sensor
+from workbench.cli.history import sensor_history
+from workbench.report.history.page import SensorHistory, history_document, recalibrate_by
+from workbench.session.index import indexed_sessions
+from workbench.session.sensor_log import SensorEntry, append_entry
+
+
+def history(folder: Path, sessions: int, drift: float = 0.0, months: int | None = None) -> SensorHistory:
+    errors = np.random.default_rng(7).normal(0.0, 0.001, (sessions, 3))
+    errors[10:, 1] += drift * np.arange(1, max(sessions - 10, 0) + 1)
+    verified_sensor(folder, errors)
+    if months is not None:
+        (folder / "lab.yaml").write_text(f"format: 1\nrecalibration: {{months: {months}, reason: agreed}}\n")
+    return sensor_history(folder, SERIAL, indexed_sessions(folder))
+
+
+@pytest.mark.parametrize(
+    ("sessions", "drift", "tone"), [(5, 0, "open"), (24, 0, "good"), (24, 0.0004, "bad")]
+)
+def test_verdict(tmp_path: Path, sessions: int, drift: float, tone: str) -> None:
+    document = history_document(history(tmp_path, sessions, drift))
+    assert document.verdict.tone == tone
+    assert any("at 400 mm since" in reason for reason in document.verdict.reasons) == (tone == "bad")
+
+
+def test_the_earliest_rule_gives_the_date(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    agreed = history(tmp_path / "a", 12, months=6)
+    assert recalibrate_by(agreed) == (date(2027, 5, 30), "agreed interval of 6 months")
+    (tmp_path / "b").mkdir()
+    drifted = recalibrate_by(history(tmp_path / "b", 24, 0.0004, months=120))
+    assert drifted is not None
+    assert drifted[0] == date(2028, 11, 24)
+    assert "alarm at 400 mm" in drifted[1]
+
+
+def test_charts_of_each_distance_and_notes_are_in_the_document(tmp_path: Path) -> None:
+    history(tmp_path, 24)
+    entry = SensorEntry(serial=SERIAL, kind="note", time="2027-01-01", operator="me", text="<b>cleaned</b>")
+    append_entry(tmp_path, entry)
+    found = history_document(sensor_history(tmp_path, SERIAL, indexed_sessions(tmp_path)))
+    sections = {section.key: section for section in found.sections}
+    names = {chart.name for chart in sections["verifications"].charts}
+    assert names == {f"{kind}_{mm}mm" for kind in ("xbar", "s", "cusum") for mm in (200, 400, 800)}
+    assert sections["notes"].tables[0].records()[0]["text"] == entry.text
+    json.dumps(found.as_json())

@@ -1,0 +1,122 @@
+"""Control charts: a published CUSUM, limits by Student, and run lengths of simulated sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from workbench.model.arrays import FloatArray
+from workbench.trials.statistics.control_chart import (
+    FALSE_ALARM,
+    FIRST_SESSIONS,
+    control_chart,
+    cusum,
+    frozen_limits,
+)
+
+SENSORS, CHARTS, REPEATS = 600, 5, 5
+LONGEST = 1000
+"""Number of sessions after which a simulated run ends; it shortens the mean run length."""
+DRIFT_SD = 0.25
+FOUND_BEFORE = 3.0 / DRIFT_SD
+"""Number of sessions in which the drift grows to 3 standard deviations."""
+
+# NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.3: means of 20 samples about the target 325.
+NIST = np.array(
+    [
+        324.925, 324.675, 324.725, 324.350, 325.350, 325.225, 324.125, 324.525, 325.225, 324.600,
+        324.625, 325.150, 328.325, 327.250, 327.825, 328.500, 326.675, 327.775, 326.875, 328.350,
+    ]
+)  # fmt: skip
+NIST_HIGH = [
+    0,
+    0,
+    0,
+    0,
+    0.0325,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    3.0075,
+    4.94,
+    7.4475,
+    10.63,
+    11.9875,
+    14.445,
+    16.0025,
+    19.035,
+]
+
+
+def test_cusum_as_published() -> None:
+    assert cusum(NIST - 325.0, 0.3175) == pytest.approx(np.array(NIST_HIGH), abs=1e-9)
+
+
+def test_limits_are_those_of_a_new_value_by_student() -> None:
+    first = np.random.default_rng(1).normal(5.0, 2.0, FIRST_SESSIONS)
+    scatter = np.full(FIRST_SESSIONS, 0.5)
+    limits = frozen_limits(first, scatter, REPEATS, CHARTS)
+    tail, k = FALSE_ALARM / CHARTS, FIRST_SESSIONS
+    expected = stats.t.isf(tail / 2, k - 1) * first.std(ddof=1) * np.sqrt(1 + 1 / k)
+    assert limits.half_width == pytest.approx(expected)
+    f = stats.f.isf(tail, REPEATS - 1, k * (REPEATS - 1))
+    assert limits.most_scatter == pytest.approx(0.5 * np.sqrt(f))
+    assert frozen_limits(first, np.full(k, np.nan), 1, CHARTS).most_scatter is None
+
+
+def test_too_few_or_equal_sessions_have_no_limits() -> None:
+    values = np.arange(FIRST_SESSIONS - 1.0)
+    assert control_chart(values, np.full(len(values), np.nan), 1, 1) is None
+    assert control_chart(np.ones(30), np.full(30, np.nan), 1, 1) is None
+
+
+def drawn(random: np.random.Generator, sessions: int, drift_sd: float) -> tuple[FloatArray, FloatArray]:
+    """Values and scatters (charts, sessions) of a sensor; the first chart drifts after the first sessions."""
+    values = random.standard_normal((CHARTS, sessions))
+    values[0, FIRST_SESSIONS:] += drift_sd * np.arange(1, sessions - FIRST_SESSIONS + 1)
+    freedom = REPEATS - 1
+    return values, np.sqrt(random.chisquare(freedom, (CHARTS, sessions)) / freedom)
+
+
+def run_length(values: FloatArray, scatter: FloatArray) -> int:
+    """Number of sessions after the first k until the first alarm of any chart."""
+    ends = [len(values[0])]
+    for one, spread in zip(values, scatter, strict=True):
+        chart = control_chart(one, spread, REPEATS, CHARTS)
+        assert chart is not None
+        if chart.alarm is not None:
+            ends.append(chart.alarm.index + 1)
+    return min(ends) - FIRST_SESSIONS
+
+
+def test_false_alarms_are_rarer_than_one_in_370_sessions_and_drift_is_found_before_3_sd() -> None:
+    random = np.random.default_rng(2026)
+    sound = [run_length(*drawn(random, FIRST_SESSIONS + LONGEST, 0.0)) for _ in range(SENSORS)]
+    drifting = [run_length(*drawn(random, FIRST_SESSIONS + 60, DRIFT_SD)) for _ in range(SENSORS)]
+    alarms = sum(length < LONGEST for length in sound)
+    # Two standard deviations of a Poisson number of alarms.
+    assert alarms + 2 * np.sqrt(alarms) < sum(sound) / 370
+    assert np.mean(sound) - 2 * np.std(sound) / np.sqrt(SENSORS) > 370
+    assert np.mean(drifting) + 2 * np.std(drifting) / np.sqrt(SENSORS) < FOUND_BEFORE
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_jump_is_named_with_its_rule_and_its_beginning(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    values = random.normal(0.0, 1.0, 30)
+    values[20:] += 30.0
+    chart = control_chart(values, np.full(30, np.nan), 1, 1)
+    assert chart is not None
+    assert chart.alarm is not None
+    assert (chart.alarm.index, chart.alarm.since) == (20, 20)
+    rough = np.full(30, 1.0)
+    rough[25] = 20.0
+    chart = control_chart(random.normal(0.0, 1.0, 30), rough, REPEATS, 1)
+    assert chart is not None
+    assert chart.alarm is not None
+    assert (chart.alarm.index, chart.alarm.rule) == (25, "scatter of the repeats")

@@ -1,0 +1,93 @@
+"""Questions about the laboratory, asked once in a terminal; the answers are written to `lab.yaml`."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+from workbench.model.laboratory import LABORATORY_FILE, Laboratory, load_laboratory
+from workbench.session.files import write_output
+
+Ask = Callable[[str], str]
+QUESTIONS = (
+    ("laboratory.name", "Name of the laboratory"),
+    ("laboratory.address", "Its address"),
+    ("customer.name", "Name of the customer"),
+    ("customer.address", "Address of the customer"),
+    ("authorised_by", "Person who authorises certificates"),
+    ("standard.name", "Reference standard of the standoffs (for example a steel rule)"),
+    ("standard.serial", "Its serial number"),
+    ("standard.certificate", "Its calibration certificate"),
+    ("standard.calibrated", "Day of its calibration, as 2026-11-30"),
+    ("standard.uncertainty_mm", "Its expanded uncertainty (k = 2), mm"),
+    ("temperature.low", "Lowest temperature of the room, deg C"),
+    ("temperature.high", "Highest temperature of the room, deg C"),
+    ("target_material", "Material of the target"),
+)
+HEADING = """\
+# What certificates state about the laboratory. docs/certificate.md lists further keys, such as several
+# standards, warm-up and the interval of recalibration. What is missing here is reported as not stated.
+"""
+
+
+def laboratory_of(sessions: Path, no_input: bool, ask: Ask) -> Laboratory:
+    """The laboratory file of a folder of sessions; without one its items are asked for, once.
+
+    Nothing is written and nothing is stated where there is no terminal, on CI, or with `no_input`.
+
+    Args:
+        sessions: folder of sessions.
+        no_input: whether to ask nothing.
+        ask: shows a question and returns the typed answer.
+
+    Raises:
+        BadInputError: the file is wrong, or cannot be written.
+    """
+    known = load_laboratory(sessions)
+    if known is not None:
+        return known
+    if no_input or os.environ.get("CI") or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return Laboratory(format=1)
+    answers = {key: ask(f"{question} (Enter: not stated)").strip() for key, question in QUESTIONS}
+    write_output(sessions / LABORATORY_FILE, (HEADING + _yaml(answers)).encode())
+    return load_laboratory(sessions) or Laboratory(format=1)
+
+
+def _yaml(answers: dict[str, str]) -> str:
+    content: dict[str, object] = {"format": 1}
+    for party in ("laboratory", "customer"):
+        if answers[f"{party}.name"]:
+            named = {key: answers[f"{party}.{key}"] for key in ("name", "address")}
+            content[party] = {key: value for key, value in named.items() if value}
+    for key in ("authorised_by", "target_material"):
+        if answers[key]:
+            content[key] = answers[key]
+    if answers["standard.name"]:
+        content["standards"] = [_standard(answers)]
+    span = [number(answers[f"temperature.{end}"]) for end in ("low", "high")]
+    if None not in span:
+        content["ambient"] = {"temperature_c": sorted(value for value in span if value is not None)}
+    stream = io.StringIO()
+    YAML().dump(content, stream)
+    return stream.getvalue()
+
+
+def _standard(answers: dict[str, str]) -> dict[str, object]:
+    named = {key: answers[f"standard.{key}"] for key in ("name", "serial", "certificate", "calibrated")}
+    standard: dict[str, object] = {key: value for key, value in named.items() if value}
+    if (uncertainty_mm := number(answers["standard.uncertainty_mm"])) is not None:
+        standard |= {"expanded_uncertainty": uncertainty_mm, "unit": "mm"}
+    return standard
+
+
+def number(typed: str) -> float | None:
+    """Typed number, with a point or a comma; None for anything else."""
+    try:
+        return float(typed.replace(",", "."))
+    except ValueError:
+        return None

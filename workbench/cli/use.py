@@ -1,0 +1,78 @@
+"""`workbench use`: put a calibration in force for a sensor, also an earlier one (roll back)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from workbench.cli.console import print_message
+from workbench.cli.sessions import find_session
+from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.report.certificate.session_record import file_sha256, read_session
+from workbench.report.history.calibrations import dated_calibrations, in_force, range_changes
+from workbench.session.caller import now, operator
+from workbench.session.index import indexed_sessions
+from workbench.session.sensor_log import SensorEntry, append_entry, read_entries
+
+
+def put_in_force(name: Path, serial: str, reason: str, sessions: Path) -> None:
+    """Record a calibration as the one in force, and print the change of ranges against the one before.
+
+    Raises:
+        BadInputError: there is no such calibration, it is of another sensor, or the record cannot be written.
+        LimitFailedError: the calibration is refused.
+    """
+    path = _file(name, sessions)
+    calibration = load_calibration(path)
+    _check(path, calibration, serial)
+    before = _before(sessions, serial)
+    inside = path.resolve().is_relative_to(sessions.resolve())
+    entry = SensorEntry(
+        serial=serial,
+        kind="in_force",
+        time=now(),
+        operator=operator(),
+        text=reason,
+        path=str(path.resolve().relative_to(sessions.resolve()) if inside else path.resolve()),
+        sha256=file_sha256(path),
+    )
+    append_entry(sessions, entry)
+    print_message(f"{serial}: {entry.path} is in force since {entry.time[:10]}: {reason}")
+    if before is None:
+        print_message("no calibration was in force before")
+        return
+    for change in range_changes(before, calibration):
+        print_message(
+            f"  at {change.range_mm:g} mm: {round(change.change_mm, 2) + 0.0:+.2f} mm against the one before"
+            f" (sd {change.sd_mm:.2g} mm)"
+        )
+
+
+def _before(sessions: Path, serial: str) -> Calibration | None:
+    """The calibration in force until now; None if there is none, or its file has changed."""
+    own = [one for one in indexed_sessions(sessions) if one.serial == serial]
+    try:
+        found = in_force(sessions, dated_calibrations(own)[0], read_entries(sessions, serial))
+    except BadInputError as error:
+        print_message(f"note: {error}")
+        return None
+    return None if found is None else found.calibration.calibration
+
+
+def _file(name: Path, sessions: Path) -> Path:
+    """Calibration file: as named, or that of a session."""
+    if name.is_file():
+        return name
+    session = read_session(find_session(name, sessions))
+    if session.calibration_path is None:
+        raise BadInputError(f"{name}: expected a calibration, the session has none")
+    return session.calibration_path
+
+
+def _check(path: Path, calibration: Calibration, serial: str) -> None:
+    own = calibration.laser_ranger.provenance.serial
+    if own != serial:
+        raise BadInputError(f"{path}: expected a calibration of the sensor {serial}, got one of {own}")
+    fit = calibration.laser_ranger.fit
+    if not fit.usable:
+        raise LimitFailedError(f"{path}: the calibration is refused: {'; '.join(fit.reasons)}")

@@ -1,0 +1,1 @@
+"""Calibration certificate of a session: as a document, and as a Digital Calibration Certificate."""

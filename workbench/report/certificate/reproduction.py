@@ -1,0 +1,58 @@
+"""Section on the data: inputs with their hashes, versions, command line, and how to reproduce the results."""
+
+from __future__ import annotations
+
+import shlex
+
+from workbench.model import event as ev
+from workbench.model.table import Column, Table
+from workbench.report.certificate.session_record import SessionRecord, file_sha256, text_sha256
+from workbench.report.document import Fact, Section
+from workbench.session.capture_table import CALIBRATION_TABLE
+from workbench.session.journal import JOURNAL
+from workbench.session.manifest import MANIFEST
+
+
+def reproduction_section(session: SessionRecord) -> Section:
+    """Inputs with sha256, versions, command line, commands that repeat the evaluation."""
+    name = shlex.quote(f"sessions/{session.folder.name}")
+    commands = [f"workbench report {name} --json > certificate.json"]
+    if session.fit is not None:
+        commands.insert(0, f"workbench fit {name} -o again.yaml")
+        if session.calibration_path is not None:
+            commands.insert(1, f"workbench compare {name}/{session.calibration_path.name} again.yaml")
+    versions = ", ".join(f"{what} {version}" for what, version in session.manifest.versions.items())
+    facts = (
+        Fact("Session", session.folder.name),
+        Fact("Command line", session.manifest.command or "not recorded by this version"),
+        Fact("Versions at the measurement", versions),
+        Fact("Reproduce with", "; ".join(commands)),
+    )
+    table = Table(
+        name="inputs",
+        title="Inputs and records",
+        columns=(Column(key="what", name="file"), Column(key="sha256", name="sha256")),
+        rows=tuple(_inputs(session)),
+    )
+    return Section("data", "Data, versions and reproduction", facts, tables=(table,))
+
+
+def _inputs(session: SessionRecord) -> list[tuple[str, str]]:
+    frames = sum(1 + (one.off is not None) for one in session.events(ev.CaptureTaken))
+    rows = [
+        (f"rig file {_name(session.manifest.rig.file)}", text_sha256(session.manifest.rig.text)),
+        *((f"procedure {_name(one.file)}", text_sha256(one.text)) for one in session.manifest.procedures),
+        (MANIFEST, session.manifest_sha256),
+        (JOURNAL, session.journal_sha256 or "missing"),
+        (f"{frames} frames, list of their sha256", session.frames_sha256),
+    ]
+    captures = session.folder / CALIBRATION_TABLE
+    if captures.exists():
+        rows.append((CALIBRATION_TABLE, file_sha256(captures)))
+    if session.calibration_path is not None and session.calibration_path.exists():
+        rows.append((session.calibration_path.name, file_sha256(session.calibration_path)))
+    return rows
+
+
+def _name(path: str) -> str:
+    return path.rsplit("/", 1)[-1]

@@ -1,0 +1,130 @@
+"""Manifest, records, calibration and hashes of one session, for its certificate."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+from typing import TypeVar
+
+from workbench.model import event as ev
+from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.rig import Rig
+from workbench.session.journal import JOURNAL, read_journal
+from workbench.session.manifest import MANIFEST, Manifest, load_manifest, load_session_rig
+from workbench.session.state import SessionStatus, effective, session_status
+
+E = TypeVar("E")
+
+
+@dataclass(frozen=True)
+class SessionRecord:
+    """A session, read once."""
+
+    folder: Path
+    manifest: Manifest
+    rig: Rig
+    status: SessionStatus
+    all_records: tuple[ev.Record, ...]
+    """Records, void ones included."""
+
+    @cached_property
+    def records(self) -> tuple[ev.Record, ...]:
+        """Records that are in effect."""
+        return tuple(effective(self.all_records))
+
+    def events(self, kind: type[E]) -> list[E]:
+        """Events of one kind that are in effect, in order."""
+        return [record.event for record in self.records if isinstance(record.event, kind)]
+
+    def timed(self, kind: type[E]) -> Iterator[tuple[str, E]]:
+        """Events of one kind with their time of day, void ones included."""
+        for record in self.all_records:
+            if isinstance(record.event, kind):
+                yield utc(record.time_ns).strftime("%Y-%m-%d %H:%M:%S"), record.event
+
+    @cached_property
+    def fit(self) -> ev.FitFinished | None:
+        """The last fit."""
+        return next(reversed(self.events(ev.FitFinished)), None)
+
+    @cached_property
+    def calibration_path(self) -> Path | None:
+        """File of the calibration that the session exported last, or of the existing one that it used."""
+        for record in reversed(self.records):
+            if isinstance(record.event, ev.CalibrationExported | ev.CalibrationLoaded):
+                return self.folder / record.event.path
+        return None
+
+    @cached_property
+    def calibration(self) -> Calibration | None:
+        """The calibration of `calibration_path`.
+
+        Raises:
+            BadInputError: the file is missing or damaged.
+        """
+        return None if self.calibration_path is None else load_calibration(self.calibration_path)
+
+    @cached_property
+    def is_own_calibration(self) -> bool:
+        """Whether the session made its calibration."""
+        return bool(self.events(ev.CalibrationExported))
+
+    @property
+    def began(self) -> datetime | None:
+        """Time of the first record, UTC."""
+        return utc(self.all_records[0].time_ns) if self.all_records else None
+
+    @property
+    def ended(self) -> datetime | None:
+        """Time of the last record, UTC."""
+        return utc(self.all_records[-1].time_ns) if self.all_records else None
+
+    @cached_property
+    def journal_sha256(self) -> str:
+        """Hash of the journal."""
+        path = self.folder / JOURNAL
+        return file_sha256(path) if path.exists() else ""
+
+    @cached_property
+    def manifest_sha256(self) -> str:
+        """Hash of the manifest."""
+        return file_sha256(self.folder / MANIFEST)
+
+    @cached_property
+    def frames_sha256(self) -> str:
+        """Hash of the hashes of all frames in effect, in order of the captures."""
+        digest = hashlib.sha256()
+        for capture in self.events(ev.CaptureTaken):
+            for frame in filter(None, (capture.on, capture.off)):
+                digest.update(f"{frame.path} {frame.sha256}\n".encode())
+        return digest.hexdigest()
+
+
+def read_session(folder: Path) -> SessionRecord:
+    """Read a session.
+
+    Raises:
+        BadInputError: `folder` is no session folder, or its manifest or journal is damaged.
+    """
+    manifest, rig = load_manifest(folder), load_session_rig(folder)
+    records = tuple(read_journal(folder)) if (folder / JOURNAL).exists() else ()
+    return SessionRecord(folder, manifest, rig, session_status(folder), records)
+
+
+def utc(time_ns: int) -> datetime:
+    """Time of a record."""
+    return datetime.fromtimestamp(time_ns / 1e9, tz=UTC)
+
+
+def file_sha256(path: Path) -> str:
+    """Hash of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def text_sha256(text: str) -> str:
+    """Hash of a text in UTF-8."""
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,1 @@
+"""History of a sensor over its sessions: calibrations, verifications, control charts, drift."""

@@ -1,0 +1,115 @@
+"""Control charts of a sensor's verifications, its drift, and the date at which to calibrate it again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime, timedelta
+from math import inf, sqrt
+
+import numpy as np
+
+from workbench.model.arrays import FloatArray
+from workbench.model.stats import t_cdf
+from workbench.report.history.verifications import Verification, monitored_mm
+from workbench.trials.statistics.control_chart import FIRST_SESSIONS, ControlChart, control_chart
+
+DAY_NS = 86_400 * 10**9
+SIGNIFICANT = 0.01
+"""P value of a trend below which a date is derived from it."""
+LONGEST_DAYS = 3650
+"""Longest time ahead for which a date is stated."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Deviation after an alarm, relative to the range."""
+
+    amount: float
+    since: str
+    """Day of the first session of the deviation."""
+    p: float
+    """Two-sided p value of the difference between these sessions and the first k (Student)."""
+    rule: str
+
+
+@dataclass(frozen=True)
+class DistanceHistory:
+    """Chart of one distance; errors are relative to the range."""
+
+    range_mm: float
+    days: FloatArray
+    """(n,) since the first session."""
+    errors: FloatArray
+    """(n,)"""
+    scatter: FloatArray
+    """(n,)"""
+    chart: ControlChart | None
+    """None: too few sessions."""
+    drift: Drift | None
+    """None: in control."""
+    due: date | None
+    """Day at which the trend reaches a control limit; None: no significant trend."""
+
+
+def distance_histories(checked: Sequence[Verification]) -> tuple[DistanceHistory, ...]:
+    """Charts at the distances that most sessions share; they share the probability of a false alarm."""
+    ranges = monitored_mm(checked)
+    return tuple(_history(checked, mm, len(ranges)) for mm in ranges)
+
+
+def _history(every: Sequence[Verification], range_mm: float, charts: int) -> DistanceHistory:
+    pairs = [(one, check) for one in every if (check := one.at(range_mm)) is not None]
+    errors = np.array([check.error for _, check in pairs])
+    scatter = np.array([check.scatter for _, check in pairs])
+    days = np.array([(one.time_ns - every[0].time_ns) / DAY_NS for one, _ in pairs])
+    chart = control_chart(errors, scatter, min(check.readings for _, check in pairs), charts)
+    return DistanceHistory(
+        range_mm,
+        days,
+        errors,
+        scatter,
+        chart,
+        None if chart is None else _drift(chart, [one.day for one, _ in pairs]),
+        None if chart is None else _due(chart, days, every[0].time_ns),
+    )
+
+
+def _drift(chart: ControlChart, days: Sequence[str]) -> Drift | None:
+    if chart.alarm is None:
+        return None
+    first = chart.values[:FIRST_SESSIONS]
+    after = chart.values[chart.alarm.since :]
+    amount = float(after.mean()) - chart.limits.centre
+    u = chart.limits.sd * sqrt(1 / len(first) + 1 / len(after))
+    p = 2.0 * float(t_cdf(-abs(amount) / u, len(first) - 1))
+    return Drift(amount, days[chart.alarm.since], p, chart.alarm.rule)
+
+
+def _due(chart: ControlChart, days: FloatArray, first_ns: int) -> date | None:
+    """Day at which a straight line through the sessions leaves the control limits."""
+    if len(days) < FIRST_SESSIONS + 2 or np.ptp(days) <= 0:
+        return None
+    slope, level, p = _line(days, chart.values)
+    if p > SIGNIFICANT or slope == 0:
+        return None
+    edge = chart.limits.centre + np.sign(slope) * chart.limits.half_width
+    at_days = (edge - level) / slope
+    if not 0 <= at_days - days[-1] <= LONGEST_DAYS:
+        return None if at_days > days[-1] else _day(first_ns, days[-1])
+    return _day(first_ns, at_days)
+
+
+def _line(x: FloatArray, y: FloatArray) -> tuple[float, float, float]:
+    """Slope, level at x = 0 and p value of the slope of a least-squares line."""
+    centred = x - x.mean()
+    slope = float(centred @ y / (centred @ centred))
+    level = float(y.mean() - slope * x.mean())
+    rest = y - level - slope * x
+    u = sqrt(float(rest @ rest) / (len(x) - 2) / float(centred @ centred))
+    t = abs(slope) / u if u > 0 else inf
+    return slope, level, 2.0 * float(t_cdf(-t, len(x) - 2))
+
+
+def _day(first_ns: int, days: float) -> date:
+    return (datetime.fromtimestamp(first_ns / 1e9, tz=UTC) + timedelta(days=float(days))).date()

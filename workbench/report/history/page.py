@@ -1,0 +1,146 @@
+"""History of a sensor as a document: verdict, control charts, calibrations, notes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date
+
+from workbench.model.number_text import counted
+from workbench.model.table import Column, Table
+from workbench.report.certificate.recalibration import months_later
+from workbench.report.document import Document, Fact, KeyNumber, Section, Tone, Verdict
+from workbench.report.history.calibration_section import calibration_section
+from workbench.report.history.calibrations import DatedCalibration, InForce
+from workbench.report.history.drift import DistanceHistory
+from workbench.report.history.verification_section import verification_section
+from workbench.report.history.verifications import Verification
+from workbench.session.sensor_log import SensorEntry
+from workbench.trials.statistics.control_chart import FIRST_SESSIONS
+
+
+@dataclass(frozen=True)
+class SensorHistory:
+    """Everything that is known about one sensor."""
+
+    serial: str
+    calibrations: Sequence[DatedCalibration]
+    in_force: InForce | None
+    verifications: Sequence[Verification]
+    """Those with the calibration in force, in order of time."""
+    distances: Sequence[DistanceHistory]
+    entries: Sequence[SensorEntry]
+    agreed_months: int | None
+    """Agreed interval of recalibration; None: none."""
+    remarks: Sequence[str] = ()
+
+
+def history_document(history: SensorHistory) -> Document:
+    """The document."""
+    force = history.in_force
+    since = "none" if force is None else f"{force.calibration.session}, since {force.since}: {force.why}"
+    head = (
+        Fact("Serial number", history.serial),
+        Fact("Calibration in force", since),
+        Fact("Verifications with it", str(len(history.verifications))),
+    )
+    sections = (
+        verification_section(history.verifications, history.distances),
+        calibration_section(history.calibrations),
+        _note_section(history),
+    )
+    verdict = verdict_of(history)
+    return Document("History of a sensor", "", "", head, verdict, _key_numbers(history), sections)
+
+
+def verdict_of(history: SensorHistory) -> Verdict:
+    """In control, drifted, or not known yet; with the date of the next calibration and its rule."""
+    reasons = [*(_drift_text(one) for one in history.distances if one.drift), *_due_texts(history)]
+    reasons += history.remarks
+    drifted = [one for one in history.distances if one.drift is not None]
+    if drifted:
+        return Verdict("bad", "Drifted: calibrate again", tuple(reasons))
+    charts = [one for one in history.distances if one.chart is not None]
+    if charts:
+        tone: Tone = "good"
+        sessions = len(history.verifications) - FIRST_SESSIONS
+        return Verdict(tone, f"In control over {counted(sessions, 'session')}", tuple(reasons))
+    count = len(history.verifications)
+    text = f"No control limits yet: {count} of {FIRST_SESSIONS} verifications with the calibration in force"
+    if count >= FIRST_SESSIONS:
+        text = "No control limits: the verifications have no distance in common, or equal readings"
+    return Verdict("open", text, tuple(reasons))
+
+
+def recalibrate_by(history: SensorHistory) -> tuple[date, str] | None:
+    """Earliest date of the next calibration, and its rule; None: no rule gives one."""
+    dates = []
+    force = history.in_force
+    if force is not None and history.agreed_months is not None:
+        try:
+            made = date.fromisoformat(force.calibration.day)
+        except ValueError:  # a calibration that another program wrote
+            made = None
+        if made is not None:
+            months = history.agreed_months
+            dates.append((months_later(made, months), f"agreed interval of {months} months"))
+    for one in history.distances:
+        if one.drift is not None:
+            last = history.verifications[-1].day
+            dates.append((date.fromisoformat(last), f"alarm at {one.range_mm:g} mm: at once"))
+        elif one.due is not None:
+            dates.append((one.due, f"the trend at {one.range_mm:g} mm reaches a control limit"))
+    return min(dates, default=None)
+
+
+def _due_texts(history: SensorHistory) -> list[str]:
+    due = recalibrate_by(history)
+    return [] if due is None else [f"recalibrate by {due[0]}: {due[1]}"]
+
+
+def _drift_text(one: DistanceHistory) -> str:
+    drift = one.drift
+    if drift is None:
+        return ""
+    if drift.rule == "scatter of the repeats":
+        return f"the scatter of the repeats at {one.range_mm:g} mm is above its limit since {drift.since}"
+    amount = f"{100 * drift.amount:+.2g} %"
+    return f"drifted by {amount} at {one.range_mm:g} mm since {drift.since}, P = {drift.p:.1g} ({drift.rule})"
+
+
+def _key_numbers(history: SensorHistory) -> tuple[KeyNumber, ...]:
+    due = recalibrate_by(history)
+    numbers = [
+        KeyNumber("Calibrations", str(len(history.calibrations)), "accepted, in this folder"),
+        KeyNumber("Verifications", str(len(history.verifications)), "with the calibration in force"),
+        KeyNumber(
+            "Recalibrate by", "-" if due is None else str(due[0]), "no rule" if due is None else due[1]
+        ),
+    ]
+    if history.distances:
+        worst = max(history.distances, key=lambda one: abs(float(one.errors[-1])))
+        latest = f"{100 * float(worst.errors[-1]):+.2g} %"
+        note = f"mean error of the last session at {worst.range_mm:g} mm, of the range"
+        numbers.append(KeyNumber("Largest latest error", latest, note))
+    return tuple(numbers)
+
+
+def _note_section(history: SensorHistory) -> Section:
+    table = Table(
+        name="notes",
+        title="Notes, and calibrations put in force",
+        columns=(
+            Column(key="time", name="time"),
+            Column(key="operator", name="operator"),
+            Column(key="kind", name="kind"),
+            Column(key="text", name="text"),
+            Column(key="path", name="calibration"),
+        ),
+        rows=tuple(
+            (one.time, one.operator, one.kind.replace("_", " "), one.text, one.path)
+            for one in history.entries
+        ),
+    )
+    return Section(
+        "notes", "Notes", tables=(table,) if table.rows else (), texts=() if table.rows else ("None.",)
+    )

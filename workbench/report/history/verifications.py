@@ -1,0 +1,126 @@
+"""Verifications of a sensor: mean error and scatter of each session at up to five distances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import exp, log
+from pathlib import Path
+
+import numpy as np
+
+from workbench.model import event as ev
+from workbench.model.arrays import FloatArray
+from workbench.session.index import IndexedSession
+from workbench.session.journal import read_journal
+from workbench.session.state import effective
+
+DISTANCES = 5
+"""Largest number of distances that are monitored."""
+SAME_DISTANCE = 0.05
+"""Largest relative difference of two standoffs of one distance."""
+LEAST_SHARE = 0.8
+"""Least number of sessions with a monitored distance, as a share of those with the most frequent one."""
+LARGEST_REFERENCE_SD = 0.1
+"""Largest relative reference uncertainty of a standoff that counts as known."""
+
+
+@dataclass(frozen=True)
+class DistanceCheck:
+    """Readings of one session at one distance; relative to the true range."""
+
+    range_mm: float
+    error: float
+    """Mean relative error."""
+    scatter: float
+    """Standard deviation of the readings' relative errors; NaN for one reading."""
+    readings: int
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Readings of one session of a flat target."""
+
+    session: str
+    day: str
+    """ISO 8601."""
+    time_ns: int
+    """Time of the first reading, ns since 1970 (UTC)."""
+    calibration: str
+    """sha256 of the calibration that the readings use."""
+    checks: tuple[DistanceCheck, ...]
+
+    def at(self, range_mm: float) -> DistanceCheck | None:
+        """The check at a distance; None if the session has none."""
+        near = [one for one in self.checks if is_same_distance(one.range_mm, range_mm)]
+        return min(near, key=lambda one: abs(log(one.range_mm / range_mm)), default=None)
+
+
+def verifications(folder: Path, sessions: Iterable[IndexedSession]) -> tuple[Verification, ...]:
+    """Verifications of the sessions that have readings, in order of time.
+
+    Args:
+        folder: folder of sessions.
+        sessions: sessions of one sensor; those without readings are left out.
+
+    Raises:
+        BadInputError: a journal is damaged.
+    """
+    found = [_verification(folder / one.name, one) for one in sessions if one.verified]
+    return tuple(sorted((one for one in found if one is not None), key=lambda one: one.time_ns))
+
+
+def monitored_mm(checked: Sequence[Verification]) -> tuple[float, ...]:
+    """Distances that most sessions share, at most `DISTANCES` of them, evenly by their ratio."""
+    counts: dict[float, int] = {}
+    for one in checked:
+        for check in one.checks:
+            known = next((mm for mm in counts if is_same_distance(mm, check.range_mm)), check.range_mm)
+            counts[known] = counts.get(known, 0) + 1
+    most = max(counts.values(), default=0)
+    common = sorted(mm for mm, count in counts.items() if count >= LEAST_SHARE * most)
+    if len(common) <= DISTANCES:
+        return tuple(common)
+    chosen: list[float] = []
+    for mm in np.geomspace(common[0], common[-1], DISTANCES).tolist():
+        free = [one for one in common if one not in chosen]
+        chosen.append(min(free, key=lambda one: abs(log(one / mm))))
+    return tuple(sorted(chosen))
+
+
+def is_same_distance(a_mm: float, b_mm: float) -> bool:
+    """Whether two standoffs count as one distance."""
+    return max(a_mm, b_mm) / min(a_mm, b_mm) <= exp(SAME_DISTANCE)
+
+
+def _verification(session_dir: Path, indexed: IndexedSession) -> Verification | None:
+    calibration, time_ns = "", 0
+    errors: dict[float, list[float]] = {}
+    for record in effective(read_journal(session_dir)):
+        event = record.event
+        if isinstance(event, ev.CalibrationExported | ev.CalibrationLoaded):
+            calibration = event.sha256
+        elif isinstance(event, ev.ReadingTaken) and (error := _relative_error(event)) is not None:
+            time_ns = time_ns or record.time_ns
+            errors.setdefault(event.standoff_mm, []).append(error)
+    if not errors:
+        return None
+    checks = tuple(_check(mm, np.array(values)) for mm, values in sorted(errors.items()))
+    return Verification(indexed.name, indexed.began[:10], time_ns, calibration, checks)
+
+
+def _relative_error(reading: ev.ReadingTaken) -> float | None:
+    """Error of a range over the true range; None without a range, or where the true range is not known.
+
+    A target that need not be measured has a reference uncertainty of the size of its range.
+    """
+    if reading.error_mm is None or reading.true is not None or reading.reference_sd_mm is None:
+        return None
+    if reading.reference_sd_mm > LARGEST_REFERENCE_SD * reading.standoff_mm:
+        return None
+    return reading.error_mm / reading.standoff_mm
+
+
+def _check(range_mm: float, errors: FloatArray) -> DistanceCheck:
+    scatter = float(errors.std(ddof=1)) if len(errors) > 1 else float("nan")
+    return DistanceCheck(range_mm, float(errors.mean()), scatter, len(errors))

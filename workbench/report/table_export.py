@@ -1,0 +1,90 @@
+"""Tables of a session for other programs: tidy data frames, and a dictionary of their columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from workbench.model.calibration import Parameters, load_calibration
+from workbench.model.event import CalibrationExported, CalibrationLoaded, TrialFinished
+from workbench.model.table import Table
+from workbench.report.data_dictionary import MEANINGS
+from workbench.report.frames import PARAMETER_COLUMNS, frame_of_table
+from workbench.report.session_frames import captures_frame, readings_frame, residuals_frame, spots_frame
+from workbench.session.journal import read_journal
+from workbench.session.state import effective
+
+DICTIONARY = "dictionary"
+DICTIONARY_COLUMNS = ["table", "column", "type", "unit", "meaning"]
+
+
+def session_tables(folder: Path) -> dict[str, pd.DataFrame]:
+    """Tables of a session by name, and `dictionary`, which describes every column of the others.
+
+    Raises:
+        BadInputError: journal or calibration is damaged.
+    """
+    events = [record.event for record in effective(read_journal(folder))]
+    tables = {
+        "captures": captures_frame(folder, events),
+        "spots": spots_frame(events),
+        "residuals": residuals_frame(events),
+        "readings": readings_frame(events),
+    }
+    files = [event for event in events if isinstance(event, CalibrationExported | CalibrationLoaded)]
+    if files:
+        tables |= _calibration_tables(load_calibration(folder / files[-1].path).laser_ranger.parameters)
+    trials = [event for event in events if isinstance(event, TrialFinished)]
+    of_trials = {table.name: table for trial in trials for table in trial.tables}
+    rows = [row for name, frame in tables.items() for row in _described(name, frame)]
+    rows += [row for table in of_trials.values() for row in _described_table(table)]
+    dictionary = pd.DataFrame(rows, columns=DICTIONARY_COLUMNS)
+    tables |= {name: frame_of_table(table) for name, table in of_trials.items()}
+    return tables | {DICTIONARY: dictionary}
+
+
+def _calibration_tables(found: Parameters) -> dict[str, pd.DataFrame]:
+    """Parameters, and their covariance with one row for each pair."""
+    values: Mapping[str, object] = {
+        name: getattr(found, _FIELD.get(name, name)) for name in PARAMETER_COLUMNS
+    }
+    first, second = np.triu_indices(len(found.names))
+    names = np.array(found.names)
+    covariance = {
+        "parameter_1": names[first],
+        "parameter_2": names[second],
+        "covariance": found.covariance_array[first, second],
+    }
+    return {
+        "parameters": pd.DataFrame({"parameter": found.names, **values}),
+        "covariance": pd.DataFrame(covariance),
+    }
+
+
+_FIELD = {"unit": "units", "value": "values"}
+"""Fields of a calibration file with another name than the column."""
+
+
+def _described(name: str, frame: pd.DataFrame) -> list[tuple[str, str, str, str, str]]:
+    return [
+        (name, column, str(frame[column].dtype), *MEANINGS[name][column])
+        for column in map(str, frame.columns)
+    ]
+
+
+def _described_table(table: Table) -> list[tuple[str, str, str, str, str]]:
+    """Columns of a trial's table; values are unscaled, so that percent are shares of 1."""
+    frame = frame_of_table(table)
+    return [
+        (
+            table.name,
+            column.key,
+            str(frame[column.key].dtype),
+            column.unit if column.scale == 1 else f"{column.unit} / {column.scale:g}",
+            f"{column.name or column.key} ({table.title})",
+        )
+        for column in table.columns
+    ]
