@@ -46,7 +46,7 @@ STATEMENTS = (
 
 @dataclass(frozen=True)
 class Sources:
-    """What a certificate is made of."""
+    """Sources of a certificate."""
 
     session: SessionRecord
     laboratory: Laboratory

@@ -1,4 +1,4 @@
-"""What a certificate is made of: manifest, records, calibration and hashes of one session."""
+"""Manifest, records, calibration and hashes of one session, for its certificate."""
 
 from __future__ import annotations
 
