@@ -15,6 +15,7 @@ from workbench.cli.sessions import find_session
 from workbench.model.errors import BadInputError
 from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.assemble import Certificate, Sources, certificate_of, fingerprint
+from workbench.report.certificate.dcc import certificate_xml, required_parties
 from workbench.report.certificate.predecessor import Predecessor, load_predecessor
 from workbench.report.certificate.session_record import SessionRecord, read_session
 from workbench.report.document import Document
@@ -53,13 +54,13 @@ def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool)
         check_output(path)
     session = read_session(folder)
     laboratory = laboratory_of(folder.parent, no_input, _ask)
+    if outputs.dcc is not None:
+        required_parties(laboratory)  # before a number is assigned
     certificate = numbered(session, laboratory)
     if not outputs.files and not outputs.as_json:
         outputs = Outputs(html=folder / DEFAULT_NAME)
     write_document(certificate.document, outputs)
     if outputs.dcc is not None:
-        from workbench.report.certificate.dcc import certificate_xml
-
         write_output(outputs.dcc, certificate_xml(certificate, datetime.now(UTC)))
     if outputs.as_json:
         print(json.dumps(certificate.as_json()))

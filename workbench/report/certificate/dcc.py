@@ -42,7 +42,7 @@ def certificate_xml(certificate: Certificate, printed: datetime) -> bytes:
         BadInputError: `lab.yaml` does not state an item that the schema requires, or the session is empty.
     """
     lab, session = certificate.sources.laboratory, certificate.sources.session
-    laboratory, customer = _required(lab)
+    laboratory, customer = required_parties(lab)
     if session.began is None or session.ended is None:
         raise BadInputError(f"{session.folder}: expected records, the session has none")
     ET.register_namespace("dcc", DCC)
@@ -64,8 +64,8 @@ def certificate_xml(certificate: Certificate, printed: datetime) -> bytes:
     return content
 
 
-def _required(lab: Laboratory) -> tuple[Party, Party]:
-    """Laboratory and customer.
+def required_parties(lab: Laboratory) -> tuple[Party, Party]:
+    """Laboratory and customer, if all items that a Digital Calibration Certificate requires are stated.
 
     Raises:
         BadInputError: an item that the schema requires is not stated.
