@@ -5,24 +5,21 @@ from __future__ import annotations
 import os
 import pty
 import re
-import select
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
-from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
 from tests.crash.short import write_files
+from tests.support.command_line import SCRIPT
+from tests.support.terminal import Terminal, at_terminal
 from workbench.model import event as ev
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
 
-SCRIPT = Path(sys.executable).with_name("workbench")
 STEPS = """\
 format: 1
 procedure: p
@@ -35,71 +32,12 @@ steps:
 """
 
 
-AT_TERMINAL = """
-import os, sys
-tty = os.open(sys.argv[1], os.O_RDWR)  # the first that the leader of a session opens is its terminal
-for handle in range(3):
-    os.dup2(tty, handle)
-os.execv(sys.argv[2], sys.argv[2:])
-"""
-
-
-@dataclass
-class Terminal:
-    """A session at a pseudo-terminal of its own."""
-
-    process: subprocess.Popen[bytes]
-    master: int
-    text: str = field(default="")
-    seen: int = 0
-
-    def wait_for(self, words: str) -> None:
-        """Read on until these words come, after what was waited for before."""
-        deadline = time.monotonic() + 120
-        while words not in self.text[self.seen :]:
-            assert time.monotonic() < deadline, self.text
-            if select.select([self.master], [], [], 0.2)[0]:
-                self.text += os.read(self.master, 65536).decode()
-        self.seen = self.text.index(words, self.seen) + len(words)
-
-    def type(self, line: str) -> None:
-        """Answer a prompt, once it is there."""
-        self.wait_for("> ")
-        os.write(self.master, line.encode() + b"\n")
-
-    def end(self) -> int:
-        """Wait for the end, and read the rest."""
-        deadline = time.monotonic() + 120
-        while self.process.poll() is None:
-            assert time.monotonic() < deadline, self.text
-            if select.select([self.master], [], [], 0.1)[0]:
-                try:
-                    self.text += os.read(self.master, 65536).decode()
-                except OSError:
-                    break
-        return self.process.wait(60)
-
-
 @pytest.fixture
 def terminal(tmp_path: Path) -> Iterator[Terminal]:
     rig, _ = write_files(tmp_path, STEPS)
     rig.write_text(rig.read_text() + "  answers: false\n")
-    master, slave = pty.openpty()
-    environment = {key: value for key, value in os.environ.items() if key != "CI"} | {"COLUMNS": "80"}
-    command = [str(SCRIPT), "run", "p.yaml", "--rig", "rig.yaml"]
-    process = subprocess.Popen(
-        [sys.executable, "-c", AT_TERMINAL, os.ttyname(slave), *command],
-        cwd=tmp_path,
-        env=environment,
-        start_new_session=True,
-    )
-    yield Terminal(process, master)
-    os.close(slave)
-    if process.poll() is None:
-        process.kill()
-        process.wait()
-    with suppress(OSError):
-        os.close(master)
+    with at_terminal(tmp_path, "run", "p.yaml", "--rig", "rig.yaml") as there:
+        yield there
 
 
 def events(folder: Path) -> list[ev.Event]:

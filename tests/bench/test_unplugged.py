@@ -16,10 +16,11 @@ from pathlib import Path
 import pytest
 
 from tests.bench.test_guided_session import Says
-from tests.bench.test_person import AT_TERMINAL, SCRIPT, Terminal
 from tests.crash.short import CALLER, RESUMER
 from tests.firmware.parts import Running, build, hurried
+from tests.support.command_line import SCRIPT
 from tests.support.mjpeg import Picture, Stream
+from tests.support.terminal import AT_TERMINAL, Terminal
 from tests.unit.devices.test_real_bench import Scene, write_rig
 from tests.unit.procedure.engine.test_check import PROCEDURE
 from workbench.model import event as ev
@@ -185,7 +186,7 @@ def test_at_the_terminal(room: Room) -> None:
     begun.type("")
     assert begun.end() == 7, begun.text
     assert "Traceback" not in begun.text
-    red = begun.text.partition("\x1b[31m")[2]
+    red = " ".join(begun.text.partition("\x1b[31m")[2].split())
     assert "error: the lasers may be on" in red
     assert "treat the beams as on" in red
     assert "workbench resume" in begun.text

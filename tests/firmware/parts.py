@@ -121,8 +121,11 @@ class Running:
         return last
 
     def stop(self) -> None:
+        """End it; a second call has no effect."""
         self._process.kill()
-        self._process.communicate()
+        self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
 
 
 Start = Callable[[], Running]

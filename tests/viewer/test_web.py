@@ -1,4 +1,4 @@
-"""`workbench view --web`: viewer and recording on loopback. No browser is started: it would be a download."""
+"""`workbench view --web`: viewer and recording on loopback, opened in a real browser."""
 
 from __future__ import annotations
 
@@ -12,8 +12,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from http.client import HTTPConnection
 from pathlib import Path
+from urllib.parse import quote
 
+import numpy as np
+
+from tests.support.browser import Picture, headless_browser
 from tests.viewer.conftest import Recorded
+from workbench.model.chart import PALETTE
 from workbench.viewer.window import LOOPBACK, free_port
 
 START_S = 30.0
@@ -93,3 +98,17 @@ def test_viewer_and_recording_are_served_on_loopback_only(recorded: Recorded, tm
         assert b"<html" in html.lower()
         status, program = fetched(page, "/re_viewer_bg.wasm")
         assert (status, program[:4]) == (200, b"\0asm")
+
+
+def test_a_browser_shows_the_recording(recorded: Recorded, tmp_path: Path) -> None:
+    """The page starts without a graphics card, loads the recording and draws it in the lasers' colours."""
+    with served(recorded.recording, tmp_path) as (data, page), headless_browser(tmp_path) as browser:
+        source = quote(f"rerun+http://{LOOPBACK}:{data}/proxy", safe="")
+        browser.open(f"http://{LOOPBACK}:{page}?url={source}")
+        browser.wait_for(lambda picture: all(has_color(picture, color) for color in PALETTE[:4]))
+
+
+def has_color(picture: Picture, color: str) -> bool:
+    """Whether at least ten pixels are `#rrggbb`, to two of 255."""
+    wanted = np.array([int(color[at : at + 2], 16) for at in (5, 3, 1)])
+    return int(np.sum(np.all(np.abs(picture.astype(int) - wanted) <= 2, axis=2))) >= 10

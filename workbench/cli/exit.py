@@ -11,6 +11,7 @@ from typing import NoReturn
 
 from workbench.cli.console import print_message
 from workbench.cli.stopping import ignore_signals
+from workbench.cli.verdict import VerdictShownError
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
 
 INTERNAL_ERROR = 1
@@ -54,6 +55,8 @@ def report(error: BaseException) -> int:
         if any(isinstance(e, BrokenPipeError) for e in chain):  # as with `| head`; typer turns it into 1
             return StoppedError.exit_code
         return error.code if isinstance(error.code, int) else int(error.code is not None)
+    if isinstance(error, VerdictShownError):
+        return error.exit_code
     if isinstance(error, WorkbenchError):
         print_message(f"error: {error}")
         return error.exit_code

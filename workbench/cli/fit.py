@@ -7,7 +7,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from textwrap import wrap
 from typing import Any
 
 from rich.console import Console
@@ -21,8 +20,10 @@ from workbench.calibration.verdict.assessment import Assessment, derive
 from workbench.calibration.verdict.export import accept_with_reason, calibrate, write_calibration
 from workbench.calibration.verdict.records import fit_finished, parameter_records
 from workbench.calibration.verdict.tables import derived_table
+from workbench.cli.brief_notes import brief_notes, merge_equal_kinds
 from workbench.cli.captures_source import calibration_table
 from workbench.cli.invocation import command_line
+from workbench.cli.verdict import Verdict, VerdictShownError, and_more, show_verdict, split_reason
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Calibration, Provenance
 from workbench.model.captures import (
@@ -32,7 +33,7 @@ from workbench.model.captures import (
     parse_captures,
     read_captures_file,
 )
-from workbench.model.errors import BadInputError, LimitFailedError
+from workbench.model.errors import BadInputError
 from workbench.model.fit_event import Rejected
 from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
 from workbench.model.nested import fix_parameters
@@ -44,8 +45,6 @@ from workbench.session.caller import now, operator
 from workbench.session.files import check_output
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
 
-MOST_REASONS = 3
-"""Largest number of reasons that a refusal prints."""
 MOST_ROWS = 12
 """Largest number of rejected rows that an error prints."""
 
@@ -115,8 +114,13 @@ def _fit_recording(rig: Rig, request: Request) -> FittedSource:
     return FittedSource((), fitted, calibration, assessment)
 
 
-def fit_captures(request: Request, as_json: bool) -> None:
+def fit_captures(request: Request, as_json: bool, details: bool = False) -> None:
     """Fit and print a calibration, and write it if it is accepted.
+
+    Args:
+        request: arguments of the command.
+        as_json: whether to print the result as JSON too.
+        details: whether to print the tables below the verdict, and all notes.
 
     Raises:
         BadInputError: a file or an option is wrong.
@@ -137,14 +141,11 @@ def fit_captures(request: Request, as_json: bool) -> None:
         record_fit(found, request.source.stem, request.recording)
     if as_json:
         print(json.dumps(_as_json(fitted, assessment)))
-    _print_tables(fitted, assessment)
+    show_verdict(_verdict(found, request, details))
+    if details:
+        _print_tables(fitted, assessment)
     if refused:
-        raise LimitFailedError(_refusal(request.output, assessment.reasons))
-    by_reason = request.accept is not None and assessment.verdict == "refused"
-    reason = f", accepted because: {request.accept}" if by_reason else ""
-    Console(stderr=True, markup=False).print(
-        f"{request.output} written{reason}", highlight=False, soft_wrap=True
-    )
+        raise VerdictShownError(f"the calibration is refused; {request.output} is not written")
 
 
 def record_fit(found: FittedSource, name: str, out: Path) -> None:
@@ -253,26 +254,31 @@ def _rejected_json(rejected: Rejected) -> dict[str, Any]:
     )
 
 
-def _refusal(output: Path, reasons: Sequence[str]) -> str:
-    """Message of a refusal, wrapped for a terminal: causes and remedies."""
-    lines = [f"the calibration is refused; {output} is not written"]
-    for reason in reasons[:MOST_REASONS]:
-        wrong, _, remedy = reason.partition(". Do: ")
-        lines += _wrapped("wrong", wrong) + (_wrapped("do", remedy) if remedy else [])
-    if (others := len(reasons) - MOST_REASONS) > 0:
-        lines.append(f"and {others} more, possibly consequences of these; --json lists all")
-    return "\n".join(lines)
-
-
-def _wrapped(label: str, text: str) -> list[str]:
-    first = f"{label + ':':<7}"
-    return wrap(
-        text,
-        width=80,
-        initial_indent=first,
-        subsequent_indent=" " * len(first),
-        break_long_words=False,
-        break_on_hyphens=False,
+def _verdict(found: FittedSource, request: Request, details: bool) -> Verdict:
+    """Verdict on the fit, and the fate of the output."""
+    assessment, fitted = found.assessment, found.fitted
+    worst = found.calibration.laser_ranger.validity.max_relative_range_sd
+    result = (
+        f"rms {fitted.rms_px:.2f} px over {counted(len(fitted.used), 'observation')};"
+        f" range uncertainty at most {100 * worst:.2g} % (1 sigma)"
+    )
+    not_used = [
+        f"not used: {line}" for line in merge_equal_kinds(dict.fromkeys(r.reason for r in fitted.rejected))
+    ]
+    notes = [] if details else [*brief_notes(assessment.warnings), *not_used]
+    if assessment.verdict == "refused" and request.accept is None:
+        return Verdict(
+            word="REFUSED",
+            headline=and_more(assessment.reasons),
+            action=split_reason(assessment.reasons[0])[1],
+            notes=notes,
+            labelled=[("file:", f"{request.output} is not written")],
+        )
+    although = [f"although {split_reason(reason)[0]}" for reason in assessment.reasons]
+    because = [f"accepted because: {request.accept}"] if although else []
+    written = ("file:", f"{request.output} written")
+    return Verdict(
+        word="ACCEPTED", headline=result, facts=[*because, *although], notes=notes, labelled=[written]
     )
 
 
@@ -291,8 +297,9 @@ def _print_tables(fitted: CalibrationFit, assessment: Assessment) -> None:
         )
     if assessment.cross_validation:
         console.print(TerminalTable(cross_validation_table(assessment.cross_validation)))
+    for reason in assessment.reasons:
+        console.print(f"reason: {reason}", highlight=False)
     for line in rejected_lines(fitted.rejected):
         console.print(f"rejected: {line}", highlight=False)
     for warning in assessment.warnings:
         console.print(f"note: {warning}", highlight=False)
-    console.print(f"verdict: {assessment.verdict}")

@@ -16,6 +16,7 @@ from workbench.cli.exit import exit_program, report
 from workbench.cli.option_types import (
     AcceptChanges,
     AnswersFile,
+    Details,
     NoInput,
     Sessions,
     View,
@@ -71,11 +72,17 @@ ExistingCalibration = Annotated[
 
 
 @app.command()
-def new(folder: Annotated[Path, typer.Argument(help="New or empty folder.")]) -> None:
-    """Lay out a laboratory's own folder: procedures, rigs, firmware."""
+def new(
+    folder: Annotated[Path, typer.Argument(help="New or empty folder.")],
+    no_input: Annotated[
+        bool, typer.Option("--no-input", help="Do not ask: write procedures, example rigs, firmware alone.")
+    ] = False,
+) -> None:
+    """Lay out a laboratory's own folder: procedures, rigs, firmware, and the rig file of its sensor."""
+    from workbench.cli.dialogue import is_interactive
     from workbench.cli.new import lay_out
 
-    print_message(lay_out(folder))
+    print_message(lay_out(folder, ask=is_interactive() and not no_input))
 
 
 @app.command()
@@ -87,11 +94,12 @@ def run(
     answers: AnswersFile = None,
     no_input: NoInput = False,
     view: View = None,
+    details: Details = False,
 ) -> None:
     """Run procedures on a rig in one session."""
-    from workbench.cli.run import Answers, run_procedures
+    from workbench.cli.run import Screen, run_procedures
 
-    run_procedures(procedures, rig, sessions, Answers(answers, no_input), calibration, view)
+    run_procedures(procedures, rig, sessions, Screen(answers, no_input, view, details), calibration)
 
 
 @app.command()
@@ -104,12 +112,14 @@ def resume(
     answers: AnswersFile = None,
     no_input: NoInput = False,
     view: View = None,
+    details: Details = False,
 ) -> None:
     """Resume a session that ended early; complete placements are not captured again."""
-    from workbench.cli.run import Answers, resume_session
+    from workbench.cli.run import Screen, resume_session
     from workbench.cli.sessions import find_session
 
-    resume_session(find_session(session, sessions), accept_changes, Answers(answers, no_input), view)
+    screen = Screen(answers, no_input, view, details)
+    resume_session(find_session(session, sessions), accept_changes, screen)
 
 
 class FitVerdict(StrEnum):
@@ -200,6 +210,7 @@ def fit(
         Path | None, typer.Option(metavar="FILE", help="Recording of the fit to write, for `workbench view`.")
     ] = None,
     json: Json = False,
+    details: Details = False,
 ) -> None:
     """Fit a calibration to images or pixel positions at known standoffs."""
     gc.set_threshold(1_000_000)  # more objects than a fit creates: collection would only take time
@@ -207,7 +218,7 @@ def fit(
 
     without, fixed = tuple(without_standoff or ()), tuple(fix or ())
     request = Request(source, rig, output, accept, without, fixed, recording)
-    fit_captures(request, json)
+    fit_captures(request, json, details)
     exit_program(0, at_once=True)
 
 

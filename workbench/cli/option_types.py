@@ -21,6 +21,7 @@ View = Annotated[
     bool | None,
     typer.Option("--view/--no-view", help="Watch in the Rerun viewer. Default: if there is a display."),
 ]
+Details = Annotated[bool, typer.Option("--details", help="Print the tables of a fit, and all its notes.")]
 Sessions = Annotated[Path, typer.Option(help="Folder of sessions.")]
 
 MOST_MM = 1e6

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 
 from workbench.devices.protocols import Operator
 from workbench.model import event as ev
 from workbench.model.errors import AnswerNeededError, BadInputError, StoppedError
-from workbench.model.prompt import Prompt
+from workbench.model.prompt import Action, Prompt
 from workbench.procedure.engine.repair import Repair
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
@@ -38,8 +37,8 @@ def suspects(fit: ev.FitFinished) -> list[str]:
     return list(dict.fromkeys(named)) or [one.placement for one in fit.left_out if one.alarm]
 
 
-def repair_commands(session_dir: Path, fit: ev.FitFinished) -> list[str]:
-    """Commands that repair a refused session.
+def repair_commands(session_dir: Path, fit: ev.FitFinished) -> list[list[str]]:
+    """Commands that repair a refused session, as lists of words, the recommended one first.
 
     Args:
         session_dir: session.
@@ -51,14 +50,20 @@ def repair_commands(session_dir: Path, fit: ev.FitFinished) -> list[str]:
         for option in ("--recapture", "--leave-out")
         if suspects(fit)
     ]
-    if not commands and fit.left_out:
-        # No evidence against it: it is offered to be captured again, never to be left out.
-        worst = max(fit.left_out, key=lambda one: abs(one.z))
-        commands.append([*start, "--recapture", worst.placement, "--reason", "largest residual, no alarm"])
+    if not commands and (worst := _worst(fit)) is not None:
+        commands.append([*start, "--recapture", worst, "--reason", "largest residual, no alarm"])
     if (advised := _advised_mm(session_dir)) is not None:
         commands.append([*start, "--add", f"{advised:g}", "--reason", "the most informative standoff"])
     commands.append([*start, "--accept", "--reason", "the failed limit does not matter here"])
-    return [shlex.join(command) for command in commands]
+    return commands
+
+
+def _worst(fit: ev.FitFinished) -> str | None:
+    """Key of the placement with the largest error of the cross-validation.
+
+    There is no evidence against it: it is offered to be captured again, never to be left out.
+    """
+    return max(fit.left_out, key=lambda one: abs(one.z)).placement if fit.left_out else None
 
 
 def _advised_mm(session_dir: Path) -> float | None:
@@ -68,23 +73,26 @@ def _advised_mm(session_dir: Path) -> float | None:
     return advised[-1] if advised else None
 
 
-def ask_for_repair(fit: ev.FitFinished, why: str, operator: Operator) -> Repair | None:
-    """Repair that a person chooses at the bench; None without a suspect, a person or a wish.
+def ask_for_repair(fit: ev.FitFinished, operator: Operator) -> Repair | None:
+    """Repair that a person chooses at the bench; None without a placement, a person or a wish.
 
     Args:
         fit: refused fit of the session.
-        why: reason of the refusal.
         operator: person at the terminal.
     """
-    keys = tuple(suspects(fit))
+    named, worst = tuple(suspects(fit)), _worst(fit)
+    keys = named or ((worst,) if worst is not None else ())
     if not keys:
         return None
-    places = ", ".join(key.rpartition("/")[2] for key in keys)
+    places = ", ".join(key.rpartition("/")[2].replace("mm", " mm") for key in keys)
+    may: dict[Action, str] = {"redo": f"capture {places} again now"}
+    if named:
+        may["skip"] = f"leave {places} out"
     prompt = Prompt(
         key="repair",
-        do=why[:1].upper() + why[1:],
-        yes="end here; the session can be repaired later",
-        may={"redo": f"capture {places} again now", "skip": f"leave {places} out"},
+        do="End the session here, with its calibration refused?",
+        yes="end; it can be repaired later",
+        may=may,
     )
     try:
         answer = operator.ask(prompt)

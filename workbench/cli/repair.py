@@ -10,6 +10,7 @@ import typer
 from workbench.cli.option_types import (
     AcceptChanges,
     AnswersFile,
+    Details,
     NoInput,
     Sessions,
     View,
@@ -49,9 +50,10 @@ def repair(
     answers: AnswersFile = None,
     no_input: NoInput = False,
     view: View = None,
+    details: Details = False,
 ) -> None:
     """Repair an ended session: capture placements again, leave out, restore or add them."""
-    from workbench.cli.run import Answers, resume_session
+    from workbench.cli.run import Screen, resume_session
     from workbench.cli.sessions import find_session
     from workbench.procedure.engine.repair import Repair
 
@@ -64,4 +66,4 @@ def repair(
         accept=accept,
     )
     folder = find_session(session, sessions)
-    resume_session(folder, accept_changes, Answers(answers, no_input), view, decisions)
+    resume_session(folder, accept_changes, Screen(answers, no_input, view, details), decisions)

@@ -12,10 +12,12 @@ from rich.console import Console
 from workbench.cli.background import Background
 from workbench.cli.console import print_message
 from workbench.cli.invocation import command_line
-from workbench.cli.refusal import ask_for_repair, refused_fit, repair_commands
+from workbench.cli.refusal import ask_for_repair, refused_fit
+from workbench.cli.session_verdict import session_verdict
 from workbench.cli.stopping import StopAfterCapture
 from workbench.cli.terminal import FaultTolerantConsumer, Terminal
 from workbench.cli.terminal_operator import choose_operator
+from workbench.cli.verdict import VerdictShownError, show_verdict
 from workbench.devices.protocols import Operator
 from workbench.model import event as ev
 from workbench.model.chart import laser_colors
@@ -42,13 +44,17 @@ from workbench.viewer.window import has_display, viewer_executable, watch
 
 
 @dataclass(frozen=True)
-class Answers:
-    """Options for answers to prompts."""
+class Screen:
+    """Options for what is shown and asked."""
 
-    file: Path | None = None
+    answers: Path | None = None
     """Answers file."""
     no_input: bool = False
     """Whether no person is asked."""
+    view: bool | None = None
+    """Whether to open the viewer; None: if there is a display."""
+    details: bool = False
+    """Whether to print the tables of fits, and all notes."""
 
 
 @dataclass(frozen=True)
@@ -64,26 +70,24 @@ def run_procedures(
     procedures: list[Path],
     rig_path: Path,
     sessions: Path,
-    answers: Answers,
+    screen: Screen,
     calibration: Path | None = None,
-    view: bool | None = None,
 ) -> None:
-    """Run procedures in a new session with progress on the terminal, and in the viewer (`view_live`).
+    """Run procedures in a new session with progress on the terminal and in the viewer.
 
     Raises:
         WorkbenchError: see `workbench.procedure.engine.run.run`.
     """
     plan = Plan.load(rig_path, procedures, calibration)
     session_dir = plan.new_session(sessions)
-    with _repairable(session_dir, plan, answers, view) as ui:
+    with _repairable(session_dir, plan, screen) as ui:
         run(plan, session_dir, ui.consumers, _caller(), ui.stopping, ui.operator)
 
 
 def resume_session(
     session_dir: Path,
     accept_changes: str | None,
-    answers: Answers,
-    view: bool | None = None,
+    screen: Screen,
     repair: Repair | None = None,
 ) -> None:
     """Resume a session that ended early, or repair one that has ended.
@@ -93,62 +97,66 @@ def resume_session(
     """
     now, _ = files_now(session_dir, load_manifest(session_dir))
     plan = plan_of(session_dir, now)
-    with _repairable(session_dir, plan, answers, view) as ui:
+    with _repairable(session_dir, plan, screen) as ui:
         resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes, repair)
 
 
 @contextmanager
-def _repairable(
-    session_dir: Path, plan: Plan, answers: Answers, view: bool | None
-) -> Iterator[SessionInterface]:
-    """`session_interface`; if the calibration is refused, prints repairs, or lets a person choose one."""
+def _repairable(session_dir: Path, plan: Plan, screen: Screen) -> Iterator[SessionInterface]:
+    """`session_interface`, then the verdict; lets a person repair a refused calibration at once."""
     try:
-        with session_interface(session_dir, plan, answers, view) as ui:
+        with session_interface(session_dir, plan, screen) as ui:
             yield ui
     except LimitFailedError as refused:
-        fit = refused_fit(session_dir)
-        if fit is None:
-            raise
-        for command in repair_commands(session_dir, fit):
-            print_message(f"repair:  {command}")
-        stop, console = StopAfterCapture(), Console(stderr=True, markup=False)
-        person = choose_operator(answers.no_input, console, lambda: stop.reason, nullcontext)
-        repair = ask_for_repair(fit, str(refused), person)
-        if repair is None:
-            raise
-        resume_session(session_dir, None, answers, view, repair)
+        show_verdict(session_verdict(session_dir, refused))
+        if not _repaired(session_dir, screen):
+            raise VerdictShownError(str(refused)) from refused
+        return
+    show_verdict(session_verdict(session_dir, None))
+
+
+def _repaired(session_dir: Path, screen: Screen) -> bool:
+    """Whether a person has chosen a repair, which has then been done."""
+    fit = refused_fit(session_dir)
+    if fit is None:
+        return False
+    stop, console = StopAfterCapture(), Console(stderr=True, markup=False)
+    person = choose_operator(screen.no_input, console, lambda: stop.reason, nullcontext)
+    repair = ask_for_repair(fit, person)
+    if repair is None:
+        return False
+    resume_session(session_dir, None, screen, repair)
+    return True
 
 
 @contextmanager
-def session_interface(
-    session_dir: Path, plan: Plan, answers: Answers, view: bool | None = None
-) -> Iterator[SessionInterface]:
-    """Terminal, recording, viewer, figures and operator for a session; prints its paths at the end.
+def session_interface(session_dir: Path, plan: Plan, screen: Screen) -> Iterator[SessionInterface]:
+    """Terminal, recording, viewer, figures and operator for a session; prints how to resume it.
 
     Args:
         session_dir: folder of the session.
         plan: rig and procedures.
-        answers: options for answers to prompts.
-        view: whether to open the viewer; None: if there is a display.
+        screen: options.
     """
-    watched = watch if view or (view is None and has_display()) else None
+    watched = watch if screen.view or (screen.view is None and has_display()) else None
     if watched is not None:
         viewer_executable()  # missing, it is named before the bench is opened
     console = Console(stderr=True, markup=False)
     stop = StopAfterCapture()
     script = None
-    if answers.file is not None:
-        script = ScriptedOperator.load(answers.file, plan.prompts(), NO_OPERATOR)
+    if screen.answers is not None:
+        script = ScriptedOperator.load(screen.answers, plan.prompts(), NO_OPERATOR)
     steps = plan.steps()
     if not is_compiled():
         print_message("note: the first capture compiles the search for spots, once, in one or two minutes")
     forecast = TimeLeft(steps, learn_durations(session_dir.parent, plan.rig.rig))
     recording = RecordingConsumer(session_dir, plan.rig, watch=watched)
     file = session_dir / RECORDING_FILE
-    with Background(recording, file, console) as beside, Terminal(console, forecast) as terminal:
-        person = beside.asking(
-            choose_operator(answers.no_input, console, lambda: stop.reason, terminal.quiet)
-        )
+    with (
+        Background(recording, file, console) as beside,
+        Terminal(console, forecast, screen.details) as terminal,
+    ):
+        person = beside.asking(choose_operator(screen.no_input, console, lambda: stop.reason, terminal.quiet))
         operator = person if script is None else replace(script, other=person)
         writer = FigureWriter(session_dir, laser_colors(plan.rig.laser_ids))
         figures = FaultTolerantConsumer(writer, "drawing figures", console)
@@ -165,8 +173,6 @@ def session_interface(
                         markup=False,
                     )
             raise
-    console.print(f"session: {session_dir}", highlight=False, soft_wrap=True)
-    console.print(f"replay:  workbench view {session_dir}", highlight=False, soft_wrap=True)
 
 
 def _caller() -> Invocation:

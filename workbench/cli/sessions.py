@@ -126,5 +126,5 @@ def next_command(one: SessionStatus) -> str | None:
     if not one.unfinished:
         return None
     if (fit := refused_fit(one.session_dir)) is not None:
-        return repair_commands(one.session_dir, fit)[0]
+        return shlex.join(repair_commands(one.session_dir, fit)[0])
     return shlex.join(["workbench", "resume", str(one.session_dir)])

@@ -27,8 +27,15 @@ from workbench.report.terminal_table import TerminalTable
 class Terminal:
     """Consumer that shows the records of a session."""
 
-    def __init__(self, console: Console, forecast: TimeLeft) -> None:
-        self._console, self._forecast = console, forecast
+    def __init__(self, console: Console, forecast: TimeLeft, details: bool = False) -> None:
+        """Terminal without progress display.
+
+        Args:
+            console: terminal.
+            forecast: estimate of the time left.
+            details: whether to print the tables of a fit, its notes, and the captures that it rejects.
+        """
+        self._console, self._forecast, self._details = console, forecast, details
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(bar_width=12),
@@ -101,7 +108,7 @@ class Terminal:
                 self._print(e.text)
             case ev.StepFinished() as e:
                 self._end_step(e.outcome)
-            case ev.FitFinished() as e:
+            case ev.FitFinished() as e if self._details:
                 for table in fit_tables(e):
                     self._console.print(TerminalTable(table))
                 for line in rejected_lines(e.rejected):

@@ -17,11 +17,14 @@ from pydantic import Field
 from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError
 
-REPLY_S = 1.0
-"""Longest wait for a reply, s. Controllers answer within milliseconds; a busy computer may add delay."""
+REPLY_S = 2.5
+"""Longest wait for a reply, s. Controllers answer within milliseconds, but a busy computer delivers late.
+Bytes of a serial line pass a kernel thread of ordinary priority, which took up to 1.6 s at a load of 20 on
+two cores. The controller's leases are shorter, so that no emission lasts longer for it."""
+BOOT_REPLY_S = 1.0
+"""Longest wait for a reply of a controller that may be booting, and is asked again, s."""
 LONGEST_REPLY = 200
-STATE, INTERLOCK = b"OK STATE ", b"OK INTERLOCK "
-OFF = b"OK OFF\n"
+STATE, INTERLOCK, ON, OFF = b"OK STATE ", b"OK INTERLOCK ", b"OK ON ", b"OK OFF\n"
 LOOK_S = 0.02
 """Time between two calls of `alarm` while a reply is awaited, s."""
 LINE_FAILURES = (serial.SerialException, OSError, termios.error)
@@ -75,8 +78,8 @@ class ControllerLine:
         while True:
             try:
                 # Off first, because another program may have left lasers on.
-                self._request("!", "OFF")
-                return self._request("*IDN?", "*IDN")
+                self._request("!", "OFF", within_s=BOOT_REPLY_S)
+                return self._request("*IDN?", "*IDN", within_s=BOOT_REPLY_S)
             except RigNotReadyError:
                 if time.monotonic() >= deadline:
                     raise
@@ -133,28 +136,35 @@ class ControllerLine:
         self._token = (self._token + 1) % 65_536
         return self._request(f"STATE? {self._token}", f"STATE {self._token}")
 
-    def _request(self, request: str, expected: str, alarm: Callable[[], bool] = lambda: False) -> str:
+    def _request(
+        self,
+        request: str,
+        expected: str,
+        alarm: Callable[[], bool] = lambda: False,
+        within_s: float = REPLY_S,
+    ) -> str:
         """Send a request and receive its reply `OK <expected>[ <rest>]`; returns the rest."""
         try:
             self._line.reset_input_buffer()
             self._line.write(request.encode() if request == "!" else f"{request}\n".encode())
-            received = self._receive(alarm, f"OK {expected}")
+            received = self._receive(alarm, f"OK {expected}", within_s)
         except LINE_FAILURES as error:
             raise self._unexpected(request, f"OK {expected}", f"a line failure ({error})") from None
         reply = received.decode("ascii", errors="backslashreplace")
         head = f"OK {expected}"
         if not (reply.endswith("\n") and f"{reply.rstrip()} ".startswith(f"{head} ")):
-            raise self._unexpected(request, head, repr(reply) if received else f"nothing within {REPLY_S} s")
+            raise self._unexpected(request, head, repr(reply) if received else f"nothing within {within_s} s")
         return reply.rstrip()[len(head) + 1 :]
 
-    def _receive(self, alarm: Callable[[], bool], head: str) -> bytes:
-        """Receive one line, possibly incomplete after `REPLY_S`; after an alarm, up to the reply to off.
+    def _receive(self, alarm: Callable[[], bool], head: str, within_s: float) -> bytes:
+        """Receive one line, possibly incomplete after `within_s`; after an alarm, up to the reply to off.
 
-        Late replies to earlier requests that switch nothing on are skipped.
+        Late replies to earlier requests are skipped. One to an earlier off or on does not answer the request
+        to switch on.
         """
         received, end, wanted = b"", b"\n", head.encode()
-        late = (STATE, INTERLOCK, OFF) if wanted.startswith(STATE) else (STATE, INTERLOCK)
-        deadline = time.monotonic() + REPLY_S
+        late = (STATE, INTERLOCK) if wanted.startswith(ON) else (STATE, INTERLOCK, ON, OFF)
+        deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
             while end == b"\n" in received and received.startswith(late) and not received.startswith(wanted):
                 received = received.partition(b"\n")[2]

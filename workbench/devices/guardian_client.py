@@ -22,8 +22,8 @@ from workbench.model.errors import (
     WorkbenchError,
 )
 
-ANSWER_S = 10.0
-"""Longest wait for an answer, s: two attempts of two requests of a second, and a busy computer."""
+ANSWER_S = 15.0
+"""Longest wait for an answer, s: a request and two attempts of two requests, of 2.5 s each, and some more."""
 LET_GO_S = 3.0
 """Time for a guardian to end if the hardware has no leases and the off is not confirmed, s."""
 SAFE_CODES = {0, BadInputError.exit_code, RigNotReadyError.exit_code}

@@ -7,10 +7,9 @@ import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import cv2
-import numpy as np
 from pydantic import Field, model_validator
 
 from workbench.devices.protocols import Frame
@@ -19,6 +18,7 @@ from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import RigNotReadyError
 from workbench.model.exposure import WIDEST
 from workbench.model.rig import CameraSpec, Name, PositiveFloat, Rig
+from workbench.spots.grey import to_grey
 
 SILENT_S = 1.5
 """Time without a frame after which a camera counts as unplugged, s; reported within two seconds."""
@@ -208,7 +208,7 @@ class OpenCvCamera:
                     made = self._exposure
                     _set(self._capture, self._device.source, cv2.CAP_PROP_EXPOSURE, "exposure", made)
                 ok, image = self._capture.read()
-                frame = Frame(_grey(image, 2**self._format.bits - 1), time.time_ns()) if ok else None
+                frame = Frame(to_grey(image, 2**self._format.bits - 1), time.time_ns()) if ok else None
             except (RigNotReadyError, cv2.error) as error:
                 self._end(str(error))
                 return
@@ -305,19 +305,3 @@ def _set(capture: cv2.VideoCapture, source: str, number: int, name: str, value: 
             f"camera {source}: {name}: requested {value:g}, the camera reports {reported:g}; state a"
             " supported value in the rig file, or remove the setting"
         )
-
-
-def _grey(image: np.ndarray[Any, Any], full_scale: int) -> Image:
-    """Grey image: the weighted mean of the colours, which is linear in the light and sharper than one colour.
-
-    The mean is not linear if a colour is clipped: such a pixel is set to full scale. (Otherwise a red spot
-    clips unnoticed at 30 % of full scale.)
-    """
-    if image.ndim == 2:
-        return image
-    if image.shape[2] == 1:
-        return image[:, :, 0]
-    grey: Image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=image.dtype)
-    blue, green, red = cv2.split(image)[:3]
-    grey[np.asarray(cv2.max(cv2.max(blue, green), red)) >= full_scale] = full_scale
-    return grey

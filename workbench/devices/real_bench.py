@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from workbench.devices.drivers import CameraDriver, DriverUnusableError, TargetDriver, load_driver
 from workbench.devices.guarded_lasers import GuardedLaserBank
 from workbench.devices.guarded_line import GuardedLine
-from workbench.devices.protocols import Bench
+from workbench.devices.protocols import Bench, Camera, Target
 from workbench.model.errors import BadInputError
 from workbench.model.problems import SchemaProblem
 from workbench.model.rig import Rig
@@ -42,20 +42,37 @@ def open_bench(rig: Rig) -> Bench:
         RigNotReadyError, LaserOffNotConfirmedError: a device fails.
     """
     refuse_problems(rig, tuple(KINDS))
-    camera: CameraDriver
-    target: TargetDriver
-    camera, camera_settings = _driver(rig, "camera")
-    target, target_settings = _driver(rig, "target")
     lasers = open_lasers(rig)
     try:
-        return Bench(
-            camera=camera.open(camera_settings, rig, lasers.beat),
-            lasers=lasers,
-            target=target.open(target_settings, rig),
-        )
+        return Bench(camera=open_camera(rig, lasers.beat), lasers=lasers, target=open_target(rig))
     except BaseException:
         lasers.close()
         raise
+
+
+def open_camera(rig: Rig, beat: Callable[[], None] = lambda: None) -> Camera:
+    """Open only the camera.
+
+    Args:
+        rig: rig.
+        beat: see `CameraDriver.open`; without effect where no laser is on.
+
+    Raises:
+        BadInputError: the driver is not installed, or its block is wrong.
+        RigNotReadyError: see `CameraDriver.open`.
+    """
+    refuse_problems(rig, ("camera",))
+    camera: CameraDriver
+    camera, settings = _driver(rig, "camera")
+    return camera.open(settings, rig, beat)
+
+
+def open_target(rig: Rig) -> Target:
+    """Open only the target; raises errors as `open_camera`."""
+    refuse_problems(rig, ("target",))
+    target: TargetDriver
+    target, settings = _driver(rig, "target")
+    return target.open(settings, rig)
 
 
 def open_lasers(rig: Rig) -> GuardedLaserBank:

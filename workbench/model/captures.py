@@ -117,12 +117,35 @@ def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:
         BadInputError: a column is missing or unknown, there are no rows, or values are wrong; one line for
             each wrong value, with row, column, expected value and actual value.
     """
-    rows = parse_csv(
-        path, content, EXPECTED, lambda names: _check_header(path, names), lambda row: _row(path, row)
-    )
+    lines: dict[tuple[str, ...], int] = {}
+    repeated: list[tuple[int, int]] = []
+
+    def parse_row(row: CsvRow) -> CaptureRow:
+        if (first := lines.setdefault((*row.cells, *row.cells.values()), row.line)) != row.line:
+            repeated.append((row.line, first))
+        return _row(path, row)
+
+    rows = parse_csv(path, content, EXPECTED, lambda names: _check_header(path, names), parse_row)
     if not rows:
         raise BadInputError(f"{path}: expected at least one row below the header, got none")
+    _refuse_repeated(path, repeated)
     return tuple(rows)
+
+
+def _refuse_repeated(path: Path, repeated: Sequence[tuple[int, int]]) -> None:
+    """Refuse rows that are pasted twice: as further repeats they would understate every deviation.
+
+    Args:
+        path: file, for messages.
+        repeated: line of each repeated row, and of the first one with the same values.
+    """
+    if repeated:
+        line, first = repeated[0]
+        more = f" ({len(repeated) - 1} more rows repeat others)" if len(repeated) > 1 else ""
+        raise BadInputError(
+            f"{path}: row {line} repeats row {first} in every column{more}; remove it, or give another"
+            " capture its own number in the column repeat"
+        )
 
 
 def check_images(path: Path, rows: Sequence[CaptureRow]) -> None:

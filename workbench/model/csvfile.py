@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from workbench.model.contents import not_text, printable, read_file
+from workbench.model.contents import CONTROL, not_text, printable, read_file
 from workbench.model.errors import BadInputError
 from workbench.model.problems import one_of, short
 
@@ -101,8 +101,10 @@ def _lines(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
         if separator != ",":
             raise BadInputError(f"{path}: row 1: {_other_separator(SEPARATORS.get(separator, separator))}")
     reader = csv.reader(io.StringIO(text, newline=""))
+    is_plain = CONTROL.search(text.replace("\r\n", "\n")) is None
     for cells in reader:
-        yield reader.line_num + above, [printable(cell).strip() for cell in cells]
+        plain = cells if is_plain else map(printable, cells)
+        yield reader.line_num + above, [cell.strip() for cell in plain]
 
 
 def _without_empty_end(cells: list[str]) -> list[str]:

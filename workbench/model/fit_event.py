@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 from workbench.model.calibration import TermSummary
@@ -52,8 +53,10 @@ class LaserError(FileModel):
     """
 
     laser_id: str
-    error_mm: float
+    error_mm: float | None
+    """None: the spot lies beyond where the laser's spot is at infinity."""
     sd_mm: float
+    """1 sigma at the standoff."""
 
 
 class CrossValidatedPlacement(FileModel):
@@ -61,9 +64,10 @@ class CrossValidatedPlacement(FileModel):
 
     placement: str
     standoff_mm: float
-    error_mm: float
-    """Range by all spots of the placement - standoff."""
+    error_mm: float | None
+    """Range by all spots of the placement - standoff; None: they lie beyond infinity."""
     sd_mm: float
+    """1 sigma at the standoff."""
     lasers: tuple[LaserError, ...]
     """Empty on the printed board: its tilt is known from its corners alone, a single spot's range is not."""
     alarm: bool = False
@@ -75,10 +79,21 @@ class CrossValidatedPlacement(FileModel):
     freedom: float | None = None
     """Degrees of freedom of the noise, estimated from the other placements; None: the noise is as stated."""
 
+    score: float | None = None
+    """Range error to first order in pixels, in predicted standard deviations; None where not recorded."""
+
     @property
     def z(self) -> float:
-        """Range error in predicted standard deviations."""
-        return self.error_mm / self.sd_mm
+        """Range error in predicted standard deviations, to first order in pixels: normal at any range."""
+        if self.score is not None:
+            return self.score
+        return inf if self.error_mm is None else self.error_mm / self.sd_mm
+
+    @property
+    def relative_error(self) -> float:
+        """Magnitude of the range error relative to the standoff; to first order in pixels beyond infinity."""
+        error_mm = self.z * self.sd_mm if self.error_mm is None else self.error_mm
+        return abs(error_mm) / self.standoff_mm
 
     @property
     def range_p(self) -> float:

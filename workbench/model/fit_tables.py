@@ -68,8 +68,8 @@ def cross_validation_table(placements: Sequence[CrossValidatedPlacement]) -> Tab
         ),
         rows=tuple(_placement_row(one, ids) for one in placements),
         caption=(
-            "error: range - standoff; u: 1 sigma; %: relative error of each laser alone;"
-            " !: error larger than u explains"
+            "error: range - standoff, none beyond infinity; u: 1 sigma at the standoff; error / u: to first"
+            " order in pixels; %: relative error of each laser alone; !: error larger than u explains"
         ),
     )
 
@@ -111,7 +111,9 @@ def worst_placements_table(fit: FitFinished, captures: Mapping[str, str], most: 
 
 
 def _placement_row(one: CrossValidatedPlacement, ids: Sequence[str]) -> tuple[float | bool | None, ...]:
-    relative = {laser.laser_id: laser.error_mm / one.standoff_mm for laser in one.lasers}
+    relative = {
+        laser.laser_id: laser.error_mm / one.standoff_mm for laser in one.lasers if laser.error_mm is not None
+    }
     return (one.standoff_mm, one.error_mm, one.sd_mm, one.z, one.alarm, *(relative.get(i) for i in ids))
 
 

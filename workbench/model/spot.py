@@ -21,6 +21,7 @@ class Failure(StrEnum):
     MERGED = "merged"
     AMBIENT_CHANGED = "ambient_changed"
     AT_EDGE = "at_edge"
+    ON_OFF_EXCHANGED = "on_off_exchanged"
 
 
 NO_FLAGS: frozenset[Failure] = frozenset()

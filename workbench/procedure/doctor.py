@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from workbench.calibration.data.spot_rows import prior_scanline
-from workbench.devices.protocols import Bench, Operator, StreamingCamera
+from workbench.devices.protocols import Bench, Camera, LaserBank, Operator, StreamingCamera
+from workbench.devices.real_bench import open_camera, open_lasers, open_target
+from workbench.devices.registry import open_bench, whole_bench
 from workbench.model.errors import LaserOffNotConfirmedError, RigNotReadyError, StoppedError
 from workbench.model.exposure import CLIPPED
 from workbench.model.number_text import counted
@@ -18,7 +23,7 @@ from workbench.model.rig import LaserSpec, Rig
 from workbench.model.target import Placement
 from workbench.procedure.capture.exposure import set_exposure
 from workbench.procedure.capture.latency import LEASE_S, count_latency
-from workbench.procedure.engine.prompts import placement_prompt, safety_prompt
+from workbench.procedure.engine.prompts import laser_class_prompt, placement_prompt, safety_prompt
 from workbench.spots import Failure, find_spots
 
 STANDOFF_MM = 500.0
@@ -37,6 +42,49 @@ class CheckResult:
     ok: bool
     found: str
     """Finding; after a failure also what to do."""
+    kind: Literal["checked", "noted", "not checked"] = "checked"
+    """`noted`: to be mended, but no hindrance. `not checked`: the part needs others that have failed."""
+
+
+def examine_rig(
+    rig: Rig, session_dir: Path, operator_of: Callable[[Bench], Operator]
+) -> Iterator[CheckResult]:
+    """Open the devices of a rig and check every part; a device that fails does not end the check.
+
+    Args:
+        rig: rig.
+        session_dir: folder beside which an emulated bench writes its files.
+        operator_of: operator for an opened bench.
+
+    Raises:
+        BadInputError: the rig names no usable devices.
+        AnswerNeededError, StoppedError, LaserOffNotConfirmedError: see `examine`.
+    """
+    if whole_bench(rig) is not None:
+        with open_bench(rig, session_dir) as bench:
+            yield from examine(rig, bench, operator_of(bench))
+        return
+    with ExitStack() as stack:
+        lasers: LaserBank | None = None
+        try:
+            lasers = stack.enter_context(closing(open_lasers(rig)))
+        except RigNotReadyError as error:
+            yield CheckResult("controller", False, str(error))
+            yield _not_checked("interlock", "the controller")
+        else:
+            yield from _controller(lasers)
+        try:
+            camera = stack.enter_context(closing(open_camera(rig, lasers.beat if lasers else lambda: None)))
+        except RigNotReadyError as error:
+            yield CheckResult("camera", False, str(error))
+        else:
+            yield _tried("camera", partial(_camera, rig, camera))
+            if lasers is not None:
+                bench = Bench(camera, lasers, open_target(rig))
+                yield from _with_emission(rig, bench, operator_of(bench))
+                return
+        for part in ("latency", "exposure", *(f"laser {laser.id}" for laser in rig.lasers)):
+            yield _not_checked(part, "controller and camera")
 
 
 def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[CheckResult]:
@@ -46,19 +94,43 @@ def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[CheckResult]
         AnswerNeededError, StoppedError: the operator does not confirm safety or the target's placement.
         LaserOffNotConfirmedError: a beam stays on.
     """
-    yield CheckResult("controller", True, f"answers, all lasers off, {bench.lasers.identity}")
-    yield _interlock(bench)
-    yield _tried("camera", partial(_camera, rig, bench))
+    yield from _controller(bench.lasers)
+    bench.mark("doctor/camera")
+    yield _tried("camera", partial(_camera, rig, bench.camera))
+    yield from _with_emission(rig, bench, operator)
+
+
+def _controller(lasers: LaserBank) -> Iterator[CheckResult]:
+    yield CheckResult("controller", True, f"answers, all lasers off, {lasers.identity}")
+    yield _interlock(lasers)
+
+
+def _with_emission(rig: Rig, bench: Bench, operator: Operator) -> Iterator[CheckResult]:
+    """Checks that switch lasers on, after safety and the target's placement are confirmed."""
+    if rig.laser_class is None and not bench.virtual:
+        answer = _asked(operator, laser_class_prompt())
+        rig = rig.model_copy(update={"laser_class": answer})
+        text = f'the rig file does not state it; add the line laser_class: "{answer}"'
+        yield CheckResult("laser class", True, text, kind="noted")
     for prompt in (safety_prompt(rig), _target_prompt()):
-        answer = operator.ask(prompt)
-        if answer.action != "done":
-            raise StoppedError(f"aborted by the operator at {prompt.key}: {answer.reason}")
+        _asked(operator, prompt)
     bench.target.place(_placement())
     # The latency comes first: without it the frames of the later checks could be stale.
     yield _tried("latency", partial(_latency, rig, bench))
     yield from _exposure(rig, bench)
     for laser in rig.lasers:
         yield _tried(f"laser {laser.id}", partial(_laser, rig, bench, laser))
+
+
+def _asked(operator: Operator, prompt: Prompt) -> float | str | None:
+    answer = operator.ask(prompt)
+    if answer.action != "done":
+        raise StoppedError(f"aborted by the operator at {prompt.key}: {answer.reason}")
+    return answer.value
+
+
+def _not_checked(part: str, needs: str) -> CheckResult:
+    return CheckResult(part, True, f"not checked: it needs {needs}", kind="not checked")
 
 
 def _tried(part: str, check: Callable[[], str]) -> CheckResult:
@@ -70,8 +142,11 @@ def _tried(part: str, check: Callable[[], str]) -> CheckResult:
         return CheckResult(part, False, str(error))
 
 
-def _interlock(bench: Bench) -> CheckResult:
-    closed = bench.lasers.state().interlock_closed
+def _interlock(lasers: LaserBank) -> CheckResult:
+    try:
+        closed = lasers.state().interlock_closed
+    except RigNotReadyError as error:
+        return CheckResult("interlock", False, str(error))
     if closed is None:
         return CheckResult(
             "interlock", True, "not reported by this driver; an open interlock makes the laser checks fail"
@@ -79,9 +154,8 @@ def _interlock(bench: Bench) -> CheckResult:
     return CheckResult("interlock", closed, "closed" if closed else "open: close the door or the key switch")
 
 
-def _camera(rig: Rig, bench: Bench) -> str:
-    bench.mark("doctor/camera")
-    image = bench.camera.grab().image
+def _camera(rig: Rig, camera: Camera) -> str:
+    image = camera.grab().image
     expected = (rig.camera.height_px, rig.camera.width_px)
     if image.shape != expected:
         raise RigNotReadyError(

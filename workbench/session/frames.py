@@ -16,6 +16,7 @@ from workbench.model.contents import not_text, read_file
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import FrameRef
 from workbench.session.files import sync_folder, write_record
+from workbench.spots.grey import to_grey
 
 LARGEST_BYTES = 2**30
 """Largest image file: 16 bits a pixel for the largest cameras, not compressed, in three colours."""
@@ -85,7 +86,7 @@ def recent_image(sha256: str) -> Image | None:
 
 
 def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
-    """Read a grey image, (height, width), uint8 or uint16; colour is converted to grey.
+    """Read a grey image, (height, width), uint8 or uint16; colour is converted by `to_grey`.
 
     Args:
         path: file in any format that OpenCV reads.
@@ -98,7 +99,7 @@ def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
     content = read_file(path, "an image", LARGEST_BYTES)
     _check_whole(path, content)
     # An orientation tag would rotate the image and move every spot: pixels are used as stored.
-    flags = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
+    flags = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         image = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
     except cv2.error as error:
@@ -113,9 +114,7 @@ def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
             f"{path}: expected an image of {size_px[0]} x {size_px[1]} pixels,"
             f" got {image.shape[1]} x {image.shape[0]}; is it from another camera or mode?"
         )
-    return (
-        image.astype(np.uint8, copy=False) if image.dtype == np.uint8 else image.astype(np.uint16, copy=False)
-    )
+    return to_grey(image)
 
 
 def _check_whole(path: Path, content: bytes) -> None:

@@ -48,6 +48,12 @@ _TEXTS: Final[dict[Failure, str]] = {
         "A spot touches the border of the image; the part outside is missing. Cause: the target is too "
         "close or off to the side. Do: move the target until the whole spot is inside the image."
     ),
+    Failure.ON_OFF_EXCHANGED: (
+        "The spot is in the frame with the lasers off, and not in the one with the lasers on. Cause: the two "
+        "frames are exchanged, or the camera's frames lag behind the switching of the lasers. "
+        "Do: exchange the columns on and off, or measure the latency (workbench doctor) and discard as many "
+        "frames."
+    ),
 }
 
 

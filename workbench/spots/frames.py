@@ -11,6 +11,7 @@ from workbench.model.errors import BadInputError
 
 _DTYPES = (np.dtype(np.uint8), np.dtype(np.uint16))
 _FULL_SCALES_IN_16_BITS = tuple(2**bits - 1 for bits in (10, 12, 14, 16))
+_FULL_SCALES_LEFT_ALIGNED = tuple(2**16 - 2**free for free in range(1, 9))
 
 
 def check_frame(frame: object, name: str) -> Image:
@@ -51,12 +52,24 @@ def check_pair(on: object, off: object | None) -> tuple[Image, Image | None]:
     return on, off
 
 
-def default_saturation_dn(on: Image) -> int:
+def default_saturation_dn(on: Image, bits: int | None = None) -> int:
     """Value at which a pixel counts as clipped: the full scale of the depth.
 
-    A camera of 10, 12 or 14 bits delivers uint16: the smallest full scale not below the brightest pixel.
+    A camera of 10, 12 or 14 bits delivers uint16. Its values are left-aligned if all are multiples of 2^k and
+    the brightest is 65536 - 2^k, the full scale then. Otherwise they are right-aligned.
+
+    Args:
+        on: frame.
+        bits: depth of a right-aligned frame of uint16; None: that of the smallest full scale not below the
+            brightest pixel.
     """
     if on.dtype == np.uint8:
         return 255
     brightest = int(on.max())
+    if bits is not None and brightest < 1 << bits:
+        return (1 << bits) - 1
+    if brightest in _FULL_SCALES_LEFT_ALIGNED:
+        step = 2**16 - brightest
+        if int(np.bitwise_or.reduce(on, axis=None)) % step == 0:
+            return brightest
     return next(full_scale for full_scale in _FULL_SCALES_IN_16_BITS if full_scale >= brightest)

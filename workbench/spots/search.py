@@ -120,6 +120,8 @@ class Search:
         failures = [Failure.AMBIENT_CHANGED] if any(s.ambient_changed for s in scenes) else []
         if len(spots) < len(fits):
             failures.append(Failure.OFF_SCANLINE)
+        if not fits and self._wants_reasons and self._is_exchanged(pair):
+            failures.append(Failure.ON_OFF_EXCHANGED)
         if not spots or (self._expected is not None and len(spots) < self._expected):
             failures.append(Failure.TOO_FEW if spots else Failure.NO_SPOT)
             failures += self._reasons(pair, scenes, spots) if self._wants_reasons else []
@@ -128,6 +130,13 @@ class Search:
         if flags := NO_FLAGS.union(*(s.flags for s in spots)):
             failures += [f for f in Failure if f in flags]
         return tuple(dict.fromkeys(failures))
+
+    def _is_exchanged(self, pair: Pair) -> bool:
+        """Whether spots are in the frame with the lasers off instead."""
+        if pair.off is None:
+            return False
+        exchanged = Pair(pair.off, pair.on, pair.clip_dn, stated_contrast2=self._contrast2)
+        return bool(self._search([measure_signal(exchanged, strip) for strip in self._strips]))
 
     def _reasons(self, pair: Pair, scenes: list[PairSignal], spots: list[Spot]) -> list[Failure]:
         """Reasons for missing spots: too dim, or outside the band (for which the whole frame is searched)."""

@@ -57,7 +57,7 @@ class ValidateStep(StepModel):
         placements = context.cross_validation
         if not placements:
             raise BadInputError(f"step {name}: nothing to validate; expected a fit of 3 placements or more")
-        worst_error = max(abs(one.error_mm) / one.standoff_mm for one in placements)
+        worst_error = max(one.relative_error for one in placements)
         worst_z = max(abs(one.z) for one in placements)
         values = {"worst_relative_error": worst_error, "worst_z": worst_z}
         verdict = check_fit(context, name, values, self.limits)

@@ -7,6 +7,7 @@ quarter less. Static values and layouts that a later one has replaced are droppe
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
@@ -38,7 +39,7 @@ def compact(recording: Path, layout: rrb.Blueprint) -> bool:
     compacted = recording.with_name(recording.name + ".compacted")
     try:
         _write(recording, compacted, layout)
-        if not is_complete(compacted):
+        if not is_complete(compacted) or rows(compacted) != rows(recording):
             return False
         compacted.replace(recording)
     except (OSError, RuntimeError, ValueError):  # of Rerun: a damaged recording, a full disk
@@ -48,6 +49,15 @@ def compact(recording: Path, layout: rrb.Blueprint) -> bool:
     finally:
         with suppress(OSError):
             compacted.unlink()
+
+
+def rows(recording: Path) -> Counter[str]:
+    """Number of rows of each entity that belong to a time; later static values replace earlier ones."""
+    counted: Counter[str] = Counter()
+    for chunk in RrdReader(str(recording)).stream():
+        if not chunk.is_static:
+            counted[chunk.entity_path] += chunk.num_rows
+    return counted
 
 
 def _write(recording: Path, out: Path, layout: rrb.Blueprint) -> None:

@@ -8,7 +8,8 @@ peak of its spot. Squares of lasers that were lit earlier at the same placement 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from math import ceil
 
 import cv2
@@ -55,8 +56,28 @@ class Crop:
     """None: no spot; the square shows where it was expected."""
     others: tuple[Spot, ...] = ()
     """The other spots of the capture, which may lie in the square."""
-    earlier: bool = False
-    """Whether it is of an earlier capture at the same placement."""
+
+    # Cached, because a crop stays in the picture while the other lasers are captured.
+    @cached_property
+    def squares(self) -> tuple[Image, Image]:
+        """The square of the signal, and that of the residual (grey where the profile fits)."""
+        return drawn(self)
+
+    @cached_property
+    def cross(self) -> FloatArray:
+        """(4, 2, 2) arms of the cross, px of the square."""
+        return self._in_square(cross)
+
+    @cached_property
+    def ellipses(self) -> FloatArray:
+        """(2, 25, 2) outlines, px of the square."""
+        return self._in_square(ellipses)
+
+    def _in_square(self, of: Callable[[Spot], list[FloatArray]]) -> FloatArray:
+        """Lines about the centre of the spot, cut at the edge of the square; none without a spot."""
+        if self.spot is None:
+            return np.empty((0, 2, 2))
+        return np.clip(np.array(of(self.spot)) - [self.left_px, self.top_px], -0.5, SIDE_PX - 0.5)
 
 
 @dataclass
@@ -66,10 +87,13 @@ class Crops:
     stream: Stream
     colors: Mapping[str, at.Rgb]
     latest: dict[str, Crop] = field(default_factory=dict)
+    earlier: set[str] = field(default_factory=set)
+    """Lasers whose crop is of an earlier capture at the same placement."""
 
     def log_none(self) -> None:
         """Remove the crops of the previous placement and log an empty picture."""
         self.latest.clear()
+        self.earlier.clear()
         self._log()
 
     def take(
@@ -83,13 +107,14 @@ class Crops:
             spots: spots with their lasers; others are ignored.
             expected: (2,) expected position, px, of the spot of each laser that was on.
         """
-        self.latest = {laser: replace(crop, earlier=True) for laser, crop in self.latest.items()}
+        self.earlier = set(self.latest)
         self._add(on, off, spots, expected)
         self._log()
 
     def take_each(self, captures: Sequence[Capture]) -> None:
         """Log the crops of captures of one laser each, in place of all earlier ones."""
         self.latest.clear()
+        self.earlier.clear()
         for capture in captures:
             self._add(*capture)
         self._log()
@@ -106,6 +131,7 @@ class Crops:
             if np.isfinite(centre).all():
                 others = tuple(one for one in spots if one is not spot)
                 self.latest[laser] = _crop(on, off, centre, spot, others)
+                self.earlier.discard(laser)
 
     def _log(self) -> None:
         lasers = list(self.colors)
@@ -116,37 +142,37 @@ class Crops:
             column, row = cell_corner(n, len(lasers))
             crop = self.latest.get(laser)
             places.append((column + SIDE_PX + GAP_PX / 2, row - LABEL_PX / 2))
-            labels.append(label(laser, crop))
+            labels.append(label(laser, crop, laser in self.earlier))
             saturated = crop is not None and crop.spot is not None and Failure.SATURATED in crop.spot.flags
             label_colors.append(at.RED if saturated else self.colors[laser])
-        self._log_outlines(at.CROPS_CENTRES, cross)
-        self._log_outlines(at.CROPS_ELLIPSES, ellipses)
+        self._log_outlines(at.CROPS_CENTRES, lambda crop: crop.cross)
+        self._log_outlines(at.CROPS_ELLIPSES, lambda crop: crop.ellipses)
         self.stream.log(
             at.CROPS_LABELS,
             rr.Points2D(places, labels=labels, colors=label_colors, radii=_NO_DOT, show_labels=True),
         )
 
-    def _log_outlines(self, entity: str, of: Callable[[Spot], list[FloatArray]]) -> None:
-        """Log lines about the centre of each crop's spot, cut at the edge of its square."""
-        strips, colors = [], []
-        for n, laser in enumerate(self.colors):
+    def _log_outlines(self, entity: str, of: Callable[[Crop], FloatArray]) -> None:
+        """Log lines about the centre of each crop's spot."""
+        strips: list[FloatArray] = []
+        colors: list[at.Rgb] = []
+        for n, (laser, color) in enumerate(self.colors.items()):
             crop = self.latest.get(laser)
             if crop is None or crop.spot is None:
                 continue
-            corner = np.array(cell_corner(n, len(self.colors))) + RERUN_PIXEL_CENTRE
-            left_top = np.array([crop.left_px, crop.top_px])
-            for strip in of(crop.spot):
-                strips.append(np.clip(strip - left_top, -0.5, SIDE_PX - 0.5) + corner)
-                colors.append(self.colors[laser])
-        drawn_strips = np.array(strips)  # as one array it is converted ten times faster
+            lines = of(crop) + np.array(cell_corner(n, len(self.colors))) + RERUN_PIXEL_CENTRE
+            strips += [*lines]
+            colors += [color] * len(lines)
+        # As one array it is converted ten times faster.
+        drawn_strips = np.array(strips, dtype=np.float32)
         self.stream.log(entity, rr.LineStrips2D(drawn_strips, colors=colors, radii=_THIN if strips else None))
 
 
-def label(laser: str, crop: Crop | None) -> str:
+def label(laser: str, crop: Crop | None, is_earlier: bool) -> str:
     """Text above a laser's squares."""
     if crop is None:
         return laser
-    earlier = " earlier" if crop.earlier else ""
+    earlier = " earlier" if is_earlier else ""
     if crop.spot is None:
         return f"{laser}{earlier} no spot"
     flags = "".join(f", {flag}" for flag in sorted(crop.spot.flags))
@@ -179,7 +205,7 @@ def mosaic(crops: Sequence[Crop | None]) -> Image:
     canvas = np.full((height, width), 26, np.uint8)
     for n, crop in enumerate(crops):
         column, row = cell_corner(n, len(crops))
-        squares = (np.zeros((SIDE_PX, SIDE_PX), np.uint8),) * 2 if crop is None else drawn(crop)
+        squares = (np.zeros((SIDE_PX, SIDE_PX), np.uint8),) * 2 if crop is None else crop.squares
         for k, square in enumerate(squares):
             left = column + k * (SIDE_PX + GAP_PX)
             canvas[row : row + SIDE_PX, left : left + SIDE_PX] = square

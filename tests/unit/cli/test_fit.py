@@ -52,7 +52,10 @@ def test_fit_prints_one_object_and_writes_the_calibration(workbench: Run, tmp_pa
     of_f = result["null_directions"][0]
     assert list(of_f["change"]) == ["f_px", "1.y_mm"]
     assert of_f["words"] in " ".join(result["warnings"])
-    assert of_f["words"] in " ".join(outcome.err.split())
+    detailed = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", output, "--json", "--details")
+    assert json.loads(detailed.out) == result
+    assert of_f["words"] in " ".join(detailed.err.split())
+    assert of_f["words"] not in " ".join(outcome.err.split())
     assert any("-1.35 px in v of laser 1 at 300 mm" in text for text in result["warnings"])
     assert load_calibration(output).laser_ranger.provenance.command.startswith("workbench fit")
 
@@ -74,7 +77,9 @@ def test_a_refused_calibration_is_reported_and_not_written(workbench: Run, tmp_p
     output.write_text("as it was\n")
     outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", output, "--json")
     refused(outcome, 3, "2 standoffs", output)
-    assert outcome.err.splitlines()[-1].startswith("do: ")  # the remedy comes last
+    first, *others = outcome.err.split("\n\n")[-1].strip().splitlines()
+    assert first.startswith("REFUSED ")
+    assert [line for line in others if line.startswith("do: ")]
     assert json.loads(outcome.out)["verdict"] == "refused"
     assert output.read_text() == "as it was\n"
 
@@ -82,9 +87,16 @@ def test_a_refused_calibration_is_reported_and_not_written(workbench: Run, tmp_p
 def test_without_json_nothing_is_on_stdout(workbench: Run, tmp_path: Path) -> None:
     outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
     assert outcome.out == ""
-    *tables, written = outcome.err.splitlines()
-    assert max(len(line) for line in tables) <= 80
-    assert written == f"{tmp_path / 'c.yaml'} written"
+    *_, written = outcome.err.splitlines()
+    assert written.endswith(f"{tmp_path / 'c.yaml'} written")
+
+
+def test_details_are_below_the_verdict(workbench: Run, tmp_path: Path) -> None:
+    outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml", "--details")
+    lines = outcome.err.strip().splitlines()
+    assert lines[0].startswith("ACCEPTED ")
+    heading = next(n for n, line in enumerate(lines) if line.startswith("Parameters"))
+    assert max(len(line) for line in lines[heading:]) <= 80
 
 
 class TestAnotherModel:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
 from tests.support.command_line import Run, refused
+from tests.support.terminal import at_terminal
 
 ROOT = Path(__file__).parents[3]
 
@@ -61,3 +63,21 @@ def test_a_second_call_overwrites_nothing(workbench: Run, tmp_path: Path) -> Non
 def test_a_path_that_cannot_be_a_folder_is_refused(workbench: Run, tmp_path: Path, name: str) -> None:
     (tmp_path / "file").write_text("")
     refused(workbench("new", tmp_path / name), 2, tmp_path / name)
+
+
+def test_no_input_lays_the_folder_out_without_questions_at_a_terminal(tmp_path: Path) -> None:
+    with at_terminal(tmp_path, "new", "lab", "--no-input") as terminal:
+        assert terminal.end() == 0
+    assert "?" not in terminal.text
+    assert (tmp_path / "lab/procedures/calibrate-flat.yaml").is_file()
+
+
+@pytest.mark.parametrize(("key", "code"), [(b"\x04", 6), (b"\x03", 5)])
+def test_nothing_is_written_where_the_questions_end_early(tmp_path: Path, key: bytes, code: int) -> None:
+    with at_terminal(tmp_path, "new", "lab") as terminal:
+        terminal.type("three")
+        terminal.wait_for("> ")
+        os.write(terminal.master, key)
+        assert terminal.end() == code
+    assert "Traceback" not in terminal.text
+    assert list((tmp_path / "lab").rglob("*")) == []

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.browser import need_pango
 from tests.support.command_line import Run, refused
+from tests.support.pango import need_pango
 from tests.support.reference_session import MARKUP, REFERENCE, copied
 from workbench.session.certificate_numbers import REGISTER
 from workbench.session.journal import JOURNAL

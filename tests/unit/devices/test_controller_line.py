@@ -85,6 +85,26 @@ def test_a_late_reply_is_not_taken_for_that_to_off(controller: Controller) -> No
     server.close()
 
 
+def test_a_late_reply_to_on_is_neither_the_reply_to_off_nor_a_failure(controller: Controller) -> None:
+    asked: list[bytes] = []
+
+    def receive(data: bytes) -> bytes:
+        asked.append(data)
+        if data.startswith(b"MASK"):
+            time.sleep(1.1 * REPLY_S)
+        return controller.receive(data)
+
+    server = PtyServer(receive)
+    line = ControllerLine(SerialBlock(port=server.port), 4, lambda: False)
+    with pytest.raises(RigNotReadyError, match="nothing within"):
+        line.light(1, 60_000)
+    line.all_off()
+    assert controller.lit() == ()
+    assert b"".join(asked).startswith(b"MASK 1 60000\n!STATE?"), "off was asked for once"
+    line.close()
+    server.close()
+
+
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can open a port as another user")
 def test_another_user_cannot_open_the_port_while_it_is_held(port: str) -> None:
     Path(port).chmod(0o666)

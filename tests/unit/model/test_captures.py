@@ -45,6 +45,17 @@ def test_positions(tmp_path: Path) -> None:
     assert isnan(second.v_px)
 
 
+def test_rows_pasted_twice_are_refused_with_both_lines(tmp_path: Path) -> None:
+    rows = "L1,200,0,10.5,42\nL1,200,1,10.5,42\nL2,200,0,,42\n"
+    with pytest.raises(BadInputError, match=r"c.csv: row 5 repeats row 2 .*2 more") as error:
+        load(tmp_path, f"{HEADER}\n{rows}{rows}")
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_captures_that_differ_in_their_repeat_alone_are_read(tmp_path: Path) -> None:
+    assert len(load(tmp_path, f"{HEADER}\nL1,200,0,,42\nL1,200,1,,42\n")) == 2
+
+
 def test_images_are_relative_to_the_file(tmp_path: Path) -> None:
     path = tmp_path / "c.csv"
     path.write_text("laser_id,standoff_mm,repeat,on,off,scene\nall,,0,a/on.png,,s1\n")

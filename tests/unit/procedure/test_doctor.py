@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from tests.support.mjpeg import Stream
 from tests.support.plain_bench import plain_bench
 from tests.support.running import Scripted, two_laser_rig, with_emulator
 from workbench.devices.protocols import StreamingCamera
 from workbench.model.errors import StoppedError
 from workbench.model.prompt import Answer
 from workbench.model.rig import Rig
-from workbench.procedure.doctor import examine
+from workbench.procedure.doctor import examine, examine_rig
 
 
 def noisy_rig(**emulator: object) -> Rig:
@@ -79,6 +81,60 @@ def test_a_fixed_exposure_that_is_too_short_leaves_spots_too_dim(tmp_path: Path)
     found = results(tmp_path, noisy_rig(camera={"exposure_s": 3e-6}))
     assert "exposure" not in found, "there is nothing to set"
     assert not found["laser L1"]
+
+
+def real(rig: Rig, **devices: dict[str, object]) -> Rig:
+    """The rig on separate devices, those of the blocks."""
+    data = rig.model_dump(exclude_unset=True, exclude={"emulator"})
+    return Rig.model_validate(data | {"driver": "opencv+serial", "devices": devices})
+
+
+def stream(rig: Rig) -> Stream:
+    shape = (rig.camera.height_px, rig.camera.width_px)
+    return Stream(lambda: np.tile(np.arange(shape[1], dtype=np.uint8), (shape[0], 1)))
+
+
+MISSING: dict[str, dict[str, object]] = {
+    "camera": {"source": "/dev/no-camera"},
+    "lasers": {"port": "/dev/no-port"},
+}
+LATER = ["latency", "exposure", "laser L1", "laser L2"]
+
+
+def test_a_missing_device_does_not_end_the_check(tmp_path: Path) -> None:
+    rig = real(two_laser_rig(), **MISSING)
+    found = list(examine_rig(rig, tmp_path / "s", lambda _: Scripted()))
+    assert [one.part for one in found if not one.ok] == ["controller", "camera"]
+    assert [one.part for one in found if one.kind == "not checked"] == ["interlock", *LATER]
+    for part, device in (("controller", "/dev/no-port"), ("camera", "/dev/no-camera")):
+        assert device in next(one.found for one in found if one.part == part)
+
+
+def test_the_camera_is_checked_although_the_port_is_missing(tmp_path: Path) -> None:
+    served = stream(two_laser_rig())
+    rig = real(two_laser_rig(), camera={"source": served.url}, lasers=MISSING["lasers"])
+    found = {one.part: one for one in examine_rig(rig, tmp_path / "s", lambda _: Scripted())}
+    served.close()
+    assert (found["controller"].ok, found["camera"].ok) == (False, True)
+    assert found["camera"].kind == "checked"
+    assert [part for part, one in found.items() if one.kind == "not checked"] == ["interlock", *LATER]
+
+
+@pytest.mark.parametrize(("virtual", "stated"), [(False, None), (False, "3B"), (True, None)])
+def test_a_laser_class_that_is_not_stated_is_asked_for_on_a_real_bench(
+    tmp_path: Path, virtual: bool, stated: str | None
+) -> None:
+    rig = noisy_rig().model_copy(update={"laser_class": stated})
+    operator = Scripted({"laser_class": [Answer(value="2")]})
+    with plain_bench(rig, tmp_path) as bench:
+        found = {one.part: one for one in examine(rig, replace(bench, virtual=virtual), operator)}
+    asked = not virtual and stated is None
+    assert ("laser class" in found) == asked
+    safety = next(prompt for prompt in operator.asked if prompt.key == "safety")
+    if asked:
+        assert found["laser class"].kind == "noted"
+        assert '"2"' in found["laser class"].found
+        assert " 2 " in safety.do, "the answer counts from here on"
 
 
 @pytest.mark.parametrize("key", ["safety", "doctor"])

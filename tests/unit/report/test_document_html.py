@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
 import pytest
 
-from tests.support.browser import opened
+from tests.support.browser import headless_browser
 from tests.support.reference_session import MARKUP, certificate
 from workbench.model.table import Column, Table
 from workbench.report.document import Document, Fact, KeyNumber, Section, Verdict
@@ -16,7 +15,7 @@ from workbench.report.document_html import MOST_ROWS, document_html
 
 TITLE = re.compile(r"<title>(.*?)</title>")
 WIDER_THAN_PAGE = (
-    "JSON.stringify({wide: [...document.querySelectorAll('td, th, h1, h2, p, svg, figcaption')].filter("
+    "({wide: [...document.querySelectorAll('td, th, h1, h2, p, svg, figcaption')].filter("
     "e => e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).display !== 'none'"
     " && !e.classList.contains('running-head')).length,"
     " page: document.documentElement.scrollWidth, tables: document.querySelectorAll('table.data').length,"
@@ -88,7 +87,9 @@ def test_nothing_is_cut_off_in_a_browser(many: bool, tmp_path: Path) -> None:
     shown = document(table(500, 100), name="x") if many else certificate().document
     page = tmp_path / "page.html"
     page.write_text(document_html(shown, "now"))
-    measured = json.loads(opened(page, tmp_path, WIDER_THAN_PAGE).replace("&amp;", "&"))
+    with headless_browser(tmp_path, 1200, 900) as browser:
+        browser.open(page.as_uri())
+        measured = browser.value_of(WIDER_THAN_PAGE)
     assert measured["wide"] == 0
     assert measured["page"] <= 1200
     assert measured["tables"] >= 8

@@ -9,7 +9,7 @@ from pathlib import Path
 import pypdfium2
 import pytest
 
-from tests.support.browser import need_pango
+from tests.support.pango import need_pango
 from tests.support.reference_session import certificate
 from workbench.model.errors import BadInputError
 from workbench.report.document_html import document_html

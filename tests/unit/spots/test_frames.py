@@ -39,6 +39,23 @@ def test_a_frame_of_16_bits_clips_at_the_smallest_full_scale_that_holds_it(
     assert default_saturation_dn(np.full((3, 4), 7, np.uint8)) == 255
 
 
+@pytest.mark.parametrize("bits", [8, 10, 12, 14, 15])
+def test_left_aligned_frames_clip_at_their_full_scale(bits: int) -> None:
+    step = 2 ** (16 - bits)
+    frame = np.full((3, 4), 5 * step, np.uint16)
+    frame[1, 2] = 2**16 - step
+    assert default_saturation_dn(frame) == 2**16 - step
+    frame[0, 0] += 1
+    assert default_saturation_dn(frame) == 2**16 - 1
+
+
+def test_stated_bits_decide_where_the_brightest_pixel_could_mislead() -> None:
+    frame = np.full((3, 4), 4095, np.uint16)
+    assert default_saturation_dn(frame, 16) == 2**16 - 1
+    assert default_saturation_dn(frame, 14) == 2**14 - 1
+    assert default_saturation_dn(16 * frame, 12) == 16 * 4095
+
+
 def test_good_frames_come_back_as_they_are() -> None:
     on, off = np.zeros((3, 4), np.uint8), np.ones((3, 4), np.uint8)
     assert check_pair(on, off)[0] is on

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import rerun as rr
-from rerun.chunk import RrdReader
+from rerun.chunk import ChunkStore, RrdReader
 
 from tests.viewer.conftest import Recorded
 from tests.viewer.readback import Contents, layout_views
@@ -52,6 +52,23 @@ def test_no_recording_is_left_alone(tmp_path: Path, content: bytes) -> None:
     assert not compact(damaged, LAYOUT)
     assert damaged.read_bytes() == content
     assert list(tmp_path.iterdir()) == [damaged]
+
+
+def test_a_copy_that_lacks_rows_replaces_nothing(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = recording.read_bytes()
+
+    class Losing(rr.RecordingStream):
+        def send_chunks(self, chunks: object) -> None:
+            assert isinstance(chunks, ChunkStore)
+            sent = list(chunks.stream())
+            sent.remove(next(chunk for chunk in sent if not chunk.is_static))
+            super().send_chunks(sent)
+
+    monkeypatch.setattr("workbench.viewer.compaction.rr.RecordingStream", Losing)
+    assert not compact(recording, LAYOUT)
+    assert recording.read_bytes() == before
+    monkeypatch.undo()
+    assert compact(recording, LAYOUT), "nothing else was wrong"
 
 
 def test_a_recording_that_does_not_fit_into_memory_stays(

@@ -7,8 +7,10 @@ their priors), spot noise and speckle. Spots too far from their prediction raise
 Let d be the residuals of n spot coordinates in standard deviations of their noise, J their derivatives by the
 parameters, C the covariance of the fit without them. Then d has the covariance V = 1 + J C J^T. A wrong
 standoff moves the residuals in the direction w. The generalised least-squares estimate of that shift,
-w V^-1 d / (w V^-1 w), is the range error of all spots together; its variance is 1 / (w V^-1 w). The test of
-all coordinates is d V^-1 d, chi-square with n degrees of freedom (C. E. Rasmussen, C. K. I. Williams,
+w V^-1 d / (w V^-1 w), is to first order the range error of all spots together. Its variance is
+1 / (w V^-1 w); the quotient is tested. Spots are linear in the inverse depth, far better than in the
+range: the range itself is found by steps in the inverse depth, and may lie beyond infinity. The test of all
+coordinates is d V^-1 d, chi-square with n degrees of freedom (C. E. Rasmussen, C. K. I. Williams,
 Gaussian Processes for Machine Learning, 2006, chapter 5.4.2).
 
 Where the residuals of the fit are larger than the stated noise, either the stated noise or some of the data
@@ -39,6 +41,11 @@ from workbench.model.fit_event import CrossValidatedPlacement, LaserError
 FALSE_ALARM = 1e-3
 """Probability that any placement of a fit raises an alarm when priors and noise are as stated."""
 FEWEST_PLACEMENTS = 3
+SMALL_STEP = 0.02
+"""Relative step of the range below which no further one is made: spots are linear in the inverse depth."""
+MOST_STEPS = 8
+LEAST_INVERSE_DEPTH = 1e-3
+"""Inverse depth, relative to that of the standoff, below which the range counts as infinite."""
 
 
 def leave_each_out(fit: CalibrationFit) -> tuple[CrossValidatedPlacement, ...]:
@@ -77,29 +84,58 @@ def _leave_out(
     w = by_standoff(reduced)
     if not (w[spots] ** 2).sum() > 0:
         return None
-    error, sd = range_error(reduced, spots, w)
+    first_order_mm, sd = range_error(reduced, spots, w)
     on_board = any(view.placement.key == info.key for view in fit.boards)
     return CrossValidatedPlacement(
         placement=info.key,
         standoff_mm=info.standoff_mm,
-        error_mm=error,
+        error_mm=_range_error(fit, reduced, index, spots, first_order_mm),
         sd_mm=sd,
-        lasers=() if on_board else _laser_errors(fit, reduced, spots, w),
+        score=first_order_mm / sd,
+        lasers=() if on_board else _laser_errors(fit, reduced, index, spots, w),
         chi2=deleted_chi2(reduced, spots),
         coordinates=int(spots.sum()),
         freedom=reduced.freedom if fit.noise_scale > 1 else None,
     )
 
 
+def _range_error(
+    fit: CalibrationFit, reduced: Refit, index: int, rows: BoolArray, first_order_mm: float
+) -> float | None:
+    """Range by the spots of `rows` - standoff of their placement, mm; None beyond infinity.
+
+    Args:
+        fit: the fit.
+        reduced: the refit without the placement.
+        index: index of the placement.
+        rows: (R,) rows of its spots.
+        first_order_mm: the error by `range_error`.
+    """
+    standoff_mm, offset_mm = fit.cells.placements[index].standoff_mm, fit.rig.bench.offset_mm.value
+    depth_mm, step_mm = standoff_mm + offset_mm, first_order_mm
+    for _ in range(MOST_STEPS):
+        inverse = (1.0 - step_mm / depth_mm) / depth_mm
+        if inverse * (standoff_mm + offset_mm) < LEAST_INVERSE_DEPTH:
+            return None
+        is_last = abs(step_mm) < SMALL_STEP * depth_mm
+        depth_mm = 1.0 / inverse
+        if is_last:
+            break
+        there = reduced.with_unused(problem_at(reduced.problem, index, depth_mm - offset_mm))
+        step_mm = range_error(there, rows, by_standoff(there))[0]
+    return depth_mm - offset_mm - standoff_mm
+
+
 def _laser_errors(
-    fit: CalibrationFit, reduced: Refit, spots: BoolArray, w: FloatArray
+    fit: CalibrationFit, reduced: Refit, index: int, spots: BoolArray, w: FloatArray
 ) -> tuple[LaserError, ...]:
     """Range errors of single lasers, for those whose spots among the rows `spots` depend on the range."""
     errors = []
     for laser, laser_id in enumerate(fit.rig.laser_ids):
         own = spots & rows_of(fit.cells.laser == laser, reduced.problem)
         if (w[own] ** 2).sum() > 0:
-            error_mm, sd_mm = range_error(reduced, own, w)
+            first_order_mm, sd_mm = range_error(reduced, own, w)
+            error_mm = _range_error(fit, reduced, index, own, first_order_mm)
             errors.append(LaserError(laser_id=laser_id, error_mm=error_mm, sd_mm=sd_mm))
     return tuple(errors)
 
@@ -133,8 +169,15 @@ def deleted_chi2(reduced: Refit, rows: BoolArray) -> float:
     return float(distance @ np.linalg.solve(predictive(reduced, rows), distance))
 
 
+def problem_at(problem: LeastSquaresProblem, index: int, standoff_mm: float) -> LeastSquaresProblem:
+    """The problem with another standoff of one placement."""
+    standoff = np.array(problem.data.standoff_mm, float)
+    standoff[index] = standoff_mm
+    return LeastSquaresProblem(problem.layout, problem.data._replace(standoff_mm=standoff))
+
+
 def range_error(reduced: Refit, rows: BoolArray, w: FloatArray) -> tuple[float, float]:
-    """Range by the spots of `rows` - their standoff, and its standard deviation, mm."""
+    """Range by the spots of `rows` - their standoff, and its standard deviation, mm, to first order."""
     weight = np.linalg.solve(predictive(reduced, rows), w[rows])
     information = float(weight @ w[rows])
     # A target farther than the ruler's value moves the measurement by w; residuals are predicted - measured.

@@ -7,7 +7,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit
+from workbench.calibration.checks.hypotheses import explain_misfit
+from workbench.calibration.checks.hypothesis import Hypothesis
+from workbench.calibration.checks.mistaken_data import UNITS
 from workbench.calibration.checks.target_motion import TargetMotion, find_target_motion
 from workbench.calibration.data.averaging import scatter_chi2, weighted_mean
 from workbench.calibration.data.observations import Observation, RejectedObservation, positions, stated_sd
@@ -15,7 +17,18 @@ from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.model.fit_event import CrossValidatedPlacement, Fault
 from workbench.model.stats import chi2_sf
 
-REFUSING = ("lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "tilted", "moved", "never_lit")
+REFUSING = (
+    "lasers_swapped",
+    "mirrored",
+    "upside_down",
+    "turned",
+    "transposed",
+    "unit",
+    "standoff",
+    "tilted",
+    "moved",
+    "never_lit",
+)
 """Faults that invalidate the calibration; all others are notes."""
 SUSPECT_P = 1e-3
 """P value below which the captures of a placement are searched for target motion."""
@@ -85,6 +98,19 @@ def _wiring_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
             " Do: exchange the plugs (or laser_id), then capture or fit again"
         )
         return Fault(name="lasers_swapped", message=text)
+    if h.kind == "transposed":
+        text = (
+            "u_px and v_px are exchanged: the data fit with the columns exchanged."
+            " Do: exchange the names of the columns, then fit again"
+        )
+        return Fault(name="transposed", message=text)
+    if h.kind == "unit":
+        unit, factor = tuple(UNITS.items())[h.subject[0]]
+        text = (
+            f"the standoffs look like {unit}: multiplied by {factor:g} they agree with the rig file."
+            " Do: state standoff_mm in millimetres, then fit again"
+        )
+        return Fault(name="unit", message=text)
     how, instead = {
         "mirrored": ("mirrored left to right", " or turned by 180 degrees"),
         "upside_down": ("mirrored top to bottom", " or turned by 180 degrees"),

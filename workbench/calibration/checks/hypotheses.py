@@ -15,14 +15,26 @@ turn, and kept only where the rest without it is decisively worse.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from itertools import combinations
+from dataclasses import replace
 from math import log, radians, tan
-from typing import Literal
 
 import numpy as np
 
-from workbench.calibration.checks.cross_validation import by_standoff, predictive, range_error, rows_at
+from workbench.calibration.checks.cross_validation import (
+    by_standoff,
+    predictive,
+    problem_at,
+    range_error,
+    rows_at,
+)
+from workbench.calibration.checks.hypothesis import DECISIVE, Hypothesis, from_priors, scored
+from workbench.calibration.checks.mistaken_data import (
+    PULLED_SD,
+    exchanged_coordinates,
+    exchanged_lasers,
+    flipped_images,
+    other_units,
+)
 from workbench.calibration.checks.priors import prior_strain
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.problem import LeastSquaresProblem
@@ -31,13 +43,10 @@ from workbench.calibration.model.parameters import PLACEMENT
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.stats import chi2_sf, f_sf
 
-HypothesisKind = Literal["lasers_swapped", "mirrored", "upside_down", "turned", "standoff", "tilted", "spot"]
 IMPROBABLE = 1e-4
 """P value of a fit below which hypotheses other than single wrong spots are tried."""
 FALSE_REJECTION = 1e-3
 """Probability that any spot of a sound fit is rejected."""
-DECISIVE = 15.0
-"""Score from which a hypothesis is adopted: exp(15 / 2), odds of 1800 to 1."""
 EXPLAINED = 0.9
 """Share of the excess misfit that the hypotheses found must explain together."""
 TIE = 10.0
@@ -68,24 +77,12 @@ LEAST_NARROWING = 1e-9
 """Least relative decrease of a prior's variance for the data to constrain the parameter."""
 
 
-@dataclass(frozen=True)
-class Hypothesis:
-    """A refitted hypothesis."""
-
-    kind: HypothesisKind
-    subject: tuple[int, ...]
-    """Indices of the two lasers, of the placement (and its slope), or of the cell."""
-    state: Refit
-    """The refit with this and all earlier hypotheses adopted."""
-    score: float
-    significant: bool
-
-
 def explain_misfit(fit: CalibrationFit) -> tuple[Hypothesis, ...]:
     """Hypotheses that together explain the misfit, in the order of adoption; none for a sound fit.
 
-    Outliers (`spot`) are reported whether or not the rest is explained; all others only where everything
-    together explains EXPLAINED of the excess misfit.
+    Outliers (`spot`) and the unit of the standoffs are reported whether or not the rest is explained: the
+    unit is compared at the noise of the residuals. All others are reported only where everything together
+    explains EXPLAINED of the excess misfit.
     """
     problem = problem_of(fit)
     state = refit(problem, measured(problem), optimum_of(fit))
@@ -100,7 +97,7 @@ def explain_misfit(fit: CalibrationFit) -> tuple[Hypothesis, ...]:
         state = best.state
     spots = tuple(h for h in found if h.kind == "spot")
     explained = _excess(state) <= (1 - EXPLAINED) * excess or not is_improbable(state)
-    found = _needed(fit, state, found) if explained else list(spots)
+    found = _needed(fit, state, found) if explained else [h for h in found if h.kind in {"spot", "unit"}]
     return tuple(found) if len(spots) <= most else tuple(h for h in found if h.kind != "spot")
 
 
@@ -115,13 +112,13 @@ def _needed(fit: CalibrationFit, state: Refit, found: list[Hypothesis]) -> list[
 def _is_needed(fit: CalibrationFit, state: Refit, h: Hypothesis) -> bool:
     problem, used = state.problem, state.used
     if h.kind == "standoff":
-        problem = _problem_at(problem, h.subject[0], fit.cells.placements[h.subject[0]].standoff_mm)
+        problem = problem_at(problem, h.subject[0], fit.cells.placements[h.subject[0]].standoff_mm)
     elif h.kind == "spot":
         own = np.isin(np.arange(len(fit.cells.laser)), h.subject)
         used = used | (rows_of(own, problem) & measured(problem))
     else:
         return True
-    without = _from_priors(problem, used)
+    without = from_priors(problem, used)
     rise = (without.cost - state.cost) / max(1.0, state.chi2 / max(state.freedom, 1.0))
     return rise > (DECISIVE if h.kind == "spot" else STANDOFF_COST + DECISIVE)
 
@@ -148,54 +145,16 @@ def _best(candidates: list[Hypothesis]) -> Hypothesis | None:
 def _candidates(fit: CalibrationFit, state: Refit, first: bool) -> Iterator[Hypothesis]:
     improbable = is_improbable(state)
     if improbable and first:
-        yield from _flipped_images(fit, state)
-        yield from _exchanged_lasers(fit, state)
+        yield from flipped_images(fit, state)
+        yield from exchanged_coordinates(fit, state)
+        yield from exchanged_lasers(fit, state)
+    pulled = np.abs(state.y[fit.table.is_sensor]).max() > PULLED_SD
+    if first and (improbable or pulled):
+        yield from other_units(state)
     if improbable or first:
         yield from _wrong_standoffs(fit, state)
         yield from _tilted_targets(fit, state)
     yield from _wrong_spots(fit, state)
-
-
-def _scored(
-    kind: HypothesisKind, subject: tuple[int, ...], before: Refit, after: Refit, cost: float
-) -> Hypothesis:
-    """The hypothesis with its score; `cost` is its Occam factor."""
-    noise = max(1.0, after.chi2 / max(after.freedom, 1.0))
-    score = (before.cost - after.cost) / noise - cost
-    return Hypothesis(kind, subject, after, score, score > DECISIVE)
-
-
-def _flipped_images(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
-    """The image mirrored left to right, top to bottom, both."""
-    data = state.problem.data
-    edge = np.array([fit.rig.camera.width_px - 1.0, fit.rig.camera.height_px - 1.0])
-    turns: tuple[tuple[HypothesisKind, tuple[bool, bool]], ...] = (
-        ("mirrored", (True, False)),
-        ("upside_down", (False, True)),
-        ("turned", (True, True)),
-    )
-    for kind, axes in turns:
-        position = np.where(axes, edge - data.position_px, data.position_px)
-        problem = LeastSquaresProblem(state.problem.layout, data._replace(position_px=position))
-        yield _scored(kind, (), state, _from_priors(problem, state.used), 2 * log(3))
-
-
-def _exchanged_lasers(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
-    """Every pair of lasers exchanged."""
-    data = state.problem.data
-    pairs = list(combinations(range(len(fit.rig.lasers)), 2))
-    laser = np.asarray(data.spots.laser)
-    for a, b in pairs:
-        swapped = np.where(laser == a, b, np.where(laser == b, a, laser))
-        spots = data.spots._replace(laser=swapped)
-        problem = LeastSquaresProblem(state.problem.layout, data._replace(spots=spots))
-        after = _from_priors(problem, state.used)
-        yield _scored("lasers_swapped", (a, b), state, after, 2 * log(len(pairs)))
-
-
-def _from_priors(problem: LeastSquaresProblem, used: BoolArray) -> Refit:
-    """Refit from the prior means: wrong data may have drawn the current optimum into another minimum."""
-    return refit(problem, used, np.zeros(len(np.asarray(problem.data.mean))))
 
 
 def _wrong_standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
@@ -221,12 +180,12 @@ def _wrong_standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
             continue
         if sound and not on_board and _gain_without(state, rows) < FIRST_ORDER_SHARE * (cost + DECISIVE):
             continue
-        reduced = _from_priors(state.problem, others)
+        reduced = from_priors(state.problem, others)
         if on_board or state.cost - reduced.cost > cost + DECISIVE:
             scan_mm = SCAN_MM[::SPARSE] if on_board else SCAN_MM
             standoff_mm = _likeliest_standoff(fit, reduced, rows, index, scan_mm)
             after = _refit_at(fit, state, reduced, index, standoff_mm)
-            found = _scored("standoff", (index,), state, after, cost)
+            found = scored("standoff", (index,), state, after, cost)
             yield found
             if found.significant and not is_improbable(found.state):
                 return
@@ -250,10 +209,10 @@ def _refit_at(fit: CalibrationFit, state: Refit, reduced: Refit, index: int, sta
     The second refit moves the standoff by the placement error of the first, so that a free standoff costs
     nothing in the prior of that error.
     """
-    problem = _problem_at(reduced.problem, index, standoff_mm)
+    problem = problem_at(reduced.problem, index, standoff_mm)
     found = refit(problem, state.used, reduced.y)
     error_mm = (fit.table.prior_mean + fit.table.prior_sd * found.y)[_error_index(fit, index)]
-    return refit(_problem_at(problem, index, standoff_mm + float(error_mm)), state.used, found.y)
+    return refit(problem_at(problem, index, standoff_mm + float(error_mm)), state.used, found.y)
 
 
 def _likeliest_standoff(
@@ -286,13 +245,7 @@ def _refine_standoff(reduced: Refit, rows: BoolArray, index: int, standoff_mm: f
 
 def _with_standoff(reduced: Refit, index: int, standoff_mm: float) -> Refit:
     """The refit, with another standoff of a placement that it does not use."""
-    return reduced.with_unused(_problem_at(reduced.problem, index, standoff_mm))
-
-
-def _problem_at(problem: LeastSquaresProblem, index: int, standoff_mm: float) -> LeastSquaresProblem:
-    standoff = np.array(problem.data.standoff_mm, float)
-    standoff[index] = standoff_mm
-    return LeastSquaresProblem(problem.layout, problem.data._replace(standoff_mm=standoff))
+    return reduced.with_unused(problem_at(reduced.problem, index, standoff_mm))
 
 
 def _deviance(reduced: Refit, rows: BoolArray) -> float:
@@ -324,9 +277,9 @@ def _tilted_targets(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
         sd = np.array(state.problem.data.sd, float)
         sd[slope] = max(sd[slope], TILTED_SD)
         problem = LeastSquaresProblem(state.problem.layout, state.problem.data._replace(sd=sd))
-        after = _from_priors(problem, state.used)
+        after = from_priors(problem, state.used)
         narrowed = np.linalg.slogdet(state.covariance)[1] - np.linalg.slogdet(after.covariance)[1]
-        yield _scored("tilted", (index, slope), state, after, cost + float(narrowed))
+        yield scored("tilted", (index, slope), state, after, cost + float(narrowed))
 
 
 def slope_indices(fit: CalibrationFit, index: int) -> IndexArray:
@@ -386,7 +339,7 @@ def _without_spot(state: Refit, cell: int, count: int) -> Hypothesis:
     """
     used = np.array(state.used)
     used[2 * cell : 2 * cell + 2] = False
-    after = _from_priors(state.problem, used) if is_improbable(state) else refit(state.problem, used, state.y)
+    after = from_priors(state.problem, used) if is_improbable(state) else refit(state.problem, used, state.y)
     freedom, degrees = max(after.freedom, 1.0), int(state.used.sum() - used.sum())
     gain = state.cost - after.cost
     noise = max(1.0, after.chi2 / freedom)

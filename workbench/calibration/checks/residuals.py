@@ -277,13 +277,21 @@ class _Repeats:
         return -float(self.direction[:-1] @ self.direction[1:])
 
     def lag(self, mean: float) -> tuple[float, float, float]:
-        """Sum of products of neighbours - `mean` times the sum of squares: value, variance, third moment."""
-        count = len(self.deviation)
-        form = (np.eye(count, k=1) + np.eye(count, k=-1)) / 2 - mean * np.eye(count)
-        product = form @ (np.eye(count) - np.outer(self.direction, self.direction))
-        square = product @ product
-        value = float(self.deviation @ form @ self.deviation)
-        return value, 2 * float(np.trace(square)), 8 * float(np.sum(square * product.T))
+        """Sum of products of neighbours - `mean` times the sum of squares: value, variance, third moment.
+
+        With F the matrix of the form and d the direction removed, the moments are the traces of powers of
+        F (1 - d d^T). F has two values only, so that they are written out: no matrix is built, because the
+        repeats may be thousands.
+        """
+
+        def form(x: FloatArray) -> FloatArray:
+            return np.convolve(x, (0.5, -mean, 0.5))[1:-1]
+
+        count, once = len(self.deviation), form(self.direction)
+        first, second, third = self.direction @ once, once @ once, once @ form(once)
+        square = (count - 1) / 2 + mean**2 * count - 2 * second + first**2
+        cube = -1.5 * mean * (count - 1) - mean**3 * count - 3 * third + 3 * first * second - first**3
+        return float(self.deviation @ form(self.deviation)), 2 * float(square), 8 * float(cube)
 
 
 def _by_axis(axes: FloatArray, powers: NDArray[np.floating]) -> FloatArray:

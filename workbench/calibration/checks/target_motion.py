@@ -17,7 +17,8 @@ from math import log
 import numpy as np
 
 from workbench.calibration.checks.cross_validation import by_standoff
-from workbench.calibration.checks.hypotheses import DECISIVE, SPOT_COST, TILTED_SD, slope_indices
+from workbench.calibration.checks.hypotheses import SPOT_COST, TILTED_SD, slope_indices
+from workbench.calibration.checks.hypothesis import DECISIVE
 from workbench.calibration.data.averaging import scatter_chi2
 from workbench.calibration.data.observations import Observation, positions, stated_sd
 from workbench.calibration.estimation.fit import CalibrationFit

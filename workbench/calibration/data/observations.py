@@ -6,9 +6,11 @@ A cell is one laser at one placement.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import isnan
+from operator import attrgetter
 
 import numpy as np
 
@@ -55,6 +57,11 @@ class Observation:
     def seen(self) -> bool:
         """Whether a spot was found: at least one coordinate is measured."""
         return not (isnan(self.u_px) and isnan(self.v_px))
+
+
+POSITION = attrgetter("u_px", "v_px")
+SD = attrgetter("u_sd_px", "v_sd_px")
+SPECKLE_SD = attrgetter("u_speckle_sd_px", "v_speckle_sd_px")
 
 
 @dataclass(frozen=True)
@@ -138,9 +145,13 @@ def group(
     buckets: dict[tuple[str, str], list[Observation]] = defaultdict(list)
     placements: dict[str, PlacementInfo] = {}
     seen = list(observations)
+    settings = set[tuple[str, float, float, float]]()
     for s in seen:
         buckets[s.placement, s.laser_id].append(s)
-        _check_placement(placements.setdefault(s.placement, PlacementInfo.of(s)), s)
+        setting = s.placement, s.standoff_mm, s.standoff_sd_mm, s.yaw_deg
+        if setting not in settings:
+            settings.add(setting)
+            _check_placement(placements.setdefault(s.placement, PlacementInfo.of(s)), s)
     kept: dict[tuple[str, str], list[Observation]] = {}
     rejected: list[Rejected] = []
     usual = usual_scale([_scatter(members, noise) for members in buckets.values()])
@@ -197,19 +208,28 @@ def as_grid(cells: MeanObservations, lasers: int) -> tuple[FloatArray, FloatArra
 
 def positions(observations: Sequence[Observation]) -> FloatArray:
     """(n, 2) measured u, v."""
-    return np.array([(s.u_px, s.v_px) for s in observations]).reshape(-1, 2)
+    return _pairs(observations, POSITION)
 
 
 def stated_sd(observations: Sequence[Observation], noise: NoiseSpec) -> FloatArray:
     """(n, 2) standard deviation of each position, the rig's where the observation states none."""
-    sd = np.array([(s.u_sd_px, s.v_sd_px) for s in observations]).reshape(-1, 2)
+    sd = _pairs(observations, SD)
     return np.where(np.isfinite(sd), sd, noise.spot_sd_px)
 
 
 def stated_speckle_sd(observations: Sequence[Observation], noise: NoiseSpec) -> FloatArray:
     """(n, 2) standard deviation by speckle, the rig's where the observation states none."""
-    sd = np.array([(s.u_speckle_sd_px, s.v_speckle_sd_px) for s in observations]).reshape(-1, 2)
+    sd = _pairs(observations, SPECKLE_SD)
     return np.where(np.isfinite(sd), sd, noise.speckle_sd_px)
+
+
+def _pairs(
+    observations: Sequence[Observation], of: Callable[[Observation], tuple[float, float]]
+) -> FloatArray:
+    """(n, 2) two numbers of each observation, of which there may be a hundred thousand."""
+    return np.fromiter(chain.from_iterable(map(of, observations)), float, 2 * len(observations)).reshape(
+        -1, 2
+    )
 
 
 def _check_placement(first: PlacementInfo, observation: Observation) -> None:

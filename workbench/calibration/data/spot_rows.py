@@ -6,7 +6,7 @@ The search for spots is imported only where a row has images.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import isnan, nan
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from workbench.calibration.data.observations import Observation, PlacementInfo, 
 from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
 from workbench.model.fit_event import Rejected
 from workbench.model.rig import LaserSpec, Rig
-from workbench.optics.image import bend_px, inside_px
+from workbench.optics.image import bend_px
 from workbench.optics.lens_models import lens_model
 from workbench.optics.rays import RAY
 
@@ -42,7 +42,8 @@ def observations_of_rows(
         BadInputError: an image cannot be used.
     """
     boards = _see_boards(rig, [row for row in rows if row.laser_id == BOARD])
-    spots = [_sight_row(rig, row) for row in rows if row.laser_id != BOARD]
+    lasers = {laser.id: laser for laser in rig.lasers}
+    spots = [_sight_row(rig, lasers, row) for row in rows if row.laser_id != BOARD]
     found = on_boards(rig.board, boards, spots)
     observations = [f for f in found if isinstance(f, Observation)]
     rejected = [f for f in (*found, *boards.values()) if isinstance(f, Rejected)]
@@ -86,7 +87,7 @@ def _in_picture(rig: Rig, observation: Observation) -> Observation | Rejected:
         ("u_px", observation.u_px, rig.camera.width_px),
         ("v_px", observation.v_px, rig.camera.height_px),
     ):
-        if not (isnan(value) or inside_px(value, size)):
+        if not (isnan(value) or -0.5 <= value < size - 0.5):  # `inside_px`, for each of many rows
             where = f"laser {observation.laser_id} at {observation.standoff_mm:g} mm"
             return Rejected(
                 observation.source, f"{where}: {name}: expected -0.5 to {size - 0.5}, got {value:g}"
@@ -143,14 +144,14 @@ def _see_board(rig: Rig, key: str, rows: Sequence[CaptureRow]) -> BoardView | Re
     return see_board(frames, rig.board, placement)
 
 
-def _sight_row(rig: Rig, row: CaptureRow) -> Observation | Rejected:
+def _sight_row(rig: Rig, lasers: Mapping[str, LaserSpec], row: CaptureRow) -> Observation | Rejected:
     source = f"row {row.row}"
     if row.laser_id == ALL_LASERS:
         return Rejected(source, "a calibration needs captures of one laser at a time, got all")
     if isnan(row.standoff_mm):
         return Rejected(source, NO_STANDOFF)
-    if row.laser_id not in rig.laser_ids:
-        known = ", ".join(rig.laser_ids)
+    if row.laser_id not in lasers:
+        known = ", ".join(lasers)
         return Rejected(source, f"laser_id: expected one of {known} (rig {rig.rig}), got {row.laser_id}")
     observation = Observation(
         source=source,
@@ -169,7 +170,8 @@ def _sight_row(rig: Rig, row: CaptureRow) -> Observation | Rejected:
         return _in_picture(rig, observation)
     from workbench.session.capture_spots import find_row_spots
 
-    laser = rig.lasers[rig.laser_ids.index(row.laser_id)]
+    laser = lasers[row.laser_id]
     size = rig.camera.width_px, rig.camera.height_px
-    found = find_row_spots(row, size, [prior_scanline(rig, laser)], 1, rig.noise.speckle_sd_px)
+    bits = rig.camera.bits if rig.camera.bits > 8 else None
+    found = find_row_spots(row, size, [prior_scanline(rig, laser)], 1, rig.noise.speckle_sd_px, bits)
     return observe(found, laser, observation)

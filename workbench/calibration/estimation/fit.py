@@ -115,7 +115,7 @@ class CalibrationFit:
         corners = self.corner_residual_px
         return float(np.sqrt(np.mean(corners**2))) if corners.size else float("nan")
 
-    @property
+    @cached_property
     def used(self) -> tuple[Observation, ...]:
         """All observations that the fit uses."""
         return tuple(s for members in self.cells.members for s in members)

@@ -204,7 +204,8 @@ def _too_few_standoffs(fit: CalibrationFit, limits: Acceptance) -> list[str]:
 
 def _alarm(one: CrossValidatedPlacement) -> str:
     if one.range_p <= one.spots_p:
-        evidence = f"range error {one.error_mm:+.2f} mm, expected 0 +- {one.sd_mm:.2g} mm (1 sigma)"
+        error = "beyond infinity" if one.error_mm is None else f"{one.error_mm:+.2f} mm"
+        evidence = f"range error {error}, expected 0 +- {one.sd_mm:.2g} mm (1 sigma)"
     else:
         evidence = f"chi2 of the spots {one.chi2:.0f}, expected {one.coordinates}"
     return (

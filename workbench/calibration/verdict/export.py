@@ -145,6 +145,7 @@ def _calibration(
                 cross_validation=tuple(
                     CrossValidatedRange(standoff_mm=one.standoff_mm, error_mm=one.error_mm, sd_mm=one.sd_mm)
                     for one in assessment.cross_validation
+                    if one.error_mm is not None
                 ),
             ),
             provenance=provenance,

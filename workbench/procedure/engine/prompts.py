@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import get_args
 
 from workbench.model.prompt import Action, Prompt, Quantity
-from workbench.model.rig import Rig
+from workbench.model.rig import LaserClass, Rig
 from workbench.model.target import BoardTarget, CylinderTarget, FlatTarget, Placement
 
 SAFETY = "safety"
 """Key of the confirmation before the first emission; asked again when a session is resumed."""
+LASER_CLASS = "laser_class"
+"""Key of the question about the class of the lasers."""
 SPECULAR = (
     "WARNING: a glossy cylinder reflects the beams sideways like a mirror. Cover it with matt white paper,"
     " and keep eyes and shiny things out of the plane of the beams."
@@ -21,12 +24,22 @@ MISREAD = 0.1
 
 def safety_prompt(rig: Rig) -> Prompt:
     """Confirmation of eyewear and beam path before the first emission of a session."""
-    laser_class: str = getattr(rig, "laser_class", None) or "3R"
     return Prompt(
         key=SAFETY,
-        do=f"Lasers of class {laser_class} will be switched on: {_protect(laser_class)}.",
+        do=_protect(rig.laser_class),
         expect="The beams end on the target; no mirror, ring or watch is in their path; no person is near.",
         otherwise="Do not confirm: close the beam path first, or abort.",
+        at_bench=True,
+    )
+
+
+def laser_class_prompt() -> Prompt:
+    """Question about the class of the lasers, where the rig file does not state it."""
+    return Prompt(
+        key=LASER_CLASS,
+        do="Class of the lasers (IEC 60825-1), as on their label? Of several, the most dangerous.",
+        otherwise="Without a label, abort: no beam is switched on before its class is known.",
+        choices=get_args(get_args(LaserClass)[0]),
         at_bench=True,
     )
 
@@ -89,10 +102,18 @@ def _instead(placement: Placement, before: Placement | None) -> dict[Action, str
     return {"redo": f"{again} again", "skip": f"leave {here} out"}
 
 
-def _protect(laser_class: str) -> str:
-    if laser_class in {"1", "2"}:
-        return "do not stare into a beam; no eyewear is needed"
-    return "put on eyewear for their wavelength and screen the beam path"
+def _protect(laser_class: LaserClass | None) -> str:
+    if laser_class is None:
+        return (
+            "Lasers will be switched on whose class the rig file does not state (laser_class). Find it on"
+            " their label. Unless it is 1 or 2, put on eyewear for their wavelength and screen the beam path."
+        )
+    protection = (
+        "do not stare into a beam; no eyewear is needed"
+        if laser_class in {"1", "2"}
+        else "put on eyewear for their wavelength and screen the beam path"
+    )
+    return f"Lasers of class {laser_class} will be switched on: {protection}."
 
 
 def _target(placement: Placement) -> str:

@@ -46,7 +46,7 @@ STATEMENTS = (
 
 @dataclass(frozen=True)
 class Sources:
-    """Sources of a certificate."""
+    """Records and statements behind a certificate."""
 
     session: SessionRecord
     laboratory: Laboratory

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from statistics import fmean
 
@@ -202,7 +203,10 @@ def _cross_validation_chart(placements: Sequence[CrossValidatedPlacement]) -> Ch
             Series(
                 name="all lasers",
                 x=tuple(one.standoff_mm for one in ordered),
-                y=tuple(100.0 * one.error_mm / one.standoff_mm for one in ordered),
+                y=tuple(
+                    math.nan if one.error_mm is None else 100.0 * one.error_mm / one.standoff_mm
+                    for one in ordered
+                ),
                 sd=sd,
                 expected_sd=sd,
             ),

@@ -12,13 +12,14 @@ from tests.support.corrupted_data import stated_as
 from tests.support.message_text import numbers
 from tests.support.rigs import STANDOFFS_MM, World, thesis_rig
 from workbench.calibration.checks.cross_validation import alarms, leave_each_out
+from workbench.calibration.data.observations import Observation
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.assessment import assess
 from workbench.model.acceptance import Acceptance
 from workbench.model.captures import load_captures
 from workbench.model.fit_event import CrossValidatedPlacement
-from workbench.model.rig import load_rig
+from workbench.model.rig import Rig, load_rig
 
 ROOT = Path(__file__).parents[4]
 RIG = thesis_rig()
@@ -49,7 +50,7 @@ def test_range_errors_are_those_of_a_fit_whose_standoff_is_free(seed: int) -> No
 def test_errors_are_as_large_as_promised(sound: list[tuple[CrossValidatedPlacement, ...]]) -> None:
     folds = [fold for folds in sound for fold in folds]
     z2 = np.array([fold.z**2 for fold in folds])
-    by_laser = np.array([(i.error_mm / i.sd_mm) ** 2 for fold in folds for i in fold.lasers])
+    by_laser = np.array([((i.error_mm or 0.0) / i.sd_mm) ** 2 for fold in folds for i in fold.lasers])
     chi2 = np.array([fold.chi2 / fold.coordinates for fold in folds])
     # Each fit counts once: its folds, and the lasers of a placement, share errors.
     for square in (z2, chi2, by_laser):
@@ -91,6 +92,45 @@ def test_an_alarm_refuses_and_says_what_to_do() -> None:
     assert standoff_mm == alarm.standoff_mm == 1412.0
     assert error_mm == pytest.approx(alarm.error_mm, abs=0.005)
     assert "--without-standoff 1412" in reason
+
+
+def test_an_error_of_a_third_is_the_range_by_the_fit_without_it() -> None:
+    """Integer rows in v; in the range, the error to first order would be a quarter too small."""
+    camera = {"width_px": 320, "height_px": 240, "f_px": {"value": 300.0, "sd": 90.0}}
+    laser = {"id": "1", "axis": "v", "x_mm": {"value": 0.0, "sd": 0.0}, "y_mm": {"value": -22.5, "sd": 1.0}}
+    rig = Rig.model_validate(
+        {
+            "format": 1,
+            "rig": "rows",
+            "camera": camera | {"cx_px": {"value": 159.5, "sd": 20.0}, "cy_px": {"value": 119.5, "sd": 20.0}},
+            "lasers": [laser | {"ty": {"value": 0.0, "sd": 0.1}}],
+            "bench": {"offset_mm": {"value": 0.0, "sd": 0.0}},
+            "noise": {"spot_sd_px": 0.289},
+        }
+    )
+    rows = {180.0: 81.0, 350.0: 99.0, 400.0: 101.0, 650.0: 108.0, 2450.0: 116.0}
+    observations = [Observation(f"{mm:g}", "1", f"{mm:g}", mm, 0, np.nan, v) for mm, v in rows.items()]
+    far = leave_each_out(fit(rig, observations))[-1]
+    freed = fit(rig, [*observations[:-1], replace(observations[-1], standoff_sd_mm=1e5)])
+    index = [p.name for p in freed.table.parameters].index("2450.error_mm")
+    assert far.error_mm == pytest.approx(freed.values[index], rel=0.02)
+    assert far.error_mm is not None
+    assert far.error_mm > 1.3 * far.z * far.sd_mm
+    assert far.lasers[0].error_mm == pytest.approx(far.error_mm, rel=0.02)
+
+
+def test_spots_beyond_infinity_have_no_range() -> None:
+    world = World(RIG, 1)
+    observations = [
+        replace(s, u_px=2 * float(world.pixel(s.laser_id, 1e9)[0]) - s.u_px) if s.standoff_mm == 4500 else s
+        for s in world.observations()
+    ]
+    far = leave_each_out(fit(RIG, observations))[-1]
+    assert far.error_mm is None
+    assert {laser.error_mm for laser in far.lasers} == {None}
+    assert far.alarm
+    assert far.z > 0
+    assert far.relative_error > 1
 
 
 def test_two_placements_leave_nothing_to_predict_with() -> None:

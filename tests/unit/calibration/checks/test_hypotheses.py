@@ -9,9 +9,10 @@ import pytest
 
 from tests.support.corrupted_data import exchanged, mirrored, shifted, stated_as, turned_at
 from tests.support.rigs import World, thesis_rig
-from workbench.calibration.checks import hypotheses
+from workbench.calibration.checks import hypotheses, mistaken_data
 from workbench.calibration.checks.cross_validation import rows_at
-from workbench.calibration.checks.hypotheses import Hypothesis, explain_misfit, is_improbable
+from workbench.calibration.checks.hypotheses import explain_misfit, is_improbable
+from workbench.calibration.checks.hypothesis import Hypothesis
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit
@@ -68,7 +69,7 @@ def test_a_mirrored_picture_is_the_only_account(seed: int) -> None:
     )
 
 
-@pytest.mark.parametrize("account", [hypotheses._flipped_images, hypotheses._exchanged_lasers])
+@pytest.mark.parametrize("account", [mistaken_data.flipped_images, mistaken_data.exchanged_lasers])
 def test_an_account_costs_the_choice_among_its_alternatives(
     account: Callable[[CalibrationFit, Refit], Iterator[Hypothesis]],
 ) -> None:
@@ -122,7 +123,7 @@ def test_what_leaves_the_data_improbable_must_explain_most(
     problem = problem_of(fitted)
     before = refit(problem, measured(problem), optimum_of(fitted))
     after = before.at(scale)
-    one = hypotheses.Hypothesis("standoff", (0,), after, 99.0, True)
+    one = Hypothesis("standoff", (0,), after, 99.0, True)
     monkeypatch.setattr(hypotheses, "_candidates", lambda fit, state, first: iter([one] if first else []))
     excess = [state.cost - state.used.sum() for state in (before, after)]
     assert (excess[1] <= 0.1 * excess[0]) == kept

@@ -8,10 +8,12 @@ import pytest
 
 from tests.support.running import two_laser_rig
 from workbench.model.prompt import Answer
+from workbench.model.rig import Rig
 from workbench.model.target import BoardTarget, CylinderTarget, FlatTarget, Placement
 from workbench.procedure.engine.prompts import (
     SPECULAR,
     captures_prompt,
+    laser_class_prompt,
     placement_prompt,
     placement_prompts,
     safety_prompt,
@@ -76,6 +78,21 @@ def test_the_safety_prompt_names_the_rigs_laser_class() -> None:
     assert all(f" {one} " in text for one, text in asked.items())
     assert asked["2"].replace(" 2 ", " 3R ") != asked["3R"]
     assert asked["3B"].replace(" 3B ", " 3R ") == asked["3R"]
+
+
+def test_a_laser_class_that_is_not_stated_is_not_assumed() -> None:
+    prompt = safety_prompt(two_laser_rig().model_copy(update={"laser_class": None}))
+    assert not re.search(r"class \d", prompt.do)
+    assert "laser_class" in prompt.do
+
+
+def test_the_classes_to_choose_from_are_those_of_a_rig_file() -> None:
+    prompt = laser_class_prompt()
+    assert prompt.choices
+    assert prompt.at_bench
+    for choice in prompt.choices:
+        data = two_laser_rig().model_dump(exclude_unset=True) | {"laser_class": choice}
+        assert Rig.model_validate(data).laser_class == choice
 
 
 @pytest.mark.parametrize(
