@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,7 +13,8 @@ import typer
 from workbench.cli.console import print_message
 from workbench.cli.lab_questions import laboratory_of
 from workbench.cli.sessions import find_session
-from workbench.model.errors import BadInputError
+from workbench.model.contents import printable
+from workbench.model.errors import AnswerNeededError, BadInputError
 from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.assemble import Certificate, Sources, certificate_of, fingerprint
 from workbench.report.certificate.dcc import certificate_xml, required_parties
@@ -142,7 +144,18 @@ def _predecessor(session: SessionRecord) -> Predecessor | None:
 
 
 def _ask(question: str) -> str:
-    return str(typer.prompt(question, default="", show_default=False, err=True))
+    """Typed answer in one line.
+
+    Raises:
+        AnswerNeededError: the terminal was closed, or end-of-file was typed (^D).
+    """
+    typer.echo(f"{question}: ", err=True, nl=False)
+    typed = sys.stdin.readline()
+    if not typed:
+        raise AnswerNeededError(
+            f"{question}: no answer; nothing was written. --no-input reports what is not known as not stated"
+        )
+    return printable(typed)
 
 
 def _print_summary(certificate: Certificate, outputs: Outputs) -> None:
