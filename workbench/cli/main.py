@@ -17,6 +17,8 @@ from workbench.cli.option_types import (
     AcceptChanges,
     AnswersFile,
     Details,
+    FitVerdict,
+    Json,
     NoInput,
     Sessions,
     View,
@@ -44,8 +46,6 @@ app.command()(repair)
 app.command(name="report")(report_)
 for command in (export, history, use):
     app.command()(command)
-
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 
 
 def _version(wanted: bool) -> None:
@@ -120,15 +120,6 @@ def resume(
 
     screen = Screen(answers, no_input, view, details)
     resume_session(find_session(session, sessions), accept_changes, screen)
-
-
-class FitVerdict(StrEnum):
-    """Verdicts on the last fit of a session."""
-
-    ACCEPTED = "accepted"
-    EXCEPTION = "exception"
-    REFUSED = "refused"
-    NONE = "none"
 
 
 @app.command(name="sessions")

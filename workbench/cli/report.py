@@ -86,7 +86,7 @@ def compare_sessions(names: tuple[Path, Path], sessions: Path, outputs: Outputs)
     write_document(document, outputs)
     if outputs.as_json:
         print(json.dumps(document.as_json()))
-    print_message(f"{document.verdict.text}: {'; '.join(document.verdict.reasons)}".rstrip(": "))
+    print_message("\n".join((document.verdict.text, *(f"note: {one}" for one in document.verdict.reasons))))
 
 
 def write_document(document: Document, outputs: Outputs) -> None:
