@@ -196,6 +196,13 @@ def test_fit_and_range_on_the_session_s_images_give_the_session_s_results(demo: 
     assert compared == 55
 
 
+def test_its_recording_gives_its_calibration(demo: Demo, tmp_path: Path) -> None:
+    output = tmp_path / "again.yaml"
+    workbench("fit", demo.folder / "recording.rrd", "-o", output)
+    again, first = load_calibration(output), load_calibration(demo.folder / "calibration.yaml")
+    assert again.laser_ranger.parameters == first.laser_ranger.parameters
+
+
 def test_each_placement_tells_how_far_the_captures_have_come(demo: Demo) -> None:
     """From the second on; the last says of the ranges what the fit then does."""
     advised = [r.event for r in read_journal(demo.folder) if isinstance(r.event, StandoffAdvised)]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import fields
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,8 @@ from workbench.viewer import entities as at
 from workbench.viewer.frame import RECORDED, as_png
 
 BLOB = "EncodedDepthImage:blob"
+OPTIONAL = {field.name for field in fields(Spot) if field.default is None}
+"""Quantities of a spot that need not be known."""
 Row = dict[str, Any]
 
 
@@ -101,12 +105,18 @@ def _observation(row: Row, spots: Row, rig: Rig, path: Path) -> Observation | Re
     count = len(spots.get("u_px") or ())
     found = tuple(
         Spot(
-            **{name: spots[name][n] for name in RECORDED},
+            **{name: _number(spots, name, n) for name in RECORDED},
             flags=frozenset(Failure(flag) for flag in spots["flags"][n].split()),
         )
         for n in range(count)
     )
     return observe(Finding(found), rig.lasers[rig.laser_ids.index(row["laser_id"])], observation)
+
+
+def _number(spots: Row, name: str, n: int) -> Any:
+    """Quantity of one spot; None where a recording of an earlier release, or its frame, does not have it."""
+    values = spots.get(name)
+    return None if values is None or (name in OPTIONAL and isnan(values[n])) else values[n]
 
 
 def _boards(captures: dict[int, Row], frames: dict[int, bytes], rig: Rig) -> dict[str, BoardView | Rejected]:
