@@ -6,6 +6,8 @@ import io
 import os
 import sys
 from collections.abc import Callable
+from datetime import date
+from math import isfinite
 from pathlib import Path
 
 from ruamel.yaml import YAML
@@ -29,6 +31,8 @@ QUESTIONS = (
     ("temperature.high", "Highest temperature of the room, deg C"),
     ("target_material", "Material of the target"),
 )
+DAYS = {"standard.calibrated"}
+NUMBERS = {"standard.uncertainty_mm", "temperature.low", "temperature.high"}
 HEADING = """\
 # What certificates state about the laboratory. docs/certificate.md lists further keys, such as several
 # standards, warm-up and the interval of recalibration. What is missing here is reported as not stated.
@@ -53,9 +57,25 @@ def laboratory_of(sessions: Path, no_input: bool, ask: Ask) -> Laboratory:
         return known
     if no_input or os.environ.get("CI") or not (sys.stdin.isatty() and sys.stderr.isatty()):
         return Laboratory(format=1)
-    answers = {key: ask(f"{question} (Enter: not stated)").strip() for key, question in QUESTIONS}
+    answers = {key: _answer(key, question, ask) for key, question in QUESTIONS}
     write_output(sessions / LABORATORY_FILE, (HEADING + _yaml(answers)).encode())
     return load_laboratory(sessions) or Laboratory(format=1)
+
+
+def _answer(key: str, question: str, ask: Ask) -> str:
+    """Answer in the form of its item, or empty; asked for again until it has that form."""
+    while True:
+        typed = ask(f"{question} (Enter: not stated)").strip()
+        if not typed or (_is_day(typed) if key in DAYS else key not in NUMBERS or number(typed) is not None):
+            return typed
+
+
+def _is_day(typed: str) -> bool:
+    try:
+        date.fromisoformat(typed)
+    except ValueError:
+        return False
+    return True
 
 
 def _yaml(answers: dict[str, str]) -> str:
@@ -86,8 +106,9 @@ def _standard(answers: dict[str, str]) -> dict[str, object]:
 
 
 def number(typed: str) -> float | None:
-    """Typed number, with a point or a comma; None for anything else."""
+    """Typed finite number, with a point or a comma; None for anything else."""
     try:
-        return float(typed.replace(",", "."))
+        value = float(typed.replace(",", "."))
     except ValueError:
         return None
+    return value if isfinite(value) else None

@@ -18,6 +18,8 @@ from workbench.cli.option_types import (
     AcceptChanges,
     AnswersFile,
     Details,
+    FitVerdict,
+    Json,
     NoInput,
     Sessions,
     View,
@@ -38,8 +40,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 
 
 def _version(wanted: bool) -> None:
@@ -117,15 +117,6 @@ def resume(
 
     screen = Screen(answers, no_input, view, details)
     resume_session(find_session(session, sessions), accept_changes, screen)
-
-
-class FitVerdict(StrEnum):
-    """Verdicts on the last fit of a session."""
-
-    ACCEPTED = "accepted"
-    EXCEPTION = "exception"
-    REFUSED = "refused"
-    NONE = "none"
 
 
 @app.command(name="sessions")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import date
+from enum import StrEnum
 from math import isfinite
 from pathlib import Path
 from typing import Annotated
@@ -17,12 +18,23 @@ AnswersFile = Annotated[
 NoInput = Annotated[
     bool, typer.Option("--no-input", help="Do not ask: an open prompt ends with exit code 6.")
 ]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 View = Annotated[
     bool | None,
     typer.Option("--view/--no-view", help="Watch in the Rerun viewer. Default: if there is a display."),
 ]
 Details = Annotated[bool, typer.Option("--details", help="Print the tables of a fit, and all its notes.")]
 Sessions = Annotated[Path, typer.Option(help="Folder of sessions.")]
+
+
+class FitVerdict(StrEnum):
+    """Verdicts on the last fit of a session."""
+
+    ACCEPTED = "accepted"
+    EXCEPTION = "exception"
+    REFUSED = "refused"
+    NONE = "none"
+
 
 MOST_MM = 1e6
 """Largest accepted length, as in rig and captures files."""

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from workbench.cli.option_types import Sessions, reason
+from workbench.cli.option_types import Json, Sessions, reason
 
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 Pdf = Annotated[Path | None, typer.Option(metavar="FILE", help="PDF file to write.")]
 Serial = Annotated[str | None, typer.Option("--rig", metavar="SERIAL", help="Serial number of the sensor.")]
 NO_QUESTIONS = "Do not ask for lab.yaml: what is missing is reported as not stated."

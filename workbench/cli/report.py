@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,9 +13,11 @@ import typer
 from workbench.cli.console import print_message
 from workbench.cli.lab_questions import laboratory_of
 from workbench.cli.sessions import find_session
-from workbench.model.errors import BadInputError
+from workbench.model.contents import printable
+from workbench.model.errors import AnswerNeededError, BadInputError
 from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.assemble import Certificate, Sources, certificate_of, fingerprint
+from workbench.report.certificate.dcc import certificate_xml, required_parties
 from workbench.report.certificate.predecessor import Predecessor, load_predecessor
 from workbench.report.certificate.session_record import SessionRecord, read_session
 from workbench.report.document import Document
@@ -53,13 +56,13 @@ def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool)
         check_output(path)
     session = read_session(folder)
     laboratory = laboratory_of(folder.parent, no_input, _ask)
+    if outputs.dcc is not None:
+        required_parties(laboratory)  # before a number is assigned
     certificate = numbered(session, laboratory)
     if not outputs.files and not outputs.as_json:
         outputs = Outputs(html=folder / DEFAULT_NAME)
     write_document(certificate.document, outputs)
     if outputs.dcc is not None:
-        from workbench.report.certificate.dcc import certificate_xml
-
         write_output(outputs.dcc, certificate_xml(certificate, datetime.now(UTC)))
     if outputs.as_json:
         print(json.dumps(certificate.as_json()))
@@ -83,7 +86,7 @@ def compare_sessions(names: tuple[Path, Path], sessions: Path, outputs: Outputs)
     write_document(document, outputs)
     if outputs.as_json:
         print(json.dumps(document.as_json()))
-    print_message(f"{document.verdict.text}: {'; '.join(document.verdict.reasons)}".rstrip(": "))
+    print_message("\n".join((document.verdict.text, *(f"note: {one}" for one in document.verdict.reasons))))
 
 
 def write_document(document: Document, outputs: Outputs) -> None:
@@ -141,7 +144,18 @@ def _predecessor(session: SessionRecord) -> Predecessor | None:
 
 
 def _ask(question: str) -> str:
-    return str(typer.prompt(question, default="", show_default=False, err=True))
+    """Typed answer in one line.
+
+    Raises:
+        AnswerNeededError: the terminal was closed, or end-of-file was typed (^D).
+    """
+    typer.echo(f"{question}: ", err=True, nl=False)
+    typed = sys.stdin.readline()
+    if not typed:
+        raise AnswerNeededError(
+            f"{question}: no answer; nothing was written. --no-input reports what is not known as not stated"
+        )
+    return printable(typed)
 
 
 def _print_summary(certificate: Certificate, outputs: Outputs) -> None:

@@ -76,7 +76,7 @@ def _series(laser: str, found: Comparison) -> Series:
     own = [one for one in found.differences if one.laser_id == laser]
     return Series(
         name=laser,
-        x=tuple(one.range_mm for one in own),
+        x=tuple(round(one.range_mm) for one in own),
         y=tuple(100.0 * one.difference_mm / one.range_mm for one in own),
         sd=tuple(100.0 * one.sd_mm / one.range_mm for one in own),
     )

@@ -50,6 +50,20 @@ def test_answers_are_written_and_not_asked_for_again(terminal: None, tmp_path: P
     assert len(person.asked) == len(QUESTIONS)
 
 
+def test_wrong_days_and_numbers_are_asked_for_again(terminal: None, tmp_path: Path) -> None:
+    typed = {"Day of its": ["yesterday", "2026-05-04"], "Its expanded": ["a little", "nan mm", "0.1"]}
+    asked: list[str] = []
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        found = next((answers for start, answers in typed.items() if question.startswith(start)), None)
+        return "rule" if found is None and question.startswith("Reference") else found.pop(0) if found else ""
+
+    lab = laboratory_of(tmp_path, False, ask)
+    assert len(asked) == len(QUESTIONS) + 3
+    assert (str(lab.standards[0].calibrated), lab.standards[0].expanded_uncertainty) == ("2026-05-04", 0.1)
+
+
 def test_no_answers_leave_every_item_open(terminal: None, tmp_path: Path) -> None:
     assert laboratory_of(tmp_path, False, Person({})) == Laboratory(format=1)
     assert (tmp_path / "lab.yaml").exists()

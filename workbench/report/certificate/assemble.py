@@ -131,7 +131,7 @@ def _sections(
         standards_section(lab, session.rig),
         procedure_section(session),
         uncertainty_section(calibration, found),
-        decision_section(session),
+        decision_section(session, calibration),
         calibration_section(session, calibration),
         validation_section(session.fit),
         *trial_sections(session),

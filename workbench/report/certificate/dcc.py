@@ -16,6 +16,7 @@ from workbench.model.errors import BadInputError
 from workbench.model.laboratory import LABORATORY_FILE, Laboratory, Party, Span, Standard
 from workbench.model.table import Cell, Table
 from workbench.report.certificate.assemble import STATEMENTS, Certificate
+from workbench.report.certificate.fit_limits import fit_limit_rows
 from workbench.report.certificate.method import DECISION_RULE
 from workbench.report.certificate.results import COVERAGE
 from workbench.report.certificate.session_record import text_sha256
@@ -42,7 +43,7 @@ def certificate_xml(certificate: Certificate, printed: datetime) -> bytes:
         BadInputError: `lab.yaml` does not state an item that the schema requires, or the session is empty.
     """
     lab, session = certificate.sources.laboratory, certificate.sources.session
-    laboratory, customer = _required(lab)
+    laboratory, customer = required_parties(lab)
     if session.began is None or session.ended is None:
         raise BadInputError(f"{session.folder}: expected records, the session has none")
     ET.register_namespace("dcc", DCC)
@@ -64,8 +65,8 @@ def certificate_xml(certificate: Certificate, printed: datetime) -> bytes:
     return content
 
 
-def _required(lab: Laboratory) -> tuple[Party, Party]:
-    """Laboratory and customer.
+def required_parties(lab: Laboratory) -> tuple[Party, Party]:
+    """Laboratory and customer, if all items that a Digital Calibration Certificate requires are stated.
 
     Raises:
         BadInputError: an item that the schema requires is not stated.
@@ -121,9 +122,11 @@ def _statements(parent: ET.Element, certificate: Certificate) -> None:
         texts.append(f"This certificate replaces certificate {document.replaces}.")
     for text in texts:
         _rich(_add(_add(parent, "statement"), "declaration"), text)
-    checks = certificate.sources.session.events(ev.LimitChecked)
+    session = certificate.sources.session
+    checks = [row[-1] for row in fit_limit_rows(session, session.calibration) if row[-1]]
+    checks += [one.verdict for one in session.events(ev.LimitChecked)]
     if checks:
-        verdicts = {check.verdict for check in checks}
+        verdicts = set(checks)
         conformity = "fail" if "fail" in verdicts else "noPass" if "marginal" in verdicts else "pass"
         statement = _add(parent, "statement")
         _rich(_add(statement, "declaration"), f"{len(checks)} limits of the procedures were checked.")

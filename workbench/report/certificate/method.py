@@ -6,7 +6,9 @@ from collections import Counter
 from collections.abc import Iterable
 
 from workbench.model import event as ev
+from workbench.model.calibration import Calibration
 from workbench.model.table import Cell, Column, Table
+from workbench.report.certificate.fit_limits import fit_limit_rows
 from workbench.report.certificate.session_record import SessionRecord, text_sha256
 from workbench.report.document import Fact, Section
 
@@ -52,7 +54,7 @@ def procedure_section(session: SessionRecord) -> Section:
     return Section("procedure", "Procedure", facts, (NO_CLAIM,), tuple(t for t in (titles, steps) if t.rows))
 
 
-def decision_section(session: SessionRecord) -> Section:
+def decision_section(session: SessionRecord, calibration: Calibration | None) -> Section:
     """Every limit that was checked, with its verdict, and the decision rule."""
     table = Table(
         name="decisions",
@@ -65,15 +67,18 @@ def decision_section(session: SessionRecord) -> Section:
             Column(key="limit", name="limit"),
             Column(key="verdict", name="verdict"),
         ),
-        rows=tuple(
-            (one.step, one.of, one.quantity, one.value, one.limit, one.verdict)
-            for one in session.events(ev.LimitChecked)
+        rows=(
+            *fit_limit_rows(session, calibration),
+            *(
+                (one.step, one.of, one.quantity, one.value, one.limit, one.verdict)
+                for one in session.events(ev.LimitChecked)
+            ),
         ),
     )
     fit = session.fit
     texts = [DECISION_RULE, *(f"Refused: {reason}." for reason in (fit.reasons if fit else ()))]
     if not table.rows:
-        texts.append("The procedures check no further limit than those of the fit.")
+        texts.append("The procedures check no limit.")
     return Section(
         "decisions", "Limits and decisions", texts=tuple(texts), tables=(table,) if table.rows else ()
     )

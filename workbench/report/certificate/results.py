@@ -87,9 +87,10 @@ def validation_section(fit: ev.FitFinished | None) -> Section:
         return Section(key, title, texts=("The session has no fit of its own.",))
     axes: tuple[ImageAxis, ImageAxis] = ("u", "v")
     charts = [chart for axis in axes if not (chart := _residual_chart(fit, axis)).is_empty]
-    tables = [cross_validation_table(_without_many_lasers(fit.left_out)), _test_table(fit)]
+    ordered = sorted(fit.left_out, key=lambda one: one.standoff_mm)
+    tables = [cross_validation_table(_without_many_lasers(ordered)), _test_table(fit)]
     if fit.left_out:
-        charts.append(_cross_validation_chart(fit.left_out))
+        charts.append(_cross_validation_chart(ordered))
     text = "Each placement is ranged by a fit without it. Bars and u are one standard deviation."
     return Section(key, title, texts=(text,), tables=tuple(t for t in tables if t.rows), charts=tuple(charts))
 
@@ -192,8 +193,8 @@ def _test_table(fit: ev.FitFinished) -> Table:
 
 
 def _cross_validation_chart(placements: Sequence[CrossValidatedPlacement]) -> Chart:
-    ordered = sorted(placements, key=lambda one: one.standoff_mm)
-    sd = tuple(100.0 * one.sd_mm / one.standoff_mm for one in ordered)
+    """Errors of placements in ascending order of their standoff."""
+    sd = tuple(100.0 * one.sd_mm / one.standoff_mm for one in placements)
     return Chart(
         name="cross_validation",
         title="Cross-validation: error of a placement ranged by the fit without it",
@@ -202,14 +203,14 @@ def _cross_validation_chart(placements: Sequence[CrossValidatedPlacement]) -> Ch
         series=(
             Series(
                 name="all lasers",
-                x=tuple(one.standoff_mm for one in ordered),
+                x=tuple(one.standoff_mm for one in placements),
                 y=tuple(
                     math.nan if one.error_mm is None else 100.0 * one.error_mm / one.standoff_mm
-                    for one in ordered
+                    for one in placements
                 ),
                 sd=sd,
                 expected_sd=sd,
             ),
         ),
-        flagged_x=tuple(dict.fromkeys(one.standoff_mm for one in ordered if one.alarm)),
+        flagged_x=tuple(dict.fromkeys(one.standoff_mm for one in placements if one.alarm)),
     )

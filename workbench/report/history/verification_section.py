@@ -23,7 +23,8 @@ RULES = (
 
 def verification_section(checked: Sequence[Verification], distances: Sequence[DistanceHistory]) -> Section:
     """Control charts of every distance, and the table of the sessions' mean errors."""
-    charts = [chart for one in distances for chart in _charts(one)]
+    several = [one for one in distances if len(one.days) > 1]
+    charts = [chart for one in several for chart in _charts(one)]
     tables = tuple(table for table in (_table(checked, distances),) if table.rows)
     title = "Verifications: control charts"
     return Section("verifications", title, texts=(RULES,), tables=tables, charts=tuple(charts))
