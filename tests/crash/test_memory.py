@@ -31,7 +31,8 @@ MOST_MB = 300.0
 def test_ten_thousand_captures_grow_by_less_than_300_mb(tmp_path: Path) -> None:
     """By the slope over 1500."""
     (tmp_path / "p.yaml").write_text(PROCEDURE)
-    command = [SCRIPT, "run", tmp_path / "p.yaml", "--rig", ROOT / "rigs/thesis-emulated.yaml"]
+    rig = ROOT / "rigs/thesis-emulated.yaml"
+    command: list[str | Path] = [SCRIPT, "run", tmp_path / "p.yaml", "--rig", rig]
     command += ["--sessions", tmp_path / "s", "--no-view"]
     samples: list[tuple[int, float]] = []
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:

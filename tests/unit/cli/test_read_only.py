@@ -38,10 +38,7 @@ def read_only(tmp_path: Path) -> Iterator[Path]:
         (f"fit {ROWS} -o TMP/c.yaml --recording RO/r.rrd", 2),
         ("target --pdf RO/t.pdf", 2),
         ("new RO/lab", 2),
-        (
-            "run procedures/calibrate-flat.yaml --rig {RIG} --sessions RO --no-view --no-input",
-            5,
-        ),
+        (f"run procedures/calibrate-flat.yaml --rig {RIG} --sessions RO --no-view", 5),
         (f"repair RO/{SESSION} --leave-out reference.4/600mm --reason x --no-view", 5),
         ("sessions RO", 0),
         (f"fit RO/{SESSION} -o TMP/c.yaml", 0),
