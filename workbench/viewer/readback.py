@@ -8,8 +8,6 @@ from math import isnan
 from pathlib import Path
 from typing import Any
 
-from rerun.chunk import RrdReader
-
 from workbench.calibration.data.boards import BoardView, on_boards, see_board
 from workbench.calibration.data.observations import Observation, PlacementInfo
 from workbench.calibration.data.spot_rows import observe
@@ -21,6 +19,7 @@ from workbench.model.spot import Failure, Spot
 from workbench.spots import Finding
 from workbench.viewer import entities as at
 from workbench.viewer.frame import RECORDED, as_png
+from workbench.viewer.rrd import open_rrd
 
 BLOB = "EncodedDepthImage:blob"
 OPTIONAL = {field.name for field in fields(Spot) if field.default is None}
@@ -65,7 +64,7 @@ def _rows(path: Path) -> tuple[dict[int, Row], dict[int, Row], dict[int, bytes]]
     captures: dict[int, Row] = {}
     spots: dict[int, Row] = {}
     blobs: dict[int, bytes] = {}
-    for chunk in RrdReader(str(path)).stream():
+    for chunk in open_rrd(path).stream():
         entity = str(chunk.entity_path).removeprefix("/")
         if entity not in {at.CAPTURE_RECORD, at.SPOTS_RECORD, at.IMAGE}:
             continue
