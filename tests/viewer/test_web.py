@@ -28,7 +28,7 @@ from pathlib import Path
 from workbench.viewer import window
 ports = iter(map(int, sys.argv[2:]))
 window.free_port = lambda: next(ports)
-sys.exit(window.serve(Path(sys.argv[1])))
+sys.exit(window.serve(Path(sys.argv[1]), print))
 """
 LISTENING = "0A"
 """State of a socket in /proc/net/tcp."""

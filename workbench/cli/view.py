@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from workbench.cli.console import print_message
 from workbench.cli.sessions import find_session
 from workbench.model.errors import BadInputError
 from workbench.session.journal import is_running, read_journal
 from workbench.session.manifest import load_session_rig
 from workbench.session.state import effective
-from workbench.viewer.window import is_complete, open_viewer, serve
+from workbench.viewer.window import has_display, is_complete, open_viewer, serve
 
 if TYPE_CHECKING:  # loads Rerun
     from workbench.viewer.comparison import Source
@@ -49,7 +50,14 @@ def view(request: Request) -> int:
     """
     with tempfile.TemporaryDirectory() as folder:
         recording = recording_of(request, Path(folder))
-        return serve(recording) if request.web else open_viewer(recording)
+        if request.web:
+            return serve(recording, lambda page: print_message(f"{page}\nserved until Ctrl-C"))
+        if not has_display() and request.rebuild:
+            print_message(f"{recording} is made again; no display to show it")
+            return 0
+        if not has_display() and recording.parent == Path(folder):
+            raise BadInputError("no display to show it; use --web")
+        return open_viewer(recording)
 
 
 def recording_of(request: Request, folder: Path) -> Path:

@@ -6,8 +6,10 @@ import os
 import socket
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from urllib.parse import quote
 
 from workbench.model.errors import BadInputError
 
@@ -86,16 +88,24 @@ def is_complete(recording: Path) -> bool:
         return False
 
 
-def serve(recording: Path) -> int:
+def serve(recording: Path, announce: Callable[[str], None]) -> int:
     """Serve a recording and the viewer to a browser on this computer until Ctrl-C; returns the exit code.
+
+    Args:
+        recording: file of the recording.
+        announce: called with the address of the page before it is served.
 
     Raises:
         BadInputError: there is no such recording, or no viewer.
     """
     _check(recording)
+    data, page = free_port(), free_port()
     command = [str(viewer_executable()), "--serve-web", "--bind", LOOPBACK]
-    command += ["--port", str(free_port()), "--web-viewer-port", str(free_port()), str(recording)]
-    return subprocess.run(command, env=viewer_environment(), check=False).returncode  # noqa: S603
+    command += ["--port", str(data), "--web-viewer-port", str(page), str(recording)]
+    source = quote(f"rerun+http://{LOOPBACK}:{data}/proxy", safe="")
+    announce(f"http://{LOOPBACK}:{page}?url={source}")
+    surroundings = {**viewer_environment(), "RUST_LOG": "warn"}  # not its own lines about the same address
+    return subprocess.run(command, env=surroundings, check=False).returncode  # noqa: S603
 
 
 def open_viewer(recording: Path) -> int:

@@ -123,3 +123,16 @@ def test_only_the_recording_of_one_session_can_be_made_again(tmp_path: Path, wha
 def test_a_recording_is_shown_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "any.rrd"
     assert recording_of(asked(path), tmp_path) == path
+
+
+def test_without_a_display_a_rebuilt_recording_is_named_and_others_need_a_browser(
+    session: Path, tmp_path: Path, workbench: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    made = workbench("view", session, "--rebuild")
+    assert (made.code, made.out) == (0, "")
+    assert str(session / "recording.rrd") in "".join(made.err.split())
+    shown = workbench("view", WEBCAM, "--rig", WEBCAM_RIG)
+    refused(shown, 2, "--web")
+    assert ".rrd" not in shown.err, "a recording in a folder that is gone"
