@@ -48,7 +48,7 @@ def test_the_number_of_records(whole: Path) -> None:
     assert len(list(read_journal(whole))) == RECORDS
 
 
-QUICK = {*(("torn", n) for n in range(0, RECORDS, 3)), *(("after", n) for n in range(1, RECORDS, 9))}
+QUICK = {*(("torn", n) for n in range(0, RECORDS, 5)), *(("after", n) for n in range(1, RECORDS, 15))}
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+import textwrap
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from workbench.cli.found_devices import FoundDevice, found_cameras, found_ports
 from workbench.cli.stopping import StopAfterCapture
 from workbench.cli.terminal_operator import choose_operator
 from workbench.devices.registry import load_bench_rig
+from workbench.model.contents import printable
 from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import Rig
 from workbench.procedure.doctor import CheckResult
@@ -54,7 +56,11 @@ def examine_rig(rig_path: Path, no_input: bool) -> None:
 
 def _print(console: Console, result: CheckResult) -> None:
     colour, word = WORDS[result.kind] if result.kind != "checked" else RESULTS[result.ok]
-    console.print(Text.assemble((word, colour), f" {result.part}: {result.found}"))
+    text = printable(f"{result.part}: {result.found}")
+    if console.is_terminal:
+        room = console.width - INDENT
+        text = textwrap.fill(text, room, break_long_words=False, break_on_hyphens=False)
+    console.print(Text.assemble((word, colour), " ", textwrap.indent(text, " " * INDENT).lstrip()))
 
 
 def _hint(rig: Rig, part: str) -> str | None:

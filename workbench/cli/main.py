@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from workbench.cli.bench_commands import aim, lasers
 from workbench.cli.console import print_message, print_warnings_as_notes
 from workbench.cli.exit import exit_program, report
 from workbench.cli.option_types import (
@@ -39,13 +40,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-
-lasers = typer.Typer(help="Control a rig's lasers without a session.", no_args_is_help=True)
-app.add_typer(lasers, name="lasers")
-app.command()(repair)
-app.command(name="report")(report_)
-for command in (export, history, use):
-    app.command()(command)
 
 
 def _version(wanted: bool) -> None:
@@ -78,7 +72,10 @@ def new(
         bool, typer.Option("--no-input", help="Do not ask: write procedures, example rigs, firmware alone.")
     ] = False,
 ) -> None:
-    """Lay out a laboratory's own folder: procedures, rigs, firmware, and the rig file of its sensor."""
+    """Lay out a laboratory's folder, with the rig file of its sensor.
+
+    At a terminal it asks about the sensor. Procedures, example rigs and firmware are copied.
+    """
     from workbench.cli.dialogue import is_interactive
     from workbench.cli.new import lay_out
 
@@ -114,7 +111,7 @@ def resume(
     view: View = None,
     details: Details = False,
 ) -> None:
-    """Resume a session that ended early; complete placements are not captured again."""
+    """Resume a session that ended early. Complete placements are not captured again."""
     from workbench.cli.run import Screen, resume_session
     from workbench.cli.sessions import find_session
 
@@ -148,7 +145,7 @@ def sessions_(
 
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Procedure and rig files.")]) -> None:
-    """Check procedure and rig files; print mistakes with file and line."""
+    """Check procedure and rig files. Mistakes are printed with file and line."""
     from workbench.cli.plan import check_files
 
     check_files(files)
@@ -161,7 +158,7 @@ def plan(
     sessions: Sessions = Path("sessions"),
     calibration: ExistingCalibration = None,
 ) -> None:
-    """Print the steps of procedures, numbers of captures, laser emission and duration."""
+    """Print the steps of procedures. With captures, laser emission and duration."""
     from workbench.cli.plan import print_plan
 
     print_plan(procedures, rig, sessions, calibration)
@@ -172,7 +169,10 @@ def doctor(
     rig: Annotated[Path, typer.Argument(help="Rig file.")],
     no_input: NoInput = False,
 ) -> None:
-    """Check camera, controller, interlock, latency, exposure and each laser of a rig."""
+    """Check every part of a rig.
+
+    Controller, interlock, camera, latency, exposure and each laser; a part that fails does not end the check.
+    """
     from workbench.cli.doctor import examine_rig
 
     examine_rig(rig, no_input)
@@ -203,7 +203,7 @@ def fit(
     json: Json = False,
     details: Details = False,
 ) -> None:
-    """Fit a calibration to images or pixel positions at known standoffs."""
+    """Fit a calibration to images or positions at known standoffs."""
     gc.set_threshold(1_000_000)  # more objects than a fit creates: collection would only take time
     from workbench.cli.fit import Request, fit_captures
 
@@ -228,7 +228,7 @@ def design(
     ] = 10,
     json: Json = False,
 ) -> None:
-    """Forecast the uncertainty of a calibration before any data; propose standoffs."""
+    """Forecast the uncertainty of a calibration. Without data; proposes standoffs."""
     from workbench.cli.design import design_calibration
 
     design_calibration(rig, standoffs, count, repeats, json)
@@ -240,7 +240,7 @@ def compare(
     b: Annotated[Path, typer.Argument(help="Another calibration file of the same sensor.")],
     json: Json = False,
 ) -> None:
-    """Test whether two calibrations agree within uncertainty; name what moved."""
+    """Test whether two calibrations agree. Names what changed."""
     from workbench.cli.compare import compare_calibrations
 
     compare_calibrations(a, b, json)
@@ -263,7 +263,7 @@ def range_(
     view: Annotated[bool, typer.Option("--view", help="Live: show readings in the Rerun viewer.")] = False,
     json: Json = False,
 ) -> None:
-    """Range the scenes of a captures file, or live on a bench, with a calibration."""
+    """Range the scenes of a captures file, or live on a bench."""
     if (captures is None) == (rig is None):
         raise typer.BadParameter("expected either a captures file or --rig for live ranging")
     if captures is not None:
@@ -278,29 +278,6 @@ def range_(
         from workbench.cli.live import LiveRequest, range_live
 
         range_live(LiveRequest(rig, calibration, readings, standoff, stats, view), json)
-
-
-@app.command()
-def aim(
-    rig: Annotated[Path, typer.Option(help="Rig file.")],
-    standoff: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MM",
-            parser=millimetres(1),
-            help="Standoff of the target; another one is typed while the command runs.",
-        ),
-    ] = None,
-    calibration: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Compare with this calibration, not the rig file.")
-    ] = None,
-    no_input: NoInput = False,
-    view: Annotated[bool, typer.Option("--view", help="Show the spots in the Rerun viewer.")] = False,
-) -> None:
-    """Aim and focus lasers: place, width, peak and direction of each spot, until Ctrl-C."""
-    from workbench.cli.aim import AimRequest, aim_lasers
-
-    aim_lasers(AimRequest(rig, calibration, standoff, no_input, view))
 
 
 class TrialKind(StrEnum):
@@ -323,7 +300,7 @@ def trial(
     ],
     json: Json = False,
 ) -> None:
-    """Compute the statistics of a trial from readings of any range sensor."""
+    """Compute statistics of a trial of any range sensor. From files of readings."""
     from workbench.cli.trial import analyse_readings
 
     analyse_readings(kind.value, readings, json)
@@ -367,20 +344,10 @@ def view(
     raise typer.Exit(view(asked))
 
 
-@lasers.command(name="off")
-def lasers_off(rig: Annotated[Path, typer.Option(help="Rig file.")]) -> None:
-    """Switch every laser off; exit code 7 if that is not confirmed."""
-    from workbench.cli.lasers import lasers_off
-
-    typer.echo(lasers_off(rig))
-
-
-@lasers.command(name="state")
-def lasers_state(rig: Annotated[Path, typer.Option(help="Rig file.")]) -> None:
-    """Print the controller's identity and interlock; this switches every laser off."""
-    from workbench.cli.lasers import lasers_state
-
-    typer.echo(lasers_state(rig))
+for other in (aim, repair, export, history, use):
+    app.command()(other)
+app.command(name="report")(report_)
+app.add_typer(lasers, name="lasers")
 
 
 def main() -> None:

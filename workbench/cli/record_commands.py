@@ -34,7 +34,7 @@ def report_(
     no_input: Annotated[bool, typer.Option("--no-input", help=NO_QUESTIONS)] = False,
     json: Json = False,
 ) -> None:
-    """Write the certificate of a session: HTML, PDF, Digital Calibration Certificate."""
+    """Write the certificate of a session. HTML, PDF, Digital Calibration Certificate."""
     from workbench.cli.report import Outputs, compare_sessions, report_session
 
     if (session is None) == (compare is None):
@@ -69,7 +69,7 @@ def history(
     sessions: Sessions = Path("sessions"),
     json: Json = False,
 ) -> None:
-    """Show the calibrations and verifications of a sensor as control charts, and its drift."""
+    """Show control charts of a sensor. Its calibrations, verifications and drift."""
     from workbench.cli.history import HistoryRequest, show_history
 
     show_history(HistoryRequest(rig, html, pdf, note, sessions), json)
@@ -83,7 +83,7 @@ def use(
     rig: Annotated[str, typer.Option(metavar="SERIAL", help="Serial number of the sensor.")],
     sessions: Sessions = Path("sessions"),
 ) -> None:
-    """Put a calibration in force for a sensor, also an earlier one; print the change in mm."""
+    """Put a calibration in force for a sensor. Also an earlier one; prints the change in mm."""
     from workbench.cli.use import put_in_force
 
     put_in_force(calibration, rig, because, sessions)

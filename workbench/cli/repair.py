@@ -52,7 +52,7 @@ def repair(
     view: View = None,
     details: Details = False,
 ) -> None:
-    """Repair an ended session: capture placements again, leave out, restore or add them."""
+    """Repair an ended session. Captures placements again, leaves them out, restores or adds them."""
     from workbench.cli.run import Screen, resume_session
     from workbench.cli.sessions import find_session
     from workbench.procedure.engine.repair import Repair

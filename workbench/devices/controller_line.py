@@ -159,11 +159,12 @@ class ControllerLine:
     def _receive(self, alarm: Callable[[], bool], head: str, within_s: float) -> bytes:
         """Receive one line, possibly incomplete after `within_s`; after an alarm, up to the reply to off.
 
-        Late replies to earlier requests are skipped. One to an earlier off or on does not answer the request
-        to switch on.
+        Late replies to earlier requests for the state are skipped, and by off and its check those to on and
+        off, too.
         """
         received, end, wanted = b"", b"\n", head.encode()
-        late = (STATE, INTERLOCK) if wanted.startswith(ON) else (STATE, INTERLOCK, ON, OFF)
+        checks_off = wanted.startswith((STATE, OFF.rstrip()))
+        late = (STATE, INTERLOCK, ON, OFF) if checks_off else (STATE, INTERLOCK)
         deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
             while end == b"\n" in received and received.startswith(late) and not received.startswith(wanted):

@@ -55,7 +55,7 @@ class Prompt:
         if self.quantity is not None:
             return self._refuse_number(self.quantity, answer.value)
         if self.choices:
-            wrong = f"expected one of {', '.join(self.choices)}, got {answer.value}"
+            wrong = f"expected one of {', '.join(self.choices)}, got {answer.value or 'nothing'}"
             return None if answer.value in self.choices else wrong
         return None if answer.value is None else f"expected yes, got {answer.value or 'nothing'}"
 

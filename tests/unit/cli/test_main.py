@@ -133,3 +133,15 @@ def test_a_folder_of_another_kind_is_refused(workbench: Run, tmp_path: Path) -> 
         2,
         f"{file}: ",
     )
+
+
+@pytest.mark.parametrize("group", [[], ["lasers"]])
+def test_no_summary_of_a_command_is_cut(
+    workbench: Run, monkeypatch: pytest.MonkeyPatch, group: list[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    outcome = workbench(*group, "--help")
+    assert outcome.code == 0
+    commands = outcome.out.partition("Commands:")[2].strip().splitlines()
+    assert len(commands) >= 2
+    assert not [line for line in commands if line.endswith("...")]

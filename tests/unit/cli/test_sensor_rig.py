@@ -10,8 +10,10 @@ from tests.support.command_line import Run
 from tests.support.sensor_answers import GIVEN
 from workbench.cli.sensor_rig import SPOILT_KEY, SPOILT_MM, Sensor, paths, practice_text, rig_text
 from workbench.emulator.spec import emulator_spec
-from workbench.model.rig import Rig
+from workbench.model.rig import Rig, load_rig
 from workbench.model.yamlfile import parse_yaml_model
+
+ROOT = Path(__file__).parents[3]
 
 
 def rigs(**answers: str) -> tuple[Rig, Rig]:
@@ -73,3 +75,13 @@ def test_both_files_pass_check(workbench: Run, tmp_path: Path) -> None:
     for path, text in zip(files, (rig_text(sensor), practice_text(sensor, 1)), strict=True):
         path.write_text(text)
     assert workbench("check", *files).code == 0
+
+
+def test_the_documented_example_is_the_sensor_of_its_answers() -> None:
+    """`rigs/uno-webcam.yaml` and docs/build-a-sensor.md describe the sensor of these answers."""
+    example, real = load_rig(ROOT / "rigs/uno-webcam.yaml"), rigs()[0]
+    for part in ("camera", "lasers", "bench", "noise", "laser_class", "driver"):
+        assert getattr(example, part) == getattr(real, part), part
+    page = (ROOT / "docs/build-a-sensor.md").read_text()
+    for key in ("size", "lens", "wavelength", "baselines", "measured", "laser_class", "port"):
+        assert f"| `{GIVEN[key]}` |" in page, key
