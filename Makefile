@@ -9,7 +9,7 @@ INSTALLED := $(VENV)/.installed
 # The dependencies of the workbench alone, without those of its developers.
 RUNNABLE := $(VENV)/.runnable
 
-.PHONY: help demo test thorough quick wheel lint bench prove mutants crash lock clean schema pictures
+.PHONY: help demo test thorough quick wheel lint bench prove mutants crash fuzz lock clean schema pictures
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
@@ -20,6 +20,7 @@ help:
 	@echo "make prove  stated uncertainties compared with simulated calibrations, shapes and trials (an hour)"
 	@echo "make mutants  200 wrong versions of the core; the tests must find nine of ten (an hour or two)"
 	@echo "make crash  a session of 10 000 captures with random faults; none may be lost (a quarter of an hour)"
+	@echo "make fuzz   100 000 mutated inputs at every door, and 500 commands (ten minutes at most)"
 	@echo "make wheel  build the wheel, install it with the run-time dependencies only, run a session (two minutes)"
 	@echo "make lint   only the linters and the type checker"
 	@echo "make pictures  the viewer's screens in docs/images, of a new run of the demo (two minutes)"
@@ -54,6 +55,9 @@ mutants: $(INSTALLED)
 crash: $(INSTALLED)
 	$(BIN)/python -m tests.crash.long
 	$(BIN)/python -m tests.crash.trials
+
+fuzz: $(INSTALLED)
+	$(BIN)/python -m tests.fuzz
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

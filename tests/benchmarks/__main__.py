@@ -11,7 +11,17 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from tests.benchmarks import accuracy, calibration, capture, detection, ranging, recording, speckle, speed
+from tests.benchmarks import (
+    accuracy,
+    calibration,
+    capture,
+    detection,
+    ranging,
+    recording,
+    rows,
+    speckle,
+    speed,
+)
 
 RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 
@@ -23,6 +33,7 @@ def main() -> None:
     subjects = {
         "spots": (speed.lines, detection.lines, accuracy.lines, speckle.lines),
         "calibration": (calibration.lines,),
+        "rows": (rows.lines,),
         "ranging": (ranging.lines,),
         "capture": (capture.lines, recording.lines),
     }

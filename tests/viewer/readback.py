@@ -9,6 +9,8 @@ from typing import Any
 
 from rerun.chunk import RrdReader
 
+from workbench.viewer.rrd import open_rrd
+
 ROW_ID = "rerun.controls.RowId"
 TIMELINES = ("capture", "step", "time", "standoff_mm")
 Row = dict[str, Any]
@@ -19,7 +21,7 @@ class Contents:
 
     def __init__(self, path: Path) -> None:
         self._rows: dict[str, list[Row]] = {}
-        for chunk in RrdReader(str(path)).stream():
+        for chunk in open_rrd(path).stream():
             self._rows.setdefault(str(chunk.entity_path), []).extend(_rows(chunk.to_record_batch()))
 
     @property
@@ -118,7 +120,7 @@ def front_tab(path: Path) -> str:
 
 
 def _last_layout(path: Path) -> list[Row]:
-    reader = RrdReader(str(path))
+    reader = open_rrd(path)
     layouts = [list(_layout_rows(reader, store)) for store in reader.blueprints()]
     return max(layouts, key=lambda rows: max(map(_row_id, rows)))
 

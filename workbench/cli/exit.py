@@ -15,8 +15,10 @@ from workbench.cli.verdict import VerdictShownError
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
 
 INTERNAL_ERROR = 1
-WRITE_FAILURES = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
-"""Errors of a full disk, an exceeded quota or file size, and a failed device."""
+WRITE_FAILURES = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
+"""Errors of a full disk, an exceeded quota or file size, a failed device, and a read-only file system."""
+ACCESS_FAILURES = {errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR}
+"""Errors of a missing permission, and of names that lead nowhere."""
 hung = False
 """Whether a thread hangs in a library, or may, for which the interpreter would wait at the end."""
 
@@ -60,8 +62,9 @@ def report(error: BaseException) -> int:
     if isinstance(error, WorkbenchError):
         print_message(f"error: {error}")
         return error.exit_code
-    if isinstance(error, OSError) and error.errno in WRITE_FAILURES:
-        print_message(f"error: {error.filename or 'output'}: cannot be written: {error.strerror}")
+    if isinstance(error, OSError) and error.errno in WRITE_FAILURES | ACCESS_FAILURES:
+        use = "written" if error.errno in WRITE_FAILURES else "used"
+        print_message(f"error: {error.filename or 'output'}: cannot be {use}: {error.strerror}")
         return StoppedError.exit_code
     with suppress(OSError):
         traceback.print_exception(error)

@@ -94,7 +94,8 @@ def fit_source(request: Request) -> FittedSource:
     rows = parse_captures(captures, content)
     check_images(captures, rows)
     fitted = fit_calibration(rig, *_observations(rig, rows, captures, request))
-    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
+    digest = hashlib.sha256(content).hexdigest()
+    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, digest))
     kept = [row for row in rows if row.standoff_mm not in request.without_mm]
     return FittedSource(kept, fitted, calibration, assessment)
 
@@ -109,8 +110,9 @@ def _fit_recording(rig: Rig, request: Request) -> FittedSource:
     kept = [one for one in found if one.standoff_mm not in request.without_mm]
     views = [view for view in boards if view.placement.standoff_mm not in request.without_mm]
     fitted = fit_calibration(rig, kept, rejected, views)
-    content = read_captures_file(request.source)
-    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, content))
+    with request.source.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, digest))
     return FittedSource((), fitted, calibration, assessment)
 
 
@@ -204,10 +206,10 @@ def _observations(
     return observations, rejected, boards
 
 
-def _provenance(rig: Rig, request: Request, captures: bytes) -> Provenance:
+def _provenance(rig: Rig, request: Request, sha256: str) -> Provenance:
     return Provenance(
         session=request.source.resolve().name if request.source.is_dir() else "",
-        captures_sha256=hashlib.sha256(captures).hexdigest(),
+        captures_sha256=sha256,
         rig=rig.rig,
         serial=rig.serial,
         command=command_line(),

@@ -15,6 +15,13 @@ from workbench.model.number_text import counted
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
 
+REPEAT = "remove the cause, and capture this placement again"
+"""Action after a limit on captures."""
+READ_AGAIN = (
+    "look at the readings in the replay; workbench repair --recapture takes those of a placement again"
+)
+"""Action after a limit on the result of a trial."""
+
 
 def session_verdict(session_dir: Path, refused: LimitFailedError | None) -> Verdict:
     """Verdict of an ended session.
@@ -70,13 +77,11 @@ def _failed_limit(session_dir: Path, events: Sequence[ev.Event], notes: Sequence
     cause, remedy = split_reason(why)
     placed = [event for event in events if isinstance(event, ev.TargetPlaced | ev.PlacementFinished)]
     unfinished = bool(placed) and isinstance(placed[-1], ev.TargetPlaced)
-    resume = ["workbench", "resume", str(session_dir)]
     return Verdict(
         word="REFUSED",
         headline=cause,
-        action=remedy
-        or ("" if unfinished else "see the readings in the recording; `repair` takes them again"),
-        commands=[resume] if unfinished else [],
+        action=remedy or (REPEAT if unfinished else READ_AGAIN),
+        commands=[["workbench", "resume", str(session_dir)]] if unfinished else [],
         facts=_outcomes(events),
         notes=notes,
         labelled=_where(session_dir),

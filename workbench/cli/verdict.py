@@ -55,9 +55,9 @@ def show_verdict(verdict: Verdict) -> None:
         if verdict.action:
             _print("do:", verdict.action)
         for number, command in enumerate(verdict.commands):
-            _print_command("or:" if number or verdict.action else "do:", command)
+            _print_command("or:" if number else "then:" if verdict.action else "do:", command)
         for fact in verdict.facts:
-            _print("", fact)
+            _print("result:" if verdict.word == "REFUSED" else "", fact)
         for note in verdict.notes:
             _print("note:", note, "yellow")
         for label, text in verdict.labelled:

@@ -292,6 +292,9 @@ def _make_settings(
     ]
     for number, name, value in settings:
         _set(capture, device.source, number, name, value)
+    if is_device:
+        # Not read back: cameras without it refuse it. What adjusts itself is found by its effect.
+        capture.set(cv2.CAP_PROP_AUTO_WB, 0.0)
 
 
 def _set(capture: cv2.VideoCapture, source: str, number: int, name: str, value: float | None) -> None:

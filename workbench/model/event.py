@@ -211,6 +211,8 @@ class LatencyMeasured(FileModel):
     kind: Literal["latency_measured"] = "latency_measured"
     frames: int
     """Number of frames in the stream that precede the first one exposed after a laser was switched."""
+    darkening: float | None = None
+    """Relative darkening of the background while a laser is on, by automatic exposure or gain; None: none."""
 
 
 class StandoffAdvised(FileModel):

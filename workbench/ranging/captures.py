@@ -88,6 +88,8 @@ def _mean_position(
         return None
     position, stated, speckle_sd = np.moveaxis(np.array(found), 1, 0)
     sd = np.where(np.isfinite(stated), stated, ranger.calibration.laser_ranger.noise.spot_sd_px)
+    if len(found) == 1:  # thousands of scenes have no repeats
+        return position[0], np.where(np.isfinite(position[0]), sd[0], np.inf), speckle_sd[0]
     kept = ~outliers(position, sd)
     scale = float(significant_scale(*scatter_chi2(position[kept], sd[kept])))
     return *weighted_mean(position[kept], scale * sd[kept]), np.sqrt((speckle_sd[kept] ** 2).mean(axis=0))

@@ -30,13 +30,15 @@ def check_output(path: Path) -> None:
     """Check before a computation that its result can be written.
 
     Raises:
-        BadInputError: the folder is missing, or `path` is no regular file.
+        BadInputError: the folder is missing or cannot be written, or `path` is no regular file.
     """
     target = path.resolve()
     if not target.parent.is_dir():
         raise BadInputError(f"{path}: cannot be written: no such folder: {target.parent}")
     if target.exists() and not target.is_file():
         raise BadInputError(f"{path}: expected the name of a file to write, got something else")
+    if not os.access(target.parent, os.W_OK):
+        raise BadInputError(f"{path}: cannot be written: the folder {target.parent} does not allow it")
 
 
 def write_record(path: Path, content: bytes) -> None:

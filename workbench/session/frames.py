@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import struct
 from collections import deque
 from dataclasses import dataclass
 from itertools import count
@@ -18,6 +19,8 @@ from workbench.model.event import FrameRef
 from workbench.session.files import sync_folder, write_record
 from workbench.spots.grey import to_grey
 
+PNG = b"\x89PNG"
+"""Beginning of a PNG file."""
 LARGEST_BYTES = 2**30
 """Largest image file: 16 bits a pixel for the largest cameras, not compressed, in three colours."""
 _RECENT: deque[tuple[str, Image]] = deque(maxlen=16)
@@ -98,6 +101,8 @@ def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
     """
     content = read_file(path, "an image", LARGEST_BYTES)
     _check_whole(path, content)
+    if content.startswith(PNG):
+        _check_png(path, content, size_px)
     # An orientation tag would rotate the image and move every spot: pixels are used as stored.
     flags = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
     try:
@@ -109,11 +114,7 @@ def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
         raise BadInputError(f"{path}: expected an image, OpenCV cannot decode it; got {got}, or truncated")
     if image.dtype not in (np.uint8, np.uint16):
         raise BadInputError(f"{path}: expected 8 or 16 bits per pixel, got {image.dtype}")
-    if size_px is not None and (image.shape[1], image.shape[0]) != size_px:
-        raise BadInputError(
-            f"{path}: expected an image of {size_px[0]} x {size_px[1]} pixels,"
-            f" got {image.shape[1]} x {image.shape[0]}; is it from another camera or mode?"
-        )
+    _check_size(path, (image.shape[1], image.shape[0]), size_px)
     return to_grey(image)
 
 
@@ -121,6 +122,28 @@ def _check_whole(path: Path, content: bytes) -> None:
     """Refuse a truncated file: decoders silently fill its missing part with grey."""
     if not content:
         raise BadInputError(f"{path}: expected an image, the file is empty")
-    png, jpeg = content.startswith(b"\x89PNG"), content.startswith(b"\xff\xd8")
+    png, jpeg = content.startswith(PNG), content.startswith(b"\xff\xd8")
     if (png and b"IEND" not in content[-16:]) or (jpeg and b"\xff\xd9" not in content[-1024:]):
         raise BadInputError(f"{path}: the image is truncated after {len(content)} bytes")
+
+
+def _check_png(path: Path, content: bytes, size_px: tuple[int, int] | None) -> None:
+    """Refuse a PNG of another size before it is decoded, and one with a part longer than the file.
+
+    The decoder would take the memory for such a part, up to 2 GB.
+    """
+    _check_size(path, struct.unpack(">II", content[16:24].ljust(8, b"\0")), size_px)
+    start = 8
+    while start < len(content):
+        (length,) = struct.unpack(">I", content[start : start + 4].ljust(4, b"\xff"))
+        start += 12 + length
+        if start > len(content):
+            raise BadInputError(f"{path}: the image is damaged: a part of it is longer than the file")
+
+
+def _check_size(path: Path, found_px: tuple[int, int], size_px: tuple[int, int] | None) -> None:
+    if size_px is not None and found_px != size_px:
+        raise BadInputError(
+            f"{path}: expected an image of {size_px[0]} x {size_px[1]} pixels, got {found_px[0]} x"
+            f" {found_px[1]}; is it from another camera or mode?"
+        )

@@ -41,8 +41,9 @@ _TEXTS: Final[dict[Failure, str]] = {
     ),
     Failure.AMBIENT_CHANGED: (
         "The ambient light differs between the on and the off frame; the difference was compensated. "
-        "Cause: a lamp that was switched, daylight, mains flicker. Do: keep the light steady, use an "
-        "exposure that is a multiple of the mains period."
+        "Cause: a lamp that was switched, daylight, mains flicker, or automatic exposure, gain or white "
+        "balance of the camera. Do: keep the light steady, end automatic control, use an exposure that "
+        "is a multiple of the mains period."
     ),
     Failure.AT_EDGE: (
         "A spot touches the border of the image; the part outside is missing. Cause: the target is too "

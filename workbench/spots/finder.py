@@ -20,9 +20,9 @@ class SpotFinder:
         shape: Height and width of the frames.
         scanlines: Image lines that spots may lie on; none: the whole frame. Only their bands are read.
         expected: Number of lasers that are on.
-        saturation_dn: Value of a clipped pixel; None means the full scale of the depth, 255 for uint8. For
-            uint16 it is the 10, 12 or 14 bit full scale if the brightest pixel has exactly that value, left-
-            or right-aligned, else 65535.
+        saturation_dn: Value of a clipped pixel; None means the full scale of the depth: 255 for uint8. For
+            uint16 it is the 10, 12 or 14 bit full scale if the brightest pixel has exactly that value (left-
+            or right-aligned), else 65535.
         speckle_sd_px: Deviation of a spot's centre by speckle, as the rig or the calibration states it. The
             contrast of speckle is measured in each frame, and averaged with it; 0: not known.
         reasons: Whether missing spots start a search for the reason, over the whole frame.

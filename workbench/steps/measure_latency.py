@@ -14,7 +14,10 @@ from workbench.procedure.engine.step import StepModel
 
 @register
 class MeasureLatencyStep(StepModel):
-    """Measure the camera's latency in frames; that many are discarded before each later capture."""
+    """Measure the camera's latency in frames; that many are discarded before each later capture.
+
+    Automatic exposure, gain or white balance that the camera does not switch off is reported.
+    """
 
     needs: ClassVar[str | None] = "target"
     step: Literal["measure_latency"]
@@ -27,5 +30,11 @@ class MeasureLatencyStep(StepModel):
 
     def run(self, context: Context, name: str) -> str:
         """Measure the latency and set the camera to discard as many frames."""
-        frames = context.measure_latency(name, self.most_frames)
-        return f"{counted(frames, 'frame')}, discarded before each capture"
+        measured = context.measure_latency(name, self.most_frames)
+        outcome = f"{counted(measured.frames, 'frame')}, discarded before each capture"
+        if measured.darkening is None:
+            return outcome
+        return (
+            f"{outcome}. The camera adjusts itself: while a laser is on the rest of the image darkens by"
+            f" {100 * measured.darkening:.0f} %. Switch its automatic exposure, gain and white balance off"
+        )

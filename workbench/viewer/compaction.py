@@ -13,12 +13,13 @@ from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
-from rerun.chunk import OptimizationProfile, RrdReader
+from rerun.chunk import OptimizationProfile
 
+from workbench.viewer.rrd import open_rrd
 from workbench.viewer.window import is_complete
 
-MOST_BYTES = 1 << 29
-"""Largest recording to compact, as of 3000 captures of 640 x 480 px; it takes six times the memory."""
+MOST_BYTES = 1 << 27
+"""Largest recording to compact, as of 1000 captures of 640 x 480 px; it takes twice the memory, or more."""
 FLUSH_SECONDS = 20.0
 
 
@@ -54,14 +55,14 @@ def compact(recording: Path, layout: rrb.Blueprint) -> bool:
 def rows(recording: Path) -> Counter[str]:
     """Number of rows of each entity that belong to a time; later static values replace earlier ones."""
     counted: Counter[str] = Counter()
-    for chunk in RrdReader(str(recording)).stream():
+    for chunk in open_rrd(recording).stream():
         if not chunk.is_static:
             counted[chunk.entity_path] += chunk.num_rows
     return counted
 
 
 def _write(recording: Path, out: Path, layout: rrb.Blueprint) -> None:
-    reader = RrdReader(str(recording))
+    reader = open_rrd(recording)
     (store,) = reader.recordings()
     chunks = reader.stream().collect(optimize=OptimizationProfile.OBJECT_STORE)
     copy = rr.RecordingStream(store.application_id, recording_id=store.recording_id, send_properties=False)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from math import hypot
+from dataclasses import fields, replace
+from math import hypot, nan
 
 import cv2
 import numpy as np
@@ -24,8 +24,8 @@ from workbench.viewer.stream import Stream
 
 QUANTITIES = ("u_px", "v_px", "peak_dn")
 """Quantities with a curve for each laser."""
-RECORDED = ("u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "peak_dn")
-"""Quantities in the record of all spots of a capture, as stored in the journal."""
+RECORDED = tuple(field.name for field in fields(Spot) if field.name not in {"flags", "laser_id"})
+"""Quantities in the record of all spots of a capture, as stored in the journal; NaN: not known."""
 RERUN_PIXEL_CENTRE = 0.5
 """Shift of drawings: Rerun's (0, 0) is the corner of the top-left pixel, the workbench's its centre."""
 AMBIENT_SHARE = 0.12
@@ -160,7 +160,8 @@ def _log_curves(stream: Stream, spots: Sequence[Spot]) -> None:
 
 def _record(spots: Sequence[Spot]) -> dict[str, list[float] | list[str]]:
     """All spots of a capture, a list for each quantity."""
-    numbers = {name: [float(getattr(spot, name)) for spot in spots] for name in RECORDED}
+    values = {name: [getattr(spot, name) for spot in spots] for name in RECORDED}
+    numbers = {name: [nan if one is None else float(one) for one in ones] for name, ones in values.items()}
     return {
         **numbers,
         "laser_id": [spot.laser_id or "" for spot in spots],

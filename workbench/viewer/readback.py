@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import fields
+from math import isnan
 from pathlib import Path
 from typing import Any
-
-from rerun.chunk import RrdReader
 
 from workbench.calibration.data.boards import BoardView, on_boards, see_board
 from workbench.calibration.data.observations import Observation, PlacementInfo
@@ -19,8 +19,11 @@ from workbench.model.spot import Failure, Spot
 from workbench.spots import Finding
 from workbench.viewer import entities as at
 from workbench.viewer.frame import RECORDED, as_png
+from workbench.viewer.rrd import open_rrd
 
 BLOB = "EncodedDepthImage:blob"
+OPTIONAL = {field.name for field in fields(Spot) if field.default is None}
+"""Quantities of a spot that need not be known."""
 Row = dict[str, Any]
 
 
@@ -61,7 +64,7 @@ def _rows(path: Path) -> tuple[dict[int, Row], dict[int, Row], dict[int, bytes]]
     captures: dict[int, Row] = {}
     spots: dict[int, Row] = {}
     blobs: dict[int, bytes] = {}
-    for chunk in RrdReader(str(path)).stream():
+    for chunk in open_rrd(path).stream():
         entity = str(chunk.entity_path).removeprefix("/")
         if entity not in {at.CAPTURE_RECORD, at.SPOTS_RECORD, at.IMAGE}:
             continue
@@ -101,12 +104,18 @@ def _observation(row: Row, spots: Row, rig: Rig, path: Path) -> Observation | Re
     count = len(spots.get("u_px") or ())
     found = tuple(
         Spot(
-            **{name: spots[name][n] for name in RECORDED},
+            **{name: _number(spots, name, n) for name in RECORDED},
             flags=frozenset(Failure(flag) for flag in spots["flags"][n].split()),
         )
         for n in range(count)
     )
     return observe(Finding(found), rig.lasers[rig.laser_ids.index(row["laser_id"])], observation)
+
+
+def _number(spots: Row, name: str, n: int) -> Any:
+    """Quantity of one spot; None where a recording of an earlier release, or its frame, does not have it."""
+    values = spots.get(name)
+    return None if values is None or (name in OPTIONAL and isnan(values[n])) else values[n]
 
 
 def _boards(captures: dict[int, Row], frames: dict[int, bytes], rig: Rig) -> dict[str, BoardView | Rejected]:

@@ -15,7 +15,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from workbench.viewer.entities import APPLICATION, CAPTURE, STANDOFF, STEP, WALL_CLOCK
-from workbench.viewer.window import LOOPBACK
+from workbench.viewer.window import END, LOOPBACK
 
 FLUSH_SECONDS = 20.0
 STALL_S = 60.0
@@ -66,7 +66,10 @@ class Stream:
         # No timelines of the logging itself: they would differ in a rebuilt recording.
         rr.set_log_time_enabled(False, self._recording)
         rr.set_log_tick_enabled(False, self._recording)
-        sinks: list[rr.FileSink | rr.GrpcServerSink] = [] if path is None else [rr.FileSink(str(path))]
+        # A footer's index grows in memory with every value, by 190 kB a capture; `compact` adds a small one.
+        sinks: list[rr.FileSink | rr.GrpcServerSink] = []
+        if path is not None:
+            sinks.append(rr.FileSink(str(path), write_footer=False))
         if port is not None:
             sinks.append(rr.GrpcServerSink(bind_ip=LOOPBACK, port=port, server_memory_limit=SERVER_MEMORY))
         with self._named():
@@ -135,11 +138,14 @@ class Stream:
             self._recording.flush(timeout_sec=FLUSH_SECONDS)
 
     def close(self) -> None:
-        """Write buffered data and the footer of the file; raises the errors of `flush`."""
+        """Write buffered data and the end of the file; raises the errors of `flush`."""
         try:
             self.flush()
         finally:
             self._recording.disconnect()
+        if self._path is not None:
+            with self._path.open("ab") as file:
+                file.write(END)
 
     @contextmanager
     def _named(self) -> Iterator[None]:

@@ -12,6 +12,8 @@ from pathlib import Path
 from workbench.model.errors import BadInputError
 
 LOOPBACK = "127.0.0.1"
+END = bytes(16)
+"""Message that ends a recording without a footer: its kind and its length are 0."""
 FOOTER = b"RRF2FOOT"
 """Mark at the end of a complete recording."""
 TAIL_BYTES = 64
@@ -73,12 +75,13 @@ def watch(port: int) -> None:
 
 
 def is_complete(recording: Path) -> bool:
-    """Whether a recording exists and has its footer; one that was interrupted has none."""
+    """Whether a recording exists and has its end or its footer; one that was interrupted has neither."""
     try:
         with recording.open("rb") as file:
             file.seek(0, os.SEEK_END)
             file.seek(max(0, file.tell() - TAIL_BYTES))
-            return FOOTER in file.read()
+            tail = file.read()
+            return FOOTER in tail or tail.endswith(END)
     except OSError:
         return False
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.records import finished, placed
-from workbench.cli.session_verdict import session_verdict
+from workbench.cli.session_verdict import READ_AGAIN, REPEAT, session_verdict
 from workbench.model import event as ev
 from workbench.model.errors import LimitFailedError
 from workbench.model.fit_event import CrossValidatedPlacement, Fault, FitFinished
@@ -86,4 +86,4 @@ def test_a_limit_on_captures_is_followed_by_a_resumption(tmp_path: Path, complet
     assert verdict.word == "REFUSED"
     assert verdict.headline.startswith("p.1/300mm/L1: snr")
     assert verdict.commands == ([] if complete else [["workbench", "resume", str(session)]])
-    assert bool(verdict.action) == complete
+    assert verdict.action == (READ_AGAIN if complete else REPEAT)

@@ -59,7 +59,7 @@ def test_all_but_paths_fits_the_terminal(
 def test_without_a_terminal_each_part_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     show_verdict(VERDICT)
     lines = capsys.readouterr().err.strip().splitlines()
-    assert [line.split()[0] for line in lines] == ["REFUSED", "do:", "or:", "or:", "note:", "session:"]
+    assert [line.split()[0] for line in lines] == ["REFUSED", "do:", "then:", "or:", "note:", "session:"]
     assert shlex.split(lines[2])[1:] == COMMAND
 
 

@@ -15,6 +15,7 @@ import pytest
 from pydantic import ValidationError
 
 from tests.support.mjpeg import Picture, Stream
+from tests.support.yuyv import write_yuyv
 from workbench.devices.opencv_camera import BACKLOG, OpenCvBlock, OpenCvCamera
 from workbench.devices.placed_by_hand import PlacedByHand
 from workbench.devices.protocols import Bench, Frame, LaserState, StreamingCamera
@@ -199,6 +200,35 @@ def test_a_file_waits_for_its_reader(tmp_path: Path) -> None:
     assert found == pytest.approx([2 * number for number in range(1, count)], abs=3)
 
 
+def test_yuyv_becomes_grey_whatever_its_colour(tmp_path: Path) -> None:
+    """Frames as V4L2 delivers them, two bytes a pixel: luminance from 16 to 235, and half the chroma."""
+    frames = []
+    for luminance in (16, 126, 235):
+        frame = np.full((HEIGHT, WIDTH, 2), 128, np.uint8)
+        frame[:, :, 0] = luminance
+        frames += [frame, frame]
+    write_yuyv(tmp_path / "recorded.avi", frames)
+    camera = camera_of(str(tmp_path / "recorded.avi"), latency_frames=0)
+    seen = [camera.read().image for _ in range(5)]
+    camera.close()
+    assert [image.dtype for image in seen] == 5 * [np.uint8]
+    assert [level(image) for image in seen] == pytest.approx([0, 128, 128, 255, 255], abs=2)
+
+
+def test_a_red_spot_of_an_mjpeg_stream_in_colour_is_clipped(streams: Callable[..., Stream]) -> None:
+    def picture() -> Picture:
+        image = np.full((HEIGHT, WIDTH, 3), 40, np.uint8)
+        image[48:64, 96:112] = (40, 40, 255)
+        return image
+
+    camera = camera_of(streams(picture).url)
+    image = camera.grab().image
+    camera.close()
+    assert image.shape == (HEIGHT, WIDTH)
+    assert image[52:60, 100:108].min() > 250
+    assert level(image[:32]) == pytest.approx(40, abs=2)
+
+
 class Device:
     """Stands for a V4L2 device, which no computer without one can open: takes exposures in steps of 8."""
 
@@ -235,6 +265,7 @@ def test_settings_are_made_and_read_back(monkeypatch: pytest.MonkeyPatch) -> Non
         cv2.CAP_PROP_AUTO_EXPOSURE: 1,
         cv2.CAP_PROP_EXPOSURE: 16,
         cv2.CAP_PROP_GAIN: 3,
+        cv2.CAP_PROP_AUTO_WB: 0,
     }
     camera.close()
 

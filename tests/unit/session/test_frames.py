@@ -135,3 +135,23 @@ except BadInputError as error:
     command = [sys.executable, "-c", script, str(tmp_path / "big.png")]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "PIXELS" in done.stdout
+
+
+@pytest.mark.parametrize("length", [0xEDA08000, 0x7FFFFFFF, 100_000])
+def test_a_part_longer_than_the_file_is_refused_before_decoding(tmp_path: Path, length: int) -> None:
+    """OpenCV would take as much memory."""
+    content = image_file(tmp_path / "a.png")
+    part = content.index(b"IDAT") - 4
+    path = tmp_path / "b.png"
+    path.write_bytes(content[:part] + struct.pack(">I", length) + content[part + 4 :])
+    with pytest.raises(BadInputError, match=r"b\.png: the image is damaged"):
+        read_image(path)
+
+
+def test_the_size_of_a_png_is_read_before_its_pixels(tmp_path: Path) -> None:
+    """The header alone states 30 000 x 30 000 pixels."""
+    content = image_file(tmp_path / "a.png")
+    path = tmp_path / "b.png"
+    path.write_bytes(content[:16] + struct.pack(">II", 30_000, 30_000) + content[24:])
+    with pytest.raises(BadInputError, match="expected an image of 64 x 48 pixels, got 30000 x 30000"):
+        read_image(path, (64, 48))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import rerun as rr
-from rerun.chunk import ChunkStore, RrdReader
+from rerun.chunk import ChunkStore
 
 from tests.viewer.conftest import Recorded
 from tests.viewer.readback import Contents, layout_views
@@ -15,6 +15,7 @@ from workbench.viewer import compaction
 from workbench.viewer.blueprint import TrialTab, blueprint
 from workbench.viewer.compaction import compact
 from workbench.viewer.recording import RecordingConsumer
+from workbench.viewer.rrd import open_rrd
 from workbench.viewer.window import is_complete
 
 LAYOUT = blueprint(a_rig(), [TrialTab(TRIAL, (("errors", "Errors"),))], "trial")
@@ -40,8 +41,8 @@ def test_a_closed_recording_is_compacted_and_shows_the_same(recorded: Recorded, 
 
 def test_only_the_last_layout_is_kept(recorded: Recorded, recording: Path) -> None:
     """Rerun's own compaction would keep all of them in any order, and open with any."""
-    assert len(RrdReader(str(recording)).blueprints()) > 1
-    assert len(RrdReader(str(recorded.recording)).blueprints()) == 1
+    assert len(open_rrd(recording).blueprints()) > 1
+    assert len(open_rrd(recorded.recording).blueprints()) == 1
     assert not list(recorded.folder.glob("*.compacted"))
 
 

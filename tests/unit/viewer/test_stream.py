@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 import rerun as rr
-from rerun.chunk import RrdReader
 
 from tests.support.viewer_stream import START_NS, logged
 from tests.viewer.readback import front_tab, layout_views
 from tests.viewer.session import a_rig
 from workbench.viewer.blueprint import TrialTab, blueprint
+from workbench.viewer.rrd import open_rrd
 from workbench.viewer.stream import Moment, Stream
 from workbench.viewer.window import free_port
 
@@ -58,7 +58,7 @@ def test_static_data_are_on_no_timeline(tmp_path: Path) -> None:
 
 def test_the_recording_is_named_after_the_session_and_has_its_properties(tmp_path: Path) -> None:
     contents = logged(tmp_path, lambda stream: stream.describe("session", id="x", captures=3))
-    (recording,) = RrdReader(str(tmp_path / "part.rrd")).recordings()
+    (recording,) = open_rrd(tmp_path / "part.rrd").recordings()
     assert (recording.application_id, recording.recording_id) == ("workbench", "part")
     assert contents.everything()["/__properties/session"] == ["[('captures', [3]), ('id', ['x'])]"]
 

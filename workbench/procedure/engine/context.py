@@ -15,6 +15,7 @@ from workbench.model.errors import RigNotReadyError, StoppedError
 from workbench.model.prompt import Answer, Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
+from workbench.procedure.capture.automatic import darkening
 from workbench.procedure.capture.latency import count_latency
 from workbench.procedure.capture.pair import PairSource, spots_found
 from workbench.procedure.engine.prompts import SAFETY, safety_prompt
@@ -153,8 +154,8 @@ class Context:
             self.begin(key)
             self.bench.camera.grab()
 
-    def measure_latency(self, key: str, most_frames: int) -> int:
-        """Measure the camera's latency in frames, and set the camera to discard as many.
+    def measure_latency(self, key: str, most_frames: int) -> ev.LatencyMeasured:
+        """Measure the camera's latency, set it to discard as many frames, and look for automatic control.
 
         Raises:
             RigNotReadyError: the camera has no readable stream, or no frame of `most_frames` shows the laser.
@@ -164,14 +165,17 @@ class Context:
             raise RigNotReadyError(
                 "camera: expected a driver with a readable stream; remove the measure_latency step"
             )
-        frames = self.recorder.latency
-        if frames is None:
+        measured = self.recorder.latency
+        if measured is None:
             self.confirm_safety()
             self.begin(key)
             frames = count_latency(self.bench.lasers, camera, self.rig, most_frames)
-        camera.discard_frames = frames
-        self.emit(ev.LatencyMeasured(frames=frames))
-        return frames
+            camera.discard_frames = frames
+            share = darkening(self.bench.lasers, camera, self.rig)
+            measured = ev.LatencyMeasured(frames=frames, darkening=share)
+        camera.discard_frames = measured.frames
+        self.emit(measured)
+        return measured
 
     def check_stop(self) -> None:
         """Raise an error if a stop was requested.

@@ -59,8 +59,8 @@ class ReplayingJournal:
             r.event.key for r in before if _is_retry(r.event) and self.repairs.counts(r.event.key, r.n)
         )
         measured = [e for e in (r.event for r in self._kept) if isinstance(e, ev.LatencyMeasured)]
-        self.latency = measured[-1].frames if measured else None
-        """Latency in frames as measured before the session ended early; None if it was not measured."""
+        self.latency = measured[-1] if measured else None
+        """Latency as measured before the session ended early; None if it was not measured."""
 
     def emit(self, event: ev.Event) -> ev.Record:
         """Journal an event unless it is replayed, then pass its record to every consumer.

@@ -117,7 +117,7 @@ def test_the_measured_latency_is_journalled_and_discarded(tmp_path: Path) -> Non
         assert isinstance(camera, StreamingCamera)
         camera.discard_frames = 0
         session.context.bench.target.place(PLACEMENT)
-        assert session.context.measure_latency("p.1", 5) == 2
+        assert session.context.measure_latency("p.1", 5).frames == 2
         assert session.events[-1] == LatencyMeasured(frames=2)
         assert camera.discard_frames == 2
 

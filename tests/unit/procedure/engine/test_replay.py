@@ -80,7 +80,7 @@ def test_confirmations_of_safety_are_passed_over(tmp_path: Path) -> None:
 def test_answers_and_latency_of_before_are_known(tmp_path: Path) -> None:
     with replay(tmp_path, [STARTED, CARD, ev.LatencyMeasured(frames=3)]) as (recorder, _):
         assert recorder.answer("p.1") == Answer(value="grey")
-        assert recorder.latency == 3
+        assert recorder.latency == ev.LatencyMeasured(frames=3)
         recorder.forget("p.1")
         assert recorder.answer("p.1") is None
 
