@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from textwrap import shorten
@@ -13,7 +13,6 @@ from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
-from workbench.cli.refusal import refused_fit, repair_commands
 from workbench.model.errors import BadInputError
 from workbench.model.number_text import counted
 from workbench.session.index import IndexedSession, indexed_sessions, read_indexed
@@ -80,7 +79,7 @@ def list_sessions(sessions: Path, as_json: bool, selection: Selection = Selectio
 
 
 def _as_json(one: IndexedSession) -> dict[str, object]:
-    fields = asdict(one.status) | {"session_dir": str(one.status.session_dir)}
+    fields = vars(one.status) | {"session_dir": str(one.status.session_dir)}
     return fields | {"serial": one.serial, "began": one.began, "verdict": one.verdict}
 
 
@@ -125,6 +124,8 @@ def next_command(one: SessionStatus) -> str | None:
     """Command that continues or repairs a session; None if there is nothing to do."""
     if not one.unfinished:
         return None
+    from workbench.cli.refusal import refused_fit, repair_commands  # loads scipy; most sessions are finished
+
     if (fit := refused_fit(one.session_dir)) is not None:
         return shlex.join(repair_commands(one.session_dir, fit)[0])
     return shlex.join(["workbench", "resume", str(one.session_dir)])

@@ -7,7 +7,6 @@ from math import inf
 from typing import Literal
 
 from workbench.model.calibration import TermSummary
-from workbench.model.stats import chi2_sf, f_sf, norm_cdf, t_cdf
 from workbench.model.yamlfile import FileModel
 
 
@@ -98,12 +97,19 @@ class CrossValidatedPlacement(FileModel):
     @property
     def range_p(self) -> float:
         """Two-sided p value of the range error: normal, or Student's t where the noise is estimated."""
+        from workbench.model.stats import (
+            norm_cdf,
+            t_cdf,
+        )  # loads scipy, which a list of sessions does not need
+
         tail = norm_cdf(-abs(self.z)) if self.freedom is None else t_cdf(-abs(self.z), self.freedom)
         return float(2 * tail)
 
     @property
     def spots_p(self) -> float:
         """P value of `chi2`: chi-square, or Fisher's F where the noise is estimated; 1 where not recorded."""
+        from workbench.model.stats import chi2_sf, f_sf
+
         if not self.coordinates:
             return 1.0
         if self.freedom is None:

@@ -6,7 +6,7 @@ that it is not stated.
 
 from __future__ import annotations
 
-from datetime import date
+from datetime import date, datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -18,9 +18,19 @@ from workbench.model.yamlfile import FileModel, load_yaml_model
 LABORATORY_FILE = "lab.yaml"
 Span = tuple[float, float]
 """Lowest and highest value."""
-Day = Annotated[
-    date, BeforeValidator(lambda value: date.fromisoformat(value) if isinstance(value, str) else value)
-]
+
+
+def _as_day(value: object) -> date:
+    """Day of a date or of its text."""
+    if isinstance(value, date):
+        return value.date() if isinstance(value, datetime) else value
+    try:
+        return date.fromisoformat(value if isinstance(value, str) else "")
+    except ValueError:
+        raise ValueError(f"expected a day, such as 2026-11-30, got {value!r}") from None
+
+
+Day = Annotated[date, BeforeValidator(_as_day)]
 """A day, as 2026-11-30."""
 
 

@@ -63,6 +63,8 @@ SPELLED = {
     r"^[ -~]{4}$": "four letters, such as YUYV or GREY",
     r"^calibration[A-Za-z0-9_.-]*\.yaml$": "a name that begins with calibration and ends with .yaml, such as"
     " calibration-night.yaml, of letters (A to z), digits, _, . and -",
+    r"^([A-Z]{2})?$": "two capital letters, such as DE",
+    r"^[A-Za-z0-9-]{0,12}$": "at most 12 letters, digits and -, such as LAB-1",
 }
 """Descriptions of the models' patterns."""
 THOUSANDS = re.compile(r"\s*([+-]?[1-9]\d{0,2}(?:[, ]\d{3})+)(?!\d)")

@@ -16,8 +16,7 @@ from workbench.report.document_html import MOST_ROWS, document_html
 TITLE = re.compile(r"<title>(.*?)</title>")
 WIDER_THAN_PAGE = (
     "({wide: [...document.querySelectorAll('td, th, h1, h2, p, svg, figcaption')].filter("
-    "e => e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).display !== 'none'"
-    " && !e.classList.contains('running-head')).length,"
+    "e => e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).display !== 'none').length,"
     " page: document.documentElement.scrollWidth, tables: document.querySelectorAll('table.data').length,"
     " charts: [...document.querySelectorAll('figure.chart svg')].filter(e =>"
     " e.getBoundingClientRect().height > 100).length})"

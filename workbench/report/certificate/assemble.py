@@ -10,7 +10,9 @@ from workbench.model.calibration import Calibration
 from workbench.model.chart import laser_colors
 from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.identity import (
+    VIRTUAL,
     conditions_section,
+    device_text,
     laboratory_section,
     party_text,
     sensor_section,
@@ -117,6 +119,7 @@ def _head(sources: Sources) -> tuple[Fact, ...]:
         Fact("Customer", party_text(lab.customer)),
         Fact("Measured", " to ".join(days) or NOT_STATED),
         Fact("Session", session.folder.name),
+        *((Fact("Devices", VIRTUAL),) if device_text(session.rig) == VIRTUAL else ()),
     )
 
 

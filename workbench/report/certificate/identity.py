@@ -12,6 +12,7 @@ from workbench.model.table import Column, Table
 from workbench.report.certificate.session_record import SessionRecord
 from workbench.report.document import NOT_STATED, Fact, Section
 
+VIRTUAL = "virtual bench: no real sensor was measured"
 MOST_NAMED = 12
 """Largest number of lasers that are named one by one."""
 
@@ -159,7 +160,7 @@ def span_text(span: Span | None, unit: str) -> str:
 def device_text(rig: Rig) -> str:
     """Drivers of the devices."""
     if rig.driver not in {None, "opencv+serial"}:
-        return f"bench driver {rig.driver}" + (" (virtual bench)" if rig.driver == "emulated" else "")
+        return VIRTUAL if rig.driver == "emulated" else f"bench driver {rig.driver}"
     if rig.devices is None:
         return NOT_STATED
     blocks = {"camera": rig.devices.camera, "lasers": rig.devices.lasers, "target": rig.devices.target}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from tests.support.reference_session import LABORATORY, MARKUP, record
+from tests.support.reference_session import LABORATORY, MARKUP, certificate, record
 from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.identity import (
+    VIRTUAL,
     conditions_section,
     laboratory_section,
     sensor_section,
@@ -58,3 +59,9 @@ def test_sensor_and_standards_are_identified() -> None:
         "2026-05-04",
         NOT_STATED,
     )
+
+
+def test_a_virtual_bench_is_named_on_the_first_page() -> None:
+    assert {fact.name: fact.value for fact in certificate().document.head}["Devices"] == VIRTUAL
+    real = record().rig.model_copy(update={"driver": None})
+    assert facts(sensor_section(real))["Devices"] == NOT_STATED
