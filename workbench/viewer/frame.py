@@ -79,16 +79,16 @@ def as_png(content: bytes) -> tuple[bytes, Image]:
     return (content if is_png else cv2.imencode(".png", grey)[1].tobytes()), grey
 
 
-def log_frame(stream: Stream, png: bytes, off: Image | None, full_scale: int) -> None:
+def log_frame(stream: Stream, png: bytes, ambient_dn: float | None, full_scale: int) -> None:
     """Log a frame with the lasers on, as stored; its contrast follows the room light.
 
     Args:
         stream: recording.
         png: the stored frame.
-        off: frame with the lasers off, (height, width); None for a frame in room light.
+        ambient_dn: room light by `median_dn` of the frame with the lasers off; None for a frame in room light.
         full_scale: largest value of a pixel.
     """
-    shown = [0.0, white_level(off, full_scale)]
+    shown = [0.0, white_level(ambient_dn, full_scale)]
     stream.log(
         at.IMAGE,
         rr.EncodedDepthImage(png, media_type="image/png", colormap="grayscale", depth_range=shown),
@@ -96,23 +96,24 @@ def log_frame(stream: Stream, png: bytes, off: Image | None, full_scale: int) ->
 
 
 def log_image(stream: Stream, on: Image, off: Image, full_scale: int) -> None:
-    """Log a frame that is not stored; arguments as of `log_frame`."""
-    log_frame(stream, cv2.imencode(".png", on)[1].tobytes(), off, full_scale)
+    """Log a frame that is not stored, with the frame with the lasers off."""
+    log_frame(stream, cv2.imencode(".png", on)[1].tobytes(), median_dn(off), full_scale)
 
 
-def log_ambient(stream: Stream, dark: Image) -> None:
+def log_ambient(stream: Stream, ambient_dn: float) -> None:
     """Log the room light: the median of a frame with the lasers off, DN."""
-    stream.log(at.AMBIENT, rr.Scalars(_median_dn(dark)))
+    stream.log(at.AMBIENT, rr.Scalars(ambient_dn))
 
 
-def _median_dn(frame: Image) -> float:
+def median_dn(frame: Image) -> float:
+    """Median of a frame (height, width), DN, from every fourth row and column."""
     return float(np.median(frame[::SAMPLED, ::SAMPLED]))
 
 
-def white_level(off: Image | None, full_scale: int) -> float:
+def white_level(ambient_dn: float | None, full_scale: int) -> float:
     """Value that is shown as white, as Rerun takes it: of 8 bits a share of full scale, of 16 bits in DN."""
-    ambient = 0.0 if off is None else _median_dn(off)
-    white = 1.0 if off is None else min(1.0, max(LEAST_WHITE, ambient / full_scale / AMBIENT_SHARE))
+    lit = None if ambient_dn is None else ambient_dn / full_scale / AMBIENT_SHARE
+    white = 1.0 if lit is None else min(1.0, max(LEAST_WHITE, lit))
     return white if full_scale <= 255 else white * full_scale
 
 

@@ -335,8 +335,10 @@ class OpenRecording:
         png, on = self._stored.image(event.on)
         off = None if event.off is None else self._stored.pixels(event.off)
         self._frames = on, off
-        frame.log_frame(self.stream, png, off, 2**self._rig.camera.bits - 1)
-        frame.log_ambient(self.stream, on if off is None else off)
+        ambient_dn = frame.median_dn(on if off is None else off)
+        full_scale = 2**self._rig.camera.bits - 1
+        frame.log_frame(self.stream, png, None if off is None else ambient_dn, full_scale)
+        frame.log_ambient(self.stream, ambient_dn)
 
     def _show_crops(self, spots: Sequence[Spot], lasers: Sequence[str]) -> None:
         if self._frames is not None:
