@@ -87,6 +87,7 @@ def knock(door: Door, folder: Path, content: bytes, outcome: Outcome) -> None:
         if not str(error).strip():
             outcome.found.setdefault("an error without a message", content)
     except Exception as error:
+        outcome.failed += 1
         last = traceback.extract_tb(error.__traceback__)
         own = [frame for frame in last if "/workbench/" in frame.filename] or list(last)
         outcome.found.setdefault(f"{type(error).__name__} at {own[-1].filename}:{own[-1].lineno}", content)

@@ -6,6 +6,7 @@ import io
 import json
 import random
 from collections.abc import Sequence
+from copy import deepcopy
 from typing import Any
 
 from hypothesis import strategies as st
@@ -77,7 +78,8 @@ def _paths(value: Any, path: Path = ()) -> list[Path]:
 
 def _edited(documents: Sequence[Any], edits: Sequence[tuple[tuple[int, Path], Any, str]]) -> bytes:
     changed = json.loads(json.dumps(documents, default=str))
-    for (number, path), value, how in edits:
+    for (number, path), shared, how in edits:
+        value = deepcopy(shared)  # a later edit may change what this one inserts
         *above, last = (number, *path)
         place = changed
         try:

@@ -29,6 +29,7 @@ def test_an_unexpected_error_is_found(tmp_path: Path) -> None:
     outcome = Outcome()
     knock(Door("bad", "x", (b"a",), read, 1), tmp_path, b"a", outcome)
     assert list(outcome.found.values()) == [b"a"]
+    assert outcome.total == outcome.failed == 1
 
 
 def test_mutated_files_end_commands_with_a_code_for_the_user() -> None:

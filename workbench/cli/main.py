@@ -271,6 +271,7 @@ def range_(
             raise typer.BadParameter(
                 "--readings, --standoff, --stats and --view require --rig (live ranging)"
             )
+        gc.set_threshold(1_000_000)  # as for `fit`: readings are kept
         from workbench.cli.range import range_captures
 
         range_captures(captures, calibration, json)

@@ -14,8 +14,9 @@ from urllib.parse import quote
 from workbench.model.errors import BadInputError
 
 LOOPBACK = "127.0.0.1"
-END = bytes(16)
-"""Message that ends a recording without a footer: its kind and its length are 0."""
+END = bytes(16) + b"recording closed"
+"""End of a recording without a footer: Rerun's last message, of kind and length 0, and a text that readers do
+not reach. Zeros alone may be left by a power failure."""
 FOOTER = b"RRF2FOOT"
 """Mark at the end of a complete recording."""
 TAIL_BYTES = 64

@@ -32,3 +32,8 @@ def test_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "r.rrd").write_bytes(b"no recording")
     with pytest.raises((OSError, RuntimeError)):
         list(open_rrd(tmp_path / "r.rrd").stream())
+
+
+def test_zeros_of_a_power_failure_are_no_end(tmp_path: Path) -> None:
+    (tmp_path / "r.rrd").write_bytes(b"RRF2" + bytes(200))
+    assert not is_complete(tmp_path / "r.rrd")

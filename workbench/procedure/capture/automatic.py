@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 
 from workbench.calibration.data.spot_rows import prior_scanline
@@ -42,7 +44,7 @@ def darkening(lasers: LaserBank, camera: StreamingCamera, rig: Rig) -> float | N
 def _background(lasers: LaserBank, camera: StreamingCamera, rig: Rig, on: bool) -> float:
     """Mean of a frame outside the band of the first laser, DN."""
     first = rig.lasers[0]
-    with lasers.lit([first.id] if on else [], for_s=LEASE_S):
+    with lasers.lit([first.id], for_s=LEASE_S) if on else nullcontext():
         for _ in range(SETTLING_FRAMES):
             camera.read()
         image = camera.grab().image
