@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -105,8 +105,7 @@ def _fit_recording(rig: Rig, request: Request) -> FittedSource:
 
     found, rejected, boards = observations_of_recording(request.source, rig)
     known = {observation.standoff_mm for observation in found}
-    if unknown := [s for s in request.without_mm if s not in known]:
-        raise BadInputError(f"--without-standoff: no capture has the standoff {unknown[0]:g} mm")
+    _check_known(request.without_mm, known)
     kept = [one for one in found if one.standoff_mm not in request.without_mm]
     views = [view for view in boards if view.placement.standoff_mm not in request.without_mm]
     fitted = fit_calibration(rig, kept, rejected, views)
@@ -191,8 +190,7 @@ def _observations(
     rig: Rig, rows: Sequence[CaptureRow], captures: Path, request: Request
 ) -> tuple[list[Observation], list[Rejected], list[BoardView]]:
     known = {row.standoff_mm for row in rows}
-    if unknown := [s for s in request.without_mm if s not in known]:
-        raise BadInputError(f"--without-standoff: no row has the standoff {unknown[0]:g} mm")
+    _check_known(request.without_mm, known)
     kept = [row for row in rows if row.standoff_mm not in request.without_mm]
     with errors_name_file(captures):
         observations, rejected, boards = observations_of_rows(rig, kept)
@@ -204,6 +202,17 @@ def _observations(
         first = f"{request.source}: no spot to fit; check that the rig file belongs to the captures"
         raise BadInputError("\n".join([first, *lines[:MOST_ROWS], *more]))
     return observations, rejected, boards
+
+
+def _check_known(without_mm: Sequence[float], known: Set[float]) -> None:
+    """Refuse a standoff to exclude that no capture has.
+
+    Raises:
+        BadInputError: there is one.
+    """
+    if unknown := [f"{s:g}" for s in without_mm if s not in known]:
+        expected = ", ".join(f"{s:.12g}" for s in sorted(known))
+        raise BadInputError(f"--without-standoff: expected one of {expected} mm, got {', '.join(unknown)} mm")
 
 
 def _provenance(rig: Rig, request: Request, sha256: str) -> Provenance:
@@ -272,7 +281,7 @@ def _verdict(found: FittedSource, request: Request, details: bool) -> Verdict:
         return Verdict(
             word="REFUSED",
             headline=and_more(assessment.reasons),
-            action=split_reason(assessment.reasons[0])[1],
+            action=split_reason(assessment.reasons[0])[1] + _leave_out_option(found),
             notes=notes,
             labelled=[("file:", f"{request.output} is not written")],
         )
@@ -282,6 +291,14 @@ def _verdict(found: FittedSource, request: Request, details: bool) -> Verdict:
     return Verdict(
         word="ACCEPTED", headline=result, facts=[*because, *although], notes=notes, labelled=[written]
     )
+
+
+def _leave_out_option(found: FittedSource) -> str:
+    """Options that leave out the suspected placements, in brackets; empty without suspects."""
+    finished = fit_finished(found.fitted, found.assessment)
+    at_mm = [p.standoff_mm for p in found.fitted.cells.placements if p.key in finished.suspects]
+    options = " ".join(f"--without-standoff {standoff_mm:g}" for standoff_mm in dict.fromkeys(at_mm))
+    return f" ({options})" if options else ""
 
 
 def _print_tables(fitted: CalibrationFit, assessment: Assessment) -> None:

@@ -76,10 +76,14 @@ def millimetres(least: float) -> Callable[[object], float]:
     return parse
 
 
+REASON_PLACEHOLDER = "TEXT"
+"""Place of a reason in printed commands, where only a person can give it."""
+
+
 def reason(given: str | None) -> str | None:
-    """Refuse a blank reason."""
-    if given is not None and not given.strip():
-        raise typer.BadParameter("expected a reason in words, got a blank")
+    """Refuse a blank reason, and the placeholder of a printed command."""
+    if given is not None and given.strip() in {"", REASON_PLACEHOLDER}:
+        raise typer.BadParameter(f"expected a reason in words, got {given.strip() or 'a blank'}")
     return given
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from workbench.cli.brief_notes import brief_notes, merge_equal_kinds
-from workbench.cli.refusal import refused_fit, repair_commands, suspects
+from workbench.cli.refusal import failed_limit_commands, refused_fit, repair_commands
 from workbench.cli.verdict import Verdict, and_more, split_reason
 from workbench.model import event as ev
 from workbench.model.errors import LimitFailedError
@@ -17,10 +17,8 @@ from workbench.session.state import effective
 
 REPEAT = "remove the cause, and capture this placement again"
 """Action after a limit on captures."""
-READ_AGAIN = (
-    "look at the readings in the replay; workbench repair --recapture takes those of a placement again"
-)
-"""Action after a limit on the result of a trial."""
+CALIBRATE_AGAIN = "see the readings in the recording; if the target was right, calibrate again"
+"""Action after a failed limit on the results of a trial."""
 
 
 def session_verdict(session_dir: Path, refused: LimitFailedError | None) -> Verdict:
@@ -61,11 +59,11 @@ def _finished(session_dir: Path, events: Sequence[ev.Event], notes: Sequence[str
 
 def _refused_calibration(session_dir: Path, fit: FitFinished, notes: Sequence[str]) -> Verdict:
     _, remedy = split_reason(fit.reasons[0])
-    # The remedy of a contradicting placement names options of `workbench fit`; the commands name the session.
+    # The commands say the same as the remedy of a wrong placement, and name the session.
     return Verdict(
         word="REFUSED",
         headline=and_more(fit.reasons),
-        action="" if suspects(fit) else remedy,
+        action="" if fit.suspects else remedy,
         commands=repair_commands(session_dir, fit),
         notes=notes,
         labelled=_where(session_dir),
@@ -75,13 +73,13 @@ def _refused_calibration(session_dir: Path, fit: FitFinished, notes: Sequence[st
 def _failed_limit(session_dir: Path, events: Sequence[ev.Event], notes: Sequence[str], why: str) -> Verdict:
     """Verdict where a limit on captures or on a trial's result failed."""
     cause, remedy = split_reason(why)
-    placed = [event for event in events if isinstance(event, ev.TargetPlaced | ev.PlacementFinished)]
-    unfinished = bool(placed) and isinstance(placed[-1], ev.TargetPlaced)
+    commands = failed_limit_commands(session_dir, events)
+    unfinished = bool(commands) and commands[0][1] == "resume"
     return Verdict(
         word="REFUSED",
         headline=cause,
-        action=remedy or (REPEAT if unfinished else READ_AGAIN),
-        commands=[["workbench", "resume", str(session_dir)]] if unfinished else [],
+        action=remedy or (REPEAT if unfinished else CALIBRATE_AGAIN),
+        commands=commands,
         facts=_outcomes(events),
         notes=notes,
         labelled=_where(session_dir),

@@ -7,24 +7,23 @@ import shlex
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from textwrap import shorten
 
 from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
-from workbench.model.errors import BadInputError
+from workbench.cli.brief_notes import merge_equal_kinds
+from workbench.cli.verdict import split_reason
+from workbench.model import event as ev
+from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.number_text import counted
 from workbench.session.index import IndexedSession, indexed_sessions, read_indexed
+from workbench.session.journal import read_journal
 from workbench.session.manifest import MANIFEST
-from workbench.session.state import SessionStatus, session_statuses
+from workbench.session.state import SessionStatus, effective, session_statuses
 
 SHOWN = 20
 """Number of latest sessions that are listed."""
-WHY_LINES = 2
-"""Number of lines for the cause of an end; `--json` and the journal contain the full text."""
-CUT_AT = 20
-"""Allowance in characters for lines that are broken between words."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,7 @@ def find_session(name: Path | None, sessions: Path) -> Path:
         sessions: folder of sessions.
 
     Raises:
-        BadInputError: there is no such session.
+        BadInputError: there is no such session; or none is named, and one is running, which may be meant.
     """
     if name is not None:
         known = [path for path in (name, sessions / name) if (path / MANIFEST).is_file()]
@@ -100,9 +99,13 @@ def find_session(name: Path | None, sessions: Path) -> Path:
         raise BadInputError(f"{name}: expected a session folder, or the name of one in {sessions}")
     found = session_statuses(sessions)
     unfinished = [each for each in found if each.unfinished]
+    if running := [each for each in found if each.state == "running"]:
+        others = "".join(f"\n  {command}" for each in unfinished[-SHOWN:] if (command := next_command(each)))
+        raise BadInputError(
+            f"{running[-1].session_dir}: the session is running in another program;"
+            f" others to resume or repair: {others or 'none'}"
+        )
     if not unfinished:
-        if running := [each for each in found if each.state == "running"]:
-            raise BadInputError(f"{running[-1].session_dir}: the session is running in another program")
         raise BadInputError(f"{sessions}: no unfinished session to resume")
     return unfinished[-1].session_dir
 
@@ -112,20 +115,52 @@ def _show(one: SessionStatus, console: Console) -> None:
     columns = [one.session_dir.name, one.rig, counted(one.captures, "capture"), one.state]
     console.print("  ".join(filter(None, columns)))
     accepted = one.calibration.startswith("accepted")
-    lines = [one.calibration if accepted else "", "" if one.state == "finished" else one.why]
+    lines = [one.calibration if accepted else "", "" if one.state == "finished" else _why(one)]
     for line in filter(None, lines):
-        room = WHY_LINES * (console.width - 4) - CUT_AT
-        console.print(Padding(Text(shorten(line, room, placeholder=" ...")), (0, 0, 0, 4)))
+        console.print(Padding(Text(line), (0, 0, 0, 4)))
     if (command := next_command(one)) is not None:
         console.print(f"    {command}", soft_wrap=True)
 
 
+def _why(one: SessionStatus) -> str:
+    """Cause of the end.
+
+    Of a refused calibration each kind of reason once, with the remedy where no command contains it.
+    """
+    if not one.unfinished:
+        return one.why
+    from workbench.cli.refusal import refused_fit, repair_commands
+
+    fit = refused_fit(one.session_dir)
+    if fit is None:
+        return one.why
+    remedy = "" if repair_commands(one.session_dir, fit) else split_reason(fit.reasons[0])[1]
+    causes = "; ".join(merge_equal_kinds(fit.reasons))
+    return f"the calibration is refused: {causes}" + (f". Do: {remedy}" if remedy else "")
+
+
 def next_command(one: SessionStatus) -> str | None:
-    """Command that continues or repairs a session; None if there is nothing to do."""
+    """Command that continues or repairs a session; None if there is none."""
     if not one.unfinished:
         return None
-    from workbench.cli.refusal import refused_fit, repair_commands  # loads scipy; most sessions are finished
+    # It loads scipy, and most sessions are finished.
+    from workbench.cli.refusal import failed_limit_commands, refused_fit, repair_commands
 
     if (fit := refused_fit(one.session_dir)) is not None:
-        return shlex.join(repair_commands(one.session_dir, fit)[0])
-    return shlex.join(["workbench", "resume", str(one.session_dir)])
+        commands = repair_commands(one.session_dir, fit)
+    elif events := _ended_by_limit(one.session_dir):
+        commands = failed_limit_commands(one.session_dir, events)
+    else:
+        commands = [["workbench", "resume", str(one.session_dir)]]
+    return shlex.join(commands[0]) if commands else None
+
+
+def _ended_by_limit(session_dir: Path) -> list[ev.Event]:
+    """Valid events of a session that a failed limit ended; empty for others."""
+    try:
+        events = [record.event for record in effective(read_journal(session_dir))]
+    except BadInputError:
+        return []
+    last = events[-1] if events else None
+    ended = isinstance(last, ev.SessionFinished) and last.exit_code == LimitFailedError.exit_code
+    return events if ended else []

@@ -9,6 +9,20 @@ from typing import Literal
 from workbench.model.calibration import TermSummary
 from workbench.model.yamlfile import FileModel
 
+REFUSING = (
+    "lasers_swapped",
+    "mirrored",
+    "upside_down",
+    "turned",
+    "transposed",
+    "unit",
+    "standoff",
+    "tilted",
+    "moved",
+    "never_lit",
+)
+"""Faults that invalidate the calibration; all others are notes."""
+
 
 class ParameterRecord(FileModel):
     """One fitted parameter; standard deviations are 1 sigma."""
@@ -125,6 +139,11 @@ class Fault(FileModel):
     placement: str | None = None
     """Key of the placement that is wrong; None: no single one."""
 
+    @property
+    def refuses(self) -> bool:
+        """Whether data with this fault give no calibration."""
+        return self.name in REFUSING
+
 
 class ResidualTest(FileModel):
     """Test of a fit's residuals, with the p value of its statistic under the stated noise."""
@@ -150,3 +169,18 @@ class FitFinished(FileModel):
     """Cross-validation, one entry for each placement."""
     faults: tuple[Fault, ...] = ()
     residual_tests: tuple[ResidualTest, ...] = ()
+    needs_standoffs: bool = False
+    """Refused because a laser was seen at too few standoffs, or because ranges are too uncertain."""
+
+    @property
+    def has_named_fault(self) -> bool:
+        """Whether a named fault refuses the calibration; its other reasons are consequences."""
+        return any(fault.refuses for fault in self.faults)
+
+    @property
+    def suspects(self) -> tuple[str, ...]:
+        """Keys of the placements with a fault that refuses, or else of those with an alarm."""
+        if self.has_named_fault:
+            named = [f.placement for f in self.faults if f.refuses and f.placement is not None]
+            return tuple(dict.fromkeys(named))
+        return tuple(one.placement for one in self.left_out if one.alarm)

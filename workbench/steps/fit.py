@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 from workbench.model.acceptance import Acceptance
 from workbench.model.captures import BOARD
 from workbench.model.errors import BadInputError, LimitFailedError
-from workbench.model.event import CaptureTaken
+from workbench.model.event import CaptureTaken, FitFinished
 from workbench.model.number_text import counted
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
@@ -62,13 +62,14 @@ class FitStep(StepModel):
         provenance = context.provenance.model_copy(update={"captures_sha256": sha256})
         notes = _skipped_notes(_planned(context, name), captures, [one.standoff_mm for one in fitted.used])
         calibration, assessment = calibrate(fitted, self.limits, provenance, notes)
-        context.emit(fit_finished(fitted, assessment))
+        finished = fit_finished(fitted, assessment)
+        context.emit(finished)
         because = context.recorder.repairs.accepted_because
         if assessment.verdict == "refused" and because is not None:
             calibration = accept_with_reason(calibration, because)
             notes = [*notes, f"accepted although {'; '.join(assessment.reasons)}, because: {because}"]
         elif assessment.verdict == "refused":
-            raise LimitFailedError("the calibration is refused: " + "; ".join(assessment.reasons))
+            raise LimitFailedError(_refusal(finished))
         context.accepted, context.cross_validation = calibration, assessment.cross_validation
         worst = calibration.laser_ranger.validity.max_relative_range_sd
         return (
@@ -76,6 +77,12 @@ class FitStep(StepModel):
             f" {len(fitted.rejected)} rejected; range uncertainty at most {100 * worst:.2g} % (1 sigma)"
             + "".join(f"; {note}" for note in notes)
         )
+
+
+def _refusal(fit: FitFinished) -> str:
+    """Reasons of a refusal, and the options of `workbench repair` for the suspected placements."""
+    options = "; ".join(f"repair --recapture {key}, or repair --leave-out {key}" for key in fit.suspects)
+    return f"the calibration is refused: {'; '.join(fit.reasons)}" + (f" ({options})" if options else "")
 
 
 def _planned(context: Context, name: str) -> list[Placement]:

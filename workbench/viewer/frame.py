@@ -85,7 +85,7 @@ def log_frame(stream: Stream, png: bytes, ambient_dn: float | None, full_scale: 
     Args:
         stream: recording.
         png: the stored frame.
-        ambient_dn: room light by `median_dn` of the frame with the lasers off; None for a frame in room light.
+        ambient_dn: `median_dn` of the frame with the lasers off; None for a frame in room light.
         full_scale: largest value of a pixel.
     """
     shown = [0.0, white_level(ambient_dn, full_scale)]

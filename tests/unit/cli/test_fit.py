@@ -115,7 +115,10 @@ class TestAnotherModel:
 
     def test_an_unknown_standoff_is_refused(self, workbench: Run, tmp_path: Path) -> None:
         arguments = ("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c", "--without-standoff", 1234)
-        refused(workbench(*arguments), 2, "--without-standoff", "1234 mm")
+        there = {row.split(",")[1] for row in WEBCAM.read_text().splitlines()[1:]}
+        refused(
+            workbench(*arguments), 2, "--without-standoff", "1234 mm", ", ".join(sorted(there, key=float))
+        )
 
     def test_a_fixed_parameter_keeps_its_value(self, workbench: Run, tmp_path: Path) -> None:
         arguments = ("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c", "--json", "--fix", "f_px")
@@ -157,6 +160,7 @@ class TestAnotherModel:
     def test_a_blank_reason_is_none(self, workbench: Run, tmp_path: Path) -> None:
         fit = ("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c")
         refused(workbench(*fit, "--accept", " "), 2, "--accept")
+        refused(workbench("repair", tmp_path, "--reason", "TEXT"), 2, "--reason")
         refused(workbench("resume", tmp_path, "--accept-changes", ""), 2, "--accept-changes")
 
     def test_a_captures_file_needs_a_rig(self, workbench: Run, tmp_path: Path) -> None:

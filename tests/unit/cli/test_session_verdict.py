@@ -6,34 +6,19 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.fits import cross_validated, fitted
 from tests.support.records import finished, placed
-from workbench.cli.session_verdict import READ_AGAIN, REPEAT, session_verdict
+from workbench.cli.session_verdict import CALIBRATE_AGAIN, REPEAT, session_verdict
 from workbench.model import event as ev
 from workbench.model.errors import LimitFailedError
-from workbench.model.fit_event import CrossValidatedPlacement, Fault, FitFinished
+from workbench.model.fit_event import Fault
 from workbench.session.journal import Journal
 
 BEGIN = ev.SessionStarted(session="s", rig="r", procedures=("p",))
-WRONG = "the captures at 300 mm fit a standoff of 320 mm. Do: leave it out (--without-standoff 300)"
+WRONG = "the captures at 300 mm fit a standoff of 320 mm. Do: leave it out"
 
 
-def fitted(*reasons: str, suspect: str | None = None) -> FitFinished:
-    left_out = [
-        CrossValidatedPlacement(placement=f"p.1/{at}mm", standoff_mm=at, error_mm=error, sd_mm=1.0, lasers=())
-        for at, error in ((300, 1.0), (600, -3.0))
-    ]
-    return FitFinished(
-        parameters=(),
-        residuals=(),
-        rms_px=0.1,
-        observations=4,
-        rejected=(),
-        verdict="refused" if reasons else "accepted",
-        reasons=reasons,
-        warnings=("cx_px is fixed. Its prior is used.",),
-        left_out=tuple(left_out),
-        faults=() if suspect is None else (Fault(name="standoff", message=reasons[0], placement=suspect),),
-    )
+PLACEMENTS = (cross_validated("p.1/300mm", 300.0, 1.0), cross_validated("p.1/600mm", 600.0, -3.0))
 
 
 def write(folder: Path, *events: ev.Event) -> Path:
@@ -68,14 +53,15 @@ def test_a_session_that_decides_nothing_is_done(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suspect", ["p.1/300mm", None])
 def test_a_refused_calibration_has_one_reason_and_a_repair(tmp_path: Path, suspect: str | None) -> None:
-    session = write(tmp_path, fitted(WRONG, suspect=suspect))
+    faults = () if suspect is None else (Fault(name="standoff", message=WRONG, placement=suspect),)
+    session = write(tmp_path, fitted(WRONG, left_out=PLACEMENTS, faults=faults))
     verdict = session_verdict(session, LimitFailedError("refused: all reasons"))
     assert (verdict.word, verdict.headline) == ("REFUSED", WRONG.partition(". Do:")[0])
     first = verdict.commands[0]
     assert first[:3] == ["workbench", "repair", str(session)]
     # Without a suspect it is the placement with the largest error.
     assert first[first.index("--recapture") + 1] == (suspect or "p.1/600mm")
-    assert ("--without-standoff" in verdict.action) == (suspect is None)
+    assert bool(verdict.action) == (suspect is None), "the commands say the same"
 
 
 @pytest.mark.parametrize("complete", [False, True])
@@ -85,5 +71,5 @@ def test_a_limit_on_captures_is_followed_by_a_resumption(tmp_path: Path, complet
     verdict = session_verdict(session, LimitFailedError("p.1/300mm/L1: snr: expected at least 9, got 3"))
     assert verdict.word == "REFUSED"
     assert verdict.headline.startswith("p.1/300mm/L1: snr")
-    assert verdict.commands == ([] if complete else [["workbench", "resume", str(session)]])
-    assert verdict.action == (READ_AGAIN if complete else REPEAT)
+    assert verdict.commands[0][:3] == ["workbench", "repair" if complete else "resume", str(session)]
+    assert verdict.action == (CALIBRATE_AGAIN if complete else REPEAT)

@@ -9,9 +9,13 @@ from pathlib import Path
 import pytest
 
 from tests.support.command_line import Run, refused
+from tests.support.fits import fitted
+from tests.support.records import placed
 from tests.support.reference_session import REFERENCE, copied
 from workbench.cli import sessions
 from workbench.cli.sessions import find_session, list_sessions
+from workbench.model import event as ev
+from workbench.model.fit_event import Fault
 from workbench.session.index import IndexedSession
 from workbench.session.journal import Journal
 from workbench.session.state import SessionStatus
@@ -63,16 +67,45 @@ def test_a_session_is_found_by_the_folder_that_one_stands_in(
     assert find_session(Path(".."), Path("sessions")) == tmp_path / "s"
 
 
-def test_how_a_session_ended_takes_two_lines_at_most(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    why = "the calibration is refused: " + "; ".join(f"laser L{n} was seen at 2 standoffs" for n in range(9))
-    found = [SessionStatus(Path("sessions/a"), "failed", ("p",), 12, why)]
-    printed = listed(found, monkeypatch, capsys)
-    assert len(printed) == 4
-    assert printed[2].rstrip().endswith("...")
-    list_sessions(Path("sessions"), as_json=True)
-    assert json.loads(capsys.readouterr().out)["why"] == why
+def ended(folder: Path, name: str, code: int, message: str, *events: ev.Event) -> Path:
+    """Folder of a session that ended with an exit code."""
+    session = folder / name
+    session.mkdir()
+    (session / "session.yaml").write_text("format: 1\n")
+    with Journal(session) as journal:
+        journal.append(ev.SessionStarted(session=name, rig="r", procedures=("p",)))
+        for event in (*events, ev.SessionFinished(exit_code=code, message=message)):
+            journal.append(event)
+    return session
+
+
+def test_causes_are_printed_whole_and_those_of_equal_kind_once(workbench: Run, tmp_path: Path) -> None:
+    reasons = [f"laser L{n} was seen at 2 standoffs, expected at least 3. Do: add some" for n in range(9)]
+    wrong = f"trial: the ranges disagree; {'much ' * 60}do this"
+    refusal = f"the calibration is refused: {'; '.join(reasons)}"
+    ended(tmp_path, "a", 3, refusal, fitted(*reasons, needs_standoffs=True))
+    ended(tmp_path, "b", 3, wrong, placed("p.1/x"), ev.PlacementFinished(key="p.1/x"))
+    printed = " ".join(workbench("sessions", tmp_path).out.split())
+    assert printed.count("was seen at") == 1
+    assert all(f"L{n}" in printed for n in range(9))
+    assert "Do:" not in printed, "the command follows"
+    assert wrong in printed
+    first, second = workbench("sessions", tmp_path, "--json").out.splitlines()
+    assert (json.loads(first)["why"], json.loads(second)["why"]) == (refusal, wrong)
+
+
+def test_a_session_that_a_resumption_would_end_likewise_is_repaired(workbench: Run, tmp_path: Path) -> None:
+    complete = (placed("p.1/x"), ev.PlacementFinished(key="p.1/x"))
+    swapped = Fault(name="lasers_swapped", message="exchanged. Do: exchange them")
+    ended(tmp_path, "a", 3, "trial failed", *complete)
+    ended(tmp_path, "b", 3, "capture failed", placed("p.1/x"))
+    ended(tmp_path, "c", 4, "camera gone", *complete)
+    ended(tmp_path, "d", 3, "refused", *complete, fitted(swapped.message, faults=(swapped,)))
+    printed = workbench("sessions", tmp_path).out.splitlines()
+    commands = [line.split()[1:3] for line in printed if line.startswith("    workbench ")]
+    expected = [("repair", "a"), ("resume", "b"), ("resume", "c")]
+    assert commands == [[word, str(tmp_path / name)] for word, name in expected]
+    assert "Do: exchange them" in " ".join(printed)
 
 
 def test_the_only_session_is_running(workbench: Run, tmp_path: Path) -> None:
@@ -80,6 +113,17 @@ def test_the_only_session_is_running(workbench: Run, tmp_path: Path) -> None:
     (tmp_path / "s/session.yaml").write_text("format: 1\n")
     with Journal(tmp_path / "s"):
         refused(workbench("resume", "--sessions", tmp_path), 2, tmp_path / "s", "is running")
+
+
+def test_beside_a_running_session_those_that_can_go_on_are_named(workbench: Run, tmp_path: Path) -> None:
+    others = [ended(tmp_path, name, 5, "stopped") for name in ("a", "b")]
+    finished = ended(tmp_path, "c", 0, "done")
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s/session.yaml").write_text("format: 1\n")
+    with Journal(tmp_path / "s"):
+        outcome = workbench("resume", "--sessions", tmp_path)
+    refused(outcome, 2, tmp_path / "s", *(f"workbench resume {other}" for other in others))
+    assert str(finished) not in outcome.err
 
 
 def test_a_folder_of_sessions_or_one_session_is_named_directly(

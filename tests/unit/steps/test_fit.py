@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.fits import cross_validated, fitted
 from tests.support.running import Scripted, running, two_laser_rig
 from tests.support.steps import parse_step, wrong_keys
 from workbench.model.errors import BadInputError
@@ -14,6 +15,7 @@ from workbench.model.event import FitFinished
 from workbench.model.prompt import Answer
 from workbench.model.rig import load_rig
 from workbench.procedure.engine.step import COMPUTING_S
+from workbench.steps.fit import _refusal
 
 
 def test_it_makes_a_fit_of_captures() -> None:
@@ -38,6 +40,14 @@ def test_without_captures_there_is_nothing_to_fit(tmp_path: Path) -> None:
         assert session.events == []
         assert not (session.context.session_dir / "captures.csv").exists()
     assert caught.value.exit_code == 2
+
+
+def test_the_advice_of_a_refusal_names_options_of_repair() -> None:
+    alarm = cross_validated("p.1/300mm", 300.0, 9.0, alarm=True)
+    text = _refusal(fitted("the captures contradict the others", left_out=(alarm,)))
+    assert "--recapture p.1/300mm" in text
+    assert "--leave-out p.1/300mm" in text
+    assert "--" not in _refusal(fitted("a limit failed"))
 
 
 RIG = Path(__file__).parents[3] / "rigs/thesis-emulated.yaml"

@@ -17,19 +17,6 @@ from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.model.fit_event import CrossValidatedPlacement, Fault
 from workbench.model.stats import chi2_sf
 
-REFUSING = (
-    "lasers_swapped",
-    "mirrored",
-    "upside_down",
-    "turned",
-    "transposed",
-    "unit",
-    "standoff",
-    "tilted",
-    "moved",
-    "never_lit",
-)
-"""Faults that invalidate the calibration; all others are notes."""
 SUSPECT_P = 1e-3
 """P value below which the captures of a placement are searched for target motion."""
 SATURATED_SHARE = 0.2
@@ -38,11 +25,6 @@ AGREE_SD = 10.0
 """Rejected spots within this many deviations of their median agree on one position."""
 LEAST_TRAVEL = 0.05
 """Share of the image that at least one spot must move from its nearest standoff to infinity."""
-
-
-def refuses(fault: Fault) -> bool:
-    """Whether data with this fault give no calibration."""
-    return fault.name in REFUSING
 
 
 def find_faults(fit: CalibrationFit, placements: Sequence[CrossValidatedPlacement]) -> tuple[Fault, ...]:
@@ -132,7 +114,7 @@ def _standoff_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
         placement=info.key,
         message=f"the captures at {info.standoff_mm:g} mm fit a standoff of {fitted:.4g} mm"
         f"{_digit_error(info.standoff_mm, fitted)}; no other cause explains them. Do: correct the standoff in"
-        f" the captures, or leave it out (--without-standoff {info.standoff_mm:g})",
+        " the captures, or leave it out",
     )
 
 
@@ -145,8 +127,7 @@ def _tilt_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
         placement=info.key,
         message=f"the target at {info.standoff_mm:g} mm was turned by {_tilt_deg(h):+.1f} deg"
         f" about the {axis} (expected {expected_deg:g} +- {fit.rig.bench.tilt_sd_deg:g} deg). Do: set it"
-        " square, then capture this standoff again or leave it out (--without-standoff"
-        f" {info.standoff_mm:g})",
+        " square, then capture this standoff again or leave it out",
     )
 
 
@@ -173,8 +154,7 @@ def _motion_fault(fit: CalibrationFit, motion: TargetMotion) -> Fault:
         placement=info.key,
         message=f"the target at {info.standoff_mm:g} mm moved by {motion.step_mm:+.2g} mm after"
         f" {motion.before} of its {motion.captures} captures, between {motion.last_before} and"
-        f" {motion.first_after}. Do: fix the target, then capture this standoff again or leave it out"
-        f" (--without-standoff {info.standoff_mm:g})",
+        f" {motion.first_after}. Do: fix the target, then capture this standoff again or leave it out",
     )
 
 

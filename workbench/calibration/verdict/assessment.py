@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from workbench.calibration.checks.cross_validation import alarms
-from workbench.calibration.checks.faults import find_faults, refuses
+from workbench.calibration.checks.faults import find_faults
 from workbench.calibration.checks.priors import contradicted_priors, doubted_priors
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.checks.residuals import explain, residual_tests
@@ -63,6 +63,8 @@ class Assessment:
     faults: tuple[Fault, ...] = ()
     residual_tests: tuple[ResidualTest, ...] = ()
     directions: tuple[NullDirection, ...] = ()
+    needs_standoffs: bool = False
+    """See `FitFinished.needs_standoffs`."""
 
 
 def determined_by(fit: CalibrationFit) -> tuple[DeterminedBy, ...]:
@@ -107,12 +109,13 @@ def assess(
         directions: null directions, for the warnings.
     """
     reasons = _too_few_standoffs(fit, limits)
+    needs_standoffs = bool(reasons) or not max_relative_range_sd <= limits.max_relative_range_sd
     if not fit.converged:
         reasons.append("the solver did not converge. Do: check the standoffs and the laser ids")
     faults = find_faults(fit, placements)
     tests = residual_tests(fit)
-    refusing = [fault.message for fault in faults if refuses(fault)]
-    warnings = [fault.message for fault in faults if not refuses(fault)]
+    refusing = [fault.message for fault in faults if fault.refuses]
+    warnings = [fault.message for fault in faults if not fault.refuses]
     if refusing:
         reasons = [*refusing, *reasons]
     else:
@@ -131,6 +134,7 @@ def assess(
         faults=faults,
         residual_tests=tests,
         directions=tuple(directions),
+        needs_standoffs=needs_standoffs and not refusing,
     )
 
 
@@ -210,7 +214,7 @@ def _alarm(one: CrossValidatedPlacement) -> str:
         evidence = f"chi2 of the spots {one.chi2:.0f}, expected {one.coordinates}"
     return (
         f"the captures at {one.standoff_mm:g} mm contradict the others: {evidence}, by the fit without them."
-        f" Do: check this standoff and its captures, or leave it out (--without-standoff {one.standoff_mm:g})"
+        f" Do: check this standoff and its captures, or leave it out"
     )
 
 

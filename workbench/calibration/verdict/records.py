@@ -50,6 +50,7 @@ def fit_finished(fit: CalibrationFit, assessment: Assessment) -> FitFinished:
         left_out=assessment.cross_validation,
         faults=assessment.faults,
         residual_tests=assessment.residual_tests,
+        needs_standoffs=assessment.needs_standoffs,
     )
 
 

@@ -56,7 +56,7 @@ class Repair:
             )
         if doubled := [key for key in chosen if chosen.count(key) > 1]:
             raise BadInputError(f"repair: expected one decision for each placement, got two for {doubled[0]}")
-        out = {*repairs_of(records).left_out, *_skipped(records)}
+        out = {*repairs_of(records).left_out, *skipped_placements([r.event for r in records])}
         if wrong := [key for key in restore if key not in out]:
             those = ", ".join(sorted(out)) or "none"
             raise BadInputError(f"repair: {wrong[0]} is neither left out nor skipped; those are: {those}")
@@ -115,7 +115,8 @@ def find_placement(name: str, keys: Sequence[str]) -> str:
     raise BadInputError(f"repair: no placement {name}; expected one of {', '.join(keys) or 'none'}")
 
 
-def _skipped(records: Sequence[ev.Record]) -> list[str]:
-    answers = {r.event.key: r.event.answer for r in records if isinstance(r.event, ev.Answered)}
-    set_aside = [r.event.key for r in records if isinstance(r.event, ev.SetAside) and r.event.left_out]
+def skipped_placements(events: Sequence[ev.Event]) -> list[str]:
+    """Keys of the placements that a person skipped, before or after their captures."""
+    answers = {event.key: event.answer for event in events if isinstance(event, ev.Answered)}
+    set_aside = [event.key for event in events if isinstance(event, ev.SetAside) and event.left_out]
     return [*(key for key, answer in answers.items() if answer.action == "skip"), *set_aside]

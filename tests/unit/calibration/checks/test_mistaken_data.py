@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support.rigs import World, thesis_rig
-from workbench.calibration.checks.faults import find_faults, refuses
+from workbench.calibration.checks.faults import find_faults
 from workbench.calibration.checks.hypotheses import explain_misfit
 from workbench.calibration.checks.mistaken_data import UNITS
 from workbench.calibration.data.observations import Observation
@@ -48,7 +48,7 @@ def test_exchanged_columns_are_named_and_refused(seed: int) -> None:
     )
     (fault,) = find_faults(fitted, ())
     assert fault.name == "transposed"
-    assert refuses(fault)
+    assert fault.refuses
 
 
 @pytest.mark.parametrize("unit", UNITS)
@@ -65,7 +65,7 @@ def test_centimetres_are_named_by_the_pull_of_wide_priors_alone() -> None:
     assert fitted.noise_scale > 1.5
     (fault,) = find_faults(fitted, ())
     assert fault.name == "unit"
-    assert refuses(fault)
+    assert fault.refuses
 
 
 def test_millimetres_need_no_other_unit() -> None:

@@ -44,6 +44,15 @@ def test_limits_that_fail_are_named(fitted: CalibrationFit) -> None:
     assert judged(fitted, worst=float("nan")).verdict == "refused"
 
 
+def test_further_standoffs_are_the_remedy_of_large_uncertainty_and_of_few_standoffs_alone(
+    fitted: CalibrationFit,
+) -> None:
+    assert judged(fitted, worst=0.3).needs_standoffs
+    assert judged(fitted, min_standoffs=12).needs_standoffs
+    assert not judged(fitted, max_rms_px=0.001).needs_standoffs
+    assert not judged(fitted).needs_standoffs
+
+
 @pytest.mark.parametrize(("cell", "axis"), [(3, 0), (17, 1)])
 def test_the_largest_residual_is_that_of_most_standard_deviations(
     fitted: CalibrationFit, cell: int, axis: int
