@@ -7,9 +7,10 @@ import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import cv2
+import numpy as np
 from pydantic import Field, model_validator
 
 from workbench.devices.protocols import Frame
@@ -18,7 +19,7 @@ from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import RigNotReadyError
 from workbench.model.exposure import WIDEST
 from workbench.model.rig import CameraSpec, Name, PositiveFloat, Rig
-from workbench.spots.grey import to_grey
+from workbench.spots.grey import JPEG_MARGIN_DN, to_grey
 
 SILENT_S = 1.5
 """Time without a frame after which a camera counts as unplugged, s; reported within two seconds."""
@@ -104,6 +105,8 @@ class OpenCvCamera:
         self.discard_frames = device.latency_frames
         self._device, self._format, self._beat = device, camera, beat
         self._is_file = Path(device.source).is_file()
+        is_compressed = device.pixel_format == "MJPG" or not _is_device(device.source)
+        self._margin_dn = JPEG_MARGIN_DN if is_compressed else 0
         self.exposure_limits, self.exposure_unit = device.exposure_limits, ""
         self._exposure = self._for_spots = device.exposure
         self._wish: float | None = None
@@ -208,7 +211,7 @@ class OpenCvCamera:
                     made = self._exposure
                     _set(self._capture, self._device.source, cv2.CAP_PROP_EXPOSURE, "exposure", made)
                 ok, image = self._capture.read()
-                frame = Frame(to_grey(image, 2**self._format.bits - 1), time.time_ns()) if ok else None
+                frame = Frame(self._grey(image), time.time_ns()) if ok else None
             except (RigNotReadyError, cv2.error) as error:
                 self._end(str(error))
                 return
@@ -220,6 +223,9 @@ class OpenCvCamera:
                 self._changed.notify_all()
                 if self._is_file:
                     self._changed.wait_for(lambda: not self._frames or self._closing)
+
+    def _grey(self, image: np.ndarray[Any, Any]) -> Image:
+        return to_grey(image, 2**self._format.bits - 1, self._margin_dn)
 
     def _grant(self, wish: float) -> float:
         self._capture.set(cv2.CAP_PROP_EXPOSURE, wish)
@@ -254,7 +260,7 @@ class OpenCvCamera:
 
 def _open(device: OpenCvBlock, camera: CameraSpec) -> cv2.VideoCapture:
     source = device.source
-    is_device = source.isdigit() or source.startswith("/dev/")
+    is_device = _is_device(source)
     if is_device:
         capture = cv2.VideoCapture(int(source) if source.isdigit() else source, cv2.CAP_ANY)
     else:
@@ -308,3 +314,7 @@ def _set(capture: cv2.VideoCapture, source: str, number: int, name: str, value: 
             f"camera {source}: {name}: requested {value:g}, the camera reports {reported:g}; state a"
             " supported value in the rig file, or remove the setting"
         )
+
+
+def _is_device(source: str) -> bool:
+    return source.isdigit() or source.startswith("/dev/")

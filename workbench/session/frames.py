@@ -17,10 +17,10 @@ from workbench.model.contents import not_text, read_file
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import FrameRef
 from workbench.session.files import sync_folder, write_record
-from workbench.spots.grey import to_grey
+from workbench.spots.grey import JPEG_MARGIN_DN, to_grey
 
-PNG = b"\x89PNG"
-"""Beginning of a PNG file."""
+PNG, JPEG = b"\x89PNG", b"\xff\xd8"
+"""Beginnings of files."""
 LARGEST_BYTES = 2**30
 """Largest image file: 16 bits a pixel for the largest cameras, not compressed, in three colours."""
 _RECENT: deque[tuple[str, Image]] = deque(maxlen=16)
@@ -115,14 +115,14 @@ def read_image(path: Path, size_px: tuple[int, int] | None = None) -> Image:
     if image.dtype not in (np.uint8, np.uint16):
         raise BadInputError(f"{path}: expected 8 or 16 bits per pixel, got {image.dtype}")
     _check_size(path, (image.shape[1], image.shape[0]), size_px)
-    return to_grey(image)
+    return to_grey(image, margin_dn=JPEG_MARGIN_DN if content.startswith(JPEG) else 0)
 
 
 def _check_whole(path: Path, content: bytes) -> None:
     """Refuse a truncated file: decoders silently fill its missing part with grey."""
     if not content:
         raise BadInputError(f"{path}: expected an image, the file is empty")
-    png, jpeg = content.startswith(PNG), content.startswith(b"\xff\xd8")
+    png, jpeg = content.startswith(PNG), content.startswith(JPEG)
     if (png and b"IEND" not in content[-16:]) or (jpeg and b"\xff\xd9" not in content[-1024:]):
         raise BadInputError(f"{path}: the image is truncated after {len(content)} bytes")
 
