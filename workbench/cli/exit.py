@@ -6,12 +6,16 @@ import errno
 import os
 import sys
 import traceback
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import NoReturn
+
+import typer
 
 from workbench.cli.console import print_message
 from workbench.cli.stopping import ignore_signals
 from workbench.cli.verdict import VerdictShownError
+from workbench.model.contents import printable
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
 
 INTERNAL_ERROR = 1
@@ -52,6 +56,7 @@ def report(error: BaseException) -> int:
     # An unconfirmed laser-off comes first, even if a later error (a stop, a full disk) covers it.
     if unsafe := [e for e in chain if isinstance(e, LaserOffNotConfirmedError)]:
         print_message(f"error: {unsafe[0]}", red=True)
+        _print_notes(chain)
         return LaserOffNotConfirmedError.exit_code
     if isinstance(error, SystemExit):
         if any(isinstance(e, BrokenPipeError) for e in chain):  # as with `| head`; typer turns it into 1
@@ -61,6 +66,7 @@ def report(error: BaseException) -> int:
         return error.exit_code
     if isinstance(error, WorkbenchError):
         print_message(f"error: {error}")
+        _print_notes([error])
         return error.exit_code
     if isinstance(error, OSError) and error.errno in WRITE_FAILURES | ACCESS_FAILURES:
         use = "written" if error.errno in WRITE_FAILURES else "used"
@@ -70,6 +76,14 @@ def report(error: BaseException) -> int:
         traceback.print_exception(error)
     print_message("internal error: this is a defect of the workbench; report it with the lines above")
     return INTERNAL_ERROR
+
+
+def _print_notes(errors: Sequence[BaseException]) -> None:
+    """Print the notes of errors, each once and unwrapped: they may be commands."""
+    notes = dict.fromkeys(note for error in errors for note in getattr(error, "__notes__", ()))
+    with suppress(OSError):  # a closed terminal
+        for note in notes:
+            typer.echo(printable(note), err=True)
 
 
 def _chain(error: BaseException) -> list[BaseException]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,11 +32,12 @@ from workbench.procedure.engine.durations import learn_durations
 from workbench.procedure.engine.operator import ScriptedOperator
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.progress import TimeLeft
-from workbench.procedure.engine.repair import Repair
+from workbench.procedure.engine.repair import Repair, kept_placements
 from workbench.procedure.engine.resume import files_now, plan_of, resume
 from workbench.procedure.engine.run import NO_OPERATOR, Invocation, run
 from workbench.report.figure_writer import FigureWriter
 from workbench.session.caller import now, operator
+from workbench.session.journal import JOURNAL, read_journal
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
@@ -97,15 +98,19 @@ def resume_session(
     """
     now, _ = files_now(session_dir, load_manifest(session_dir))
     plan = plan_of(session_dir, now)
-    with _repairable(session_dir, plan, screen) as ui:
+    records = list(read_journal(session_dir)) if (session_dir / JOURNAL).exists() else []
+    kept = kept_placements(plan, records, repair)
+    with _repairable(session_dir, plan, screen, kept) as ui:
         resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes, repair)
 
 
 @contextmanager
-def _repairable(session_dir: Path, plan: Plan, screen: Screen) -> Iterator[SessionInterface]:
+def _repairable(
+    session_dir: Path, plan: Plan, screen: Screen, kept: Collection[str] = ()
+) -> Iterator[SessionInterface]:
     """`session_interface`, then the verdict; lets a person repair a refused calibration at once."""
     try:
-        with session_interface(session_dir, plan, screen) as ui:
+        with session_interface(session_dir, plan, screen, kept) as ui:
             yield ui
     except LimitFailedError as refused:
         show_verdict(session_verdict(session_dir, refused))
@@ -130,13 +135,16 @@ def _repaired(session_dir: Path, screen: Screen) -> bool:
 
 
 @contextmanager
-def session_interface(session_dir: Path, plan: Plan, screen: Screen) -> Iterator[SessionInterface]:
-    """Terminal, recording, viewer, figures and operator for a session; prints how to resume it.
+def session_interface(
+    session_dir: Path, plan: Plan, screen: Screen, kept: Collection[str] = ()
+) -> Iterator[SessionInterface]:
+    """Terminal, recording, viewer, figures and operator for a session; adds to errors how to resume it.
 
     Args:
         session_dir: folder of the session.
         plan: rig and procedures.
         screen: options.
+        kept: keys of placements that are not captured again.
     """
     watched = watch if screen.view or (screen.view is None and has_display()) else None
     if watched is not None:
@@ -154,7 +162,7 @@ def session_interface(session_dir: Path, plan: Plan, screen: Screen) -> Iterator
     file = session_dir / RECORDING_FILE
     with (
         Background(recording, file, console) as beside,
-        Terminal(console, forecast, screen.details) as terminal,
+        Terminal(console, forecast, screen.details, kept) as terminal,
     ):
         person = beside.asking(choose_operator(screen.no_input, console, lambda: stop.reason, terminal.quiet))
         operator = person if script is None else replace(script, other=person)
@@ -163,15 +171,9 @@ def session_interface(session_dir: Path, plan: Plan, screen: Screen) -> Iterator
         consumers = (FaultTolerantConsumer(terminal, "the progress", console), figures, beside)
         try:
             yield SessionInterface(consumers, lambda: stop.reason, operator)
-        except (RigNotReadyError, StoppedError, AnswerNeededError, LaserOffNotConfirmedError):
-            if (session_dir / MANIFEST).exists():
-                with suppress(OSError):  # a closed terminal
-                    console.print(
-                        f"resume:  workbench resume {session_dir}",
-                        highlight=False,
-                        soft_wrap=True,
-                        markup=False,
-                    )
+        except (RigNotReadyError, StoppedError, AnswerNeededError, LaserOffNotConfirmedError) as error:
+            if (session_dir / MANIFEST).exists():  # after the message: lasers that may be on come first
+                error.add_note(f"resume:  workbench resume {session_dir}")
             raise
 
 

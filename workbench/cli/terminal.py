@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import TracebackType
 
@@ -27,14 +27,22 @@ from workbench.report.terminal_table import TerminalTable
 class Terminal:
     """Consumer that shows the records of a session."""
 
-    def __init__(self, console: Console, forecast: TimeLeft, details: bool = False) -> None:
+    def __init__(
+        self,
+        console: Console,
+        forecast: TimeLeft,
+        details: bool = False,
+        kept: Collection[str] = (),
+    ) -> None:
         """Terminal without progress display.
 
         Args:
             console: terminal.
             forecast: estimate of the time left.
             details: whether to print the tables of a fit, its notes, and the captures that it rejects.
+            kept: keys of placements whose captures are kept, not taken again.
         """
+        self._kept = set(kept)
         self._console, self._forecast, self._details = console, forecast, details
         self._progress = Progress(
             TextColumn("{task.description}"),
@@ -91,12 +99,15 @@ class Terminal:
             case ev.SpotsFound() as e if e.key in self._captures:
                 self._show_capture(self._captures.pop(e.key), e)
             case ev.PlacementFinished() as e if self._spots:
-                self._print(self._placement)
-                self._print(self.progress_text())
+                kept = e.key in self._kept
+                self._print(f"{self._placement} (kept)" if kept else self._placement)
+                if not kept:
+                    self._print(self.progress_text())
             case ev.LimitChecked() as e if e.verdict != "pass":
                 value = "not measured" if e.value is None else f"{e.value:.3g}"
                 self._print(f"{e.verdict}: {e.of}: {e.quantity} {value}, limit {e.limit}", style="yellow")
             case ev.SetAside() as e:
+                self._kept.discard(e.key)
                 self._print(e.text, style="yellow")
             case ev.SessionResumed() as e:
                 self._print(
@@ -119,7 +130,7 @@ class Terminal:
                 self._print(remark, style="yellow")
             case ev.TrialFinished() as e:
                 for table in e.tables:
-                    if not table.is_detail:
+                    if table.rows and not table.is_detail:
                         self._console.print(TerminalTable(table))
             case ev.TrialProgress() as e:
                 self._print(e.text)

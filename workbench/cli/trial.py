@@ -18,6 +18,10 @@ from workbench.trials.any_sensor.readings_file import load_sessions
 OPERATORS = "gauge-rr"
 """Kind of trial in which the column `session` names an operator, not a session."""
 
+SHORTEST_MM = 10.0
+"""True ranges that all lie below this may be metres: triangulating heads begin at some 10 mm, and most
+sensors in a laboratory end at 10 m."""
+
 
 def analyse_readings(kind: str, paths: Sequence[Path], as_json: bool) -> None:
     """Analyse files of readings: JSON on standard output, table and notes on standard error.
@@ -62,8 +66,10 @@ def _notes(result: Analysis) -> list[str]:
     if result.missing:
         notes.append(f"{result.missing} of {result.readings + result.missing} readings have no range")
     if result.autocorrelation.lag1 > 0:
+        notes.append(f"successive readings are autocorrelated (lag 1: {result.autocorrelation.lag1:.2f})")
+    if result.longest_mm < SHORTEST_MM:
         notes.append(
-            f"successive readings are autocorrelated (lag 1: {result.autocorrelation.lag1:.2f}); intervals"
-            " of repeats are widened"
+            f"all true ranges are below {SHORTEST_MM:g} mm (the longest: {result.longest_mm:g} mm); state"
+            " true_mm and measured_mm in millimetres, not in metres"
         )
     return notes

@@ -109,6 +109,13 @@ class CrossValidatedPlacement(FileModel):
         return abs(error_mm) / self.standoff_mm
 
     @property
+    def alarm_test(self) -> Literal["range", "spots", ""]:
+        """Test that raises the alarm, the less probable of both; empty without an alarm."""
+        if not self.alarm:
+            return ""
+        return "range" if self.range_p <= self.spots_p else "spots"
+
+    @property
     def range_p(self) -> float:
         """Two-sided p value of the range error: normal, or Student's t where the noise is estimated."""
         from workbench.model.stats import (

@@ -64,12 +64,14 @@ def cross_validation_table(placements: Sequence[CrossValidatedPlacement]) -> Tab
             Column(key="sd_mm", name="stated u", unit="mm", format="sd"),
             Column(key="normalised_error", name="error / u", format="+.1f"),
             Column(key="alarm", name="alarm"),
+            Column(key="alarm_test", name="by"),
             *(Column(key=f"relative_error.{i}", name=i, unit="%", scale=100, format="+.2f") for i in ids),
         ),
         rows=tuple(_placement_row(one, ids) for one in placements),
         caption=(
             "error: range - standoff, none beyond infinity; u: 1 sigma at the standoff; error / u: to first"
-            " order in pixels; %: relative error of each laser alone; !: error larger than u explains"
+            " order in pixels; %: relative error of each laser alone; !: contradicts the others, by its range"
+            " error (range) or by the distance of all its spots from their prediction (spots)"
         ),
     )
 
@@ -110,11 +112,12 @@ def worst_placements_table(fit: FitFinished, captures: Mapping[str, str], most: 
     )
 
 
-def _placement_row(one: CrossValidatedPlacement, ids: Sequence[str]) -> tuple[float | bool | None, ...]:
+def _placement_row(one: CrossValidatedPlacement, ids: Sequence[str]) -> tuple[str | float | bool | None, ...]:
     relative = {
         laser.laser_id: laser.error_mm / one.standoff_mm for laser in one.lasers if laser.error_mm is not None
     }
-    return (one.standoff_mm, one.error_mm, one.sd_mm, one.z, one.alarm, *(relative.get(i) for i in ids))
+    tested = (one.standoff_mm, one.error_mm, one.sd_mm, one.z, one.alarm, one.alarm_test)
+    return (*tested, *(relative.get(i) for i in ids))
 
 
 def term_table(terms: Sequence[TermSummary]) -> Table:

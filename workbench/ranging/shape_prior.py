@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.model.arrays import FloatArray, IndexArray
+from workbench.model.errors import BadInputError
 
 CUBIC = 3
 """Degree of an irregular surface; the front of four lasers determines no higher one."""
@@ -49,6 +50,20 @@ class ShapePrior:
     """Probability that these are `steep_factor` larger, given that the surface is irregular: steps. Half of
     them are parabolas, half cubic."""
     steep_factor: float = 6.0
+
+    def __post_init__(self) -> None:
+        """Check the probabilities of the shapes.
+
+        Raises:
+            BadInputError: one is negative, or they do not add up to 1.
+        """
+        shapes = {name: getattr(self, name) for name in ("flat", "incline", "round", "irregular")}
+        if min(shapes.values()) < 0 or not math.isclose(sum(shapes.values()), 1.0, abs_tol=1e-9):
+            got = ", ".join(f"{name}={value:g}" for name, value in shapes.items())
+            raise BadInputError(
+                f"ShapePrior: expected probabilities from 0 that add up to 1, got {got} (sum"
+                f" {sum(shapes.values()):g}); state all four"
+            )
 
 
 class PriorComponents(NamedTuple):

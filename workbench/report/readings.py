@@ -39,10 +39,10 @@ def reading_list(readings: Sequence[Reading]) -> Lines:
 
 
 def reading_line(r: Reading) -> str:
-    """Summary of a reading in one line."""
+    """Summary of a reading in one line, 1 sigma; the 95 % interval is in the JSON."""
     if r.closest_mm is None or r.sigma_mm is None or r.interval_mm is None:
         return f"{r.scene}  {r.status}  {'; '.join(r.notes)}"
-    return f"{r.scene}  {r.status}  {_closest(r)} mm  {_shapes(r)}  {_lasers(r)}"
+    return f"{r.scene}  {r.status}  {_closest(r)} mm  {_shapes(r)} (1 sigma)  {_lasers(r)}"
 
 
 def shape_words(shape: Shape) -> str:

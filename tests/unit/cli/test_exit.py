@@ -6,7 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.support.command_line import SCRIPT, shell
+from workbench.cli.exit import report
+from workbench.model.errors import LaserOffNotConfirmedError, StoppedError
 
 ROOT = Path(__file__).parents[3]
 WEBCAM = ROOT / "data/webcam-laser-rows.csv"
@@ -48,3 +52,15 @@ def test_a_fit_whose_result_nobody_reads_ends_as_stopped(tmp_path: Path) -> None
     assert (done.returncode, output.is_file()) == (5, True), done.stderr
     assert "cannot be written: No space left" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_lasers_that_may_be_on_come_before_the_resumption(capsys: pytest.CaptureFixture[str]) -> None:
+    unsafe, stopped = LaserOffNotConfirmedError("cut the power"), StoppedError("interrupted")
+    for error in (unsafe, stopped):
+        error.add_note("resume:  workbench resume s")
+    stopped.__context__ = unsafe
+    assert report(stopped) == 7
+    printed = capsys.readouterr().err
+    assert printed.index("cut the power") < printed.index("resume:")
+    assert printed.count("resume:") == 1
+    assert report(stopped.__class__("interrupted")) == 5

@@ -26,9 +26,9 @@ def console() -> tuple[Console, io.StringIO]:
     return Console(file=stream, width=80, markup=False), stream
 
 
-def shown(*timed: tuple[float, ev.Event]) -> list[str]:
+def shown(*timed: tuple[float, ev.Event], kept: tuple[str, ...] = ()) -> list[str]:
     there, stream = console()
-    with Terminal(there, TimeLeft(STEPS, StepDurations())) as terminal:
+    with Terminal(there, TimeLeft(STEPS, StepDurations()), kept=kept) as terminal:
         for record in records((0, STARTED), *timed):
             terminal(record)
     return stream.getvalue().splitlines()
@@ -53,6 +53,17 @@ def test_a_placement_is_summed_up_when_it_is_finished() -> None:
     assert {"500", "40", "0.707"} <= set(line.replace(",", " ").split())
     (progress,) = [line for line in lines if line.strip().startswith("placement ")]
     assert [int(word) for word in progress.split()[1:4:2]] == [1, 3]
+
+
+def test_a_placement_that_is_kept_shows_no_progress_until_it_is_captured_again() -> None:
+    end = ev.PlacementFinished(key="a")
+    again = [(24.0, ev.SetAside(key="a", from_n=0, reason="moved")), *SESSION[1:4]]
+    once = [line for line in shown(*SESSION[:4], (23.0, end), kept=("a",)) if "lasers" in line]
+    twice = shown(*SESSION[:4], (23.0, end), *again, (25.0, end), kept=("a",))
+    assert next(line for line in twice if "lasers" in line) == once[0]
+    assert len([line for line in twice if line.strip().startswith("placement ")]) == 1
+    assert not [line for line in shown(*SESSION[:4], (23.0, end), kept=("a",)) if "placement 1" in line]
+    assert "(kept)" in once[0]
 
 
 @pytest.mark.parametrize(("readings", "spots"), [(1, 1), (1, 2), (3, 1), (2, 4)])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.support.command_line import Run, refused
-from tests.support.trial_readings import drawn_levels
+from tests.support.trial_readings import autoregressive, drawn_levels
 from workbench.cli.main import TrialKind
 from workbench.trials.any_sensor.analysis import KINDS, analyse
 from workbench.trials.any_sensor.readings_file import load_readings
@@ -75,3 +76,25 @@ def test_each_file_is_a_session(workbench: Run, readings: Path, tmp_path: Path) 
     assert json.loads(outcome.out)["readings"] == 72 + 36
     for arguments in (("repeatability", readings, readings), ("gauge-rr", readings, other)):
         assert workbench("trial", *arguments).code == 2
+
+
+def test_readings_in_metres_have_a_note(workbench: Run, tmp_path: Path) -> None:
+    for name, factor, noted in (("mm", 1.0, False), ("m", 1e-3, True)):
+        path = tmp_path / f"{name}.csv"
+        frame = drawn_levels(1, (20.0, 4500.0))
+        frame[["true_mm", "measured_mm"]] *= factor
+        frame[USED].to_csv(path, index=False)
+        outcome = workbench("trial", "accuracy", path)
+        assert outcome.code == 0
+        assert ("true_mm" in outcome.err) == noted
+
+
+def test_intervals_are_not_called_wider_where_none_is_printed(workbench: Run, tmp_path: Path) -> None:
+    path = tmp_path / "dependent.csv"
+    series = autoregressive(np.random.default_rng(1), 0.9, (1, 200))[0]
+    rows = [f"500,{500 + error:.4f}" for error in series]
+    path.write_text("\n".join(["true_mm,measured_mm", *rows]))
+    for kind, widened in (("linearity", False), ("gauge-rr", False), ("repeatability", True)):
+        outcome = workbench("trial", kind, path)
+        assert "autocorrelated" in outcome.err
+        assert ("widened" in " ".join(outcome.err.split())) == widened

@@ -8,6 +8,7 @@ import pytest
 from pydantic import ValidationError
 from scipy import stats
 
+from tests.support.fits import cross_validated
 from tests.viewer.session import a_fit
 from workbench.model.fit_event import CrossValidatedPlacement, FitFinished
 
@@ -51,6 +52,15 @@ def test_range_errors_have_the_p_value_of_their_distribution() -> None:
     assert placement().z == -2.0
     assert placement().range_p == pytest.approx(2 * stats.norm.sf(2.0))
     assert placement(freedom=5.0).range_p == pytest.approx(2 * stats.t.sf(2.0, 5))
+
+
+@pytest.mark.parametrize(
+    ("error_mm", "chi2", "alarm", "test"),
+    [(9.0, 8.0, True, "range"), (1.0, 90.0, True, "spots"), (9.0, 90.0, False, "")],
+)
+def test_an_alarm_names_the_test_that_raises_it(error_mm: float, chi2: float, alarm: bool, test: str) -> None:
+    one = cross_validated("p.1/300mm", 300.0, error_mm, alarm)
+    assert one.model_copy(update={"chi2": chi2, "coordinates": 8}).alarm_test == test
 
 
 def test_spots_have_the_p_value_of_their_distribution() -> None:

@@ -9,7 +9,7 @@ from typing import Any, cast
 from rich.console import Console
 
 from workbench.ranging.ranger import Reading
-from workbench.report.readings import reading_list
+from workbench.report.readings import reading_line, reading_list
 
 
 def reading(scene: str, status: str = "done", notes: tuple[str, ...] = ()) -> Reading:
@@ -20,6 +20,7 @@ def reading(scene: str, status: str = "done", notes: tuple[str, ...] = ()) -> Re
         status=status,
         closest_mm=1002.34,
         sigma_mm=1.2,
+        interval_mm=(1000.0, 1004.7),
         lines=[SimpleNamespace(shape=shape)],
         lasers=lasers,
         notes=notes,
@@ -33,6 +34,12 @@ def shown(readings: list[Reading]) -> list[str]:
     lines = [line.rstrip() for line in stream.getvalue().splitlines()]
     assert max(map(len, lines)) <= 80
     return lines
+
+
+def test_a_line_states_the_kind_of_its_uncertainties() -> None:
+    line = reading_line(reading("0"))
+    assert "1002.3 +- 1.2 mm" in line
+    assert line.index("incline") < line.index("(1 sigma)")
 
 
 def test_a_usual_reading_takes_one_line() -> None:

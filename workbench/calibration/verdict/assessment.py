@@ -207,7 +207,7 @@ def _too_few_standoffs(fit: CalibrationFit, limits: Acceptance) -> list[str]:
 
 
 def _alarm(one: CrossValidatedPlacement) -> str:
-    if one.range_p <= one.spots_p:
+    if one.alarm_test == "range":
         error = "beyond infinity" if one.error_mm is None else f"{one.error_mm:+.2f} mm"
         evidence = f"range error {error}, expected 0 +- {one.sd_mm:.2g} mm (1 sigma)"
     else:

@@ -11,6 +11,7 @@ from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.procedure.engine.plan import Plan
 from workbench.session.repairs import repairs_of
+from workbench.session.state import placement_captures
 
 if TYPE_CHECKING:
     from workbench.procedure.engine.run import Invocation
@@ -113,6 +114,23 @@ def find_placement(name: str, keys: Sequence[str]) -> str:
     if found:
         raise BadInputError(f"repair: several placements at {place} mm: {', '.join(found)}; name one of them")
     raise BadInputError(f"repair: no placement {name}; expected one of {', '.join(keys) or 'none'}")
+
+
+def kept_placements(plan: Plan, records: Sequence[ev.Record], repair: Repair | None) -> frozenset[str]:
+    """Keys of the complete placements that a resumption reads from disk, and does not capture again.
+
+    Args:
+        plan: rig and procedures of the session.
+        records: records of the session so far.
+        repair: decisions of the resumption.
+
+    Raises:
+        BadInputError: the repair names no placement of the session.
+    """
+    complete = {key for key, one in placement_captures(records).items() if one.complete}
+    keys = placement_keys(plan, records)
+    again = () if repair is None else repair.recapture
+    return frozenset(complete - {find_placement(name, keys) for name in again})
 
 
 def skipped_placements(events: Sequence[ev.Event]) -> list[str]:

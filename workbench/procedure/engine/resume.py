@@ -11,6 +11,7 @@ from workbench.devices.protocols import Operator
 from workbench.devices.registry import open_bench
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
+from workbench.model.problems import short
 from workbench.model.rig import Rig
 from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model
 from workbench.procedure.engine.existing_calibration import ExistingCalibration
@@ -131,11 +132,32 @@ def _now(session_dir: Path, entry: Entry, model: type[FileModel]) -> tuple[Entry
     path = Path(entry.file)
     if not path.is_file():
         return entry, []
-    now = load_yaml_model(path, model)
-    if now == parse_yaml_model(entry.text, session_dir / MANIFEST, model):
+    now, before = load_yaml_model(path, model), parse_yaml_model(entry.text, session_dir / MANIFEST, model)
+    if now == before:
         return entry, []
-    change = f"{path} has changed since the session began"
+    where = first_change(before.model_dump(mode="json"), now.model_dump(mode="json"))
+    change = f"{path} has changed since the session began, first at {where}"
     return entry.model_copy(update={"text": path.read_text(encoding="utf-8")}), [change]
+
+
+def first_change(before: object, now: object, key: str = "") -> str:
+    """Key of the first value that differs, with both values: `camera.f_px.value (650.0, now 700.0)`.
+
+    Args:
+        before: values of the earlier file; mappings and lists may be nested.
+        now: those of the present file, which differ.
+        key: key of both in the file.
+    """
+    if isinstance(before, dict) and isinstance(now, dict):
+        absent = "nothing"
+        for name in dict.fromkeys([*before, *now]):
+            one, other = before.get(name, absent), now.get(name, absent)
+            if one != other:
+                return first_change(one, other, f"{key}.{name}".lstrip("."))
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        index = next(n for n, (one, other) in enumerate(zip(before, now, strict=True)) if one != other)
+        return first_change(before[index], now[index], f"{key}[{index}]")
+    return f"{key or 'document'} ({short(before)}, now {short(now)})"
 
 
 def _check_unfinished(session_dir: Path, *, finished_too: bool) -> None:

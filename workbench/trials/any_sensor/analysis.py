@@ -45,6 +45,8 @@ class Analysis:
     readings: int
     """Number of readings with a range."""
     missing: int
+    longest_mm: float
+    """Longest true range."""
     autocorrelation: Autocorrelation
     clipped: tuple[ClippedLevel, ...]
     """Levels with clipped readings, which the table leaves out."""
@@ -66,6 +68,7 @@ def analyse(kind: str, frame: pd.DataFrame) -> Analysis:
         kind=kind,
         readings=int(frame["measured_mm"].count()),
         missing=int(frame["measured_mm"].isna().sum()),
+        longest_mm=float(frame["true_mm"].max()),
         autocorrelation=dependence(used),
         clipped=limits,
         table=KINDS[kind](kind, used),

@@ -23,6 +23,7 @@ COLUMNS = (
     Column(key="note", name="note"),
 )
 TITLE = "Gauge R&R (AIAG): part = standoff, trial = placement"
+DESIGN = "column session: operator; column placement: trial; true range: part"
 
 
 def gauge_table(name: str, frame: pd.DataFrame) -> Table:
@@ -46,7 +47,7 @@ def gauge_table(name: str, frame: pd.DataFrame) -> Table:
     try:
         study = gauge_rr(trials)
     except BadInputError as error:
-        row: dict[str, Cell] = {"component": "GRR", "note": f"no statistics: {error}"}
+        row: dict[str, Cell] = {"component": "GRR", "note": f"no statistics: {error} ({DESIGN})"}
         return table_of(name, TITLE, COLUMNS, [row], "")
     caption = (
         f"{study.parts} standoffs, {study.operators} operators, {study.trials} trials of each;"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -13,11 +13,13 @@ from workbench.trials.reading_frame import dependence, levels, table_of
 from workbench.trials.statistics.autocorrelation import Autocorrelation
 from workbench.trials.statistics.estimate import TooFewReadingsError
 from workbench.trials.statistics.repeatability import (
+    LIMIT_FACTOR,
     OutlierTest,
     Repeatability,
     cochran,
     grubbs,
     repeatability,
+    repeatability_alone,
 )
 from workbench.trials.statistics.resolution import coarse_step
 
@@ -71,11 +73,11 @@ def _row(standoff_mm: float, readings: pd.DataFrame, repeats: Autocorrelation) -
         "placements": cell.nunique(),
         "sessions": used["session"].nunique(),
     }
+    notes = [f"repeats autocorrelated ({repeats.lag1:.2f}), intervals widened"] if repeats.lag1 > 0 else []
     try:
         found = repeatability(used, repeats)
     except TooFewReadingsError as error:
-        return row | {"note": f"no statistics: {error}"}
-    notes = [f"repeats autocorrelated ({repeats.lag1:.2f}), intervals widened"] if repeats.lag1 > 0 else []
+        return row | _repeats_alone(used, repeats, notes, f"{error} (column placement)")
     if (step_mm := coarse_step(used)) is not None:
         notes.append(f"resolution {step_mm:.3g} mm: too coarse for tests of outliers")
         return row | _precision(found) | {"note": "; ".join(notes)}
@@ -85,6 +87,23 @@ def _row(standoff_mm: float, readings: pd.DataFrame, repeats: Autocorrelation) -
         if test.probability < OUTLIER_PROBABILITY:
             notes.append(f"placement {test.group}: outlier ({key.removesuffix('_p').capitalize()})")
     return row | _precision(found) | tests | {"note": "; ".join(notes)}
+
+
+def _repeats_alone(
+    used: pd.DataFrame, repeats: Autocorrelation, notes: Sequence[str], why: str
+) -> dict[str, Cell]:
+    """Cells of s_r where s_R has no estimate, for the reason `why`."""
+    try:
+        alone = repeatability_alone(used, repeats)
+    except TooFewReadingsError as error:
+        return {"note": f"no statistics: {error}"}
+    return {
+        "repeatability_sd_mm": alone.value,
+        "repeatability_low_mm": alone.low,
+        "repeatability_high_mm": alone.high,
+        "repeatability_limit_mm": LIMIT_FACTOR * alone.value,
+        "note": "; ".join([f"no s_R: {why}", *notes]),
+    }
 
 
 def _outlier_tests(used: pd.DataFrame) -> Iterator[tuple[str, OutlierTest]]:

@@ -84,12 +84,12 @@ def repeatability(readings: pd.DataFrame, dependence: Autocorrelation = INDEPEND
     require(squares.within_dof + 1, 2, "readings at one placement")
     size = squares.placement_size
     factor = dependence.variance_factor(size)
-    within = squares.within * (size - 1) / (size - factor) if size > factor else squares.within
+    within = _within(squares.within, size, dependence)
     placement_variance = max(0.0, (squares.placement - factor * within) / size)
     session_variance = _session_variance(squares, factor * within)
     total = _total(squares, dependence)
     return Repeatability(
-        repeatability=sd_estimate(within, max(1.0, squares.within_dof * dependence.dof_factor)),
+        repeatability=_repeats(within, squares.within_dof, dependence),
         between_placements=float(np.sqrt(placement_variance)),
         between_sessions=None if session_variance is None else float(np.sqrt(session_variance)),
         reproducibility=_reproducibility(total, within + placement_variance + (session_variance or 0.0)),
@@ -98,6 +98,35 @@ def repeatability(readings: pd.DataFrame, dependence: Autocorrelation = INDEPEND
         placements=squares.placements,
         sessions=squares.sessions,
     )
+
+
+def repeatability_alone(readings: pd.DataFrame, dependence: Autocorrelation = INDEPENDENT) -> Estimate:
+    """s_r where the placements are too few for s_R: the first part of `repeatability`, also of one placement.
+
+    Args:
+        readings: one row a reading with `error_mm`, `session` and `placement`.
+        dependence: autocorrelation of the repeats.
+
+    Raises:
+        TooFewReadingsError: no placement with two readings.
+    """
+    groups = readings.groupby(["session", "placement"])["error_mm"]
+    dof = len(readings) - groups.ngroups
+    require(dof + 1, 2, "readings at one placement")
+    squares = float(((readings["error_mm"] - groups.transform("mean")) ** 2).sum())
+    within = _within(squares / dof, len(readings) / groups.ngroups, dependence)
+    return _repeats(within, dof, dependence)
+
+
+def _within(mean_square: float, size: float, dependence: Autocorrelation) -> float:
+    """Variance of a reading from the mean square within placements of `size` readings."""
+    factor = dependence.variance_factor(size)
+    return mean_square * (size - 1) / (size - factor) if size > factor else mean_square
+
+
+def _repeats(variance: float, dof: int, dependence: Autocorrelation) -> Estimate:
+    """s_r with its interval, wider for autocorrelated repeats."""
+    return sd_estimate(variance, max(1.0, dof * dependence.dof_factor))
 
 
 def _session_variance(squares: NestedSquares, mean_variance: float) -> float | None:

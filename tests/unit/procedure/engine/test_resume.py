@@ -6,12 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.support.procedures import CALLER, RIG, plan_of, story
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.procedure.engine.plan import Plan
-from workbench.procedure.engine.resume import files_now, resume
+from workbench.procedure.engine.resume import files_now, first_change, resume
 from workbench.procedure.engine.resume import plan_of as plan_of_manifest
 from workbench.procedure.engine.run import Invocation, run
 from workbench.session.manifest import load_manifest
@@ -116,3 +117,27 @@ def test_another_version_is_a_change_that_names_it(stopped: Path) -> None:
     _, changes = files_now(stopped, older)
     assert len(changes) == 1
     assert {"numpy:", "0.9"} <= set(changes[0].split())
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "where"),
+    [
+        ({"a": 1, "b": {"c": [1, {"d": 2}]}}, {"a": 1, "b": {"c": [1, {"d": 3}]}}, "b.c[1].d (2, now 3)"),
+        ({"a": [1, 2]}, {"a": [1, 2, 3]}, "a ([1, 2], now [1, 2, 3])"),
+        ({"a": 1, "b": 2}, {"a": 3, "b": 4}, "a (1, now 3)"),
+        ({"a": {"b": None}}, {"a": {"b": 5}}, "a.b (nothing, now 5)"),
+    ],
+)
+def test_a_change_is_named_by_its_first_key(before: object, now: object, where: str) -> None:
+    assert first_change(before, now) == where
+
+
+def test_a_changed_rig_file_is_named_with_the_key_that_changed(stopped: Path) -> None:
+    rig = stopped.parent / "rig.yaml"
+    values = yaml.safe_load(rig.read_text())
+    values["bench"]["placement_sd_mm"] = 7.5
+    rig.write_text(yaml.safe_dump(values))
+    _, changes = files_now(stopped, load_manifest(stopped))
+    assert len(changes) == 1
+    assert "bench.placement_sd_mm" in changes[0]
+    assert "7.5" in changes[0]

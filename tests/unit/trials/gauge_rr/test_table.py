@@ -52,6 +52,7 @@ def test_a_study_that_separates_nothing_is_stated_in_words(column: str) -> None:
     (row,) = gauge_table("t", study().assign(**{column: 1})).records()
     assert row["sd_mm"] is None
     assert str(row["note"]).startswith("no statistics")
+    assert all(f"column {name}" in str(row["note"]) for name in ("session", "placement"))
 
 
 def test_a_missing_trial_is_named_with_operator_and_standoff() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import chi2
 
 from tests.support.trial_readings import autoregressive, drawn_levels
 from workbench.model.table import Cell
@@ -42,7 +43,21 @@ def test_missing_readings_are_counted() -> None:
     assert (row["readings"], row["missing"]) == (22, 2)
 
 
-@pytest.mark.parametrize("shape", [(1, 1, 5), (1, 4, 1), (1, 1, 1)])
+@pytest.mark.parametrize("shape", [(1, 1, 20), (3, 1, 7)])
+def test_repeats_at_one_placement_give_s_r_with_its_interval(shape: tuple[int, int, int]) -> None:
+    frame = drawn_levels(1, shape=shape)
+    for row, (_, level) in zip(rows(frame), frame.groupby("standoff_mm"), strict=True):
+        pooled = float(np.sqrt(level.groupby("session")["error_mm"].var().mean()))
+        dof = shape[0] * (shape[2] - 1)
+        low, high = pooled * np.sqrt(dof / chi2.ppf([0.975, 0.025], dof))
+        assert row["repeatability_sd_mm"] == pytest.approx(pooled)
+        assert (row["repeatability_low_mm"], row["repeatability_high_mm"]) == pytest.approx((low, high))
+        assert row["repeatability_limit_mm"] == pytest.approx(2.8 * pooled)
+        assert row["reproducibility_sd_mm"] is None
+        assert "column placement" in note(row)
+
+
+@pytest.mark.parametrize("shape", [(1, 4, 1), (1, 1, 1)])
 def test_too_few_readings_are_stated_in_words_not_as_numbers(shape: tuple[int, int, int]) -> None:
     (row,) = rows(drawn_levels(1, [300.0], shape))
     assert row["repeatability_sd_mm"] is None

@@ -11,7 +11,12 @@ from tests.support.trial_readings import autoregressive, drawn_readings
 from workbench.model.arrays import FloatArray
 from workbench.trials.statistics.autocorrelation import Autocorrelation
 from workbench.trials.statistics.estimate import TooFewReadingsError
-from workbench.trials.statistics.repeatability import cochran, grubbs, repeatability
+from workbench.trials.statistics.repeatability import (
+    cochran,
+    grubbs,
+    repeatability,
+    repeatability_alone,
+)
 
 GLUCOSE_A = [
     [41.03, 41.45, 41.37],
@@ -67,6 +72,17 @@ def test_intervals_cover_93_to_97_percent(placement_sd: float, session_sd: float
         between += found.reproducibility.low <= total <= found.reproducibility.high
     assert 0.93 - spread(0.93, trials) / 2 < within / trials < 0.97 + spread(0.97, trials) / 2
     assert 0.93 - spread(0.93, trials) / 2 < between / trials < 0.97 + spread(0.97, trials) / 2
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5])
+def test_s_r_alone_is_that_of_the_whole_statistics(rho: float) -> None:
+    readings = drawn_readings(np.random.default_rng(17), (2, 4, 12), (0.3, 0.2, 0.1))
+    dependence = Autocorrelation(lag1=rho)
+    alone, whole = (
+        repeatability_alone(readings, dependence),
+        repeatability(readings, dependence).repeatability,
+    )
+    assert (alone.value, alone.low, alone.high) == pytest.approx((whole.value, whole.low, whole.high))
 
 
 @pytest.mark.parametrize(("placement_sd", "session_sd"), [(0.0, 0.0), (0.5, 0.0), (0.5, 0.8)])
