@@ -10,6 +10,7 @@ from difflib import get_close_matches
 from typing import Any, Protocol, get_args, runtime_checkable
 
 from pydantic import BaseModel, RootModel
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 Location = tuple[int | str, ...]
@@ -73,6 +74,10 @@ STATEMENTS = {"missing", "extra_forbidden", "invalid_key", "unexpected_keyword_a
 """Error types whose text is a statement, not an expectation."""
 WITHOUT_GOT = STATEMENTS | {"too_short", "too_long"}
 """Error types without an actual value, or with the actual value in their text."""
+
+
+BOUNDS = {"greater_than_equal", "less_than_equal"}
+"""Error types of a number outside a bound, of which the message names both."""
 
 
 @runtime_checkable
@@ -209,6 +214,8 @@ def _expected(model: type[BaseModel], error: ErrorDetails) -> str:
         context["tags"] = ", ".join(closest_first(context["tag"], known))
     if kind == "string_pattern_mismatch":
         context["spelled"] = SPELLED.get(context["pattern"], f"text that fits {context['pattern']}")
+    if kind in BOUNDS and set(both := _bounds(model, error["loc"])) == {"ge", "le"}:
+        return f"{both['ge']:.12g} to {both['le']:.12g}"
     context |= {name: f"{number:.12g}" for name, number in context.items() if isinstance(number, float)}
     context |= {"number": _number_in(value, kind), "items": f"[{value}]" if _plain(value) else "[1, 2]"}
     context["text"] = f'"{value}"' if _plain(value) else '"some words"'
@@ -235,13 +242,29 @@ def _number_in(value: object, kind: str) -> str:
 
 def _keys_of(model: type[BaseModel], location: Location) -> list[str]:
     """Permitted keys at a location, which contains the names of kinds that pydantic inserts."""
+    return [field.alias or name for name, field in _fields_at(model, location)]
+
+
+def _bounds(model: type[BaseModel], location: Location) -> dict[str, float]:
+    """Bounds of the field at a location, by the name of their constraint; empty for several fields."""
+    found = [field for name, field in _fields_at(model, location[:-1]) if location[-1] in (name, field.alias)]
+    if len(found) != 1:
+        return {}
+    bounds = [
+        (name, getattr(one, name, None)) for one in found[0].metadata for name in ("ge", "gt", "le", "lt")
+    ]
+    return {name: bound for name, bound in bounds if bound is not None}
+
+
+def _fields_at(model: type[BaseModel], location: Location) -> list[tuple[str, FieldInfo]]:
+    """Names and fields of the models at a location."""
     here = _models_in(model)
     for part in location:
         fields = [each.model_fields for each in here]
         named = [f.annotation for of in fields for name, f in of.items() if part in (name, f.alias)]
         kinds = [each for each in here if _is_kind(each, part)]
         here = [m for annotation in named for m in _models_in(annotation)] or kinds or here
-    return [field.alias or name for each in here for name, field in each.model_fields.items()]
+    return [(name, field) for each in here for name, field in each.model_fields.items()]
 
 
 def _is_kind(model: type[BaseModel], name: object) -> bool:

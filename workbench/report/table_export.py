@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from workbench.model.calibration import Parameters, load_calibration
-from workbench.model.event import CalibrationExported, CalibrationLoaded, TrialFinished
+from workbench.model.event import CalibrationExported, CalibrationLoaded, FitFinished, TrialFinished
+from workbench.model.fit_tables import cross_validation_table
 from workbench.model.table import Table
 from workbench.report.data_dictionary import MEANINGS
 from workbench.report.frames import PARAMETER_COLUMNS, frame_of_table
@@ -38,11 +39,13 @@ def session_tables(folder: Path) -> dict[str, pd.DataFrame]:
     if files:
         tables |= _calibration_tables(load_calibration(folder / files[-1].path).laser_ranger.parameters)
     trials = [event for event in events if isinstance(event, TrialFinished)]
-    of_trials = {table.name: table for trial in trials for table in trial.tables}
+    fits = [event for event in events if isinstance(event, FitFinished)]
+    checked = [cross_validation_table(fits[-1].left_out)] if fits and fits[-1].left_out else []
+    others = {table.name: table for table in (*checked, *(one for trial in trials for one in trial.tables))}
     rows = [row for name, frame in tables.items() for row in _described(name, frame)]
-    rows += [row for table in of_trials.values() for row in _described_table(table)]
+    rows += [row for table in others.values() for row in _described_table(table)]
     dictionary = pd.DataFrame(rows, columns=DICTIONARY_COLUMNS)
-    tables |= {name: frame_of_table(table) for name, table in of_trials.items()}
+    tables |= {name: frame_of_table(table) for name, table in others.items()}
     return tables | {DICTIONARY: dictionary}
 
 
@@ -76,7 +79,7 @@ def _described(name: str, frame: pd.DataFrame) -> list[tuple[str, str, str, str,
 
 
 def _described_table(table: Table) -> list[tuple[str, str, str, str, str]]:
-    """Columns of a trial's table; values are unscaled, so that percent are shares of 1."""
+    """Columns of a table of a fit or a trial; values are unscaled, so that percent are shares of 1."""
     frame = frame_of_table(table)
     return [
         (

@@ -8,10 +8,10 @@ import re
 from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 import workbench
 from workbench.model.errors import BadInputError
@@ -159,3 +159,23 @@ def test_a_value_that_fits_no_type_of_a_union_is_one_mistake_at_its_key() -> Non
     assert caught.value.error_count() > 1
     (found,) = problems(Answer, {"value": [1]}, caught.value.errors())
     assert found.location == ("value",)
+
+
+class Bounded(FileModel):
+    both: Annotated[float, Field(ge=-80, le=80)] = 0.0
+    one: Annotated[float, Field(ge=0)] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"both": 95}, "both: expected -80 to 80, got 95"),
+        ({"both": -95}, "both: expected -80 to 80, got -95"),
+        ({"one": -1}, "one: expected at least 0, got -1"),
+    ],
+)
+def test_the_message_of_a_number_outside_names_both_bounds(values: dict[str, float], text: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        Bounded.model_validate(values)
+    (problem,) = problems(Bounded, values, caught.value.errors())
+    assert problem.message == text

@@ -51,7 +51,7 @@ def test_a_rig_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
-        ("sd: 25.0", "sd: -1", 6, ["camera.f_px.sd", "expected at least 0", "got -1"]),
+        ("sd: 25.0", "sd: -1", 6, ["camera.f_px.sd", "expected 0 to 1000000", "got -1"]),
         ("sd: 25.0", "sd: wide", 6, ["camera.f_px.sd", "expected a number", "got 'wide'"]),
         ("  height_px: 480\n", "  height_px: 480\n  hue: 1\n", 6, ["camera.hue", "no such key"]),
         ("  width_px: 640\n", "", 3, ["camera.width_px", "is missing"]),

@@ -19,12 +19,10 @@ def test_the_probabilities_of_four_lasers_sum_to_1() -> None:
     assert np.exp(prior_components(PRIOR, FRONT_MM).log_mass).sum() == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(
-    "shapes", [{"flat": 1.0, "incline": 1.0}, {"flat": 0.5}, {"flat": 1.12, "incline": -0.56}]
-)
-def test_probabilities_that_are_none_are_refused(shapes: dict[str, float]) -> None:
+@pytest.mark.parametrize(("flat", "incline"), [(1.0, 1.0), (0.5, 0.12), (1.12, -0.56)])
+def test_probabilities_that_are_none_are_refused(flat: float, incline: float) -> None:
     with pytest.raises(BadInputError, match="add up to 1"):
-        ShapePrior(**shapes)
+        ShapePrior(flat=flat, incline=incline)
 
 
 @pytest.mark.parametrize(("highest", "degrees"), [(1, {0, 1}), (2, {0, 1, 2}), (3, {0, 1, 2, 3})])

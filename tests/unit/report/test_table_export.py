@@ -35,6 +35,13 @@ def test_covariance_is_that_of_the_calibration() -> None:
     np.testing.assert_array_equal(matrix, parameters.covariance_array)
 
 
+def test_the_cross_validation_has_a_row_for_each_placement() -> None:
+    table = session_tables(REFERENCE)["cross_validation"]
+    standoffs_mm = set(session_tables(REFERENCE)["residuals"]["standoff_mm"])
+    assert set(table["standoff_mm"]) == standoffs_mm
+    assert not table["alarm"].any()
+
+
 def test_a_session_without_calibration_has_its_readings() -> None:
     tables = session_tables(Path(DATA / "simulation-0.1.0"))
     assert "parameters" not in tables
