@@ -71,7 +71,7 @@ test: $(INSTALLED)
 	@nice -n 10 $(MAKE) lint & lint=$$!; \
 	$(BIN)/python -m pytest -m "not real_time and not wheel and not thorough"; tests=$$?; \
 	wait $$lint && exit $$tests
-	$(BIN)/python -m pytest -m "real_time and not wheel and not thorough"
+	$(BIN)/python -m pytest -n 0 -m "real_time and not thorough"
 
 thorough: $(INSTALLED)
 	$(BIN)/python -m pytest -m thorough

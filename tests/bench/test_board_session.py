@@ -79,7 +79,7 @@ def test_a_board_too_far_away_is_named_and_the_rest_goes_on(session: Path) -> No
 
 
 def test_the_session_is_fitted_again_from_its_captures(session: Path, tmp_path: Path) -> None:
-    said = workbench("fit", session, "-o", tmp_path / "again.yaml")
+    said = workbench("fit", session, "-o", tmp_path / "again.yaml", "--details")
     assert "corners in 4 views" in said
     assert "the board at this placement was not found" in " ".join(said.split())
     again = load_calibration(tmp_path / "again.yaml").laser_ranger

@@ -151,7 +151,7 @@ def test_nobody_at_a_real_rig_and_then_somebody(tmp_path: Path) -> None:
     assert not list((tmp_path / "s/frames").iterdir()), "nothing was lit"
     waiting = session_status(tmp_path / "s")
     assert (waiting.state, waiting.unfinished) == ("waiting", True)
-    assert waiting.why.startswith("for an answer to safety: Lasers of class ")
+    assert waiting.why.startswith("for an answer to safety: Lasers will be switched on")
     assert "nobody" not in waiting.why
     operator = Says()
     resume(tmp_path / "s", (), RESUMER, lambda: None, operator)
