@@ -28,8 +28,6 @@ class Drift:
     amount: float
     since: str
     """Day of the first session of the deviation."""
-    p: float
-    """Two-sided p value of the difference between these sessions and the first k (Student)."""
     rule: str
 
 
@@ -78,12 +76,8 @@ def _history(every: Sequence[Verification], range_mm: float, charts: int) -> Dis
 def _drift(chart: ControlChart, days: Sequence[str]) -> Drift | None:
     if chart.alarm is None:
         return None
-    first = chart.values[:FIRST_SESSIONS]
-    after = chart.values[chart.alarm.since :]
-    amount = float(after.mean()) - chart.limits.centre
-    u = chart.limits.sd * sqrt(1 / len(first) + 1 / len(after))
-    p = 2.0 * float(t_cdf(-abs(amount) / u, len(first) - 1))
-    return Drift(amount, days[chart.alarm.since], p, chart.alarm.rule)
+    amount = float(chart.values[chart.alarm.since :].mean()) - chart.limits.centre
+    return Drift(amount, days[chart.alarm.since], chart.alarm.rule)
 
 
 def _due(chart: ControlChart, days: FloatArray, first_ns: int) -> date | None:

@@ -105,7 +105,7 @@ def _drift_text(one: DistanceHistory) -> str:
     if drift.rule == "scatter of the repeats":
         return f"the scatter of the repeats at {one.range_mm:g} mm is above its limit since {drift.since}"
     amount = f"{100 * drift.amount:+.2g} %"
-    return f"drifted by {amount} at {one.range_mm:g} mm since {drift.since}, P = {drift.p:.1g} ({drift.rule})"
+    return f"drifted by {amount} at {one.range_mm:g} mm since {drift.since} ({drift.rule})"
 
 
 def _key_numbers(history: SensorHistory) -> tuple[KeyNumber, ...]:
