@@ -36,6 +36,8 @@ class DistanceHistory:
     """Chart of one distance; errors are relative to the range."""
 
     range_mm: float
+    sessions: tuple[str, ...]
+    """(n,) names of the sessions with this distance."""
     days: FloatArray
     """(n,) since the first session."""
     errors: FloatArray
@@ -51,7 +53,7 @@ class DistanceHistory:
 
 
 def distance_histories(checked: Sequence[Verification]) -> tuple[DistanceHistory, ...]:
-    """Charts at the distances that most sessions share; they share the probability of a false alarm."""
+    """Charts at the monitored distances; they share the probability of a false alarm."""
     ranges = monitored_mm(checked)
     return tuple(_history(checked, mm, len(ranges)) for mm in ranges)
 
@@ -61,9 +63,11 @@ def _history(every: Sequence[Verification], range_mm: float, charts: int) -> Dis
     errors = np.array([check.error for _, check in pairs])
     scatter = np.array([check.scatter for _, check in pairs])
     days = np.array([(one.time_ns - every[0].time_ns) / DAY_NS for one, _ in pairs])
-    chart = control_chart(errors, scatter, min(check.readings for _, check in pairs), charts)
+    readings = np.array([check.readings for _, check in pairs])
+    chart = control_chart(errors, scatter, readings, charts)
     return DistanceHistory(
         range_mm,
+        tuple(one.session for one, _ in pairs),
         days,
         errors,
         scatter,

@@ -14,7 +14,7 @@ from workbench.report.history.calibration_section import calibration_section
 from workbench.report.history.calibrations import DatedCalibration, InForce
 from workbench.report.history.drift import DistanceHistory
 from workbench.report.history.verification_section import verification_section
-from workbench.report.history.verifications import Verification
+from workbench.report.history.verifications import Verification, unmonitored_mm
 from workbench.session.sensor_log import SensorEntry
 from workbench.trials.statistics.control_chart import FIRST_SESSIONS
 
@@ -56,15 +56,15 @@ def history_document(history: SensorHistory) -> Document:
 def verdict_of(history: SensorHistory) -> Verdict:
     """In control, drifted, or not known yet; with the date of the next calibration and its rule."""
     reasons = [*(_drift_text(one) for one in history.distances if one.drift), *_due_texts(history)]
-    reasons += history.remarks
+    reasons += [*_missing_texts(history), *history.remarks]
     drifted = [one for one in history.distances if one.drift is not None]
     if drifted:
         return Verdict("bad", "Drifted: calibrate again", tuple(reasons))
     charts = [one for one in history.distances if one.chart is not None]
     if charts:
         tone: Tone = "good"
-        sessions = len(history.verifications) - FIRST_SESSIONS
-        return Verdict(tone, f"In control over {counted(sessions, 'session')}", tuple(reasons))
+        sessions = {name for one in charts for name in one.sessions[FIRST_SESSIONS:]}
+        return Verdict(tone, f"In control over {counted(len(sessions), 'session')}", tuple(reasons))
     count = len(history.verifications)
     text = f"No control limits yet: {count} of {FIRST_SESSIONS} verifications with the calibration in force"
     if count >= FIRST_SESSIONS:
@@ -106,6 +106,20 @@ def _drift_text(one: DistanceHistory) -> str:
         return f"the scatter of the repeats at {one.range_mm:g} mm is above its limit since {drift.since}"
     amount = f"{100 * drift.amount:+.2g} %"
     return f"drifted by {amount} at {one.range_mm:g} mm since {drift.since} ({drift.rule})"
+
+
+def _missing_texts(history: SensorHistory) -> list[str]:
+    """Monitored distances that sessions lack, and distances that are not monitored."""
+    checked = history.verifications
+    texts = []
+    for one in history.distances:
+        lacking = [each.session for each in checked if each.session not in one.sessions]
+        if lacking:
+            where = counted(len(lacking), "session")
+            texts.append(f"{one.range_mm:g} mm is monitored, but missing in {where}, last in {lacking[-1]}")
+    if other := unmonitored_mm(checked, [one.range_mm for one in history.distances]):
+        texts.append(f"not monitored: {', '.join(f'{mm:g}' for mm in other)} mm")
+    return texts
 
 
 def _key_numbers(history: SensorHistory) -> tuple[KeyNumber, ...]:

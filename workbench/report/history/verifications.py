@@ -14,6 +14,7 @@ from workbench.model.arrays import FloatArray
 from workbench.session.index import IndexedSession
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
+from workbench.trials.statistics.control_chart import FIRST_SESSIONS
 
 DISTANCES = 5
 """Largest number of distances that are monitored."""
@@ -71,12 +72,17 @@ def verifications(folder: Path, sessions: Iterable[IndexedSession]) -> tuple[Ver
 
 
 def monitored_mm(checked: Sequence[Verification]) -> tuple[float, ...]:
-    """Distances that most sessions share, at most `DISTANCES` of them, evenly by their ratio."""
+    """Distances that most of the first k sessions share, at most `DISTANCES` of them, evenly by their ratio.
+
+    Later sessions do not change them: an alarm stays.
+    """
     counts: dict[float, int] = {}
-    for one in checked:
-        for check in one.checks:
-            known = next((mm for mm in counts if is_same_distance(mm, check.range_mm)), check.range_mm)
-            counts[known] = counts.get(known, 0) + 1
+    for one in checked[:FIRST_SESSIONS]:
+        known = {
+            next((mm for mm in counts if is_same_distance(mm, check.range_mm)), check.range_mm)
+            for check in one.checks
+        }
+        counts |= {mm: counts.get(mm, 0) + 1 for mm in known}
     most = max(counts.values(), default=0)
     common = sorted(mm for mm, count in counts.items() if count >= LEAST_SHARE * most)
     if len(common) <= DISTANCES:
@@ -86,6 +92,15 @@ def monitored_mm(checked: Sequence[Verification]) -> tuple[float, ...]:
         free = [one for one in common if one not in chosen]
         chosen.append(min(free, key=lambda one: abs(log(one / mm))))
     return tuple(sorted(chosen))
+
+
+def unmonitored_mm(checked: Sequence[Verification], monitored: Sequence[float]) -> tuple[float, ...]:
+    """Distances of the sessions that are not monitored, in increasing order."""
+    found: list[float] = []
+    for mm in sorted(check.range_mm for one in checked for check in one.checks):
+        if not any(is_same_distance(mm, known) for known in (*monitored, *found)):
+            found.append(mm)
+    return tuple(found)
 
 
 def is_same_distance(a_mm: float, b_mm: float) -> bool:

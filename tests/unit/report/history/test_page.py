@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.support.reference_session import SERIAL
-from tests.support.verified_sensor import verified_sensor
+from tests.support.verified_sensor import FIRST, MONTH, verified_sensor, write_verification
 from workbench.cli.history import sensor_history
 from workbench.report.history.page import SensorHistory, history_document, recalibrate_by
 from workbench.session.index import indexed_sessions
@@ -33,6 +33,28 @@ def test_verdict(tmp_path: Path, sessions: int, drift: float, tone: str) -> None
     document = history_document(history(tmp_path, sessions, drift))
     assert document.verdict.tone == tone
     assert any("at 400 mm since" in reason for reason in document.verdict.reasons) == (tone == "bad")
+
+
+def test_a_distance_that_a_session_lacks_is_named_and_an_alarm_stays(tmp_path: Path) -> None:
+    history(tmp_path, 24, 0.0004)
+    write_verification(tmp_path, FIRST + 30 * MONTH, [[0.001, 0.002]])
+    for n in range(40):
+        write_verification(tmp_path, FIRST + (31 + n) * MONTH, [[0.001, 0.002], [], [0.001, 0.002]])
+    verdict = history_document(sensor_history(tmp_path, SERIAL, indexed_sessions(tmp_path))).verdict
+    assert verdict.tone == "bad"
+    assert any("400 mm" in reason and "42 sessions" in reason for reason in verdict.reasons)
+    assert any("800 mm" in reason and "2 sessions" in reason for reason in verdict.reasons)
+
+
+def test_sessions_without_a_chart_do_not_count_as_in_control(tmp_path: Path) -> None:
+    history(tmp_path, 12)
+    for n in range(5):
+        path = write_verification(tmp_path, FIRST + (20 + n) * MONTH, [[0.001, 0.002]])
+        journal = path / "journal.jsonl"
+        journal.write_text(journal.read_text().replace('"standoff_mm":200.0', '"standoff_mm":1500.0'))
+    verdict = history_document(sensor_history(tmp_path, SERIAL, indexed_sessions(tmp_path))).verdict
+    assert verdict.text.endswith("over 2 sessions")
+    assert any("1500 mm" in reason for reason in verdict.reasons)
 
 
 def test_the_earliest_rule_gives_the_date(tmp_path: Path) -> None:
