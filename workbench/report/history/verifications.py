@@ -36,6 +36,8 @@ class DistanceCheck:
     scatter: float
     """Standard deviation of the readings' relative errors; NaN for one reading."""
     readings: int
+    expanded: float = float("nan")
+    """Stated expanded uncertainty U of the error, 95 %; NaN: not known."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,8 @@ class Verification:
     calibration: str
     """sha256 of the calibration that the readings use."""
     checks: tuple[DistanceCheck, ...]
+    valid: bool = True
+    """Whether no trial of the session found the calibration not valid."""
 
     def at(self, range_mm: float) -> DistanceCheck | None:
         """The check at a distance; None if the session has none."""
@@ -109,19 +113,21 @@ def is_same_distance(a_mm: float, b_mm: float) -> bool:
 
 
 def _verification(session_dir: Path, indexed: IndexedSession) -> Verification | None:
-    calibration, time_ns = "", 0
-    errors: dict[float, list[float]] = {}
+    calibration, time_ns, valid = "", 0, True
+    errors: dict[float, list[tuple[float, float]]] = {}
     for record in effective(read_journal(session_dir)):
         event = record.event
         if isinstance(event, ev.CalibrationExported | ev.CalibrationLoaded):
             calibration = event.sha256
         elif isinstance(event, ev.ReadingTaken) and (error := _relative_error(event)) is not None:
             time_ns = time_ns or record.time_ns
-            errors.setdefault(event.standoff_mm, []).append(error)
-    if not errors:
+            errors.setdefault(event.standoff_mm, []).append((error, _expanded(event)))
+        elif isinstance(event, ev.TrialFinished) and event.refuses_calibration:
+            time_ns, valid = time_ns or record.time_ns, False
+    if valid and not errors:
         return None
     checks = tuple(_check(mm, np.array(values)) for mm, values in sorted(errors.items()))
-    return Verification(indexed.name, indexed.began[:10], time_ns, calibration, checks)
+    return Verification(indexed.name, indexed.began[:10], time_ns, calibration, checks, valid)
 
 
 def _relative_error(reading: ev.ReadingTaken) -> float | None:
@@ -136,6 +142,16 @@ def _relative_error(reading: ev.ReadingTaken) -> float | None:
     return reading.error_mm / reading.standoff_mm
 
 
-def _check(range_mm: float, errors: FloatArray) -> DistanceCheck:
+def _expanded(reading: ev.ReadingTaken) -> float:
+    """U of the error over the true range, on the side of the true range; NaN if it is not stated."""
+    if reading.interval_mm is None or reading.range_mm is None:
+        return float("nan")
+    low_mm, high_mm = reading.interval_mm
+    below = reading.range_mm > reading.standoff_mm
+    return (reading.range_mm - low_mm if below else high_mm - reading.range_mm) / reading.standoff_mm
+
+
+def _check(range_mm: float, values: FloatArray) -> DistanceCheck:
+    errors, expanded = values.T
     scatter = float(errors.std(ddof=1)) if len(errors) > 1 else float("nan")
-    return DistanceCheck(range_mm, float(errors.mean()), scatter, len(errors))
+    return DistanceCheck(range_mm, float(errors.mean()), scatter, len(errors), float(expanded.mean()))
