@@ -62,6 +62,16 @@ def test_a_slow_trend_gives_the_day_on_which_it_reaches_a_limit() -> None:
     assert found.due > date(2028, 4, 1)
 
 
+def test_sound_sensors_rarely_have_a_date_at_any_time() -> None:
+    random = np.random.default_rng(5)
+    sensors, dated = 60, 0
+    for _ in range(sensors):
+        sessions = checked(random.normal(0.0, SD, 36))
+        dated += any(distance_histories(sessions[:count])[0].due for count in range(12, 37))
+    # 25 looks at 1 in 3000 have 0.8 % together: more than 3 of 60 with a probability of 0.14 %.
+    assert dated <= 3
+
+
 def test_few_sessions_have_no_chart() -> None:
     (found,) = distance_histories(checked(np.random.default_rng(1).normal(0.0, SD, 9)))
     assert (found.chart, found.drift, found.due) == (None, None, None)
