@@ -9,6 +9,8 @@ from workbench.model.chart import Chart
 from workbench.model.table import Table
 from workbench.model.yamlfile import FileModel
 
+NOT_VALID = "NO"
+"""Cell of a verification's verdict, column `valid`, for a calibration that is not valid."""
 COVERAGE_FACTOR = 1.959963984540054
 """Half width of the 95 % interval of a normal error, in standard deviations."""
 STATUS_TEXT = {
@@ -150,3 +152,8 @@ class TrialFinished(FileModel):
     """Name of the step."""
     tables: tuple[Table, ...] = ()
     charts: tuple[Chart, ...] = ()
+
+    @property
+    def refuses_calibration(self) -> bool:
+        """Whether the verdict of a verification is that the calibration is not valid."""
+        return any(row.get("valid") == NOT_VALID for table in self.tables for row in table.records())

@@ -6,14 +6,15 @@ made in memory.
 
 from __future__ import annotations
 
-import json
 import os
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing
-from dataclasses import asdict, dataclass, replace
+from contextlib import closing, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
+
+from pydantic import TypeAdapter, ValidationError
 
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
@@ -24,6 +25,10 @@ from workbench.session.state import SessionStatus, effective, session_status
 INDEX = ".sessions.sqlite3"
 FORMAT = 1
 """Number of the index's format; another one is made again."""
+BUSY_S = 2.5
+"""Longest wait for another program that writes the index."""
+IN_USE = {sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
+"""Codes of an index that another program uses: it is not damaged."""
 Verdict = Literal["accepted", "exception", "refused", "none"]
 VERDICTS: dict[Verdict, str] = {
     "accepted": "the last fit was accepted",
@@ -54,6 +59,10 @@ class IndexedSession:
         return self.status.session_dir.name
 
 
+CONTENT = TypeAdapter(IndexedSession)
+"""A row's content as JSON; reading checks it."""
+
+
 def indexed_sessions(folder: Path) -> list[IndexedSession]:
     """All sessions of a folder, ordered by name and therefore by time; the index is brought up to date.
 
@@ -64,15 +73,36 @@ def indexed_sessions(folder: Path) -> list[IndexedSession]:
         got = "a file" if folder.exists() else "no such folder"
         raise BadInputError(f"{folder}: expected a folder of sessions, got {got}")
     stamps = {entry.name: stamp for entry, stamp in _stamps(folder)}
-    with closing(_open(folder / INDEX)) as database:
-        known: dict[str, tuple[str, str]] = {
-            name: (stamp, content) for name, stamp, content in database.execute("SELECT * FROM sessions")
-        }
-        changed = [name for name, stamp in stamps.items() if known.get(name, ("", ""))[0] != stamp]
-        fresh = {name: _text(read_indexed(folder / name)) for name in changed}
-        _store(database, fresh, stamps, set(known) - set(stamps))
-    contents = {name: fresh.get(name) or known[name][1] for name in sorted(stamps)}
-    return [_live(_parsed(folder / name, content)) for name, content in contents.items()]
+    return [_live(one) for one in _current(folder, stamps)]
+
+
+def _current(folder: Path, stamps: dict[str, str]) -> list[IndexedSession]:
+    """Sessions of the index; a damaged file is deleted and made again once, then it is made in memory."""
+    path = folder / INDEX
+    for name in (str(path), str(path), ":memory:"):
+        try:
+            with closing(sqlite3.connect(name, timeout=BUSY_S)) as database:
+                return _updated(database, folder, stamps)
+        except (sqlite3.Error, ValidationError) as error:
+            if getattr(error, "sqlite_errorcode", None) not in IN_USE:
+                with suppress(OSError):  # no permission, or a folder in its place
+                    path.unlink()
+    raise BadInputError(f"{path}: the index cannot be made")
+
+
+def _updated(database: sqlite3.Connection, folder: Path, stamps: dict[str, str]) -> list[IndexedSession]:
+    _prepare(database)
+    known: dict[str, tuple[str, str]] = {
+        name: (stamp, content)
+        for name, stamp, content in database.execute("SELECT name, stamp, content FROM sessions")
+    }
+    changed = [name for name, stamp in stamps.items() if known.get(name, ("", ""))[0] != stamp]
+    kept = stamps.keys() - changed
+    sessions = {name: _parsed(folder / name, known[name][1]) for name in kept}
+    fresh = {name: read_indexed(folder / name) for name in changed}
+    texts = {name: _text(session) for name, session in fresh.items()}
+    _store(database, texts, stamps, set(known) - set(stamps))
+    return [one for _, one in sorted((sessions | fresh).items())]
 
 
 def _stamps(folder: Path) -> Iterator[tuple[os.DirEntry[str], str]]:
@@ -92,24 +122,13 @@ def _stamp(path: str) -> str:
     return f"{found.st_mtime_ns} {found.st_size}"
 
 
-def _open(path: Path) -> sqlite3.Connection:
-    """The database on disk; in memory if the file cannot be used."""
-    for name in (str(path), ":memory:"):
-        try:
-            return _prepared(sqlite3.connect(name, timeout=5))
-        except sqlite3.DatabaseError:  # damaged, locked, or in a folder without permission
-            continue
-    raise BadInputError(f"{path}: the index cannot be made")
-
-
-def _prepared(database: sqlite3.Connection) -> sqlite3.Connection:
+def _prepare(database: sqlite3.Connection) -> None:
     (version,) = database.execute("PRAGMA user_version").fetchone()
     if version != FORMAT:
         database.execute("DROP TABLE IF EXISTS sessions")
     database.execute("CREATE TABLE IF NOT EXISTS sessions (name TEXT PRIMARY KEY, stamp TEXT, content TEXT)")
     database.execute(f"PRAGMA user_version = {FORMAT}")
     database.commit()
-    return database
 
 
 def _store(
@@ -125,7 +144,7 @@ def _store(
                 [(name, stamps[name], content) for name, content in fresh.items()],
             )
             database.executemany("DELETE FROM sessions WHERE name = ?", [(name,) for name in gone])
-    except sqlite3.Error:  # a full disk, or another program: the next command tries again
+    except sqlite3.OperationalError:  # a full disk, or another program: the next command tries again
         return
 
 
@@ -150,16 +169,13 @@ def read_indexed(folder: Path) -> IndexedSession:
 
 
 def _text(session: IndexedSession) -> str:
-    values = asdict(session)
-    values["status"]["session_dir"] = ""
-    return json.dumps(values)
+    status = replace(session.status, session_dir=Path())
+    return CONTENT.dump_json(replace(session, status=status)).decode()
 
 
 def _parsed(folder: Path, content: str) -> IndexedSession:
-    values: dict[str, Any] = json.loads(content)
-    status = values.pop("status") | {"session_dir": folder}
-    status["procedures"] = tuple(status["procedures"])
-    return IndexedSession(SessionStatus(**status), **values)
+    session = CONTENT.validate_json(content)
+    return replace(session, status=replace(session.status, session_dir=folder))
 
 
 def _live(session: IndexedSession) -> IndexedSession:

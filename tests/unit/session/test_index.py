@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.support.reference_session import copied
@@ -16,6 +18,8 @@ from workbench.session.journal import JOURNAL, Journal
 from workbench.session.state import session_statuses
 
 OLD = Path(__file__).parents[3] / "data/session-0.1.0"
+PAGE = 4096
+"""Size of a page of an SQLite file, bytes."""
 
 
 @pytest.fixture
@@ -72,6 +76,50 @@ def test_a_damaged_index_is_made_again(folder: Path, content: bytes) -> None:
     before = indexed_sessions(folder)
     (folder / INDEX).write_bytes(content)
     assert indexed_sessions(folder) == before
+    assert is_index(folder / INDEX)
+
+
+def is_index(path: Path) -> bool:
+    with closing(sqlite3.connect(path)) as database:
+        rows = database.execute("SELECT name FROM sessions").fetchall()
+    return len(rows) == 2
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("page", [0, 1, 2])
+def test_an_index_with_a_damaged_page_is_made_again(folder: Path, page: int, seed: int) -> None:
+    before = indexed_sessions(folder)
+    damaged = bytearray((folder / INDEX).read_bytes())
+    start = page * PAGE
+    damaged[start : start + PAGE] = np.random.default_rng(seed).bytes(PAGE)
+    (folder / INDEX).write_bytes(damaged)
+    assert indexed_sessions(folder) == before
+    assert indexed_sessions(folder) == before
+
+
+@pytest.mark.parametrize("content", ["{}", "[]", "5", "", None, b"\xff", '{"status": 5}'])
+def test_an_index_with_a_damaged_row_is_made_again(folder: Path, content: str | bytes | None) -> None:
+    before = indexed_sessions(folder)
+    with closing(sqlite3.connect(folder / INDEX)) as database, database:
+        database.execute("UPDATE sessions SET content = ? WHERE name = 'b'", [content])
+    assert indexed_sessions(folder) == before
+    assert is_index(folder / INDEX)
+
+
+def test_an_index_that_cannot_be_replaced_is_made_in_memory(folder: Path) -> None:
+    before = indexed_sessions(folder)
+    (folder / INDEX).unlink()
+    (folder / INDEX).mkdir()
+    assert indexed_sessions(folder) == before
+
+
+def test_an_index_in_use_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = indexed_sessions(folder)
+    monkeypatch.setattr(index, "BUSY_S", 0.01)
+    with closing(sqlite3.connect(folder / INDEX, isolation_level=None)) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        assert indexed_sessions(folder) == before
+    assert is_index(folder / INDEX)
 
 
 def test_an_index_of_another_format_is_made_again(folder: Path) -> None:

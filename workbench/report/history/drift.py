@@ -10,13 +10,12 @@ from math import inf, sqrt
 import numpy as np
 
 from workbench.model.arrays import FloatArray
-from workbench.model.stats import t_cdf
-from workbench.report.history.verifications import Verification, monitored_mm
-from workbench.trials.statistics.control_chart import FIRST_SESSIONS, ControlChart, control_chart
+from workbench.model.stats import norm_ppf, t_cdf
+from workbench.model.trial_event import COVERAGE_FACTOR
+from workbench.report.history.verifications import DistanceCheck, Verification, monitored_mm
+from workbench.trials.statistics.control_chart import FALSE_ALARM, FIRST_SESSIONS, ControlChart, control_chart
 
 DAY_NS = 86_400 * 10**9
-SIGNIFICANT = 0.01
-"""P value of a trend below which a date is derived from it."""
 LONGEST_DAYS = 3650
 """Longest time ahead for which a date is stated."""
 
@@ -28,9 +27,19 @@ class Drift:
     amount: float
     since: str
     """Day of the first session of the deviation."""
-    p: float
-    """Two-sided p value of the difference between these sessions and the first k (Student)."""
     rule: str
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Mean error of a session beyond its stated uncertainty; relative to the range."""
+
+    error: float
+    expanded: float
+    """U, 95 %."""
+    day: str
+    alarm: bool
+    """Whether it is beyond U at the probability of a false alarm of the charts."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +47,8 @@ class DistanceHistory:
     """Chart of one distance; errors are relative to the range."""
 
     range_mm: float
+    sessions: tuple[str, ...]
+    """(n,) names of the sessions with this distance."""
     days: FloatArray
     """(n,) since the first session."""
     errors: FloatArray
@@ -48,14 +59,17 @@ class DistanceHistory:
     """None: too few sessions."""
     drift: Drift | None
     """None: in control."""
+    excess: Excess | None
+    """First alarm, or else that of the last session; None: the errors are within U."""
     due: date | None
     """Day at which the trend reaches a control limit; None: no significant trend."""
 
 
 def distance_histories(checked: Sequence[Verification]) -> tuple[DistanceHistory, ...]:
-    """Charts at the distances that most sessions share; they share the probability of a false alarm."""
-    ranges = monitored_mm(checked)
-    return tuple(_history(checked, mm, len(ranges)) for mm in ranges)
+    """Charts at the monitored distances; they share the probability of a false alarm."""
+    charted = [one for one in checked if one.checks]
+    ranges = monitored_mm(charted)
+    return tuple(_history(charted, mm, len(ranges)) for mm in ranges)
 
 
 def _history(every: Sequence[Verification], range_mm: float, charts: int) -> DistanceHistory:
@@ -63,35 +77,51 @@ def _history(every: Sequence[Verification], range_mm: float, charts: int) -> Dis
     errors = np.array([check.error for _, check in pairs])
     scatter = np.array([check.scatter for _, check in pairs])
     days = np.array([(one.time_ns - every[0].time_ns) / DAY_NS for one, _ in pairs])
-    chart = control_chart(errors, scatter, min(check.readings for _, check in pairs), charts)
+    readings = np.array([check.readings for _, check in pairs])
+    chart = control_chart(errors, scatter, readings, charts)
     return DistanceHistory(
         range_mm,
+        tuple(one.session for one, _ in pairs),
         days,
         errors,
         scatter,
         chart,
         None if chart is None else _drift(chart, [one.day for one, _ in pairs]),
-        None if chart is None else _due(chart, days, every[0].time_ns),
+        _excess(pairs, charts),
+        None if chart is None else _due(chart, days, every[0].time_ns, charts),
     )
 
 
 def _drift(chart: ControlChart, days: Sequence[str]) -> Drift | None:
     if chart.alarm is None:
         return None
-    first = chart.values[:FIRST_SESSIONS]
-    after = chart.values[chart.alarm.since :]
-    amount = float(after.mean()) - chart.limits.centre
-    u = chart.limits.sd * sqrt(1 / len(first) + 1 / len(after))
-    p = 2.0 * float(t_cdf(-abs(amount) / u, len(first) - 1))
-    return Drift(amount, days[chart.alarm.since], p, chart.alarm.rule)
+    amount = float(chart.values[chart.alarm.since :].mean()) - chart.limits.centre
+    return Drift(amount, days[chart.alarm.since], chart.alarm.rule)
 
 
-def _due(chart: ControlChart, days: FloatArray, first_ns: int) -> date | None:
-    """Day at which a straight line through the sessions leaves the control limits."""
+def _excess(pairs: Sequence[tuple[Verification, DistanceCheck]], charts: int) -> Excess | None:
+    """Comparison of each session's mean error with U, about the centre 0: a constant error is seen too.
+
+    U is 95 %; an alarm needs the error that a sound sensor exceeds with the charts' shared probability.
+    """
+    factor = -float(norm_ppf(FALSE_ALARM / charts / 2)) / COVERAGE_FACTOR
+    alarms = [pair for pair in pairs if abs(pair[1].error) > factor * pair[1].expanded]
+    session, check = alarms[0] if alarms else pairs[-1]
+    if not abs(check.error) > check.expanded:
+        return None
+    return Excess(check.error, check.expanded, session.day, bool(alarms))
+
+
+def _due(chart: ControlChart, days: FloatArray, first_ns: int, charts: int) -> date | None:
+    """Day at which a straight line through the sessions leaves the control limits.
+
+    The charts and all sessions at which the trend is tested share the probability of a false one, as the
+    x-bar charts do.
+    """
     if len(days) < FIRST_SESSIONS + 2 or np.ptp(days) <= 0:
         return None
     slope, level, p = _line(days, chart.values)
-    if p > SIGNIFICANT or slope == 0:
+    if p > FALSE_ALARM / charts or slope == 0:
         return None
     edge = chart.limits.centre + np.sign(slope) * chart.limits.half_width
     at_days = (edge - level) / slope

@@ -14,7 +14,7 @@ from workbench.report.history.calibration_section import calibration_section
 from workbench.report.history.calibrations import DatedCalibration, InForce
 from workbench.report.history.drift import DistanceHistory
 from workbench.report.history.verification_section import verification_section
-from workbench.report.history.verifications import Verification
+from workbench.report.history.verifications import Verification, unmonitored_mm
 from workbench.session.sensor_log import SensorEntry
 from workbench.trials.statistics.control_chart import FIRST_SESSIONS
 
@@ -54,22 +54,40 @@ def history_document(history: SensorHistory) -> Document:
 
 
 def verdict_of(history: SensorHistory) -> Verdict:
-    """In control, drifted, or not known yet; with the date of the next calibration and its rule."""
-    reasons = [*(_drift_text(one) for one in history.distances if one.drift), *_due_texts(history)]
-    reasons += history.remarks
-    drifted = [one for one in history.distances if one.drift is not None]
-    if drifted:
-        return Verdict("bad", "Drifted: calibrate again", tuple(reasons))
+    """In control, drifted, wrong, or not known yet; with the date of the next calibration and its rule."""
+    reasons = [text for one in history.distances for text in (_drift_text(one), _excess_text(one)) if text]
+    if _last_is_not_valid(history):
+        reasons.append(f"the last verification, {history.verifications[-1].session}, ended with: not valid")
+    reasons += _due_texts(history)
+    reasons += [*_missing_texts(history), *history.remarks]
+    return Verdict(*_tone_and_text(history), tuple(reasons))
+
+
+def _tone_and_text(history: SensorHistory) -> tuple[Tone, str]:
+    if any(one.drift for one in history.distances):
+        return "bad", "Drifted: calibrate again"
+    if any(one.excess is not None and one.excess.alarm for one in history.distances):
+        return "bad", "Errors beyond their stated uncertainty: calibrate again"
+    if _last_is_not_valid(history):
+        return "bad", "The last verification ended with: not valid; calibrate again"
     charts = [one for one in history.distances if one.chart is not None]
-    if charts:
-        tone: Tone = "good"
-        sessions = len(history.verifications) - FIRST_SESSIONS
-        return Verdict(tone, f"In control over {counted(sessions, 'session')}", tuple(reasons))
+    tested = {name for one in charts for name in one.sessions[FIRST_SESSIONS:]}
+    if tested:
+        text = f"In control over {counted(len(tested), 'session')}"
+        if any(one.excess for one in history.distances):
+            return "open", f"{text}, but the last error exceeds U"
+        return "good", text
     count = len(history.verifications)
     text = f"No control limits yet: {count} of {FIRST_SESSIONS} verifications with the calibration in force"
-    if count >= FIRST_SESSIONS:
+    if charts:
+        text = f"Control limits from {FIRST_SESSIONS} verifications; none after them yet"
+    elif count >= FIRST_SESSIONS:
         text = "No control limits: the verifications have no distance in common, or equal readings"
-    return Verdict("open", text, tuple(reasons))
+    return "open", text
+
+
+def _last_is_not_valid(history: SensorHistory) -> bool:
+    return bool(history.verifications) and not history.verifications[-1].valid
 
 
 def recalibrate_by(history: SensorHistory) -> tuple[date, str] | None:
@@ -85,12 +103,17 @@ def recalibrate_by(history: SensorHistory) -> tuple[date, str] | None:
             months = history.agreed_months
             dates.append((months_later(made, months), f"agreed interval of {months} months"))
     for one in history.distances:
-        if one.drift is not None:
-            last = history.verifications[-1].day
-            dates.append((date.fromisoformat(last), f"alarm at {one.range_mm:g} mm: at once"))
+        if one.drift is not None or (one.excess is not None and one.excess.alarm):
+            dates.append((_last_day(history), f"alarm at {one.range_mm:g} mm: at once"))
         elif one.due is not None:
             dates.append((one.due, f"the trend at {one.range_mm:g} mm reaches a control limit"))
+    if _last_is_not_valid(history):
+        dates.append((_last_day(history), "the last verification is not valid: at once"))
     return min(dates, default=None)
+
+
+def _last_day(history: SensorHistory) -> date:
+    return date.fromisoformat(history.verifications[-1].day)
 
 
 def _due_texts(history: SensorHistory) -> list[str]:
@@ -105,7 +128,29 @@ def _drift_text(one: DistanceHistory) -> str:
     if drift.rule == "scatter of the repeats":
         return f"the scatter of the repeats at {one.range_mm:g} mm is above its limit since {drift.since}"
     amount = f"{100 * drift.amount:+.2g} %"
-    return f"drifted by {amount} at {one.range_mm:g} mm since {drift.since}, P = {drift.p:.1g} ({drift.rule})"
+    return f"drifted by {amount} at {one.range_mm:g} mm since {drift.since} ({drift.rule})"
+
+
+def _excess_text(one: DistanceHistory) -> str:
+    excess = one.excess
+    if excess is None:
+        return ""
+    amounts = f"{100 * excess.error:+.2g} %, U = {100 * excess.expanded:.2g} %"
+    return f"the error at {one.range_mm:g} mm exceeds its stated uncertainty on {excess.day}: {amounts}"
+
+
+def _missing_texts(history: SensorHistory) -> list[str]:
+    """Monitored distances that sessions lack, and distances that are not monitored."""
+    checked = history.verifications
+    texts = []
+    for one in history.distances:
+        lacking = [each.session for each in checked if each.checks and each.session not in one.sessions]
+        if lacking:
+            where = counted(len(lacking), "session")
+            texts.append(f"{one.range_mm:g} mm is monitored, but missing in {where}, last in {lacking[-1]}")
+    if other := unmonitored_mm(checked, [one.range_mm for one in history.distances]):
+        texts.append(f"not monitored: {', '.join(f'{mm:g}' for mm in other)} mm")
+    return texts
 
 
 def _key_numbers(history: SensorHistory) -> tuple[KeyNumber, ...]:

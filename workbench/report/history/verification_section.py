@@ -17,7 +17,8 @@ RULES = (
     f"Limits are frozen from the first {FIRST_SESSIONS} sessions with the calibration in force. An alarm is a"
     " session beyond the control limits, a CUSUM (reference 1 sd) above"
     f" {CUSUM_LIMIT:g} sd, or a scatter of the repeats above its limit. The charts of all distances together"
-    " raise at most one false alarm in 370 sessions."
+    " raise at most one false alarm in 370 sessions. Each session's mean error is also compared with its"
+    " stated uncertainty U, about 0."
 )
 
 
@@ -72,15 +73,20 @@ def _charts(one: DistanceHistory) -> list[Chart]:
             flagged_x=flagged,
         )
     )
-    if (most := one.chart.limits.most_scatter) is not None:
+    limited = np.isfinite(one.chart.most_scatter)
+    if limited.any():
+        at = tuple(np.round(one.days[limited]).tolist())
+        scatter, most = 100 * one.scatter[limited], 100 * one.chart.most_scatter[limited]
         charts.append(
             Chart(
                 name=f"s_{name}",
                 title=f"Scatter of the repeats at {one.range_mm:g} mm",
                 x=day,
                 y=Axis(label="s / range", unit="%"),
-                series=(Series(name="session", x=days, y=tuple((100 * one.scatter).tolist())),),
-                limits=(LimitLine(name="limit", y=100 * most),),
+                series=(
+                    Series(name="session", x=at, y=tuple(scatter.tolist())),
+                    Series(name="limit", x=at, y=tuple(most.tolist()), style="line"),
+                ),
             )
         )
     return [chart for chart in charts if not chart.is_empty]

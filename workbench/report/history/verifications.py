@@ -14,6 +14,7 @@ from workbench.model.arrays import FloatArray
 from workbench.session.index import IndexedSession
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
+from workbench.trials.statistics.control_chart import FIRST_SESSIONS
 
 DISTANCES = 5
 """Largest number of distances that are monitored."""
@@ -35,6 +36,8 @@ class DistanceCheck:
     scatter: float
     """Standard deviation of the readings' relative errors; NaN for one reading."""
     readings: int
+    expanded: float = float("nan")
+    """Stated expanded uncertainty U of the error, 95 %; NaN: not known."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,8 @@ class Verification:
     calibration: str
     """sha256 of the calibration that the readings use."""
     checks: tuple[DistanceCheck, ...]
+    valid: bool = True
+    """Whether no trial of the session found the calibration not valid."""
 
     def at(self, range_mm: float) -> DistanceCheck | None:
         """The check at a distance; None if the session has none."""
@@ -71,12 +76,17 @@ def verifications(folder: Path, sessions: Iterable[IndexedSession]) -> tuple[Ver
 
 
 def monitored_mm(checked: Sequence[Verification]) -> tuple[float, ...]:
-    """Distances that most sessions share, at most `DISTANCES` of them, evenly by their ratio."""
+    """Distances that most of the first k sessions share, at most `DISTANCES` of them, evenly by their ratio.
+
+    Later sessions do not change them: an alarm stays.
+    """
     counts: dict[float, int] = {}
-    for one in checked:
-        for check in one.checks:
-            known = next((mm for mm in counts if is_same_distance(mm, check.range_mm)), check.range_mm)
-            counts[known] = counts.get(known, 0) + 1
+    for one in checked[:FIRST_SESSIONS]:
+        known = {
+            next((mm for mm in counts if is_same_distance(mm, check.range_mm)), check.range_mm)
+            for check in one.checks
+        }
+        counts |= {mm: counts.get(mm, 0) + 1 for mm in known}
     most = max(counts.values(), default=0)
     common = sorted(mm for mm, count in counts.items() if count >= LEAST_SHARE * most)
     if len(common) <= DISTANCES:
@@ -88,25 +98,36 @@ def monitored_mm(checked: Sequence[Verification]) -> tuple[float, ...]:
     return tuple(sorted(chosen))
 
 
+def unmonitored_mm(checked: Sequence[Verification], monitored: Sequence[float]) -> tuple[float, ...]:
+    """Distances of the sessions that are not monitored, in increasing order."""
+    found: list[float] = []
+    for mm in sorted(check.range_mm for one in checked for check in one.checks):
+        if not any(is_same_distance(mm, known) for known in (*monitored, *found)):
+            found.append(mm)
+    return tuple(found)
+
+
 def is_same_distance(a_mm: float, b_mm: float) -> bool:
     """Whether two standoffs count as one distance."""
     return max(a_mm, b_mm) / min(a_mm, b_mm) <= exp(SAME_DISTANCE)
 
 
 def _verification(session_dir: Path, indexed: IndexedSession) -> Verification | None:
-    calibration, time_ns = "", 0
-    errors: dict[float, list[float]] = {}
+    calibration, time_ns, valid = "", 0, True
+    errors: dict[float, list[tuple[float, float]]] = {}
     for record in effective(read_journal(session_dir)):
         event = record.event
         if isinstance(event, ev.CalibrationExported | ev.CalibrationLoaded):
             calibration = event.sha256
         elif isinstance(event, ev.ReadingTaken) and (error := _relative_error(event)) is not None:
             time_ns = time_ns or record.time_ns
-            errors.setdefault(event.standoff_mm, []).append(error)
-    if not errors:
+            errors.setdefault(event.standoff_mm, []).append((error, _expanded(event)))
+        elif isinstance(event, ev.TrialFinished) and event.refuses_calibration:
+            time_ns, valid = time_ns or record.time_ns, False
+    if valid and not errors:
         return None
     checks = tuple(_check(mm, np.array(values)) for mm, values in sorted(errors.items()))
-    return Verification(indexed.name, indexed.began[:10], time_ns, calibration, checks)
+    return Verification(indexed.name, indexed.began[:10], time_ns, calibration, checks, valid)
 
 
 def _relative_error(reading: ev.ReadingTaken) -> float | None:
@@ -121,6 +142,16 @@ def _relative_error(reading: ev.ReadingTaken) -> float | None:
     return reading.error_mm / reading.standoff_mm
 
 
-def _check(range_mm: float, errors: FloatArray) -> DistanceCheck:
+def _expanded(reading: ev.ReadingTaken) -> float:
+    """U of the error over the true range, on the side of the true range; NaN if it is not stated."""
+    if reading.interval_mm is None or reading.range_mm is None:
+        return float("nan")
+    low_mm, high_mm = reading.interval_mm
+    below = reading.range_mm > reading.standoff_mm
+    return (reading.range_mm - low_mm if below else high_mm - reading.range_mm) / reading.standoff_mm
+
+
+def _check(range_mm: float, values: FloatArray) -> DistanceCheck:
+    errors, expanded = values.T
     scatter = float(errors.std(ddof=1)) if len(errors) > 1 else float("nan")
-    return DistanceCheck(range_mm, float(errors.mean()), scatter, len(errors))
+    return DistanceCheck(range_mm, float(errors.mean()), scatter, len(errors), float(expanded.mean()))

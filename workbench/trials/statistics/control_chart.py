@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from workbench.model.arrays import FloatArray
+from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.stats import f_ppf, t_ppf
 
 FIRST_SESSIONS = 10
@@ -43,8 +43,19 @@ class Limits:
     """Standard deviation between them."""
     half_width: float
     """Half width of the control limits of a session's value."""
-    most_scatter: float | None
-    """Largest standard deviation of the repeats of a session; None: the sessions have no repeats."""
+    scatter: float
+    """Pooled standard deviation of the repeats; NaN: the first k sessions have no repeats."""
+    freedom: int
+    """Its degrees of freedom."""
+    tail: float
+    """Probability that the repeats of a sound session scatter more than their limit."""
+
+    def most_scatter(self, readings: IndexArray) -> FloatArray:
+        """(n,) largest standard deviation of the readings of sessions with (n,) readings; NaN: no limit."""
+        repeats = np.where(readings > 1, readings - 1.0, np.nan)
+        freedom = self.freedom if self.scatter > 0 else np.nan
+        limit: FloatArray = self.scatter * np.sqrt(f_ppf(1 - self.tail, repeats, freedom))
+        return limit
 
 
 @dataclass(frozen=True)
@@ -66,6 +77,8 @@ class ControlChart:
     """(n,)"""
     scatter: FloatArray
     """(n,) standard deviation of the repeats of each session; NaN: no repeats."""
+    most_scatter: FloatArray
+    """(n,) its limit by the session's number of readings; NaN: none."""
     limits: Limits
     high: FloatArray
     """(n - k,) CUSUM upwards, in standard deviations."""
@@ -74,25 +87,29 @@ class ControlChart:
     alarm: Alarm | None
 
 
-def control_chart(values: FloatArray, scatter: FloatArray, repeats: int, charts: int) -> ControlChart | None:
+def control_chart(
+    values: FloatArray, scatter: FloatArray, readings: IndexArray, charts: int
+) -> ControlChart | None:
     """Chart of the sessions in the order of time; None if there are too few for limits, or all are equal.
 
     Args:
         values: (n,) mean of each session.
         scatter: (n,) standard deviation of the readings of each session; NaN where there is one reading.
-        repeats: number of readings of a session, the least of all.
+        readings: (n,) number of readings of each session.
         charts: number of charts of the sensor, which share the probability of a false alarm.
     """
     k = FIRST_SESSIONS
     if len(values) < k or not np.std(values[:k], ddof=1) > 0:
         return None
-    limits = frozen_limits(values[:k], scatter[:k], repeats, charts)
+    limits = frozen_limits(values[:k], scatter[:k], readings[:k], charts)
     z = (values[k:] - limits.centre) / limits.sd
     high, low = cusum(z, CUSUM_REFERENCE), cusum(-z, CUSUM_REFERENCE)
-    return ControlChart(values, scatter, limits, high, low, _first_alarm(values, scatter, limits, high, low))
+    most = limits.most_scatter(readings)
+    alarm = _first_alarm(values, scatter > most, limits, high, low)
+    return ControlChart(values, scatter, most, limits, high, low, alarm)
 
 
-def frozen_limits(first: FloatArray, scatter: FloatArray, repeats: int, charts: int) -> Limits:
+def frozen_limits(first: FloatArray, scatter: FloatArray, readings: IndexArray, charts: int) -> Limits:
     """Limits from the first k sessions; a new value has Student's distribution about their mean.
 
     Args: as `control_chart`, of the first k sessions.
@@ -100,10 +117,11 @@ def frozen_limits(first: FloatArray, scatter: FloatArray, repeats: int, charts: 
     k, tail = len(first), FALSE_ALARM / charts
     sd = float(np.std(first, ddof=1))
     half_width = float(t_ppf(1 - tail / 2, k - 1)) * sd * sqrt(1 + 1 / k)
-    most = None
-    if repeats > 1 and np.isfinite(scatter).all() and (pooled := float(np.mean(scatter**2))) > 0:
-        most = sqrt(pooled * float(f_ppf(1 - tail, repeats - 1, k * (repeats - 1))))
-    return Limits(float(first.mean()), sd, half_width, most)
+    repeated = readings > 1
+    each = readings[repeated] - 1
+    freedom = int(each.sum())
+    pooled = sqrt(float(each @ scatter[repeated] ** 2) / freedom) if freedom else float("nan")
+    return Limits(float(first.mean()), sd, half_width, pooled, freedom, tail)
 
 
 def cusum(z: FloatArray, reference: float) -> FloatArray:
@@ -117,17 +135,16 @@ def cusum(z: FloatArray, reference: float) -> FloatArray:
 
 
 def _first_alarm(
-    values: FloatArray, scatter: FloatArray, limits: Limits, high: FloatArray, low: FloatArray
+    values: FloatArray, rough: BoolArray, limits: Limits, high: FloatArray, low: FloatArray
 ) -> Alarm | None:
     k = FIRST_SESSIONS
-    most = np.inf if limits.most_scatter is None else limits.most_scatter
     for n in range(len(high)):
         since = k + _start(high if high[n] >= low[n] else low, n)
         if high[n] > CUSUM_LIMIT or low[n] > CUSUM_LIMIT:
             return Alarm(k + n, "CUSUM", since)
         if abs(values[k + n] - limits.centre) > limits.half_width:
             return Alarm(k + n, "beyond the control limits", since)
-        if scatter[k + n] > most:
+        if rough[k + n]:
             return Alarm(k + n, "scatter of the repeats", k + n)
     return None
 

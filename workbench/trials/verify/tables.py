@@ -7,6 +7,7 @@ from math import log
 
 from workbench.model.calibration import Calibration, CrossValidatedRange
 from workbench.model.table import Cell, Column, Table
+from workbench.model.trial_event import NOT_VALID
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.reading_frame import table_of
 from workbench.trials.verify.changes import Change
@@ -68,7 +69,7 @@ def verify_tables(
                 Column(key="verdict", name="verdict"),
                 Column(key="action", name="action"),
             ),
-            rows=(("yes" if verdict.valid else "NO", verdict.text, verdict.action),),
+            rows=(("yes" if verdict.valid else NOT_VALID, verdict.text, verdict.action),),
         ),
         table_of(name, "Verification: error = measured - true", columns, rows, CAPTION),
     ]

@@ -10,11 +10,15 @@ import numpy as np
 import pytest
 
 from tests.support.reference_session import SERIAL
-from tests.support.verified_sensor import verified_sensor
+from tests.support.verified_sensor import FIRST, MONTH, reading, verified_sensor, write_verification
+from tests.unit.trials.verify.test_tables import REFERENCE, SENSOR
 from workbench.cli.history import sensor_history
+from workbench.model import event as ev
 from workbench.report.history.page import SensorHistory, history_document, recalibrate_by
 from workbench.session.index import indexed_sessions
 from workbench.session.sensor_log import SensorEntry, append_entry
+from workbench.trials.verify.tables import verify_tables
+from workbench.trials.verify.verdict import Verdict
 
 
 def history(folder: Path, sessions: int, drift: float = 0.0, months: int | None = None) -> SensorHistory:
@@ -33,6 +37,61 @@ def test_verdict(tmp_path: Path, sessions: int, drift: float, tone: str) -> None
     document = history_document(history(tmp_path, sessions, drift))
     assert document.verdict.tone == tone
     assert any("at 400 mm since" in reason for reason in document.verdict.reasons) == (tone == "bad")
+
+
+@pytest.mark.parametrize(("error", "tone"), [(0.05, "bad"), (0.0045, "open"), (0.001, "good")])
+def test_an_error_from_the_first_verification_is_seen(tmp_path: Path, error: float, tone: str) -> None:
+    # U is 0.36 % at 200 mm, 0.25 % at 400 mm.
+    errors = np.random.default_rng(7).normal(0.0, 0.0002, (12, 3))
+    errors[:, 0] += error
+    verified_sensor(tmp_path, errors)
+    found = sensor_history(tmp_path, SERIAL, indexed_sessions(tmp_path))
+    assert history_document(found).verdict.tone == tone
+    assert (recalibrate_by(found) is not None) == (tone == "bad")
+
+
+def tone(folder: Path) -> str:
+    return history_document(sensor_history(folder, SERIAL, indexed_sessions(folder))).verdict.tone
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_verification_that_ended_not_valid_counts_until_a_valid_one(tmp_path: Path, measured: bool) -> None:
+    history(tmp_path, 12)
+    path = write_verification(tmp_path, FIRST + 20 * MONTH, [[0.001]] * 3 if measured else [])
+    journal = path / "journal.jsonl"
+    lines = journal.read_text().splitlines()
+    if not measured:
+        one = ev.Record(n=len(lines), time_ns=int(1.9e18), event=reading(600.0, 0, 0.0))
+        lines.append(one.model_dump_json().replace('"reference_sd_mm":0.3', '"reference_sd_mm":600.0'))
+    tables = tuple(verify_tables("verify", SENSOR, (REFERENCE, ()), Verdict(False, "wrong", "act")))
+    finished = ev.TrialFinished(trial="verify", tables=tables)
+    lines.append(ev.Record(n=len(lines), time_ns=int(1.9e18), event=finished).model_dump_json())
+    journal.write_text("".join(f"{line}\n" for line in lines))
+    assert tone(tmp_path) == "bad"
+    write_verification(tmp_path, FIRST + 70 * MONTH, [[0.001]] * 3)
+    assert tone(tmp_path) == "good"
+
+
+def test_a_distance_that_a_session_lacks_is_named_and_an_alarm_stays(tmp_path: Path) -> None:
+    history(tmp_path, 24, 0.0004)
+    write_verification(tmp_path, FIRST + 30 * MONTH, [[0.001, 0.002]])
+    for n in range(40):
+        write_verification(tmp_path, FIRST + (31 + n) * MONTH, [[0.001, 0.002], [], [0.001, 0.002]])
+    verdict = history_document(sensor_history(tmp_path, SERIAL, indexed_sessions(tmp_path))).verdict
+    assert verdict.tone == "bad"
+    assert any("400 mm" in reason and "42 sessions" in reason for reason in verdict.reasons)
+    assert any("800 mm" in reason and "2 sessions" in reason for reason in verdict.reasons)
+
+
+def test_sessions_without_a_chart_do_not_count_as_in_control(tmp_path: Path) -> None:
+    history(tmp_path, 12)
+    for n in range(5):
+        path = write_verification(tmp_path, FIRST + (20 + n) * MONTH, [[0.001, 0.002]])
+        journal = path / "journal.jsonl"
+        journal.write_text(journal.read_text().replace('"standoff_mm":200.0', '"standoff_mm":1500.0'))
+    verdict = history_document(sensor_history(tmp_path, SERIAL, indexed_sessions(tmp_path))).verdict
+    assert verdict.text.endswith("over 2 sessions")
+    assert any("1500 mm" in reason for reason in verdict.reasons)
 
 
 def test_the_earliest_rule_gives_the_date(tmp_path: Path) -> None:

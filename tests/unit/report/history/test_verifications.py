@@ -15,6 +15,7 @@ from workbench.report.history.verifications import (
     Verification,
     is_same_distance,
     monitored_mm,
+    unmonitored_mm,
     verifications,
 )
 from workbench.session.index import indexed_sessions
@@ -50,6 +51,14 @@ def test_the_distances_of_most_sessions_are_monitored_evenly() -> None:
     assert monitored_mm([session(180, 700), *usual]) == (200, 500, 800, 1200, 3000)
     assert monitored_mm([session(200, 500), session(203, 501)]) == (200, 500)
     assert monitored_mm([]) == ()
+
+
+def test_the_first_sessions_choose_the_distances_each_session_once() -> None:
+    first = [session(200, 500)] * 10
+    assert monitored_mm([*first, *[session(300)] * 90]) == (200, 500)
+    assert unmonitored_mm([*first, session(300, 305, 1000)], (200, 500)) == (300, 1000)
+    twice = [session(500, 510), *[session(200)] * 2]
+    assert monitored_mm(twice) == (200,)
 
 
 def test_a_distance_within_five_percent_is_the_same() -> None:
