@@ -19,7 +19,7 @@ from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.assemble import Certificate, Sources, certificate_of, fingerprint
 from workbench.report.certificate.dcc import certificate_xml, required_parties
 from workbench.report.certificate.predecessor import Predecessor, load_predecessor
-from workbench.report.certificate.session_record import SessionRecord, read_session
+from workbench.report.certificate.session_record import SessionRecord, read_session, unchanged
 from workbench.report.document import Document
 from workbench.session.caller import now
 from workbench.session.certificate_numbers import assign_number
@@ -137,7 +137,8 @@ def _predecessor(session: SessionRecord) -> Predecessor | None:
         return None
     last = before[-1]
     try:
-        return load_predecessor(last.status.session_dir / last.calibration)
+        path = unchanged(last.status.session_dir / last.calibration, last.calibration_sha256)
+        return load_predecessor(path)
     except BadInputError as error:
         print_message(f"note: the calibration before is not used: {error}")
         return None

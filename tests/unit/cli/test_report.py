@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.command_line import Run, refused
 from tests.support.pango import need_pango
-from tests.support.reference_session import MARKUP, REFERENCE, copied
+from tests.support.reference_session import MARKUP, REFERENCE, copied, edit_calibration
 from workbench.session.certificate_numbers import REGISTER
 from workbench.session.journal import JOURNAL
 
@@ -93,6 +93,13 @@ def test_a_damaged_session_is_named(workbench: Run, tmp_path: Path, file: str) -
     if file == JOURNAL:
         (session / file).write_text("damaged\n")
     refused(workbench("report", session), 2, file)
+
+
+def test_an_edited_calibration_gets_no_certificate(workbench: Run, tmp_path: Path) -> None:
+    session = copied(tmp_path)
+    edit_calibration(session)
+    refused(workbench("report", session), 2, "calibration.yaml", "workbench fit")
+    assert not (tmp_path / REGISTER).exists()
 
 
 def test_a_session_that_has_only_begun(workbench: Run, tmp_path: Path) -> None:

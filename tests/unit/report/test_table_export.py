@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from tests.support.reference_session import REFERENCE, record
+from tests.support.reference_session import REFERENCE, copied, edit_calibration, record
+from workbench.model.errors import BadInputError
 from workbench.report.data_dictionary import MEANINGS
 from workbench.report.table_export import DICTIONARY, session_tables
 
@@ -33,6 +35,13 @@ def test_covariance_is_that_of_the_calibration() -> None:
     matrix = np.zeros((len(names), len(names)))
     matrix[first, second] = matrix[second, first] = table["covariance"]
     np.testing.assert_array_equal(matrix, parameters.covariance_array)
+
+
+def test_an_edited_calibration_is_not_exported(tmp_path: Path) -> None:
+    session = copied(tmp_path)
+    edit_calibration(session)
+    with pytest.raises(BadInputError):
+        session_tables(session)
 
 
 def test_the_cross_validation_has_a_row_for_each_placement() -> None:

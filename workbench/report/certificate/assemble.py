@@ -61,6 +61,7 @@ def fingerprint(sources: Sources) -> str:
     parts = (
         sources.session.journal_sha256,
         sources.session.manifest_sha256,
+        sources.session.calibration_sha256,
         sources.laboratory.model_dump_json(),
         workbench_version(),
         "" if sources.predecessor is None else sources.predecessor.sha256,
@@ -91,7 +92,7 @@ def certificate_of(sources: Sources, number: AssignedNumber) -> Certificate:
     """The certificate.
 
     Raises:
-        BadInputError: the calibration file of the session is missing or damaged.
+        BadInputError: the calibration file of the session is missing or damaged, or has changed since.
     """
     session, lab = sources.session, sources.laboratory
     calibration = session.calibration
