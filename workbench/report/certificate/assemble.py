@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from workbench.model.calibration import Calibration
 from workbench.model.chart import laser_colors
 from workbench.model.laboratory import Laboratory
+from workbench.report.certificate.assessment import Assessment, assess
 from workbench.report.certificate.identity import (
     VIRTUAL,
     conditions_section,
@@ -34,7 +35,7 @@ from workbench.report.certificate.results import (
     validation_section,
 )
 from workbench.report.certificate.session_record import SessionRecord
-from workbench.report.certificate.summary import key_numbers, verdict_of
+from workbench.report.certificate.summary import key_numbers
 from workbench.report.document import NOT_STATED, Document, Fact, Section
 from workbench.session.certificate_numbers import AssignedNumber
 from workbench.session.manifest import workbench_version
@@ -74,6 +75,7 @@ class Certificate:
     """A certificate: the document, and the values that programs read."""
 
     document: Document
+    assessment: Assessment
     sources: Sources
     uncertainties: tuple[RangeUncertainty, ...]
 
@@ -97,18 +99,19 @@ def certificate_of(sources: Sources, number: AssignedNumber) -> Certificate:
     session, lab = sources.session, sources.laboratory
     calibration = session.calibration
     found = () if calibration is None else range_uncertainties(calibration, TABLE_MM)
+    assessment = assess(session, calibration)
     document = Document(
-        title="Calibration certificate" if session.fit is not None else "Measurement report",
+        title=assessment.title,
         number=number.number,
         replaces=number.replaces,
         head=_head(sources),
-        verdict=verdict_of(session, calibration),
+        verdict=assessment.verdict,
         key_numbers=key_numbers(session, calibration, found),
         sections=_sections(sources, calibration, found),
         authorised_by=lab.authorised_by or NOT_STATED,
         colors=laser_colors(session.rig.laser_ids),
     )
-    return Certificate(document, sources, found)
+    return Certificate(document, assessment, sources, found)
 
 
 def _head(sources: Sources) -> tuple[Fact, ...]:

@@ -16,7 +16,6 @@ from workbench.model.errors import BadInputError
 from workbench.model.laboratory import LABORATORY_FILE, Laboratory, Party, Span, Standard
 from workbench.model.table import Cell, Table
 from workbench.report.certificate.assemble import STATEMENTS, Certificate
-from workbench.report.certificate.fit_limits import fit_limit_rows
 from workbench.report.certificate.method import DECISION_RULE
 from workbench.report.certificate.results import COVERAGE
 from workbench.report.certificate.session_record import text_sha256
@@ -122,15 +121,11 @@ def _statements(parent: ET.Element, certificate: Certificate) -> None:
         texts.append(f"This certificate replaces certificate {document.replaces}.")
     for text in texts:
         _rich(_add(_add(parent, "statement"), "declaration"), text)
-    session = certificate.sources.session
-    checks = [row[-1] for row in fit_limit_rows(session, session.calibration) if row[-1]]
-    checks += [one.verdict for one in session.events(ev.LimitChecked)]
-    if checks:
-        verdicts = set(checks)
-        conformity = "fail" if "fail" in verdicts else "noPass" if "marginal" in verdicts else "pass"
+    assessment = certificate.assessment
+    if assessment.conformity is not None:
         statement = _add(parent, "statement")
-        _rich(_add(statement, "declaration"), f"{len(checks)} limits of the procedures were checked.")
-        _add(statement, "conformity", conformity)
+        _rich(_add(statement, "declaration"), f"{assessment.limits} limits of the procedures were checked.")
+        _add(statement, "conformity", assessment.conformity)
 
 
 def _measurement(parent: ET.Element, certificate: Certificate) -> None:
