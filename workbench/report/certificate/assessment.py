@@ -87,8 +87,9 @@ def _is_refused(session: SessionRecord, calibration: Calibration | None) -> bool
     if session.fit is None or session.fit.verdict != "refused":
         return False
     # A calibration of an earlier fit, or an existing one, is no acceptance of the last fit.
-    is_of_this_fit = session.is_own_calibration and calibration is not None
-    return not (is_of_this_fit and calibration.laser_ranger.fit.verdict == "refused")
+    if calibration is None or not session.is_own_calibration:
+        return True
+    return calibration.laser_ranger.fit.verdict != "refused"
 
 
 def _with(rows: Sequence[Row], verdict: str) -> list[Row]:
