@@ -79,14 +79,14 @@ def _described(name: str, frame: pd.DataFrame) -> list[tuple[str, str, str, str,
 
 
 def _described_table(table: Table) -> list[tuple[str, str, str, str, str]]:
-    """Columns of a table of a fit or a trial; values are unscaled, so that percent are shares of 1."""
+    """Columns of a table of a fit or a trial; values are unscaled."""
     frame = frame_of_table(table)
     return [
         (
             table.name,
             column.key,
             str(frame[column.key].dtype),
-            column.unit if column.scale == 1 else f"{column.unit} / {column.scale:g}",
+            column.unscaled_unit,
             f"{column.name or column.key} ({table.title})",
         )
         for column in table.columns

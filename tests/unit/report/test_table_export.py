@@ -24,6 +24,13 @@ def test_every_column_of_every_table_is_described() -> None:
     assert set(MEANINGS) <= set(tables)
 
 
+def test_percent_are_exported_as_ratios_of_unit_1() -> None:
+    dictionary = session_tables(REFERENCE)[DICTIONARY].set_index(["table", "column"])["unit"]
+    assert dictionary["reference.6", "mean_relative_error"] == "1"
+    assert dictionary["reference.6", "mean_error_mm"] == "mm"
+    assert not dictionary.str.contains("%").any()
+
+
 def test_covariance_is_that_of_the_calibration() -> None:
     calibration = record().calibration
     assert calibration is not None
