@@ -22,9 +22,9 @@ from workbench.report.certificate.identity import (
 from workbench.report.certificate.method import decision_section, exception_section, procedure_section
 from workbench.report.certificate.predecessor import Predecessor, change_section
 from workbench.report.certificate.range_uncertainty import (
-    TABLE_MM,
     RangeUncertainty,
     range_uncertainties,
+    table_mm,
 )
 from workbench.report.certificate.recalibration import recalibration_section
 from workbench.report.certificate.reproduction import reproduction_section
@@ -98,7 +98,7 @@ def certificate_of(sources: Sources, number: AssignedNumber) -> Certificate:
     """
     session, lab = sources.session, sources.laboratory
     calibration = session.calibration
-    found = () if calibration is None else range_uncertainties(calibration, TABLE_MM)
+    found = () if calibration is None else range_uncertainties(calibration, table_mm(calibration))
     assessment = assess(session, calibration)
     document = Document(
         title=assessment.title,
