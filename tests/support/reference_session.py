@@ -67,4 +67,4 @@ def certificate(
     predecessor: Predecessor | None = None,
     session: SessionRecord | None = None,
 ) -> Certificate:
-    return certificate_of(Sources(session or record(), laboratory, predecessor), NUMBER)
+    return certificate_of(Sources(session or record(), laboratory, predecessor)).numbered(NUMBER)

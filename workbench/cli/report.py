@@ -57,7 +57,7 @@ def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool)
     session = read_session(folder)
     laboratory = laboratory_of(folder.parent, no_input, _ask)
     if outputs.dcc is not None:
-        required_parties(laboratory)  # before a number is assigned
+        required_parties(laboratory, session)  # before a number is assigned
     certificate = numbered(session, laboratory)
     if not outputs.files and not outputs.as_json:
         outputs = Outputs(html=folder / DEFAULT_NAME)
@@ -116,9 +116,10 @@ def numbered(session: SessionRecord, laboratory: Laboratory) -> Certificate:
     """
     lab_folder = session.folder.parent
     sources = Sources(session, laboratory, _predecessor(session))
+    certificate = certificate_of(sources)  # one that cannot be made gets no number
     key = fingerprint(sources)
     number = assign_number(lab_folder, session.folder.name, key, now(), laboratory.number_prefix)
-    return certificate_of(sources, number)
+    return certificate.numbered(number)
 
 
 def _predecessor(session: SessionRecord) -> Predecessor | None:

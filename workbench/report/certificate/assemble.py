@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from workbench.model.calibration import Calibration
 from workbench.model.chart import laser_colors
@@ -79,6 +79,11 @@ class Certificate:
     sources: Sources
     uncertainties: tuple[RangeUncertainty, ...]
 
+    def numbered(self, number: AssignedNumber) -> Certificate:
+        """The certificate with its number."""
+        document = replace(self.document, number=number.number, replaces=number.replaces)
+        return replace(self, document=document)
+
     def as_json(self) -> dict[str, object]:
         """Plain values for JSON."""
         session = self.sources.session
@@ -90,8 +95,8 @@ class Certificate:
         )
 
 
-def certificate_of(sources: Sources, number: AssignedNumber) -> Certificate:
-    """The certificate.
+def certificate_of(sources: Sources) -> Certificate:
+    """The certificate, without a number yet.
 
     Raises:
         BadInputError: the calibration file of the session is missing or damaged, or has changed since.
@@ -102,8 +107,8 @@ def certificate_of(sources: Sources, number: AssignedNumber) -> Certificate:
     assessment = assess(session, calibration)
     document = Document(
         title=assessment.title,
-        number=number.number,
-        replaces=number.replaces,
+        number="",
+        replaces="",
         head=_head(sources),
         verdict=assessment.verdict,
         key_numbers=key_numbers(session, calibration, found),

@@ -18,7 +18,7 @@ from workbench.model.table import Cell, Table
 from workbench.report.certificate.assemble import STATEMENTS, Certificate
 from workbench.report.certificate.method import DECISION_RULE
 from workbench.report.certificate.results import COVERAGE
-from workbench.report.certificate.session_record import text_sha256
+from workbench.report.certificate.session_record import SessionRecord, text_sha256
 from workbench.report.document import NOT_STATED
 from workbench.session.manifest import DISTRIBUTION, workbench_version
 
@@ -42,9 +42,7 @@ def certificate_xml(certificate: Certificate, printed: datetime) -> bytes:
         BadInputError: `lab.yaml` does not state an item that the schema requires, or the session is empty.
     """
     lab, session = certificate.sources.laboratory, certificate.sources.session
-    laboratory, customer = required_parties(lab)
-    if session.began is None or session.ended is None:
-        raise BadInputError(f"{session.folder}: expected records, the session has none")
+    laboratory, customer = required_parties(lab, session)
     ET.register_namespace("dcc", DCC)
     ET.register_namespace("si", SI)
     root = ET.Element(_dcc("digitalCalibrationCertificate"), {"schemaVersion": SCHEMA})
@@ -64,12 +62,14 @@ def certificate_xml(certificate: Certificate, printed: datetime) -> bytes:
     return content
 
 
-def required_parties(lab: Laboratory) -> tuple[Party, Party]:
+def required_parties(lab: Laboratory, session: SessionRecord) -> tuple[Party, Party]:
     """Laboratory and customer, if all items that a Digital Calibration Certificate requires are stated.
 
     Raises:
-        BadInputError: an item that the schema requires is not stated.
+        BadInputError: `lab.yaml` does not state an item that the schema requires, or the session is empty.
     """
+    if session.began is None:
+        raise BadInputError(f"{session.folder}: expected records, the session has none")
     items = {
         "country": lab.country,
         "laboratory": lab.laboratory,
