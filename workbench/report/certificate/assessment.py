@@ -8,6 +8,7 @@ from typing import Literal
 
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration
+from workbench.model.number_text import counted
 from workbench.model.table import Table
 from workbench.report.certificate.fit_limits import Row, limit_rows
 from workbench.report.certificate.session_record import SessionRecord
@@ -16,7 +17,7 @@ from workbench.trials.accuracy.verdict import BIAS_ALARM, joint_probability
 
 CERTIFICATE, REPORT = "Calibration certificate", "Measurement report"
 MOST_LIMITS = 4
-"""Largest number of failed limits that the verdict names."""
+"""Largest number of failed or marginal limits that the verdict names."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def _verdict(session: SessionRecord, calibration: Calibration | None, rows: Sequ
     fit, state = session.fit, session.status.state
     is_refused = fit is not None and fit.verdict == "refused"
     failed = [row for row in _with(rows, "fail") if not (is_refused and row[1] == "fit")]
-    reasons = (*_failures(failed), *_trial_outcomes(session))
+    reasons = (*_named(failed), *_trial_outcomes(session))
     if fit is not None and _is_refused(session, calibration):
         return Verdict("bad", "Calibration refused", (*fit.reasons, *reasons))
     if _has_invalid_verification(session):
@@ -72,8 +73,8 @@ def _verdict(session: SessionRecord, calibration: Calibration | None, rows: Sequ
         return Verdict("open", text, (because, *ours.reasons, *reasons))
     if failed:
         return Verdict("bad", "A limit failed", reasons)
-    if _with(rows, "marginal"):
-        return Verdict("open", "A result is neither within nor outside its limit", reasons)
+    if marginal := _with(rows, "marginal"):
+        return Verdict("open", "A result is marginal", (*_named(marginal), *reasons))
     if calibration is None:
         return Verdict("open", "No calibration in this session", reasons)
     own = session.is_own_calibration
@@ -96,11 +97,11 @@ def _with(rows: Sequence[Row], verdict: str) -> list[Row]:
     return [row for row in rows if row[-1] == verdict]
 
 
-def _failures(failed: Sequence[Row]) -> Iterator[str]:
-    for step, of, quantity, _, limit, _ in failed[:MOST_LIMITS]:
-        yield f"{step}, {of}: {quantity} expected {limit}"
-    if len(failed) > MOST_LIMITS:
-        yield f"{len(failed) - MOST_LIMITS} more limits failed"
+def _named(rows: Sequence[Row]) -> Iterator[str]:
+    for step, of, quantity, _, limit, verdict in rows[:MOST_LIMITS]:
+        yield f"{step}, {of}: {quantity} expected {limit}, {verdict}"
+    if len(rows) > MOST_LIMITS:
+        yield f"{counted(len(rows) - MOST_LIMITS, 'more limit')}: {rows[0][-1]}"
 
 
 def _trial_outcomes(session: SessionRecord) -> Iterator[str]:

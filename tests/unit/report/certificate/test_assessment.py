@@ -84,6 +84,15 @@ def test_a_refused_fit_names_its_reasons() -> None:
     assert assess(session, session.calibration).verdict.reasons[0] == "too few standoffs"
 
 
+@pytest.mark.parametrize("verdict", ["fail", "marginal"])
+def test_limits_that_are_not_met_are_named_up_to_four(verdict: str) -> None:
+    session = with_events(*[limit(verdict)] * 6)
+    reasons = assess(session, session.calibration).verdict.reasons
+    assert len(reasons) == 4 + 1 + 1, "limits, number of others, outcome of the trial"
+    assert "error_mm" in reasons[3]
+    assert reasons[4].startswith("2 ")
+
+
 @pytest.mark.parametrize("last", [0, 10])
 def test_a_session_that_was_cut_is_open(tmp_path: Path, last: int) -> None:
     session = copied(tmp_path)
