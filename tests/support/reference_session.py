@@ -49,6 +49,15 @@ def copied(folder: Path, name: str = REFERENCE.name, frames: bool = False) -> Pa
     return Path(shutil.copytree(REFERENCE, folder / name, ignore=ignored))
 
 
+def edit_calibration(session: Path) -> None:
+    """Change a number of the session's calibration file, which stays a valid calibration."""
+    path = session / "calibration.yaml"
+    text = path.read_text()
+    changed = text.replace("max_relative_range_sd: 0.", "max_relative_range_sd: 0.1", 1)
+    assert changed != text
+    path.write_text(changed)
+
+
 def record(folder: Path = REFERENCE) -> SessionRecord:
     return read_session(folder)
 
@@ -58,4 +67,4 @@ def certificate(
     predecessor: Predecessor | None = None,
     session: SessionRecord | None = None,
 ) -> Certificate:
-    return certificate_of(Sources(session or record(), laboratory, predecessor), NUMBER)
+    return certificate_of(Sources(session or record(), laboratory, predecessor)).numbered(NUMBER)

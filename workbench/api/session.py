@@ -15,12 +15,11 @@ from workbench.model.arrays import Image
 from workbench.model.chart import Chart
 from workbench.model.errors import BadInputError
 from workbench.model.event import (
-    CalibrationExported,
-    CalibrationLoaded,
     CaptureTaken,
     TrialFinished,
 )
 from workbench.model.rig import Rig
+from workbench.report.certificate.session_record import recorded_calibration
 from workbench.report.frames import SESSION_COLUMNS, frame_of, frame_of_table
 from workbench.report.session_frames import captures_frame, readings_frame, residuals_frame, spots_frame
 from workbench.session.frames import read_image
@@ -110,13 +109,12 @@ class Session:
         """The calibration that the session exported last, or the existing one that it used.
 
         Raises:
-            BadInputError: the session has none, or its file is damaged.
+            BadInputError: the session has none, or its file is damaged or has changed since.
         """
-        kinds = CalibrationExported | CalibrationLoaded
-        exported = [event for event in self._events if isinstance(event, kinds)]
-        if not exported:
+        path = recorded_calibration(self.folder, self._events)
+        if path is None:
             raise BadInputError(f"{self.folder}: expected a calibration, the session has none")
-        return load_calibration(self.folder / exported[-1].path)
+        return load_calibration(path)
 
     def captures_for_fit(self, without: float | Collection[float] = ()) -> pd.DataFrame:
         """Captures of the calibration, as columns of a captures file, for `fit`.

@@ -19,7 +19,7 @@ from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.assemble import Certificate, Sources, certificate_of, fingerprint
 from workbench.report.certificate.dcc import certificate_xml, required_parties
 from workbench.report.certificate.predecessor import Predecessor, load_predecessor
-from workbench.report.certificate.session_record import SessionRecord, read_session
+from workbench.report.certificate.session_record import SessionRecord, read_session, unchanged
 from workbench.report.document import Document
 from workbench.session.caller import now
 from workbench.session.certificate_numbers import assign_number
@@ -57,7 +57,7 @@ def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool)
     session = read_session(folder)
     laboratory = laboratory_of(folder.parent, no_input, _ask)
     if outputs.dcc is not None:
-        required_parties(laboratory)  # before a number is assigned
+        required_parties(laboratory, session)  # before a number is assigned
     certificate = numbered(session, laboratory)
     if not outputs.files and not outputs.as_json:
         outputs = Outputs(html=folder / DEFAULT_NAME)
@@ -116,9 +116,10 @@ def numbered(session: SessionRecord, laboratory: Laboratory) -> Certificate:
     """
     lab_folder = session.folder.parent
     sources = Sources(session, laboratory, _predecessor(session))
+    certificate = certificate_of(sources)  # one that cannot be made gets no number
     key = fingerprint(sources)
     number = assign_number(lab_folder, session.folder.name, key, now(), laboratory.number_prefix)
-    return certificate_of(sources, number)
+    return certificate.numbered(number)
 
 
 def _predecessor(session: SessionRecord) -> Predecessor | None:
@@ -137,7 +138,8 @@ def _predecessor(session: SessionRecord) -> Predecessor | None:
         return None
     last = before[-1]
     try:
-        return load_predecessor(last.status.session_dir / last.calibration)
+        path = unchanged(last.status.session_dir / last.calibration, last.calibration_sha256)
+        return load_predecessor(path)
     except BadInputError as error:
         print_message(f"note: the calibration before is not used: {error}")
         return None

@@ -23,6 +23,7 @@ def _plain(value: Any) -> Any:
 
 Cell = Annotated[float | int | bool | str | None, BeforeValidator(_plain)]
 """Value of a cell. None: no number, or one that is not finite. A bool is an alarm."""
+PERCENT = 100.0
 MISSING = "-"
 ALARM = "!"
 DIGITS_OF = "digits of "
@@ -49,6 +50,13 @@ class Column(FileModel):
     def sd_key(self) -> str:
         """Key of the column with the standard deviation of this one; empty if the format names none."""
         return self.format.removeprefix(DIGITS_OF) if self.format.startswith(DIGITS_OF) else ""
+
+    @property
+    def unscaled_unit(self) -> str:
+        """Unit of the unscaled numbers: 1 for a ratio that is displayed in percent."""
+        if self.scale == 1:
+            return self.unit
+        return "1" if (self.unit, self.scale) == ("%", PERCENT) else f"{self.unit} / {self.scale:g}"
 
     @property
     def heading(self) -> str:

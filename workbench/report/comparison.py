@@ -48,7 +48,7 @@ def _name(session: SessionRecord) -> str:
 
 
 def _numbers(found: Comparison) -> tuple[KeyNumber, ...]:
-    largest = max(found.differences, key=lambda one: abs(one.difference_mm) / one.sd_mm)
+    largest = max(found.differences, key=lambda one: abs(one.difference_mm))
     freedom = f"{found.degrees_of_freedom} degrees of freedom"
     return (
         KeyNumber("p value", f"{found.probability:.2g}", "of differences as large, if nothing changed"),

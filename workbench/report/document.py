@@ -105,5 +105,5 @@ def _section_json(section: Section) -> dict[str, object]:
 
 
 def _table_json(table: Table) -> dict[str, object]:
-    units = {column.key: column.unit for column in table.columns if column.unit}
+    units = {column.key: column.unscaled_unit for column in table.columns if column.unit}
     return {"name": table.name, "title": table.title, "units": units, "rows": table.records()}

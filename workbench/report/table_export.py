@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 
 from workbench.model.calibration import Parameters, load_calibration
-from workbench.model.event import CalibrationExported, CalibrationLoaded, FitFinished, TrialFinished
+from workbench.model.event import FitFinished, TrialFinished
 from workbench.model.fit_tables import cross_validation_table
 from workbench.model.table import Table
+from workbench.report.certificate.session_record import recorded_calibration
 from workbench.report.data_dictionary import MEANINGS
 from workbench.report.frames import PARAMETER_COLUMNS, frame_of_table
 from workbench.report.session_frames import captures_frame, readings_frame, residuals_frame, spots_frame
@@ -26,7 +27,7 @@ def session_tables(folder: Path) -> dict[str, pd.DataFrame]:
     """Tables of a session by name, and `dictionary`, which describes every column of the others.
 
     Raises:
-        BadInputError: journal or calibration is damaged.
+        BadInputError: journal or calibration is damaged, or the calibration has changed since the session.
     """
     events = [record.event for record in effective(read_journal(folder))]
     tables = {
@@ -35,9 +36,8 @@ def session_tables(folder: Path) -> dict[str, pd.DataFrame]:
         "residuals": residuals_frame(events),
         "readings": readings_frame(events),
     }
-    files = [event for event in events if isinstance(event, CalibrationExported | CalibrationLoaded)]
-    if files:
-        tables |= _calibration_tables(load_calibration(folder / files[-1].path).laser_ranger.parameters)
+    if calibration := recorded_calibration(folder, events):
+        tables |= _calibration_tables(load_calibration(calibration).laser_ranger.parameters)
     trials = [event for event in events if isinstance(event, TrialFinished)]
     fits = [event for event in events if isinstance(event, FitFinished)]
     checked = [cross_validation_table(fits[-1].left_out)] if fits and fits[-1].left_out else []
@@ -79,14 +79,14 @@ def _described(name: str, frame: pd.DataFrame) -> list[tuple[str, str, str, str,
 
 
 def _described_table(table: Table) -> list[tuple[str, str, str, str, str]]:
-    """Columns of a table of a fit or a trial; values are unscaled, so that percent are shares of 1."""
+    """Columns of a table of a fit or a trial; values are unscaled."""
     frame = frame_of_table(table)
     return [
         (
             table.name,
             column.key,
             str(frame[column.key].dtype),
-            column.unit if column.scale == 1 else f"{column.unit} / {column.scale:g}",
+            column.unscaled_unit,
             f"{column.name or column.key} ({table.title})",
         )
         for column in table.columns

@@ -73,9 +73,15 @@ def _assign(handle: int, path: Path, wanted: AssignedNumber, prefix: str) -> Ass
         count += 1
     replaces = of_session[-1].number if of_session else ""
     entry = wanted.model_copy(update={"number": number, "replaces": replaces})
-    os.write(handle, (entry.model_dump_json() + "\n").encode())
+    start = "" if _ends_a_line(path) else "\n"
+    os.write(handle, f"{start}{entry.model_dump_json()}\n".encode())
     os.fsync(handle)
     return entry
+
+
+def _ends_a_line(path: Path) -> bool:
+    """Whether a new line can follow; an editor may have removed the last line's end."""
+    return path.read_bytes()[-1:] in {b"", b"\n"}
 
 
 def _read(path: Path) -> list[AssignedNumber]:

@@ -23,7 +23,7 @@ from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.session.state import SessionStatus, effective, session_status
 
 INDEX = ".sessions.sqlite3"
-FORMAT = 1
+FORMAT = 2
 """Number of the index's format; another one is made again."""
 BUSY_S = 2.5
 """Longest wait for another program that writes the index."""
@@ -50,6 +50,8 @@ class IndexedSession:
     verdict: Verdict
     calibration: str = ""
     """File of the calibration that the session exported; empty if it made none."""
+    calibration_sha256: str = ""
+    """Hash of that file when it was exported."""
     verified: bool = False
     """Whether the session has readings of a trial."""
 
@@ -160,12 +162,13 @@ def read_indexed(folder: Path) -> IndexedSession:
         return IndexedSession(status, serial, began, "none")
     events = [record.event for record in effective(read_journal(folder))]
     fits = [event for event in events if isinstance(event, ev.FitFinished)]
-    exported = [event.path for event in events if isinstance(event, ev.CalibrationExported)]
+    exported = [event for event in events if isinstance(event, ev.CalibrationExported)]
     verdict: Verdict = fits[-1].verdict if fits else "none"
     if verdict == "refused" and exported:
         verdict = "exception"
     readings = any(isinstance(event, ev.ReadingTaken) for event in events)
-    return IndexedSession(status, serial, began, verdict, exported[-1] if exported else "", readings)
+    file, sha256 = (exported[-1].path, exported[-1].sha256) if exported else ("", "")
+    return IndexedSession(status, serial, began, verdict, file, sha256, readings)
 
 
 def _text(session: IndexedSession) -> str:

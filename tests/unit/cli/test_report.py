@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.command_line import Run, refused
 from tests.support.pango import need_pango
-from tests.support.reference_session import MARKUP, REFERENCE, copied
+from tests.support.reference_session import MARKUP, REFERENCE, copied, edit_calibration
 from workbench.session.certificate_numbers import REGISTER
 from workbench.session.journal import JOURNAL
 
@@ -93,6 +93,14 @@ def test_a_damaged_session_is_named(workbench: Run, tmp_path: Path, file: str) -
     if file == JOURNAL:
         (session / file).write_text("damaged\n")
     refused(workbench("report", session), 2, file)
+    assert not (tmp_path / REGISTER).exists()
+
+
+def test_an_edited_calibration_gets_no_certificate(workbench: Run, tmp_path: Path) -> None:
+    session = copied(tmp_path)
+    edit_calibration(session)
+    refused(workbench("report", session), 2, "calibration.yaml", "workbench fit")
+    assert not (tmp_path / REGISTER).exists()
 
 
 def test_a_session_that_has_only_begun(workbench: Run, tmp_path: Path) -> None:
@@ -101,6 +109,14 @@ def test_a_session_that_has_only_begun(workbench: Run, tmp_path: Path) -> None:
     done = workbench("report", session, "--json")
     assert done.code == 0
     assert json.loads(done.out)["verdict"]["tone"] == "open"
+
+
+def test_an_empty_session_gets_no_digital_certificate_and_no_number(workbench: Run, tmp_path: Path) -> None:
+    session = copied(tmp_path)
+    (session / JOURNAL).unlink()
+    (tmp_path / "lab.yaml").write_text(LAB)
+    refused(workbench("report", session, "--dcc", tmp_path / "x.xml"), 2, session.name)
+    assert not (tmp_path / REGISTER).exists()
 
 
 def test_outputs_that_cannot_be_written_are_named_before_a_number_is_assigned(

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from tests.support.command_line import Run, refused
-from tests.support.reference_session import REFERENCE, SERIAL, copied
+from tests.support.reference_session import REFERENCE, SERIAL, copied, edit_calibration
 
 
 def in_force(workbench: Run, sessions: Path) -> str:
@@ -33,6 +33,13 @@ def test_a_calibration_of_another_sensor_is_refused(workbench: Run, tmp_path: Pa
     done = workbench("use", other, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
     refused(done, 2, SERIAL)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_edited_calibration_of_a_session_is_refused(workbench: Run, tmp_path: Path) -> None:
+    session = copied(tmp_path)
+    edit_calibration(session)
+    done = workbench("use", session.name, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
+    refused(done, 2, "calibration.yaml", "workbench fit")
 
 
 def test_a_refused_calibration_is_not_put_in_force(workbench: Run, tmp_path: Path) -> None:

@@ -21,3 +21,4 @@ def test_tables_have_unscaled_records_and_units() -> None:
     row = next(one for one in table["rows"] if one["range_mm"] == 500)
     assert row["mean_relative_expanded"] * 500 == row["mean_expanded_mm"]
     assert table["units"]["mean_expanded_mm"] == "mm"
+    assert table["units"]["mean_relative_expanded"] == "1"

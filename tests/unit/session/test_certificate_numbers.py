@@ -57,6 +57,14 @@ def test_a_damaged_register_assigns_nothing(tmp_path: Path) -> None:
         assigned(tmp_path, "t")
 
 
+def test_a_last_line_without_its_end_is_kept_whole(tmp_path: Path) -> None:
+    first = assigned(tmp_path, "s")
+    (tmp_path / REGISTER).write_text((tmp_path / REGISTER).read_text().rstrip("\n"))
+    second = assigned(tmp_path, "t")
+    assert (first, second) == (assigned(tmp_path, "s"), assigned(tmp_path, "t"))
+    assert len((tmp_path / REGISTER).read_text().splitlines()) == 2
+
+
 def test_a_folder_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=REGISTER):
         assigned(tmp_path / "missing", "s")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from workbench.model.calibration import Calibration
 from workbench.model.chart import laser_colors
 from workbench.model.laboratory import Laboratory
+from workbench.report.certificate.assessment import Assessment, assess
 from workbench.report.certificate.identity import (
     VIRTUAL,
     conditions_section,
@@ -21,9 +22,9 @@ from workbench.report.certificate.identity import (
 from workbench.report.certificate.method import decision_section, exception_section, procedure_section
 from workbench.report.certificate.predecessor import Predecessor, change_section
 from workbench.report.certificate.range_uncertainty import (
-    TABLE_MM,
     RangeUncertainty,
     range_uncertainties,
+    table_mm,
 )
 from workbench.report.certificate.recalibration import recalibration_section
 from workbench.report.certificate.reproduction import reproduction_section
@@ -34,7 +35,7 @@ from workbench.report.certificate.results import (
     validation_section,
 )
 from workbench.report.certificate.session_record import SessionRecord
-from workbench.report.certificate.summary import key_numbers, verdict_of
+from workbench.report.certificate.summary import key_numbers
 from workbench.report.document import NOT_STATED, Document, Fact, Section
 from workbench.session.certificate_numbers import AssignedNumber
 from workbench.session.manifest import workbench_version
@@ -61,6 +62,7 @@ def fingerprint(sources: Sources) -> str:
     parts = (
         sources.session.journal_sha256,
         sources.session.manifest_sha256,
+        sources.session.calibration_sha256,
         sources.laboratory.model_dump_json(),
         workbench_version(),
         "" if sources.predecessor is None else sources.predecessor.sha256,
@@ -73,8 +75,14 @@ class Certificate:
     """A certificate: the document, and the values that programs read."""
 
     document: Document
+    assessment: Assessment
     sources: Sources
     uncertainties: tuple[RangeUncertainty, ...]
+
+    def numbered(self, number: AssignedNumber) -> Certificate:
+        """The certificate with its number."""
+        document = replace(self.document, number=number.number, replaces=number.replaces)
+        return replace(self, document=document)
 
     def as_json(self) -> dict[str, object]:
         """Plain values for JSON."""
@@ -87,27 +95,28 @@ class Certificate:
         )
 
 
-def certificate_of(sources: Sources, number: AssignedNumber) -> Certificate:
-    """The certificate.
+def certificate_of(sources: Sources) -> Certificate:
+    """The certificate, without a number yet.
 
     Raises:
-        BadInputError: the calibration file of the session is missing or damaged.
+        BadInputError: the calibration file of the session is missing or damaged, or has changed since.
     """
     session, lab = sources.session, sources.laboratory
     calibration = session.calibration
-    found = () if calibration is None else range_uncertainties(calibration, TABLE_MM)
+    found = () if calibration is None else range_uncertainties(calibration, table_mm(calibration))
+    assessment = assess(session, calibration)
     document = Document(
-        title="Calibration certificate" if session.fit is not None else "Measurement report",
-        number=number.number,
-        replaces=number.replaces,
+        title=assessment.title,
+        number="",
+        replaces="",
         head=_head(sources),
-        verdict=verdict_of(session, calibration),
+        verdict=assessment.verdict,
         key_numbers=key_numbers(session, calibration, found),
         sections=_sections(sources, calibration, found),
         authorised_by=lab.authorised_by or NOT_STATED,
         colors=laser_colors(session.rig.laser_ids),
     )
-    return Certificate(document, sources, found)
+    return Certificate(document, assessment, sources, found)
 
 
 def _head(sources: Sources) -> tuple[Fact, ...]:

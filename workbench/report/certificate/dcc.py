@@ -16,10 +16,9 @@ from workbench.model.errors import BadInputError
 from workbench.model.laboratory import LABORATORY_FILE, Laboratory, Party, Span, Standard
 from workbench.model.table import Cell, Table
 from workbench.report.certificate.assemble import STATEMENTS, Certificate
-from workbench.report.certificate.fit_limits import fit_limit_rows
 from workbench.report.certificate.method import DECISION_RULE
 from workbench.report.certificate.results import COVERAGE
-from workbench.report.certificate.session_record import text_sha256
+from workbench.report.certificate.session_record import SessionRecord, text_sha256
 from workbench.report.document import NOT_STATED
 from workbench.session.manifest import DISTRIBUTION, workbench_version
 
@@ -43,9 +42,7 @@ def certificate_xml(certificate: Certificate, printed: datetime) -> bytes:
         BadInputError: `lab.yaml` does not state an item that the schema requires, or the session is empty.
     """
     lab, session = certificate.sources.laboratory, certificate.sources.session
-    laboratory, customer = required_parties(lab)
-    if session.began is None or session.ended is None:
-        raise BadInputError(f"{session.folder}: expected records, the session has none")
+    laboratory, customer = required_parties(lab, session)
     ET.register_namespace("dcc", DCC)
     ET.register_namespace("si", SI)
     root = ET.Element(_dcc("digitalCalibrationCertificate"), {"schemaVersion": SCHEMA})
@@ -65,12 +62,14 @@ def certificate_xml(certificate: Certificate, printed: datetime) -> bytes:
     return content
 
 
-def required_parties(lab: Laboratory) -> tuple[Party, Party]:
+def required_parties(lab: Laboratory, session: SessionRecord) -> tuple[Party, Party]:
     """Laboratory and customer, if all items that a Digital Calibration Certificate requires are stated.
 
     Raises:
-        BadInputError: an item that the schema requires is not stated.
+        BadInputError: `lab.yaml` does not state an item that the schema requires, or the session is empty.
     """
+    if session.began is None:
+        raise BadInputError(f"{session.folder}: expected records, the session has none")
     items = {
         "country": lab.country,
         "laboratory": lab.laboratory,
@@ -122,15 +121,11 @@ def _statements(parent: ET.Element, certificate: Certificate) -> None:
         texts.append(f"This certificate replaces certificate {document.replaces}.")
     for text in texts:
         _rich(_add(_add(parent, "statement"), "declaration"), text)
-    session = certificate.sources.session
-    checks = [row[-1] for row in fit_limit_rows(session, session.calibration) if row[-1]]
-    checks += [one.verdict for one in session.events(ev.LimitChecked)]
-    if checks:
-        verdicts = set(checks)
-        conformity = "fail" if "fail" in verdicts else "noPass" if "marginal" in verdicts else "pass"
+    assessment = certificate.assessment
+    if assessment.conformity is not None:
         statement = _add(parent, "statement")
-        _rich(_add(statement, "declaration"), f"{len(checks)} limits of the procedures were checked.")
-        _add(statement, "conformity", conformity)
+        _rich(_add(statement, "declaration"), f"{assessment.limits} limits of the procedures were checked.")
+        _add(statement, "conformity", assessment.conformity)
 
 
 def _measurement(parent: ET.Element, certificate: Certificate) -> None:

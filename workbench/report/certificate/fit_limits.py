@@ -14,12 +14,22 @@ from ruamel.yaml.error import YAMLError
 from workbench.calibration.model.parameters import DRIFT
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Calibration
+from workbench.model.event import LimitChecked
 from workbench.model.fit_event import FitFinished
 from workbench.model.table import Cell
 from workbench.report.certificate.session_record import SessionRecord
 
-Row = tuple[Cell, ...]
+Row = tuple[Cell, Cell, Cell, Cell, Cell, Cell]
 """Step, subject, quantity, value, limit, verdict."""
+
+
+def limit_rows(session: SessionRecord, calibration: Calibration | None) -> list[Row]:
+    """One row for each limit that was checked: those of the last fit, then those of the journal."""
+    checked = session.events(LimitChecked)
+    return [
+        *fit_limit_rows(session, calibration),
+        *((one.step, one.of, one.quantity, one.value, one.limit, one.verdict) for one in checked),
+    ]
 
 
 def fit_limit_rows(session: SessionRecord, calibration: Calibration | None) -> list[Row]:

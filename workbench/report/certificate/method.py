@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration
 from workbench.model.table import Cell, Column, Table
-from workbench.report.certificate.fit_limits import fit_limit_rows
+from workbench.report.certificate.fit_limits import limit_rows
 from workbench.report.certificate.session_record import SessionRecord, text_sha256
 from workbench.report.document import Fact, Section
 
@@ -67,13 +67,7 @@ def decision_section(session: SessionRecord, calibration: Calibration | None) ->
             Column(key="limit", name="limit"),
             Column(key="verdict", name="verdict"),
         ),
-        rows=(
-            *fit_limit_rows(session, calibration),
-            *(
-                (one.step, one.of, one.quantity, one.value, one.limit, one.verdict)
-                for one in session.events(ev.LimitChecked)
-            ),
-        ),
+        rows=tuple(limit_rows(session, calibration)),
     )
     fit = session.fit
     texts = [DECISION_RULE, *(f"Refused: {reason}." for reason in (fit.reasons if fit else ()))]

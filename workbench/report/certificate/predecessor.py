@@ -90,6 +90,6 @@ def _table(found: Comparison) -> Table:
 
 def _row(found: Comparison, range_mm: float) -> tuple[Cell, ...]:
     own = [one for one in found.differences if one.range_mm == range_mm]
-    largest = max(own, key=lambda one: abs(one.difference_mm) / one.sd_mm)
+    largest = max(own, key=lambda one: abs(one.difference_mm))
     mean_mm = float(np.mean([one.difference_mm for one in own]))
     return (range_mm, mean_mm, largest.difference_mm, largest.laser_id, 2.0 * largest.sd_mm)

@@ -12,7 +12,7 @@ from workbench.model.chart import Axis, Band, Chart, Series
 from workbench.model.table import Column, Table
 from workbench.sensor.calibrated import CalibratedSensor
 
-TABLE_MM = (100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 4000, 5000)
+ROUND_MM = (100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 4000, 5000)
 CURVE_POINTS = 60
 COVERAGE_FACTOR = 2.0
 MOST_LASERS = 8
@@ -47,6 +47,11 @@ def range_uncertainties(calibration: Calibration, ranges_mm: Sequence[float]) ->
         )
         for n, range_mm in enumerate(at.tolist())
     )
+
+
+def table_mm(calibration: Calibration) -> tuple[float, ...]:
+    """Distances of the table: round ones, and both ends of the standoffs that the calibration covers."""
+    return tuple(sorted({*ROUND_MM, *calibration.laser_ranger.validity.standoff_mm}))
 
 
 def curve_mm(calibration: Calibration) -> tuple[float, ...]:

@@ -49,8 +49,8 @@ def _inputs(session: SessionRecord) -> list[tuple[str, str]]:
     captures = session.folder / CALIBRATION_TABLE
     if captures.exists():
         rows.append((CALIBRATION_TABLE, file_sha256(captures)))
-    if session.calibration_path is not None and session.calibration_path.exists():
-        rows.append((session.calibration_path.name, file_sha256(session.calibration_path)))
+    if session.calibration_path is not None and session.calibration_sha256:
+        rows.append((session.calibration_path.name, session.calibration_sha256))
     return rows
 
 

@@ -41,7 +41,7 @@ COVERAGE = (
 LINEARITY = (
     "Linearity: independent deviations are from the straight line that makes the largest one smallest (best"
     " fit), absolute ones from the line of identity, measured = true. A line through the end points is not"
-    " used. Percent are of full scale, the largest true range of the trial."
+    " used. Percent are of full scale, the largest minus the smallest true range of the trial."
 )
 INPUTS = (
     "The uncertainty contains noise and speckle of the spots, placement and tilt of the target, scale of the"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.session.journal import JOURNAL, read_journal
 from workbench.session.manifest import MANIFEST, Manifest, load_manifest, load_session_rig
@@ -53,20 +54,27 @@ class SessionRecord:
 
     @cached_property
     def calibration_path(self) -> Path | None:
-        """File of the calibration that the session exported last, or of the existing one that it used."""
-        for record in reversed(self.records):
-            if isinstance(record.event, ev.CalibrationExported | ev.CalibrationLoaded):
-                return self.folder / record.event.path
-        return None
+        """File of the calibration that the session exported last, or of the existing one that it used.
+
+        Raises:
+            BadInputError: the file has changed since.
+        """
+        return recorded_calibration(self.folder, [record.event for record in self.records])
 
     @cached_property
     def calibration(self) -> Calibration | None:
         """The calibration of `calibration_path`.
 
         Raises:
-            BadInputError: the file is missing or damaged.
+            BadInputError: the file is missing or damaged, or has changed since the session.
         """
         return None if self.calibration_path is None else load_calibration(self.calibration_path)
+
+    @cached_property
+    def calibration_sha256(self) -> str:
+        """Hash of the file of the calibration; empty if there is none."""
+        path = self.calibration_path
+        return "" if path is None or not path.exists() else file_sha256(path)
 
     @cached_property
     def is_own_calibration(self) -> bool:
@@ -113,6 +121,36 @@ def read_session(folder: Path) -> SessionRecord:
     manifest, rig = load_manifest(folder), load_session_rig(folder)
     records = tuple(read_journal(folder)) if (folder / JOURNAL).exists() else ()
     return SessionRecord(folder, manifest, rig, session_status(folder), records)
+
+
+def recorded_calibration(folder: Path, events: Iterable[object]) -> Path | None:
+    """File of the calibration that a session exported last, or of the existing one that it used.
+
+    Args:
+        folder: folder of the session.
+        events: events that are in effect, in order.
+
+    Raises:
+        BadInputError: the file has changed since.
+    """
+    kinds = ev.CalibrationExported | ev.CalibrationLoaded
+    found = [event for event in events if isinstance(event, kinds)]
+    return unchanged(folder / found[-1].path, found[-1].sha256) if found else None
+
+
+def unchanged(path: Path, sha256: str) -> Path:
+    """The file of a calibration, which may be missing.
+
+    Raises:
+        BadInputError: the file has another hash than the session recorded.
+    """
+    if path.is_file() and (got := file_sha256(path)) != sha256:
+        raise BadInputError(
+            f"{path}: expected the calibration of the session (sha256 {sha256[:12]}...), got another"
+            f" ({got[:12]}...): the file has changed; restore it from a copy, or make one again with"
+            " `workbench fit SESSION -o FILE`"
+        )
+    return path
 
 
 def utc(time_ns: int) -> datetime:

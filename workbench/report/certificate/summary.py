@@ -1,58 +1,19 @@
-"""First page: verdict and five numbers."""
+"""Five numbers of the first page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration
 from workbench.model.number_text import counted, two_digits
 from workbench.report.certificate.range_uncertainty import RangeUncertainty
 from workbench.report.certificate.session_record import SessionRecord
-from workbench.report.document import KeyNumber, Verdict
+from workbench.report.document import KeyNumber
 
 DASH = "-"
 KEY_RANGE_MM = 1000.0
 """Range at which the first page states the uncertainty."""
-
-
-def verdict_of(session: SessionRecord, calibration: Calibration | None) -> Verdict:
-    """Verdict on the session: its calibration, its limits, its trials."""
-    failed = [one for one in session.events(ev.LimitChecked) if one.verdict == "fail"]
-    reasons = [f"{one.step}, {one.of}: {one.quantity} expected {one.limit}" for one in failed[:4]]
-    if len(failed) > len(reasons):
-        reasons.append(f"{len(failed) - len(reasons)} more limits failed")
-    reasons += _trial_outcomes(session)
-    fit = session.fit
-    if fit is not None and fit.verdict == "refused" and calibration is None:
-        return Verdict("bad", "Calibration refused", (*fit.reasons, *reasons))
-    if session.status.state != "finished":
-        why = session.status.why or session.status.state
-        return Verdict("bad" if failed else "open", f"Session {session.status.state}: {why}", tuple(reasons))
-    if calibration is None:
-        return Verdict("open", "No calibration in this session", tuple(reasons))
-    return _of_calibration(session, calibration, bool(failed), reasons)
-
-
-def _of_calibration(
-    session: SessionRecord, calibration: Calibration, failed: bool, reasons: Sequence[str]
-) -> Verdict:
-    ours = calibration.laser_ranger.fit
-    because = f"accepted in spite of failed limits because: {ours.accepted_because}"
-    if ours.verdict == "refused":
-        text = "Calibration accepted with a reason, although limits failed"
-        return Verdict("open", text, (because, *ours.reasons, *reasons))
-    if failed:
-        return Verdict("bad", "A limit failed", tuple(reasons))
-    text = "Calibration accepted" if session.is_own_calibration else "Measured with an accepted calibration"
-    return Verdict("good", text, tuple(reasons))
-
-
-def _trial_outcomes(session: SessionRecord) -> Iterator[str]:
-    trials = {one.trial for one in session.events(ev.TrialFinished)}
-    for step in session.events(ev.StepFinished):
-        if (name := f"{step.procedure}.{step.index}") in trials:
-            yield f"{name}: {step.outcome}"
 
 
 def key_numbers(

@@ -11,7 +11,7 @@ import numpy as np
 from workbench.calibration.verdict.comparison import Comparison, compare
 from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.errors import BadInputError
-from workbench.report.certificate.session_record import file_sha256
+from workbench.report.certificate.session_record import file_sha256, unchanged
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.session.index import IndexedSession
 from workbench.session.sensor_log import SensorEntry
@@ -52,14 +52,14 @@ class RangeChange:
 
 
 def dated_calibrations(sessions: Sequence[IndexedSession]) -> tuple[list[DatedCalibration], list[str]]:
-    """Usable calibrations of the sessions, in order of time, and remarks on files that cannot be read."""
+    """Usable calibrations of the sessions, in order of time, and remarks on the files of others."""
     found, remarks = [], []
     for one in sessions:
         if not one.calibration or one.verdict not in {"accepted", "exception"}:
             continue
         path = one.status.session_dir / one.calibration
         try:
-            found.append(dated(path, one.name, one.began[:10]))
+            found.append(dated(unchanged(path, one.calibration_sha256), one.name, one.began[:10]))
         except BadInputError as error:
             remarks.append(str(error))
     return found, remarks

@@ -45,7 +45,12 @@ def verdict_of(ranges: Sequence[Agreement], limits: AccuracyLimits) -> Verdict:
 
 def bias_probability(ranges: Sequence[Agreement]) -> float:
     """P value of the largest bias of any range (Bonferroni); ranges of one sensor are not independent."""
-    return min(1.0, len(ranges) * min(one.bias.probability for one in ranges))
+    return joint_probability([one.bias.probability for one in ranges])
+
+
+def joint_probability(probabilities: Sequence[float]) -> float:
+    """P value of the smallest of several, at least one (Bonferroni)."""
+    return min(1.0, len(probabilities) * min(probabilities))
 
 
 def results_of(ranges: Sequence[Agreement], limits: AccuracyLimits) -> list[Result]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tests.support.reference_session import REFERENCE, record
+from workbench.calibration.verdict.comparison import Difference, compare
 from workbench.model.calibration import Calibration
+from workbench.report.certificate import predecessor
 from workbench.report.certificate.predecessor import Predecessor, change_section, load_predecessor
 
 
@@ -37,6 +40,17 @@ def test_the_error_as_found_is_the_change_that_the_calibration_before_lacked(
     (table,) = change_section(calibration, before).tables
     # A spot seen at the range r by the new calibration is ranged 25 mm nearer by the old one.
     assert [row["mean_mm"] for row in table.records()] == pytest.approx([-25.0] * len(table.rows), rel=1e-3)
+
+
+def test_the_largest_error_is_that_in_mm_not_in_standard_deviations(
+    calibration: Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = compare(calibration, shifted(calibration, 2.0))
+    pair = (Difference("L1", 500.0, -3.0, 3.0), Difference("L2", 500.0, 1.0, 0.1))
+    monkeypatch.setattr(predecessor, "compare", lambda *_: replace(found, differences=pair))
+    (table,) = change_section(calibration, Predecessor("old", calibration, "")).tables
+    (row,) = table.records()
+    assert (row["largest_mm"], row["laser_id"], row["expanded_mm"]) == (-3.0, "L1", 6.0)
 
 
 def test_an_equal_calibration_has_not_changed(calibration: Calibration) -> None:

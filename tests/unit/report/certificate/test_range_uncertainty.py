@@ -8,9 +8,10 @@ import pytest
 from tests.support.reference_session import record
 from workbench.model.calibration import Calibration
 from workbench.report.certificate.range_uncertainty import (
-    TABLE_MM,
+    ROUND_MM,
     curve_mm,
     range_uncertainties,
+    table_mm,
     uncertainty_chart,
     uncertainty_table,
 )
@@ -49,8 +50,18 @@ def test_uncertainty_of_the_mean_holds_for_drawn_sensors(calibration: Calibratio
     assert one.mean_sd_mm == pytest.approx(means.std(), rel=4 / np.sqrt(2 * draws))
 
 
+def test_the_table_contains_both_ends_of_the_certified_span(calibration: Calibration) -> None:
+    nearest, farthest = calibration.laser_ranger.validity.standoff_mm
+    found = {one.range_mm: one for one in range_uncertainties(calibration, table_mm(calibration))}
+    assert list(found) == sorted(found)
+    assert found[nearest].inside
+    assert found[farthest].inside
+    assert farthest not in ROUND_MM
+    assert not found[100].inside
+
+
 def test_ranges_outside_the_standoffs_are_marked(calibration: Calibration) -> None:
-    found = range_uncertainties(calibration, TABLE_MM)
+    found = range_uncertainties(calibration, table_mm(calibration))
     table = uncertainty_table(found)
     remarks = {row["range_mm"]: row["remark"] for row in table.records()}
     assert remarks[100] == remarks[5000] == "extrapolated"

@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.reference_session import record
 from workbench.model import event as ev
-from workbench.report.certificate.range_uncertainty import TABLE_MM, range_uncertainties
+from workbench.report.certificate.range_uncertainty import range_uncertainties, table_mm
 from workbench.report.certificate.results import (
     calibration_section,
     trial_sections,
@@ -32,7 +32,7 @@ def test_a_session_without_calibration_states_that() -> None:
 def test_uncertainty_has_its_coverage_factor() -> None:
     calibration = record().calibration
     assert calibration is not None
-    section = uncertainty_section(calibration, range_uncertainties(calibration, TABLE_MM))
+    section = uncertainty_section(calibration, range_uncertainties(calibration, table_mm(calibration)))
     assert "k = 2" in section.texts[0]
     assert [chart.name for chart in section.charts] == ["range_uncertainty"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.reference_session import REFERENCE, copied, record
+from tests.support.reference_session import REFERENCE, copied, edit_calibration, record
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.report.certificate.session_record import read_session
@@ -39,6 +39,15 @@ def test_a_session_without_journal_has_no_records(tmp_path: Path) -> None:
     found = read_session(session)
     assert (found.records, found.calibration, found.fit, found.began) == ((), None, None, None)
     assert found.journal_sha256 == ""
+
+
+def test_a_calibration_that_was_edited_since_is_refused(tmp_path: Path) -> None:
+    session = copied(tmp_path)
+    found = read_session(session)
+    assert found.calibration_sha256 == found.events(ev.CalibrationExported)[-1].sha256
+    edit_calibration(session)
+    with pytest.raises(BadInputError, match="changed"):
+        _ = read_session(session).calibration
 
 
 def test_a_damaged_session_is_refused(tmp_path: Path) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tests.support.reference_session import SERIAL, copied
+from tests.support.reference_session import SERIAL, copied, edit_calibration
 from tests.unit.report.certificate.test_predecessor import shifted
 from workbench.model.errors import BadInputError
 from workbench.report.certificate.session_record import file_sha256
@@ -46,8 +47,9 @@ def test_a_calibration_that_changed_since_is_refused(tmp_path: Path) -> None:
         in_force(tmp_path, [], [chosen("a/calibration.yaml", "0" * 64)])
 
 
-def test_a_damaged_calibration_is_a_remark(tmp_path: Path) -> None:
-    (copied(tmp_path, "a") / "calibration.yaml").write_text("damaged: [")
+@pytest.mark.parametrize("damage", [edit_calibration, lambda s: (s / "calibration.yaml").unlink()])
+def test_an_edited_or_missing_calibration_is_a_remark(tmp_path: Path, damage: Callable[[Path], None]) -> None:
+    damage(copied(tmp_path, "a"))
     found, remarks = dated_calibrations(indexed_sessions(tmp_path))
     assert found == []
     assert len(remarks) == 1
