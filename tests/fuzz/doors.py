@@ -93,7 +93,7 @@ def knock(door: Door, folder: Path, content: bytes, outcome: Outcome) -> None:
         outcome.found.setdefault(f"{type(error).__name__} at {own[-1].filename}:{own[-1].lineno}", content)
     if time.process_time() - started > MOST_CPU_S:
         outcome.found.setdefault(f"more than {MOST_CPU_S:g} s", content)
-    if _peak_bytes() > max(before, MOST_BYTES):  # a peak before this input is not its own
+    if _peak_bytes() - before > MOST_BYTES:
         outcome.found.setdefault(f"more than {MOST_BYTES / 2**20:g} MiB", content)
 
 

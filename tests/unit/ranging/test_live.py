@@ -128,7 +128,7 @@ def test_a_line_of_words_for_each(live: Live) -> None:
     ended = live("--readings", 1, "--standoff", 600)
     (line,) = ended.out
     assert line.startswith("0  done  ")
-    assert "mm  flat  L1 " in line or "mm  incline" in line
+    assert "mm  flat (1 sigma)  L1 " in line or "mm  incline" in line
 
 
 def test_nothing_before_the_sensor(live: Live) -> None:
