@@ -21,6 +21,7 @@ from tests.support.mjpeg import Picture, Stream
 from tests.unit.procedure.engine.test_check import PROCEDURE
 from workbench.devices.registry import open_bench
 from workbench.model import event as ev
+from workbench.model.prompt import Answer
 from workbench.model.rig import load_rig
 from workbench.procedure.doctor import examine
 from workbench.procedure.engine.plan import Plan
@@ -132,7 +133,7 @@ def test_off_that_the_files_do_not_confirm_is_exit_7(lab: Lab) -> None:
 def test_doctor_sees_each_laser(lab: Lab, tmp_path: Path) -> None:
     rig = load_rig(lab.rig)
     with open_bench(rig, tmp_path / "s") as bench:
-        results = list(examine(rig, bench, Says()))
+        results = list(examine(rig, bench, Says(("laser_class", Answer(value="2")))))
     assert [result.part for result in results if not result.ok] == []
     assert {"laser L1", "laser L2"} <= {result.part for result in results}
     assert lab.lit() == [False, False]
