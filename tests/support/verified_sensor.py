@@ -11,7 +11,7 @@ import numpy as np
 from tests.support.reference_session import REFERENCE, copied
 from workbench.model import event as ev
 from workbench.model.arrays import FloatArray
-from workbench.report.certificate.session_record import file_sha256
+from workbench.model.contents import file_sha256
 from workbench.session.journal import JOURNAL
 from workbench.session.manifest import MANIFEST
 

@@ -33,6 +33,7 @@ from workbench.model.captures import (
     parse_captures,
     read_captures_file,
 )
+from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
 from workbench.model.fit_event import Rejected
 from workbench.model.fit_tables import cross_validation_table, parameter_table, term_table
@@ -109,9 +110,9 @@ def _fit_recording(rig: Rig, request: Request) -> FittedSource:
     kept = [one for one in found if one.standoff_mm not in request.without_mm]
     views = [view for view in boards if view.placement.standoff_mm not in request.without_mm]
     fitted = fit_calibration(rig, kept, rejected, views)
-    with request.source.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, digest))
+    calibration, assessment = calibrate(
+        fitted, Acceptance(), _provenance(rig, request, file_sha256(request.source))
+    )
     return FittedSource((), fitted, calibration, assessment)
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from workbench.cli.console import print_message
 from workbench.cli.sessions import find_session
 from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError, LimitFailedError
-from workbench.report.certificate.session_record import file_sha256, read_session
+from workbench.report.certificate.session_record import read_session
 from workbench.report.history.calibrations import dated_calibrations, in_force, range_changes
 from workbench.session.caller import now, operator
 from workbench.session.index import indexed_sessions

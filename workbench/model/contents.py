@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import stat
@@ -60,6 +61,12 @@ def _shown_in_json(found: re.Match[str]) -> str:
     if len(character) != 1 or "\ud800" <= character <= "\udfff" or not CONTROL.match(character):
         return escape
     return "\\" + character.encode("unicode_escape").decode("ascii")
+
+
+def file_sha256(path: Path) -> str:
+    """SHA-256 of a file of any size, in hexadecimal digits; raises `OSError`."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def read_file(path: Path, expected: str, most_bytes: int) -> bytes:

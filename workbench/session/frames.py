@@ -138,7 +138,7 @@ def _check_png(path: Path, content: bytes, size_px: tuple[int, int] | None) -> N
         (length,) = struct.unpack(">I", content[start : start + 4].ljust(4, b"\xff"))
         start += 12 + length
         if start > len(content):
-            raise BadInputError(f"{path}: the image is damaged: a part of it is longer than the file")
+            raise BadInputError(f"{path}: the image is damaged: one of its parts is longer than the file")
 
 
 def _check_size(path: Path, found_px: tuple[int, int], size_px: tuple[int, int] | None) -> None:

@@ -21,11 +21,12 @@ from workbench.report.certificate.results import COVERAGE
 from workbench.report.certificate.session_record import SessionRecord, text_sha256
 from workbench.report.document import NOT_STATED
 from workbench.session.manifest import DISTRIBUTION, workbench_version
+from workbench.trials.errors import EXPANSION
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 SCHEMA = "3.2.0"
 LANGUAGE = "en"
-COVERAGE_FACTOR, COVERAGE_PROBABILITY = 2.0, 0.95
+COVERAGE_PROBABILITY = 0.95
 UNITS = {"mm": r"\milli\metre", "px": r"\one", "": r"\one", "deg": r"\degree", "%": r"\percent"}
 """Units of D-SI by ours; a pixel is a count."""
 DEGREE_CELSIUS, PERCENT = r"\degreecelsius", r"\percent"
@@ -199,14 +200,14 @@ def _range_uncertainty(results: ET.Element, certificate: Certificate) -> None:
         _quantity(data, "Range from the reference plane"),
         [one.range_mm for one in found],
         UNITS["mm"],
-        [COVERAGE_FACTOR * (one.mean_sd_mm or 0.0) for one in found],
+        [EXPANSION * (one.mean_sd_mm or 0.0) for one in found],
     )
 
 
 def _parameters(results: ET.Element, found: Parameters) -> None:
     data = _result(results, "Parameters of the sensor")
     for name, unit, value, sd in zip(found.names, found.units, found.values, found.sd, strict=True):
-        _real_list(_quantity(data, name), [value], UNITS.get(unit, r"\one"), [COVERAGE_FACTOR * sd])
+        _real_list(_quantity(data, name), [value], UNITS.get(unit, r"\one"), [EXPANSION * sd])
 
 
 def _trial_errors(results: ET.Element, table: Table) -> None:
@@ -224,7 +225,7 @@ def _trial_errors(results: ET.Element, table: Table) -> None:
         true_mm, error_mm, expanded_mm = (
             [float(row[key] or 0.0) for row in rows] for key in ("standoff_mm", "error_mm", "expanded_mm")
         )
-        factors = [float(row.get("k") or COVERAGE_FACTOR) for row in rows]
+        factors = [float(row.get("k") or EXPANSION) for row in rows]
         _real_list(_quantity(data, "True range"), true_mm, UNITS["mm"], ())
         _real_list(_quantity(data, "Measured - true range"), error_mm, UNITS["mm"], expanded_mm, factors)
 
@@ -234,7 +235,7 @@ def _real_list(
     values: Sequence[float],
     unit: str,
     expanded: Sequence[float],
-    factors: Sequence[float] = (COVERAGE_FACTOR,),
+    factors: Sequence[float] = (EXPANSION,),
 ) -> None:
     """List of values with one unit; with their expanded uncertainties and coverage factors, if known."""
     found = ET.SubElement(quantity, _si("realListXMLList"))

@@ -9,10 +9,11 @@ import numpy as np
 
 from workbench.calibration.verdict.comparison import Comparison, compare
 from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
 from workbench.model.table import Cell, Column, Table
-from workbench.report.certificate.session_record import file_sha256
 from workbench.report.document import Section
+from workbench.trials.errors import EXPANSION
 
 KEY, TITLE = "change", "As found and as left"
 EXPLANATION = (
@@ -92,4 +93,4 @@ def _row(found: Comparison, range_mm: float) -> tuple[Cell, ...]:
     own = [one for one in found.differences if one.range_mm == range_mm]
     largest = max(own, key=lambda one: abs(one.difference_mm))
     mean_mm = float(np.mean([one.difference_mm for one in own]))
-    return (range_mm, mean_mm, largest.difference_mm, largest.laser_id, 2.0 * largest.sd_mm)
+    return (range_mm, mean_mm, largest.difference_mm, largest.laser_id, EXPANSION * largest.sd_mm)

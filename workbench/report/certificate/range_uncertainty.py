@@ -11,10 +11,10 @@ from workbench.model.calibration import Calibration
 from workbench.model.chart import Axis, Band, Chart, Series
 from workbench.model.table import Column, Table
 from workbench.sensor.calibrated import CalibratedSensor
+from workbench.trials.errors import EXPANSION
 
 ROUND_MM = (100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 4000, 5000)
 CURVE_POINTS = 60
-COVERAGE_FACTOR = 2.0
 MOST_LASERS = 8
 """Largest number of lasers that each get a column."""
 
@@ -125,11 +125,11 @@ def _lasers(one: RangeUncertainty) -> list[float]:
 
 
 def _percent(sd_mm: float | None, one: RangeUncertainty) -> float | None:
-    return None if sd_mm is None else 100.0 * COVERAGE_FACTOR * sd_mm / one.range_mm
+    return None if sd_mm is None else 100.0 * EXPANSION * sd_mm / one.range_mm
 
 
 def _expanded(sd_mm: float | None) -> float | None:
-    return None if sd_mm is None else COVERAGE_FACTOR * sd_mm
+    return None if sd_mm is None else EXPANSION * sd_mm
 
 
 def _row(one: RangeUncertainty, shown: Sequence[str]) -> tuple[float | str | None, ...]:

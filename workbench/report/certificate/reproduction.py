@@ -5,8 +5,9 @@ from __future__ import annotations
 import shlex
 
 from workbench.model import event as ev
+from workbench.model.contents import file_sha256
 from workbench.model.table import Column, Table
-from workbench.report.certificate.session_record import SessionRecord, file_sha256, text_sha256
+from workbench.report.certificate.session_record import SessionRecord, text_sha256
 from workbench.report.document import Fact, Section
 from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.journal import JOURNAL

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.session.journal import JOURNAL, read_journal
@@ -156,11 +157,6 @@ def unchanged(path: Path, sha256: str) -> Path:
 def utc(time_ns: int) -> datetime:
     """Time of a record."""
     return datetime.fromtimestamp(time_ns / 1e9, tz=UTC)
-
-
-def file_sha256(path: Path) -> str:
-    """Hash of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def text_sha256(text: str) -> str:

@@ -10,6 +10,7 @@ from workbench.model.number_text import counted, two_digits
 from workbench.report.certificate.range_uncertainty import RangeUncertainty
 from workbench.report.certificate.session_record import SessionRecord
 from workbench.report.document import KeyNumber
+from workbench.trials.errors import EXPANSION
 
 DASH = "-"
 KEY_RANGE_MM = 1000.0
@@ -42,13 +43,15 @@ def _at_one_metre(found: Sequence[RangeUncertainty]) -> KeyNumber:
     if not inside:
         return KeyNumber("U at 1 m", DASH, "not known")
     one = min(inside, key=lambda each: abs(each.range_mm - KEY_RANGE_MM))
-    expanded_mm = 2.0 * (one.mean_sd_mm or 0.0)
+    expanded_mm = EXPANSION * (one.mean_sd_mm or 0.0)
     name = "U at 1 m" if one.range_mm == KEY_RANGE_MM else f"U at {one.range_mm:g} mm"
     return KeyNumber(name, f"{two_digits(expanded_mm)} mm", "k = 2, a single range, mean of the lasers")
 
 
 def _largest(found: Sequence[RangeUncertainty]) -> KeyNumber:
-    inside = [(2.0 * one.mean_sd_mm / one.range_mm, one) for one in found if one.inside and one.mean_sd_mm]
+    inside = [
+        (EXPANSION * one.mean_sd_mm / one.range_mm, one) for one in found if one.inside and one.mean_sd_mm
+    ]
     if not inside:
         return KeyNumber("Largest U", DASH, "not known")
     relative, one = max(inside, key=lambda pair: pair[0])

@@ -10,8 +10,9 @@ import numpy as np
 
 from workbench.calibration.verdict.comparison import Comparison, compare
 from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
-from workbench.report.certificate.session_record import file_sha256, unchanged
+from workbench.report.certificate.session_record import unchanged
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.session.index import IndexedSession
 from workbench.session.sensor_log import SensorEntry

@@ -9,8 +9,8 @@ import pytest
 
 from tests.support.reference_session import SERIAL, copied, edit_calibration
 from tests.unit.report.certificate.test_predecessor import shifted
+from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
-from workbench.report.certificate.session_record import file_sha256
 from workbench.report.history.calibrations import compared, dated_calibrations, in_force, range_changes
 from workbench.session.index import indexed_sessions
 from workbench.session.sensor_log import SensorEntry
