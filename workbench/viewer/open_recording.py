@@ -342,9 +342,5 @@ class OpenRecording:
 
     def _show_crops(self, spots: Sequence[Spot], lasers: Sequence[str]) -> None:
         if self._frames is not None:
-            expected = {
-                laser: spot
-                for laser, spot in expected_spots(self._geometry, self._placement).items()
-                if laser in lasers
-            }
+            expected = expected_spots(self._geometry, self._placement, lasers)
             self._crops.take(*self._frames, spots, expected)
