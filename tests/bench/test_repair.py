@@ -114,6 +114,37 @@ def test_a_spoilt_placement_is_captured_again_and_nothing_else(copy: Path) -> No
     assert kept == old, "the captures that do not count are kept"
 
 
+@pytest.mark.parametrize("copy", ["good"], indirect=True)
+def test_captures_that_were_replaced_are_restored_and_exchanged_again(copy: Path) -> None:
+    first = results(copy)
+    repair(copy, recapture=("300",))
+    second = results(copy)
+    assert second["captures.csv"] != first["captures.csv"]
+    repair(copy, restore=("300",))
+    assert results(copy) == first
+    repair(copy, restore=("300",))
+    assert results(copy) == second
+
+
+@pytest.mark.parametrize("copy", ["good"], indirect=True)
+def test_captures_are_restored_after_a_recapture_that_was_stopped(copy: Path) -> None:
+    first = results(copy)
+    with pytest.raises(StoppedError):
+        repair(copy, stop_after=2, recapture=("300",))
+    repair(copy, restore=("300",))
+    assert results(copy) == first
+
+
+@pytest.mark.parametrize("copy", ["good"], indirect=True)
+def test_captures_whose_frames_are_gone_are_not_restored(copy: Path) -> None:
+    repair(copy, recapture=("300",))
+    shutil.rmtree(copy / "set-aside")
+    before = (copy / "journal.jsonl").read_bytes()
+    with pytest.raises(BadInputError, match="300mm"):
+        repair(copy, restore=("300",))
+    assert (copy / "journal.jsonl").read_bytes() == before
+
+
 @pytest.mark.parametrize("copy", ["refused"], indirect=True)
 def test_a_repair_that_is_stopped_goes_on_and_gives_the_same(copy: Path) -> None:
     other = shutil.copytree(copy.parent, copy.parent.with_name("g")) / "s"
