@@ -186,6 +186,16 @@ def test_a_standoff_is_added_to_a_finished_session(copy: Path) -> None:
 
 
 @pytest.mark.parametrize("copy", ["good"], indirect=True)
+def test_the_prompt_of_an_added_placement_is_answered_from_a_file(copy: Path) -> None:
+    answers = copy.parent / "answers.yaml"
+    answers.write_text("short.1/900mm: 905\n")
+    command: list[str | Path] = [SCRIPT, "repair", "s", "--add", "900", "--reason", "r", "--answers", answers]
+    done = subprocess.run(command, cwd=copy.parent, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert 905.0 in standoffs(copy)
+
+
+@pytest.mark.parametrize("copy", ["good"], indirect=True)
 @pytest.mark.parametrize(
     "decisions",
     [

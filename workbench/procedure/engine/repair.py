@@ -9,16 +9,12 @@ from typing import TYPE_CHECKING
 
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
-from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.plan import FIT, GRID, Plan
 from workbench.session.repairs import repairs_of
 from workbench.session.state import placement_captures, replaced_captures
 
 if TYPE_CHECKING:
     from workbench.procedure.engine.run import Invocation
-
-
-GRID, FIT = "capture_grid", "fit"
-"""Kinds of the steps that take additional standoffs, and use them."""
 
 
 @dataclass(frozen=True)
