@@ -55,7 +55,7 @@ def test_few_degrees_of_freedom_are_stated_with_their_factor() -> None:
     vars(session)["calibration"] = calibration.model_copy(update={"laser_ranger": ranger})
     found = certificate(session=session)
     assert "nu = 7" in found.document.key_numbers[1].note
-    assert found.as_json()["uncertainties"][3]["mean_degrees_of_freedom"] == pytest.approx(7.0)
+    assert found.uncertainties[3].mean_degrees_of_freedom == pytest.approx(7.0)
     root = parsed(certificate_xml(found, PRINTED))
     lists = root.iterfind(".//dcc:quantity/si:realListXMLList", NAMES)
     ranges, freedom, *_ = [one for one in lists if " " in one.findtext("si:valueXMLList", "", NAMES)]
