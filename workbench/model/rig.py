@@ -260,6 +260,10 @@ LaserClass = Annotated[
 """Laser class according to IEC 60825-1."""
 
 
+UNKNOWN_SERIAL = "unknown"
+"""Serial number of a rig whose file states none."""
+
+
 class Rig(FileModel):
     """A rig file, format 1."""
 
@@ -267,7 +271,7 @@ class Rig(FileModel):
 
     format: Literal[1]
     rig: str
-    serial: Name = "unknown"
+    serial: Name = UNKNOWN_SERIAL
     driver: str | None = None
     """Driver of the bench: `opencv+serial` or None for separate `devices`; else an entry point in the group
     `workbench.benches`. A rig without driver and devices can be fitted but not run."""
