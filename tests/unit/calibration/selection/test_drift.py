@@ -10,11 +10,11 @@ import pytest
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import fit
+from workbench.calibration.model.parameters import fits_drift
 from workbench.calibration.selection.drift import (
     drift_is_shown,
     drift_test,
     fit_with_drift,
-    fits_drift,
     score_test,
 )
 from workbench.procedure.engine.visiting_order import shuffled
