@@ -74,7 +74,7 @@ class Capture:
     pause: float = 0.0
     """Pause after half of the captures, in running times of the session; the captures then have times."""
     resumed: bool = False
-    """The session was interrupted by the pause and resumed: the sensor is cold again, the drift starts anew."""
+    """The pause was an interruption: the sensor is cold again, and the drift starts anew."""
     step_px: float = 0.0
     """Shift of the image while the session was interrupted."""
 

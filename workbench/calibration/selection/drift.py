@@ -21,7 +21,6 @@ from workbench.calibration.checks.hypotheses import explain_misfit
 from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import CalibrationFit, fit
-from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import optimum_of, problem_of
 from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.parameters import DRIFT, DRIFT_SD_PX, fits_drift
@@ -58,10 +57,23 @@ def drift_test(fitted: CalibrationFit) -> DriftTest:
     residual, jacobian = problem.linearise(optimum_of(fitted), fitted.noise_scale)
     sd = fitted.table.prior_sd
     covariance = fitted.covariance / np.outer(*(np.where(sd > 0, sd, np.inf),) * 2)
-    shift = _shifts(problem, fitted.cells.parts.shape[1]) / fitted.noise_scale
+    shift = shift_columns(fitted)
     along = jacobian.T @ shift
     information = shift.T @ shift - along.T @ covariance @ along
     return score_test(information, -shift.T @ residual)
+
+
+def shift_columns(fitted: CalibrationFit) -> FloatArray:
+    """(R, 2 P) change of the residuals, in their deviations, with a drift of 1 px, then with each step."""
+    data, parts = problem_of(fitted).data, fitted.cells.parts.shape[1]
+    time = np.concatenate([np.asarray(data.spots.time, float), np.asarray(data.corners.time, float)])
+    shares = np.concatenate([np.asarray(data.spots.parts, float), np.asarray(data.corners.parts, float)])
+    offsets = shares @ Layout(fitted.rig.camera.lens, parts=parts).offsets_by_step
+    inverse_sd = np.asarray(data.inverse_sd) / fitted.noise_scale
+    by_axis = np.column_stack([time, offsets])[:, None] * inverse_sd[:, :, None]
+    shift = np.zeros((2 * len(time), 2 * parts))
+    shift[0::2, 0::2], shift[1::2, 1::2] = by_axis[:, 0], by_axis[:, 1]
+    return shift
 
 
 def score_test(information: FloatArray, score: FloatArray) -> DriftTest:
@@ -118,15 +130,3 @@ def drift_is_shown(fitted: CalibrationFit) -> bool:
         return False
     faults = [h for h in explain_misfit(fitted) if h.kind != "spot"]
     return test.score > max((h.score for h in faults), default=0.0)
-
-
-def _shifts(problem: LeastSquaresProblem, parts: int) -> FloatArray:
-    """(R, 2 P) change of the residuals, in stated deviations, with a drift of 1 px, or a step."""
-    data = problem.data
-    time = np.concatenate([np.asarray(data.spots.time, float), np.asarray(data.corners.time, float)])
-    shares = np.concatenate([np.asarray(data.spots.parts, float), np.asarray(data.corners.parts, float)])
-    offsets = shares @ Layout(problem.layout.lens_name, parts=parts).offsets_by_step
-    by_axis = np.column_stack([time, offsets])[:, None] * np.asarray(data.inverse_sd)[:, :, None]
-    shift = np.zeros((2 * len(time), 2 * parts))
-    shift[0::2, 0::2], shift[1::2, 1::2] = by_axis[:, 0], by_axis[:, 1]
-    return shift
