@@ -22,6 +22,7 @@ from workbench.model.rig import Rig
 from workbench.report.certificate.session_record import recorded_calibration
 from workbench.report.frames import SESSION_COLUMNS, frame_of, frame_of_table
 from workbench.report.session_frames import captures_frame, readings_frame, residuals_frame, spots_frame
+from workbench.session.capture_table import first_time_ns, part_name, seconds_after
 from workbench.session.frames import read_image
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_manifest, load_session_rig
@@ -131,8 +132,13 @@ class Session:
             raise BadInputError(f"without: no capture has the standoff {min(unknown):g} mm")
         kept = captures[~captures["standoff_mm"].isin(excluded)]
         scene = kept["scene"].where(kept["scene"] != "", kept["placement"])
+        taken = [self._captures[key] for key in kept["capture"]]
+        zero_ns = first_time_ns(taken)
+        times_s = [seconds_after(zero_ns, capture) for capture in taken]
+        parts = [part_name(capture) for capture in taken]
         columns = ["laser_id", "standoff_mm", "repeat", "on", "off", "scene", "standoff_sd_mm"]
-        return kept.assign(scene=scene)[columns].reset_index(drop=True)
+        found = kept.assign(scene=scene, time_s=times_s, part=parts)
+        return found[[*columns, "time_s", "part"]].reset_index(drop=True)
 
     def frame(self, capture: str, off: bool = False) -> Image:
         """A frame, (height, width), uint8 or uint16: lasers on, or all off.
