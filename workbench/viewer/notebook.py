@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,6 +12,10 @@ from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.viewer.recording import RECORDING_FILE, rebuild
+
+ASSETS = ("RERUN_NOTEBOOK_ASSET", "serve-local")
+"""Read by rerun-notebook when it is imported: the page loads the viewer from this computer. Its default is a
+server of Rerun, which needs a network."""
 
 
 def notebook_viewer(
@@ -27,6 +32,7 @@ def notebook_viewer(
     Raises:
         BadInputError: the package rerun-notebook is missing, or a frame is missing or has changed.
     """
+    os.environ.setdefault(*ASSETS)
     try:
         from rerun_notebook import Viewer
     except ImportError:
