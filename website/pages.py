@@ -25,6 +25,7 @@ COPIED = (
     "CONTRIBUTING.md",
     "LICENSE",
     "README.md",
+    "website/iframe-worker.js",
 )
 """Files and folders of the repository that are pages, or that pages link."""
 LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc", "*.o", "*.elf", "*.hex")
