@@ -119,8 +119,8 @@ def _at_set_up(
     """One target at one range, n lasers.
 
     Returns:
-        Errors (n,) of the ranges; their derivatives (n, P) by the parameters; their change (n,) with the
-        angle by its standard uncertainty; covariance (n, n) of everything else at this set-up.
+        Errors (n,) of the ranges, and their derivatives (n, P) by the parameters. Their change (n,) by one
+        standard uncertainty of the angle. Covariance (n, n) of everything else at this set-up.
     """
     parameters, points = sensor.calibration.laser_ranger.parameters, one.points
     columns = [parameters.names.index(name) for name in TARGET_TILT]
