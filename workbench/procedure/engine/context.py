@@ -60,7 +60,9 @@ class Context:
     pairs: PairSource = field(init=False)
 
     def __post_init__(self) -> None:
-        self.pairs = PairSource(self.session_dir, self.rig, self.bench)
+        parts = [capture.part for capture in self.recorder.complete_captures]
+        part = max(parts) + (not self.bench.rests) if parts else 0
+        self.pairs = PairSource(self.session_dir, self.rig, self.bench, part=part)
 
     def emit(self, event: ev.Event) -> ev.Record:
         """Journal an event, then pass it to every consumer."""
@@ -176,6 +178,11 @@ class Context:
         camera.discard_frames = measured.frames
         self.emit(measured)
         return measured
+
+    def continue_clock(self) -> None:
+        """Set simulated time to the last capture that counts; called before those of each placement."""
+        counted = (*self.recorder.complete_captures, *self.captures)
+        self.bench.clock.continue_after(max((capture.time_ns for capture in counted), default=0))
 
     def check_stop(self) -> None:
         """Raise an error if a stop was requested.

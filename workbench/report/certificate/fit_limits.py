@@ -85,5 +85,5 @@ def _placement_scale(calibration: Calibration | None) -> float | None:
 
 
 def _drift_px(fit: FitFinished) -> float | None:
-    found = [abs(one.value) for one in fit.parameters if one.name in DRIFT]
-    return max(found, default=None)
+    recorded = fit.drift_px or [one.value for one in fit.parameters if one.name in DRIFT]
+    return max(map(abs, recorded), default=None)
