@@ -143,8 +143,7 @@ def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Recor
     if context.pairs.replayed is not None:
         return context.emit(context.pairs.replayed.placed), context.pairs.replayed.placed.placement
     measured = answer.value if isinstance(answer.value, float) else asked.standoff_mm
-    again = sum(event.key == asked.key for event in context.recorder.set_aside(asked.key))
-    attempt = 1 + context.recorder.repairs.attempts[asked.key] + again
+    attempt = 1 + context.recorder.repairs.attempts[asked.key]
     wanted = asked.model_copy(update={"standoff_mm": measured, "attempt": attempt})
     placed = context.bench.target.place(wanted)
     # Not before the target stands there: until then the frames so far belong to valid records.
