@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from tests.support.simulated_trials import SimulatedBench
 from workbench.procedure.engine.step import flat_placement
 from workbench.trials.accuracy.agreement import Agreement
-from workbench.trials.accuracy.ranges import Reference, range_errors
+from workbench.trials.accuracy.ranges import range_errors
 from workbench.trials.accuracy.trial import PlacementReadings, agreements
+from workbench.trials.reference import Reference
 
 STANDOFFS_MM = (140.0, 250.0, 500.0, 1100.0, 2000.0, 3800.0)
 
@@ -19,8 +20,9 @@ def accuracy_run(
     """Agreement of every range in one run."""
     visited = []
     for standoff_mm in standoffs_mm:
-        reference = Reference.of(bench.rig.bench, standoff_mm, None)
-        both = bench.readings("a", flat_placement("a", standoff_mm), count)
+        placement = flat_placement("a", standoff_mm)
+        reference = Reference.of(bench.rig.bench, placement)
+        both = bench.readings("a", placement, count)
         errors = [range_errors(bench.ranger.sensor, reading, taken, reference) for taken, reading in both]
         visited.append(PlacementReadings([taken for taken, _ in both], reference, errors))
     return agreements(bench.ranger.sensor, bench.rig.bench.ruler_scale.sd, visited)

@@ -65,8 +65,13 @@ class ReadingTaken(FileModel):
     """Stated standard uncertainty of `range_mm`."""
     spot_sd_mm: float | None = None
     """Part of `sigma_mm` by noise and speckle of the spots, not of the calibration; None: unknown."""
+    flat_true_mm: float | None = None
+    """True range of a flat target: the standoff with the ruler's scale and the tilt of the rail as stated in
+    the rig file; None: the standoff."""
     reference_sd_mm: float | None = None
     """Reference uncertainty of the true range; None if unknown."""
+    placement_sd_mm: float | None = None
+    """Part of `reference_sd_mm` that differs between placements; None if unknown."""
     true: TrueValues | None = None
     """True values of a reading of the closest range; None: the range is that of a flat at `standoff_mm`."""
     closest_mm: float | None = None
@@ -99,7 +104,9 @@ class ReadingTaken(FileModel):
     @property
     def reference_mm(self) -> float:
         """True value of `range_mm`."""
-        return self.standoff_mm if self.true is None else self.true.range_mm
+        if self.true is not None:
+            return self.true.range_mm
+        return self.standoff_mm if self.flat_true_mm is None else self.flat_true_mm
 
     @property
     def error_mm(self) -> float | None:

@@ -54,6 +54,8 @@ class Reading:
     flat_sigma_mm: float | None = None
     flat_spot_sd_mm: float | None = None
     """Standard deviation of `flat_mm` by noise and speckle of the spots alone."""
+    flat_at_mm: tuple[float, float] = (0.0, 0.0)
+    """Mean x and y of the spots, weighted likewise: the point whose range is `flat_mm`."""
     notes: tuple[str, ...] = ()
     """Reasons of missing ranges, and remarks on uncertain ones."""
 
@@ -304,8 +306,16 @@ class Ranger:
             flat_mm,
             flat_sigma_mm,
             flat_spot_sd_mm,
+            self._mean_place(ids, ranges),
             tuple(all_notes),
         )
+
+    def _mean_place(self, ids: Sequence[str], ranges: RangeEstimates) -> tuple[float, float]:
+        weight = ranges.spot_sd_mm**-2
+        x, y = (
+            float(np.average(self.sensor.places(ids, axis, ranges)[0], weights=weight)) for axis in ("u", "v")
+        )
+        return x, y
 
     def _no_spot_note(self, laser_id: str, range_mm: float) -> str:
         if self.sensor.in_frame(laser_id, np.array([range_mm]))[0]:

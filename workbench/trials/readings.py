@@ -16,6 +16,7 @@ from workbench.ranging.ranger import Ranger, Reading
 from workbench.ranging.shape import Shape
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.spots import Finding
+from workbench.trials.reference import Reference
 from workbench.trials.targets import TargetSpec, front_axis, true_values
 
 
@@ -117,7 +118,8 @@ def reading_taken(
     closest: ClosestRange | None = None,
 ) -> ReadingTaken:
     """Reading as it is journalled; arguments as of `take_readings`."""
-    stated = placement.standoff_sd_mm
+    reference = Reference.of(rig.bench, placement)
+    tilt = reference.at_point(reading.flat_at_mm)
     taken = ReadingTaken(
         trial=name,
         scene=reading.scene,
@@ -127,7 +129,9 @@ def reading_taken(
         range_mm=reading.flat_mm,
         sigma_mm=reading.flat_sigma_mm,
         spot_sd_mm=reading.flat_spot_sd_mm,
-        reference_sd_mm=rig.bench.placement_sd_mm if stated is None else stated,
+        flat_true_mm=reference.true_mm(tilt),
+        reference_sd_mm=reference.sd_mm(tilt),
+        placement_sd_mm=reference.own_sd_mm(tilt),
         closest_mm=reading.closest_mm,
         closest_sigma_mm=reading.sigma_mm,
         shape=", ".join(line.shape.kind for line in reading.lines),
@@ -152,6 +156,8 @@ def _closest_reading(taken: ReadingTaken, reading: Reading, closest: ClosestRang
             "range_mm": reading.closest_mm,
             "sigma_mm": reading.sigma_mm,
             "spot_sd_mm": None,
+            "flat_true_mm": None,
+            "placement_sd_mm": None,
             **_interval(reading),
             "true": closest.true,
             "reference_sd_mm": closest.true.range_sd_mm,

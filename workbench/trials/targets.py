@@ -18,6 +18,7 @@ from workbench.model.rig import LARGEST, BenchSpec, ImageAxis, NonNegativeFloat,
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 from workbench.model.yamlfile import FileModel
 from workbench.sensor.calibrated import CalibratedSensor
+from workbench.trials.reference import ON_AXIS, Reference, front_ends
 
 RULER_DECIMALS = 1
 """Decimals of a standoff in mm that is asked for: a ruler can be read to 0.1 mm."""
@@ -114,34 +115,30 @@ def target_placement(spec: TargetSpec, key: str, range_mm: float, rig: Rig) -> P
 def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, rig: Rig) -> TrueValues:
     """True values at a placement as measured; the front is that of the calibration.
 
-    The closest range of a flat target has the uncertainty of its squareness too: its near end is closer. The
-    tilt common to all placements, as measured, adds to a set angle, and its uncertainty to that of the angle.
+    The closest range of a flat target is that of its near end: closer on average, with the uncertainty of its
+    squareness. The tilt common to all placements, as measured, adds to a set angle, and its uncertainty to
+    that of the angle. The uncertainties of ranges contain the ruler's scale.
     """
-    bench, stated = rig.bench, placed.standoff_sd_mm
-    standoff_sd_mm = bench.placement_sd_mm if stated is None else stated
+    reference = Reference.of(rig.bench, placed)
+    on_axis_mm, on_axis_sd_mm = reference.true_mm(ON_AXIS), reference.sd_mm(ON_AXIS)
     if isinstance(spec, FlatTargetSpec):
-        tilt_sd = radians(hypot(bench.tilt_sd_deg, bench.target_tilt_sd_deg))
-        lead_sd_mm = tilt_sd * _half_front_mm(sensor)
-        range_mm = placed.standoff_mm - _tilt_lead_mm(bench, sensor)
-        return TrueValues(range_mm=range_mm, range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm))
+        tilt = reference.at_near_end(front_ends(sensor))
+        return TrueValues(range_mm=reference.true_mm(tilt), range_sd_mm=reference.sd_mm(tilt))
     front = sensor.front_mm(front_axis(spec))
     if isinstance(spec, CylinderSpec):
-        recess_mm = _cylinder_recess_mm(spec, front)
-        radius_sd_mm = spec.diameter_sd_mm / 2
         return TrueValues(
-            range_mm=placed.standoff_mm + recess_mm,
-            range_sd_mm=standoff_sd_mm,
+            range_mm=on_axis_mm + _cylinder_recess_mm(spec, front),
+            range_sd_mm=on_axis_sd_mm,
             radius_mm=spec.diameter_mm / 2,
-            radius_sd_mm=radius_sd_mm,
+            radius_sd_mm=spec.diameter_sd_mm / 2,
         )
-    angle_deg = _angle_deg(spec, bench)
-    lead_mm = _lead_mm(angle_deg, front)
+    angle_deg = _angle_deg(spec, rig.bench)
     arm_mm = abs(front[0] if angle_deg > 0 else front[1])
-    angle_sd_deg = hypot(spec.reference_sd_deg, bench.target_tilt_sd_deg)
+    angle_sd_deg = hypot(spec.reference_sd_deg, rig.bench.target_tilt_sd_deg)
     lead_sd_mm = arm_mm / cos(radians(angle_deg)) ** 2 * radians(angle_sd_deg)
     return TrueValues(
-        range_mm=placed.standoff_mm - lead_mm,
-        range_sd_mm=hypot(standoff_sd_mm, lead_sd_mm),
+        range_mm=on_axis_mm - _lead_mm(angle_deg, front),
+        range_sd_mm=hypot(on_axis_sd_mm, lead_sd_mm),
         angle_deg=angle_deg,
         set_deg=spec.angle_deg,
         angle_sd_deg=angle_sd_deg,
@@ -154,12 +151,6 @@ def _rig_front(spec: TargetSpec, rig: Rig) -> list[float]:
     return [(laser.x_mm if axis == "u" else laser.y_mm).value for laser in rig.lasers if laser.axis == axis]
 
 
-def _half_front_mm(sensor: CalibratedSensor) -> float:
-    """Largest distance of a laser from the optical axis along its line: the arm of a target's tilt."""
-    axes: tuple[ImageAxis, ...] = ("u", "v")
-    return max(abs(end) for axis in axes if len(sensor.lasers_on(axis)) for end in sensor.front_mm(axis))
-
-
 def _angle_deg(spec: InclineSpec, bench: BenchSpec) -> float:
     """Angle to the sensor: as set, with the tilt common to all placements as measured."""
     common_deg = bench.target_yaw_deg if spec.axis == "vertical" else bench.target_pitch_deg
@@ -170,16 +161,6 @@ def _lead_mm(angle_deg: float, front_mm: Sequence[float]) -> float:
     """Distance by which the near end of the front is closer than the optical axis."""
     slope = tan(radians(angle_deg))
     return max(-slope * end for end in front_mm)
-
-
-def _tilt_lead_mm(bench: BenchSpec, sensor: CalibratedSensor) -> float:
-    """Distance by which the near end of a flat target is closer, by the common tilt as measured."""
-    tilts: dict[ImageAxis, float] = {"u": bench.target_yaw_deg, "v": bench.target_pitch_deg}
-    return max(
-        _lead_mm(angle_deg, sensor.front_mm(axis)) if angle_deg else 0.0
-        for axis, angle_deg in tilts.items()
-        if len(sensor.lasers_on(axis))
-    )
 
 
 def _cylinder_recess_mm(spec: CylinderSpec, front_mm: tuple[float, float]) -> float:

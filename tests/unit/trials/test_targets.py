@@ -117,7 +117,7 @@ def test_two_lasers_measure_no_cylinder() -> None:
         target_placement(CylinderSpec(kind="cylinder", diameter_mm=500.0), "k", 400.0, two_laser_rig())
 
 
-def test_the_near_end_of_a_flat_target_has_the_uncertainty_of_its_squareness() -> None:
+def test_the_near_end_of_a_flat_target_is_closer_by_its_squareness() -> None:
     bench = RIG.bench.model_copy(
         update={"tilt_sd_deg": 0.3, "target_tilt_sd_deg": 0.4, "placement_sd_mm": 0.2}
     )
@@ -126,6 +126,8 @@ def test_the_near_end_of_a_flat_target_has_the_uncertainty_of_its_squareness() -
     true = true_values(spec, target_placement(spec, "k", 400.0, rig), SENSOR, rig)
     random = np.random.default_rng(5)
     tilt = np.radians(0.5) * random.standard_normal(20_000)
-    ends_mm = 0.2 * random.standard_normal(20_000) + 60.0 * np.tan(tilt)
+    ends_mm = 0.2 * random.standard_normal(20_000) - 60.0 * np.abs(np.tan(tilt))
     # The relative standard deviation of a variance of 20 000 trials is 1 %.
-    assert true.range_sd_mm**2 == pytest.approx(ends_mm.var(), rel=0.05)
+    scale_mm = rig.bench.ruler_scale.sd * 400.0
+    assert true.range_sd_mm**2 == pytest.approx(ends_mm.var() + scale_mm**2, rel=0.07)
+    assert true.range_mm == pytest.approx(400.0 + ends_mm.mean(), abs=0.02)

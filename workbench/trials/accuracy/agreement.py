@@ -14,8 +14,9 @@ from math import hypot, inf, sqrt
 import numpy as np
 
 from workbench.model.arrays import FloatArray
-from workbench.trials.accuracy.ranges import RangeError, Reference, Sensitivities
+from workbench.trials.accuracy.ranges import RangeError, Sensitivities
 from workbench.trials.errors import EXPANSION
+from workbench.trials.reference import Reference, TiltEffect
 from workbench.trials.statistics.bias import BiasTest, ErrorSources, bias_test, en_score
 from workbench.trials.statistics.coverage import clopper_pearson, effective_number
 from workbench.trials.statistics.error_budget import BudgetTest, ErrorBudget, budget_test
@@ -49,7 +50,6 @@ class PlacementErrors:
     @classmethod
     def of(cls, reference: Reference, found: Sequence[RangeError]) -> PlacementErrors:
         """Errors of the readings at one placement."""
-        arms = np.mean([one.sensitivities.arms_mm for one in found], axis=0)
         return cls(
             reference,
             np.array([one.error_mm for one in found]),
@@ -58,7 +58,7 @@ class PlacementErrors:
                 np.mean([one.sensitivities.by_parameter for one in found], axis=0),
                 sqrt(float(np.mean([one.sensitivities.spot_sd_mm**2 for one in found]))),
                 float(np.mean([one.sensitivities.speckle_share for one in found])),
-                (float(arms[0]), float(arms[1])),
+                TiltEffect.mean([one.sensitivities.tilt for one in found]),
             ),
         )
 
@@ -70,7 +70,7 @@ class PlacementErrors:
     @property
     def true_mm(self) -> float:
         """True range."""
-        return self.reference.true_mm(self.sensitivities.arms_mm)
+        return self.reference.true_mm(self.sensitivities.tilt)
 
 
 @dataclass(frozen=True)
@@ -128,17 +128,12 @@ class Agreement:
     @cached_property
     def placement_mm(self) -> FloatArray:
         """(p,) 1 sigma by the placement with its tilt."""
-        return np.array([one.reference.own_sd_mm(one.sensitivities.arms_mm) for one in self.placements])
+        return np.array([one.reference.own_sd_mm(one.sensitivities.tilt) for one in self.placements])
 
     @cached_property
     def common_mm(self) -> FloatArray:
-        """(p, 2) 1 sigma by the tilt common to all placements, about the vertical and the horizontal."""
-        return np.array(
-            [
-                [one.reference.common_tilt_sd * arm for arm in one.sensitivities.arms_mm]
-                for one in self.placements
-            ]
-        )
+        """(p, 2) 1 sigma by the tilt common to all placements, signed."""
+        return np.array([one.sensitivities.tilt.common_mm for one in self.placements])
 
     @cached_property
     def covariance(self) -> FloatArray:

@@ -55,7 +55,7 @@ def accuracy_row(readings: Sequence[ReadingTaken]) -> AccuracyRow:
             missing=len(readings),
             reference_sd_mm=readings[0].reference_sd_mm,
         )
-    error = ranges - standoff_mm
+    error = np.array([r.error_mm for r in readings if r.error_mm is not None])
     return AccuracyRow(
         standoff_mm=standoff_mm,
         readings=len(ranges),

@@ -13,12 +13,13 @@ from workbench.procedure.engine.context import Context
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.accuracy.agreement import Agreement, Bench, PlacementErrors
 from workbench.trials.accuracy.limits import AccuracyLimits
-from workbench.trials.accuracy.ranges import CLOSEST, MEAN, RangeError, Reference, range_errors
+from workbench.trials.accuracy.ranges import CLOSEST, MEAN, RangeError, range_errors
 from workbench.trials.accuracy.statistics import accuracy_row
 from workbench.trials.accuracy.tables import accuracy_table, detail_tables, verdict_table
 from workbench.trials.accuracy.verdict import results_of, verdict_of
 from workbench.trials.limits import check_results, require_readings
 from workbench.trials.readings import take_full_reading
+from workbench.trials.reference import Reference
 from workbench.trials.trial_run import TrialRun
 
 
@@ -45,7 +46,7 @@ def run_trial(
     ranger = run.ranger
 
     def work(placement: Placement) -> PlacementReadings:
-        reference = Reference.of(context.rig.bench, placement.standoff_mm, placement.standoff_sd_mm)
+        reference = Reference.of(context.rig.bench, placement)
         both = [take_full_reading(context, ranger, name, placement, number) for number in range(count)]
         errors = [range_errors(ranger.sensor, reading, taken, reference) for taken, reading in both]
         return PlacementReadings([taken for taken, _ in both], reference, errors)

@@ -44,7 +44,8 @@ CAPTION = (
 def budget_table(name: str, frame: pd.DataFrame) -> Table:
     """Table of the budget, one row per standoff, and one for all standoffs together.
 
-    The error of the calibration is common to all readings and no source of their variance.
+    The errors of the calibration, of the ruler's scale and of the tilt common to all placements are common to
+    all readings and no source of their variance.
 
     Args:
         name: name of the table.
@@ -74,11 +75,11 @@ def _budget(used: pd.DataFrame, repeats: Autocorrelation) -> ErrorBudget:
         TooFewReadingsError: the readings have no precision, or an uncertainty is unknown.
     """
     found = repeatability(used, repeats)
-    stated = used[["spot_u_mm", "reference_u_mm"]]
+    stated = used[["spot_u_mm", "placement_u_mm"]]
     if stated.isna().to_numpy().any():
         raise TooFewReadingsError("expected the uncertainties of spots and placements, got unknown ones")
-    mean_squares = (stated**2).mean()
-    sources = {str(source): float(np.sqrt(square)) for source, square in mean_squares.items()}
+    spot_mm, placement_mm = np.sqrt((stated**2).mean()).tolist()
+    sources = {"spot_u_mm": spot_mm, "reference_u_mm": placement_mm}
     if not sum(sources.values()) > 0:
         raise TooFewReadingsError("expected stated uncertainties above 0 mm")
     return ErrorBudget(found.unbiased_variance, found.reproducibility.degrees_of_freedom, sources)

@@ -62,7 +62,7 @@ def laser_errors(reference: Reference, checks: Sequence[PlacementCheck]) -> Lase
 
 def _at_placement(reference: Reference, check: PlacementCheck) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Errors (n,), derivatives by the true parameters (n, P + 3), and covariance (n, n) by the placement."""
-    expected_mm = check.standoff_mm + check.by_shared @ reference.shared
+    expected_mm = check.true_mm(reference)
     ratio = (expected_mm + reference.offset_mm) / (check.laser_mm + reference.offset_mm)
     by_parameter = ratio[:, None] ** 2 * check.by_parameter
     # A shift of all ranges is ratio x shift, however large: an unmeasured standoff hides the pinhole's.

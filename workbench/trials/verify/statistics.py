@@ -12,6 +12,7 @@ from workbench.model.arrays import FloatArray
 from workbench.model.event import LaserRange, ReadingTaken
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.errors import EXPANSION
+from workbench.trials.reference import true_ranges_mm
 from workbench.trials.target_check import Points, fit_plane
 from workbench.trials.verify.reference import Reference
 
@@ -52,10 +53,15 @@ class PlacementCheck:
         """Mean range of the lasers; None without any range."""
         return float(self.weight @ self.laser_mm) if len(self.laser_mm) else None
 
-    @property
-    def error_mm(self) -> float | None:
-        """Measured - true."""
-        return None if self.range_mm is None else self.range_mm - self.standoff_mm
+    def true_mm(self, reference: Reference) -> FloatArray:
+        """(n,) expected true ranges of the lasers, with the ruler's scale and the target's common tilt."""
+        return true_ranges_mm(self.standoff_mm, reference.shared, self.place_mm)
+
+    def error_mm(self, reference: Reference) -> float | None:
+        """Measured - true mean range; None without any range."""
+        if not len(self.laser_mm):
+            return None
+        return float(self.weight @ (self.laser_mm - self.true_mm(reference)))
 
     @property
     def by_shared(self) -> FloatArray:

@@ -57,7 +57,7 @@ def verify_tables(
     rows = [_row(sensor, measured[0], check) for check in measured[1]]
     if other is not None:
         for row, check in zip(rows, other[1], strict=True):
-            row["other_error_mm"] = check.error_mm
+            row["other_error_mm"] = check.error_mm(other[0])
             row["other_expanded_mm"] = predicted_mm(other[0], check) if check.readings else None
     columns = (*COLUMNS, *OTHER) if other is not None else COLUMNS
     return [
@@ -114,7 +114,7 @@ def _row(sensor: CalibratedSensor, reference: Reference, check: PlacementCheck) 
     row: dict[str, Cell] = {"standoff_mm": check.standoff_mm, "readings": check.readings}
     if (nearest := nearest_cross_validation(sensor.calibration, check.standoff_mm)) is not None:
         row |= {"cross_validated_mm": nearest.error_mm, "cross_validated_at_mm": nearest.standoff_mm}
-    error_mm = check.error_mm
+    error_mm = check.error_mm(reference)
     if error_mm is None:
         return row
     expanded_mm = predicted_mm(reference, check)

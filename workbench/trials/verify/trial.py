@@ -12,6 +12,7 @@ from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.trials.limits import Result, check_results, require_readings
 from workbench.trials.readings import take_readings
+from workbench.trials.reference import standoff_sd_mm
 from workbench.trials.trial_run import TrialRun
 from workbench.trials.verify.changes import changes
 from workbench.trials.verify.compared import compared_sensor
@@ -47,7 +48,7 @@ def run_trial(context: Context, name: str, step: VerifyTrialStep) -> str:
 
     def work(placed: Placement) -> Checked:
         readings = take_readings(context, run.ranger, name, placed, step.readings)
-        return Checked(readings, check_placement(sensor, readings, readings[0].reference_sd_mm or 0.0))
+        return Checked(readings, check_placement(sensor, readings, standoff_sd_mm(placed, context.rig.bench)))
 
     unmeasured, *measured = step.placements(name, context.rig)
     first = run.visit([unmeasured], work)
@@ -66,7 +67,7 @@ def verify_results(reference: Reference, checks: Sequence[PlacementCheck]) -> li
     """Mean errors at every standoff with their U, for limits."""
     found = []
     for check in checks:
-        of, error_mm = f"{check.standoff_mm:g} mm", check.error_mm
+        of, error_mm = f"{check.standoff_mm:g} mm", check.error_mm(reference)
         expanded_mm = None if error_mm is None else predicted_mm(reference, check)
         relative = [None if one is None else one / check.standoff_mm for one in (error_mm, expanded_mm)]
         found += [

@@ -13,8 +13,9 @@ from workbench.model.rig import BenchSpec
 from workbench.model.target import Placement
 from workbench.ranging.ranger import Reading
 from workbench.sensor.calibrated import CalibratedSensor
-from workbench.trials.accuracy.ranges import CLOSEST, MEAN, Reference, range_errors
+from workbench.trials.accuracy.ranges import CLOSEST, MEAN, range_errors
 from workbench.trials.readings import reading_taken
+from workbench.trials.reference import Reference
 
 STANDOFF_MM = 500.0
 
@@ -43,22 +44,13 @@ def test_each_range_has_an_error_of_its_own() -> None:
 
 def test_a_measured_tilt_of_the_rail_is_no_error() -> None:
     """The lasers are some 0.1 mm beside their design, and parallel to the axis to 5 mrad."""
-    bench = BenchSpec(target_yaw_deg=2.0)
-    reference = Reference.of(bench, STANDOFF_MM, None)
+    bench = BenchSpec(target_yaw_deg=2.0, target_tilt_sd_deg=0.0)
+    reference = Reference.of(bench, Placement(key="t/1", standoff_mm=STANDOFF_MM))
     ranges_mm = {i: STANDOFF_MM + tan(radians(2.0)) * x for i, x in zip(IDS, X_MM, strict=True)}
     found = errors(ranges_mm, reference)
     assert [abs(found[i]) for i in IDS] == pytest.approx([0.0] * 4, abs=0.3)
     assert found[CLOSEST] == pytest.approx(0.0, abs=0.3)
     assert abs(errors(ranges_mm, Reference(STANDOFF_MM, 0.3))["L1"]) == pytest.approx(2.1, abs=0.3)
-
-
-def test_the_reference_adds_tilt_by_the_distance_from_the_axis() -> None:
-    reference = Reference.of(BenchSpec(tilt_sd_deg=0.5, target_tilt_sd_deg=0.2), STANDOFF_MM, 0.3)
-    assert reference.own_sd_mm((0.0, 0.0)) == pytest.approx(0.3)
-    assert reference.own_sd_mm((60.0, 0.0)) == pytest.approx(np.hypot(0.3, 60 * radians(0.5)))
-    assert reference.sd_mm((0.0, -60.0)) == pytest.approx(
-        np.hypot(0.3, 60 * np.hypot(radians(0.5), radians(0.2)))
-    )
 
 
 def test_sensitivities_are_the_derivatives_of_the_ranges() -> None:

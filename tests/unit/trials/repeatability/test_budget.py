@@ -12,10 +12,13 @@ from workbench.trials.repeatability.budget import COLUMNS, budget_table
 from workbench.trials.statistics.error_budget import ALARM_PROBABILITY
 
 
-def stated(frame: pd.DataFrame, spot_u_mm: float = 0.3, reference_u_mm: float = 0.5) -> pd.DataFrame:
-    """Readings with these uncertainties, and a calibration of 0.1 mm."""
+def stated(frame: pd.DataFrame, spot_u_mm: float = 0.3, placement_u_mm: float = 0.5) -> pd.DataFrame:
+    """Readings with these uncertainties, calibration and common tilt of 0.1 mm."""
     return frame.assign(
-        spot_u_mm=spot_u_mm, reference_u_mm=reference_u_mm, stated_u_mm=np.hypot(spot_u_mm, 0.1)
+        spot_u_mm=spot_u_mm,
+        placement_u_mm=placement_u_mm,
+        reference_u_mm=np.hypot(placement_u_mm, 0.1),
+        stated_u_mm=np.hypot(spot_u_mm, 0.1),
     )
 
 
@@ -57,7 +60,7 @@ def test_intervals_that_hold_cover_all_placements() -> None:
     assert row["coverage_low"] < row["coverage"]
 
 
-@pytest.mark.parametrize("column", ["spot_u_mm", "reference_u_mm"])
+@pytest.mark.parametrize("column", ["spot_u_mm", "placement_u_mm"])
 def test_unknown_uncertainties_are_stated_in_words(column: str) -> None:
     (row,) = budget_table("t", stated(drawn_levels(1, [300.0])).assign(**{column: np.nan})).records()
     assert (row["observed_sd_mm"], row["alarm"]) == (None, None)

@@ -7,7 +7,8 @@ import pytest
 
 from tests.support.drawn_sensors import flat_readings
 from tests.support.rangers import thesis_ranger
-from tests.support.rigs import thesis_rig
+from tests.support.rigs import prior, thesis_rig
+from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.verify.changes import Change
 from workbench.trials.verify.reference import Reference
 from workbench.trials.verify.statistics import check_placement, predicted_mm
@@ -17,10 +18,8 @@ from workbench.trials.verify.verdict import Verdict
 SENSOR = thesis_ranger().sensor
 REFERENCE = Reference.own(SENSOR, thesis_rig().bench)
 VERDICT = Verdict(True, "the ranges agree", "keep the calibration")
-CHECKS = [
-    check_placement(SENSOR, flat_readings(SENSOR, mm, 3, np.random.default_rng(1), 0.3), 0.3)
-    for mm in (300.0, 1000.0)
-]
+READINGS = [flat_readings(SENSOR, mm, 3, np.random.default_rng(1), 0.3) for mm in (300.0, 1000.0)]
+CHECKS = [check_placement(SENSOR, readings, 0.3) for readings in READINGS]
 
 
 def test_the_verdict_comes_first_and_errors_stand_beside_cross_validation() -> None:
@@ -34,10 +33,19 @@ def test_the_verdict_comes_first_and_errors_stand_beside_cross_validation() -> N
 
 
 def test_errors_by_another_calibration_stand_beside() -> None:
-    _, errors = verify_tables("v.1", SENSOR, (REFERENCE, CHECKS), VERDICT, (REFERENCE, CHECKS))
-    for row in errors.records():
-        assert row["other_error_mm"] == row["error_mm"]
-        assert row["other_expanded_mm"] == row["expanded_mm"]
+    """The other calibration has a focal length longer by 1 %, and another ruler."""
+    geometry = SENSOR.calibration.geometry()
+    other = CalibratedSensor(SENSOR.calibration, {"f_px": 1.01 * geometry["f_px"]})
+    bench = thesis_rig().bench.model_copy(update={"ruler_scale": prior(0.001, 0.002)})
+    reference = Reference.own(other, bench)
+    checks = [check_placement(other, readings, 0.3) for readings in READINGS]
+    _, errors = verify_tables("v.1", SENSOR, (REFERENCE, CHECKS), VERDICT, (reference, checks))
+    for row, own, by_other in zip(errors.records(), CHECKS, checks, strict=True):
+        assert row["error_mm"] == own.error_mm(REFERENCE)
+        assert row["expanded_mm"] == predicted_mm(REFERENCE, own)
+        assert row["other_error_mm"] == by_other.error_mm(reference)
+        assert row["other_expanded_mm"] == predicted_mm(reference, by_other)
+        assert by_other.error_mm(reference) == pytest.approx(0.009 * own.standoff_mm, rel=0.3)
 
 
 def test_a_calibration_without_cross_validation_has_empty_cells() -> None:
