@@ -175,5 +175,5 @@ def _values(sd: float) -> FloatArray:
     """Equally probable values of a normal error with this standard deviation; a single 0 without one."""
     if sd == 0:
         return np.zeros(1)
-    values = np.asarray(ndtri((np.arange(NODES) + 0.5) / NODES), np.float64)
-    return sd * values / values.std()
+    values: FloatArray = np.asarray(ndtri((np.arange(NODES) + 0.5) / NODES), np.float64)
+    return np.asarray(sd * values / values.std(), np.float64)

@@ -15,6 +15,7 @@ COLUMNS = (
     Column(key="readings", name="n"),
     Column(key="missing", name="missing"),
     Column(key="placements", name="placements"),
+    Column(key="sessions", name="sessions"),
     Column(key="mean_error_mm", name="mean error", unit="mm", format="+.3g"),
     Column(key="mean_low_mm", name="low", unit="mm", format="+.3g"),
     Column(key="mean_high_mm", name="high", unit="mm", format="+.3g"),
@@ -26,8 +27,8 @@ COLUMNS = (
     Column(key="note", name="note"),
 )
 CAPTION = (
-    "low, high: 95 % interval of the mean error over placements (Student); se of mean: standard error, at one"
-    " placement only that of its repeats"
+    "mean error: mean over placements, with several sessions over sessions; low, high: its 95 % interval over"
+    " these (Student); se of mean: standard error, at one placement only that of its repeats"
 )
 
 
@@ -46,12 +47,16 @@ def accuracy_table(name: str, frame: pd.DataFrame) -> Table:
 def _row(standoff_mm: float, readings: pd.DataFrame, repeats: Autocorrelation) -> dict[str, Cell]:
     used = readings.dropna(subset=["error_mm"]).sort_values("repeat", kind="stable")
     error = used["error_mm"].to_numpy(np.float64)
-    means = used.groupby(["session", "placement"])["error_mm"].mean().to_numpy(np.float64)
+    by_placement = used.groupby(["session", "placement"])["error_mm"].mean()
+    by_session = by_placement.groupby("session").mean()
+    # Placements of one session share its error: with several, sessions are the independent values.
+    means = (by_session if len(by_session) > 1 else by_placement).to_numpy(np.float64)
     row: dict[str, Cell] = {
         "standoff_mm": standoff_mm,
         "readings": len(error),
         "missing": len(readings) - len(error),
-        "placements": len(means),
+        "placements": len(by_placement),
+        "sessions": len(by_session),
     }
     if not len(error):
         return row | {"note": "no statistics: no reading has a range"}

@@ -42,6 +42,24 @@ def test_interval_of_the_mean_counts_placements_and_covers_95_percent() -> None:
     assert inside / trials == pytest.approx(0.95, abs=spread(0.95, trials))
 
 
+@pytest.mark.parametrize(
+    ("design", "sds"),
+    [((2, 8, 3), (0.5, 0.2, 0.1)), ((5, 4, 3), (0.5, 0.2, 0.1)), ((3, 8, 3), (0.3, 0.3, 0.3))],
+)
+def test_interval_of_the_mean_counts_sessions_if_there_are_several(
+    design: tuple[int, int, int], sds: tuple[float, float, float]
+) -> None:
+    trials, inside = 200, 0
+    for seed in range(trials):
+        found = row(drawn_levels(seed, [400.0], design, sds))
+        assert (found["sessions"], found["placements"]) == (design[0], design[0] * design[1])
+        low, high = found["mean_low_mm"], found["mean_high_mm"]
+        assert isinstance(low, float)
+        assert isinstance(high, float)
+        inside += low <= 0 <= high
+    assert inside / trials == pytest.approx(0.95, abs=spread(0.95, trials))
+
+
 def test_one_placement_has_no_interval_of_its_mean_error() -> None:
     found = row(drawn_levels(1, [400.0], (1, 1, 5)))
     assert (found["mean_low_mm"], found["mean_high_mm"]) == (None, None)
