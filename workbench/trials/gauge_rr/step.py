@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import sqrt
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -12,11 +13,15 @@ from workbench.model.fields import Count, Standoff, require_different
 from workbench.model.limit import Limit
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
+from workbench.model.stats import chi2_isf
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import flat_placement
 from workbench.trials.trial_step import ResultLimits, TrialStepModel
+
+LOWER_TAIL = 0.025
+"""Probability below a two-sided 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +68,21 @@ class GaugeTrialStep(TrialStepModel):
     @property
     def title(self) -> str:
         """Design, and the components of variance that it separates."""
+        parts, operators = len(self.standoffs_mm), len(self.operators)
+        error, appraisers = parts * operators * (self.trials - 1), operators - 1
+        crossed = (parts - 1) * appraisers
         return (
-            f"Gauge R&R, {len(self.standoffs_mm)} standoffs x {len(self.operators)} operators x {self.trials}"
-            " placements: separates re-placements, operators and their interaction with standoffs"
+            f"Gauge R&R, {parts} standoffs x {operators} operators x {self.trials} placements: separates"
+            f" re-placements ({error} degrees of freedom), operators ({appraisers}: the upper end of GRR is"
+            f" {self._widest:.2g} times its value if they dominate) and their interaction with standoffs"
+            f" ({crossed})"
         )
+
+    @property
+    def _widest(self) -> float:
+        """Upper end of the 95 % interval of a standard deviation between operators, over its value."""
+        dof = len(self.operators) - 1
+        return float(sqrt(dof / chi2_isf(1.0 - LOWER_TAIL, dof)))
 
     def rounds(self, name: str) -> Iterator[Round]:
         """Passes in order: every operator once, then every operator again."""

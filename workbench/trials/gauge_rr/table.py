@@ -11,6 +11,7 @@ from workbench.model.chart import Axis, Chart, Series
 from workbench.model.errors import BadInputError
 from workbench.model.table import Cell, Column, Table
 from workbench.trials.reading_frame import table_of
+from workbench.trials.statistics.estimate import Estimate
 from workbench.trials.statistics.gauge_rr import GaugeStudy, gauge_rr
 
 COLUMNS = (
@@ -51,7 +52,8 @@ def gauge_table(name: str, frame: pd.DataFrame) -> Table:
         return table_of(name, TITLE, COLUMNS, [row], "")
     caption = (
         f"{study.parts} standoffs, {study.operators} operators, {study.trials} trials of each;"
-        f" {len(used) / len(trials):.3g} readings a trial; low, high: 95 % interval; ndc: distinct categories"
+        f" {len(used) / len(trials):.3g} readings a trial; low, high: 95 % interval; ndc: distinct"
+        " categories; PV, study variation and ndc follow from the choice of standoffs"
     )
     return table_of(name, TITLE, COLUMNS, _rows(study), caption)
 
@@ -60,12 +62,7 @@ def _rows(study: GaugeStudy) -> list[dict[str, Cell]]:
     categories = study.distinct_categories
     pooled = f"pooled with EV (p = {study.interaction_probability:.2g})"
     rows: list[dict[str, Cell]] = [
-        {
-            "component": "EV (repeatability)",
-            "sd_mm": study.equipment.value,
-            "low_mm": study.equipment.low,
-            "high_mm": study.equipment.high,
-        },
+        {"component": "EV (repeatability)", **_sd_cells(study, study.equipment)},
         {"component": "AV (operators)", "sd_mm": study.appraiser},
         {
             "component": "interaction",
@@ -74,9 +71,7 @@ def _rows(study: GaugeStudy) -> list[dict[str, Cell]]:
         },
         {
             "component": "GRR",
-            "sd_mm": study.gauge.value,
-            "low_mm": study.gauge.low,
-            "high_mm": study.gauge.high,
+            **_sd_cells(study, study.gauge),
             "distinct_categories": categories if isfinite(categories) else None,
         },
         {"component": "PV (standoffs)", "sd_mm": study.part},
@@ -88,6 +83,16 @@ def _rows(study: GaugeStudy) -> list[dict[str, Cell]]:
         if isinstance(sd, float) and study.total > 0:
             row["study_variation"] = sd / study.total
     return rows
+
+
+def _sd_cells(study: GaugeStudy, found: Estimate) -> dict[str, Cell]:
+    """Standard deviation, its interval if it holds, and its degrees of freedom or why there is none."""
+    if study.has_intervals:
+        note = f"{found.degrees_of_freedom:.3g} degrees of freedom"
+        return {"sd_mm": found.value, "low_mm": found.low, "high_mm": found.high, "note": note}
+    p = study.homogeneity_probability
+    note = f"no interval: repeatability differs between standoffs or operators (p = {p:.2g})"
+    return {"sd_mm": found.value, "note": note}
 
 
 def gauge_chart(name: str, frame: pd.DataFrame) -> Chart:

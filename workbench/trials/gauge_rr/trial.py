@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from workbench.model.event import ReadingTaken
 from workbench.model.number_text import counted
 from workbench.model.table import Table
@@ -14,6 +16,9 @@ from workbench.trials.reading_frame import reading_frame, reading_rows
 from workbench.trials.readings import take_readings
 from workbench.trials.results import write_readings
 from workbench.trials.trial_run import TrialRun
+
+MOST_CATEGORIES = 1e6
+"""Number of categories that stands for the infinite one of a gauge without scatter."""
 
 
 def run_trial(context: Context, name: str, step: GaugeTrialStep) -> str:
@@ -54,8 +59,14 @@ def gauge_results(table: Table) -> list[Result]:
     """
     (row,) = [one for one in table.records() if one["component"] == "GRR"]
     found = {column.key: cell_number(row[column.key]) for column in table.columns}
+    sd_mm, low_mm, high_mm = (found[key] for key in ("sd_mm", "low_mm", "high_mm"))
+    if sd_mm is not None and low_mm is None:
+        low_mm, high_mm = 0.0, inf  # without an interval no limit is decided
+    categories = found["distinct_categories"]
+    if sd_mm == 0 and found["study_variation"] == 0:
+        categories = MOST_CATEGORIES
     return [
-        Result("gauge_sd_mm", "GRR", found["sd_mm"], found["low_mm"], found["high_mm"]),
+        Result("gauge_sd_mm", "GRR", sd_mm, low_mm, high_mm),
         Result("study_variation", "GRR", found["study_variation"]),
-        Result("distinct_categories", "GRR", found["distinct_categories"]),
+        Result("distinct_categories", "GRR", categories),
     ]

@@ -2,7 +2,8 @@
 
 Variance components follow from expected mean squares of the random model. The interaction is pooled with the
 repeatability if its F test gives p > 0.25, as in AIAG's manual. Intervals: modified large-sample method
-(Burdick, Borror and Montgomery, Journal of Quality Technology 35, 2003).
+(Burdick, Borror and Montgomery, Journal of Quality Technology 35, 2003). They assume equal repeatability of
+all parts and operators, which Cochran's test checks.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from scipy.stats import f as f_distribution
 from workbench.model.errors import BadInputError
 from workbench.trials.statistics.estimate import Estimate, require, sd_estimate
 from workbench.trials.statistics.mean_squares import combined_sd
+from workbench.trials.statistics.repeatability import largest_variance_probability
 
 POOLING_PROBABILITY = 0.25
 """The interaction is pooled if its p value is above this (AIAG)."""
+HETEROGENEOUS_PROBABILITY = 0.05
+"""P value below which the repeatability differs between parts or operators: no pooled interval holds."""
 NDC_FACTOR = 1.41
 """Number of distinct categories = 1.41 PV / GRR (AIAG)."""
 
@@ -40,10 +44,17 @@ class GaugeStudy:
     """PV: between parts."""
     interaction_probability: float
     """p value of the interaction's F test."""
+    homogeneity_probability: float
+    """p value of equal repeatability of all parts and operators, which the intervals assume."""
     parts: int
     operators: int
     trials: int
     """Number of trials of each part by each operator."""
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether the intervals of EV and GRR hold: the repeatability does not differ significantly."""
+        return self.homogeneity_probability >= HETEROGENEOUS_PROBABILITY
 
     @property
     def total(self) -> float:
@@ -119,10 +130,27 @@ def gauge_rr(readings: pd.DataFrame) -> GaugeStudy:
         gauge=_gauge(squares, squares.error + interaction + appraiser),
         part=float(np.sqrt(part)),
         interaction_probability=probability,
+        homogeneity_probability=_homogeneity_probability(readings),
         parts=parts,
         operators=operators,
         trials=trials,
     )
+
+
+def _homogeneity_probability(readings: pd.DataFrame) -> float:
+    """P value of equal variances within cells: Cochran's test over parts, and over operators (Bonferroni).
+
+    The variances of a part's (an operator's) cells are pooled. That of a single cell has few degrees of
+    freedom, and a test over cells would rarely find a repeatability that grows with the range.
+    """
+    cells = readings.groupby(["part", "operator"])["measured_mm"].var(ddof=1)
+    trials = len(readings) / len(cells)
+    found = []
+    for name in ("part", "operator"):
+        pooled = cells.groupby(name).mean()
+        dof = (trials - 1) * len(cells) / len(pooled)
+        found.append(largest_variance_probability(np.asarray(pooled, np.float64), dof))
+    return min(1.0, 2.0 * min(found))
 
 
 def _gauge(squares: _CrossedSquares, variance: float) -> Estimate:

@@ -165,12 +165,23 @@ def cochran(readings: pd.DataFrame) -> OutlierTest:
     groups = readings.groupby("placement")["error_mm"]
     variances = groups.var(ddof=1).dropna()
     require(len(variances), 2, "placements with two readings")
-    count, total = len(variances), float(variances.sum())
     dof = float(groups.count()[variances.index].mean()) - 1
-    largest = float(variances.max()) / total if total > 0 else 1 / count
+    values: FloatArray = np.asarray(variances, np.float64)
+    probability = largest_variance_probability(values, dof)
+    return OutlierTest(variances.idxmax(), _largest_share(values), probability)
+
+
+def largest_variance_probability(variances: FloatArray, dof: float) -> float:
+    """P value of Cochran's test of the largest of n variances, each with `dof` degrees of freedom."""
+    count, largest = len(variances), _largest_share(variances)
     ratio = np.inf if largest >= 1 else largest * (count - 1) / (1 - largest)
-    probability = min(1.0, count * float(f_distribution.sf(ratio, dof, (count - 1) * dof)))
-    return OutlierTest(variances.idxmax(), largest, probability)
+    return min(1.0, count * float(f_distribution.sf(ratio, dof, (count - 1) * dof)))
+
+
+def _largest_share(variances: FloatArray) -> float:
+    """Cochran's C; 1 / n if all variances are 0."""
+    total = float(variances.sum())
+    return float(variances.max()) / total if total > 0 else 1 / len(variances)
 
 
 def grubbs(means: pd.Series[float]) -> OutlierTest:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
+import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from tests.support.running import two_laser_rig
 from tests.support.steps import parse_step, wrong_keys
@@ -48,3 +52,14 @@ def test_each_change_of_operator_is_a_prompt() -> None:
 def test_title_names_design_and_components() -> None:
     title = parse_step(DESIGN).title
     assert all(word in title for word in ("2 standoffs", "2 operators", "2 placements", "interaction"))
+
+
+@pytest.mark.parametrize(("operators", "dofs"), [("A, B", [8, 1, 3]), ("A, B, C", [12, 2, 6])])
+def test_title_has_the_degrees_of_freedom_of_each_component(operators: str, dofs: list[int]) -> None:
+    """8 = 4 standoffs x 2 operators x (2 - 1) placements."""
+    text = f"step: gauge_rr_trial, standoffs_mm: [480, 490, 500, 510], operators: [{operators}], trials: 2"
+    title = parse_step(text).title
+    found = [int(number) for number in re.findall(r"\((\d+)", title)]
+    assert found == dofs
+    widest = float(np.sqrt(dofs[1] / chi2.ppf(0.025, dofs[1])))
+    assert f"{widest:.2g} times" in title

@@ -7,10 +7,16 @@ import pandas as pd
 import pytest
 
 from tests.support.trial_readings import drawn_levels
+from workbench.model.limit import Limit
 from workbench.trials.gauge_rr.table import COLUMNS, gauge_chart, gauge_table
+from workbench.trials.gauge_rr.trial import gauge_results
 from workbench.trials.statistics.gauge_rr import gauge_rr
 
 STANDOFFS_MM = (300.0, 301.0, 302.0, 303.0)
+
+
+def limit(low: float | None, high: float | None) -> Limit:
+    return Limit.model_validate({"in": [low, high]})
 
 
 def study(seed: int = 1, repeats: int = 1) -> pd.DataFrame:
@@ -28,6 +34,30 @@ def test_components_are_those_of_the_statistics() -> None:
     assert rows["GRR"]["study_variation"] == pytest.approx(found.gauge_share)
     assert rows["TV"]["study_variation"] == pytest.approx(1)
     assert list(rows) == ["EV", "AV", "interaction", "GRR", "PV", "TV"]
+
+
+def test_without_equal_repeatability_there_is_no_interval_and_no_decision() -> None:
+    """The repeatability at the last standoff is ten times that at the others."""
+    frame = study()
+    factor = np.where(frame["standoff_mm"] == STANDOFFS_MM[-1], 10.0, 1.0)
+    random = np.random.default_rng(3)
+    error = 0.3 * factor * random.standard_normal(len(frame))
+    table = gauge_table("t", frame.assign(error_mm=error))
+    rows = {str(row["component"]).split()[0]: row for row in table.records()}
+    for name in ("EV", "GRR"):
+        assert isinstance(rows[name]["sd_mm"], float)
+        assert (rows[name]["low_mm"], rows[name]["high_mm"]) == (None, None)
+        assert str(rows[name]["note"]).startswith("no interval")
+    decisions = [
+        one.decision(limit(None, 1e5)) for one in gauge_results(table) if one.quantity == "gauge_sd_mm"
+    ]
+    assert decisions == ["neither"]
+
+
+def test_a_gauge_without_scatter_passes_a_limit_on_categories() -> None:
+    results = {one.quantity: one for one in gauge_results(gauge_table("t", study().assign(error_mm=0.0)))}
+    assert results["distinct_categories"].decision(limit(5.0, None)) == "pass"
+    assert results["study_variation"].decision(limit(None, 0.1)) == "pass"
 
 
 def test_lengths_in_mm_have_that_unit() -> None:

@@ -84,6 +84,18 @@ def test_interval_of_grr_covers_93_to_97_percent(interaction: float) -> None:
     assert 0.93 - spread(0.93, trials) < covered < 0.97 + spread(0.97, trials)
 
 
+def test_unequal_repeatability_is_found_and_an_equal_one_seldom_reported() -> None:
+    """Two operators; sd = hypot(0.3, 1.6 (z / 2000)^2) mm at 300 to 2000 mm, and 0.3 mm everywhere."""
+    random, trials = np.random.default_rng(12), 300
+    z = np.array([300.0, 500.0, 800.0, 1300.0, 2000.0])
+    without = []
+    for sd in (np.hypot(0.3, 1.6 * (z / 2000) ** 2), np.full(5, 0.3)):
+        fits = [gauge_rr(frame(z + sd * random.standard_normal((2, 3, 5)))) for _ in range(trials)]
+        without.append(np.mean([not one.has_intervals for one in fits]))
+    assert without[0] > 0.8 - spread(0.8, trials)
+    assert without[1] < 0.05 + spread(0.05, trials)
+
+
 @pytest.mark.parametrize("shape", [(1, 2, 5), (3, 1, 5), (3, 2, 1)])
 def test_studies_without_degrees_of_freedom_are_refused(shape: tuple[int, int, int]) -> None:
     with pytest.raises(TooFewReadingsError):
