@@ -97,7 +97,7 @@ pictures: $(INSTALLED)
 	$(BIN)/python -m tests.viewer.pictures docs/images
 
 docs: $(INSTALLED)
-	$(BIN)/python -m website
+	$(BIN)/python -m tests.website
 
 schema: $(INSTALLED)
 	$(BIN)/python -c 'import json; from workbench.model.calibration import Calibration; print(json.dumps(Calibration.model_json_schema(), indent=2))' > docs/calibration.schema.json

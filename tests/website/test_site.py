@@ -10,8 +10,8 @@ import pytest
 
 import workbench
 from tests.support.browser import headless_browser
-from website.build import build
-from website.pages import gather
+from tests.website.build import build
+from tests.website.pages import gather
 
 SEARCH_S = 30.0
 OTHER_SERVER = re.compile(r"<(?:script|link|img|iframe)[^>]+(?:src|href)=\"(https?:)?//")

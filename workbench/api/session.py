@@ -25,6 +25,7 @@ from workbench.report.session_frames import (
     residuals_frame,
     spots_frame,
 )
+from workbench.session.capture_table import first_time_ns, part_name, seconds_after
 from workbench.session.frames import read_image
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_manifest, load_session_rig
@@ -140,8 +141,13 @@ class Session:
             raise BadInputError(f"without: no capture has the standoff {min(unknown):g} mm")
         kept = captures[~captures["standoff_mm"].isin(excluded)]
         scene = kept["scene"].where(kept["scene"] != "", kept["placement"])
+        taken = [self._captures[key] for key in kept["capture"]]
+        zero_ns = first_time_ns(taken)
+        times_s = [seconds_after(zero_ns, capture) for capture in taken]
+        parts = [part_name(capture) for capture in taken]
         columns = ["laser_id", "standoff_mm", "repeat", "on", "off", "scene", "standoff_sd_mm"]
-        return kept.assign(scene=scene)[columns].reset_index(drop=True)
+        found = kept.assign(scene=scene, time_s=times_s, part=parts)
+        return found[[*columns, "time_s", "part"]].reset_index(drop=True)
 
     def frame(self, capture: str, off: bool = False) -> Image:
         """A frame, (height, width), uint8 or uint16: lasers on, or all off.

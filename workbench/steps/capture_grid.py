@@ -19,6 +19,8 @@ from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.lasers import capture_lasers
 from workbench.procedure.engine.limits import capture_limit_prompts, check_captures
 from workbench.procedure.engine.placements import visit_placements
+from workbench.procedure.engine.plan import takes_added
+from workbench.procedure.engine.prompts import placement_prompts
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import Step, StepModel, flat_placement
 from workbench.procedure.engine.visiting_order import RETURN_AT, returned, shuffled
@@ -83,20 +85,21 @@ class CaptureGridStep(StepModel):
             _advise(context)
             return pairs
 
-        placements = [*self.placements(name, context.rig), *self._added(context, name)]
+        placements = [*self.placements(name, context.rig)]
+        if takes_added(context.steps, context.step_index):
+            placements += self._added_placements(name, context.recorder.repairs.added_mm)
         return counted(sum(visit_placements(context, placements, work)), "pair")
 
-    def _added(self, context: Context, name: str) -> list[Placement]:
-        """Placements that repairs have added, in the last grid before the fit."""
-        upcoming = _next_fit(context.steps, context.step_index)
-        if upcoming is None:
-            return []
-        later = context.steps[context.step_index + 1 :]
-        if any(isinstance(step, CaptureGridStep) for step in later[: later.index(upcoming[1])]):
-            return []
+    def added_prompts(self, name: str, rig: Rig, added_mm: Sequence[float]) -> Sequence[Prompt]:
+        """Prompts of the added placements, then those of limits with `on_fail: ask`."""
+        added = self._added_placements(name, added_mm)
+        return [*placement_prompts(added), *capture_limit_prompts(added, rig, self.limits)]
+
+    def _added_placements(self, name: str, added_mm: Sequence[float]) -> list[Placement]:
+        """Placements that repairs have added after the step's own."""
         visited = list(self.visits_mm)
         added = []
-        for standoff_mm in context.recorder.repairs.added_mm:
+        for standoff_mm in added_mm:
             number = visited.count(standoff_mm) + 1
             visited.append(standoff_mm)
             added.append(flat_placement(name, standoff_mm, number if number > 1 else None))

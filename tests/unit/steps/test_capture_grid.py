@@ -45,6 +45,13 @@ def test_prompts_are_those_of_placements_and_of_limits_that_ask() -> None:
     assert keys[2:] == [f"p.1/{mm}mm/{one}/snr" for mm in (300, 600) for one in ("L1", "L2")]
 
 
+def test_prompts_of_added_placements_are_those_of_placements_and_of_limits_that_ask() -> None:
+    limits = "limits: {snr: {in: [5, null], on_fail: ask}}"
+    step = parse_step(f"step: capture_grid, standoffs_mm: [300, 600], repeats: 1, {limits}")
+    keys = [prompt.key for prompt in step.added_prompts("p.1", two_laser_rig(), (600.0,))]
+    assert keys == ["p.1/02-600mm", "p.1/02-600mm/L1/snr", "p.1/02-600mm/L2/snr"]
+
+
 def test_it_counts_the_pairs_that_it_took(tmp_path: Path) -> None:
     skip = Answer(action="skip", reason="no room")
     step = parse_step("step: capture_grid, standoffs_mm: [400, 600], repeats: 2")

@@ -1,4 +1,4 @@
-"""Build the site: `python -m website [--without-figures] [FOLDER]`; every warning is an error.
+"""Build the site: `python -m tests.website [--without-figures] [FOLDER]`; every warning is an error.
 
 FOLDER gets the configuration, the gathered pages, and the site.
 """
@@ -9,8 +9,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from website.build import build
-from website.pages import ROOT, gather
+from tests.website.build import build
+from tests.website.pages import ROOT, gather
 
 
 def main() -> int:

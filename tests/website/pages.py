@@ -8,11 +8,11 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from website.commands import commands_page
-from website.notebooks import write_notebook
-from website.python_interface import interface_page
+from tests.website.commands import commands_page
+from tests.website.notebooks import write_notebook
+from tests.website.python_interface import interface_page
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 COPIED = (
     "docs",
     "data/README.md",
@@ -25,7 +25,7 @@ COPIED = (
     "CONTRIBUTING.md",
     "LICENSE",
     "README.md",
-    "website/iframe-worker.js",
+    "tests/website/iframe-worker.js",
 )
 """Files and folders of the repository that are pages, or that pages link."""
 LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc", "*.o", "*.elf", "*.hex")

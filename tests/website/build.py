@@ -18,7 +18,7 @@ def build(folder: Path) -> subprocess.CompletedProcess[str]:
     """
     config = shutil.copy(CONFIG, folder)
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", str(config)]
-    # Material announces its end of life, and that of MkDocs 1: docs/decisions/0009-documentation-site.md.
+    # Material announces its end of life, and that of MkDocs 1: docs/decisions/0010-documentation-site.md.
     environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
     return subprocess.run(  # noqa: S603  # no shell
         command, env=environment, capture_output=True, text=True, check=False

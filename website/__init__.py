@@ -1,1 +1,0 @@
-"""Documentation site: pages gathered from the repository, built by MkDocs with the theme Material."""
