@@ -111,8 +111,8 @@ def uncertainty_table(found: Sequence[RangeUncertainty]) -> Table:
         ),
         rows=tuple(_row(one, shown) for one in found),
         caption=(
-            "U -: no spot in the image. nu -: infinite. Extrapolated: outside the covered standoffs, not"
-            " certified."
+            "U -: no spot in the image. k and nu: of the mean; nu -: infinite. Extrapolated: outside the"
+            " covered standoffs, not certified."
         ),
     )
 
