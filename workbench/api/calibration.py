@@ -37,12 +37,13 @@ from workbench.session.manifest import workbench_version
 class Calibration:
     """A calibrated sensor with its uncertainty.
 
-    >>> import workbench as wb
-    >>> calibration = wb.load_calibration("data/session-0.1.0/calibration.yaml")
-    >>> calibration.verdict
-    'accepted'
-    >>> calibration.parameters.loc["f_px", ["unit", "determined_by"]].tolist()
-    ['px', 'joint']
+    Examples:
+        >>> import workbench as wb
+        >>> calibration = wb.load_calibration("data/session-0.1.0/calibration.yaml")
+        >>> calibration.verdict
+        'accepted'
+        >>> calibration.parameters.loc["f_px", ["unit", "determined_by"]].tolist()
+        ['px', 'joint']
     """
 
     file: CalibrationFile
@@ -220,10 +221,11 @@ def fit(
 def compare(a: Calibration | str | Path, b: Calibration | str | Path) -> CalibrationComparison:
     """Compare two calibrations of one sensor, or their files, over the ranges and lasers that both have.
 
-    >>> import workbench as wb
-    >>> calibration = wb.load_calibration("data/session-0.1.0/calibration.yaml")
-    >>> wb.compare(calibration, calibration).identical
-    True
+    Examples:
+        >>> import workbench as wb
+        >>> calibration = wb.load_calibration("data/session-0.1.0/calibration.yaml")
+        >>> wb.compare(calibration, calibration).identical
+        True
 
     Raises:
         BadInputError: image size, lasers or standoffs differ.

@@ -15,10 +15,11 @@ from workbench.model.rig import Rig
 def with_prior(rig: str | Path | Rig, name: str, value: float | None = None, sd: float | None = None) -> Rig:
     """A rig that knows one parameter otherwise, for `fit`, `design` and `simulate`.
 
-    >>> import workbench as wb
-    >>> rig = wb.with_prior("rigs/thesis-emulated.yaml", "L1.x_mm", sd=0.02)
-    >>> rig.lasers[0].x_mm.value, rig.lasers[0].x_mm.sd
-    (-60.0, 0.02)
+    Examples:
+        >>> import workbench as wb
+        >>> rig = wb.with_prior("rigs/thesis-emulated.yaml", "L1.x_mm", sd=0.02)
+        >>> rig.lasers[0].x_mm.value, rig.lasers[0].x_mm.sd
+        (-60.0, 0.02)
 
     Args:
         rig: a rig file, or its contents.

@@ -58,12 +58,13 @@ class Trial:
 class Session:
     """A session folder; see `open_session`.
 
-    >>> import workbench as wb
-    >>> session = wb.open_session("data/session-0.1.0")
-    >>> session.captures.groupby("laser_id").size().to_dict()
-    {'L1': 3, 'L4': 3, 'all': 1}
-    >>> session.spots.loc[0, ["u_px", "v_px"]].round(1).tolist()
-    [262.6, 249.6]
+    Examples:
+        >>> import workbench as wb
+        >>> session = wb.open_session("data/session-0.1.0")
+        >>> session.captures.groupby("laser_id").size().to_dict()
+        {'L1': 3, 'L4': 3, 'all': 1}
+        >>> session.spots.loc[0, ["u_px", "v_px"]].round(1).tolist()
+        [262.6, 249.6]
     """
 
     folder: Path

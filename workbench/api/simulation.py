@@ -41,10 +41,11 @@ def simulate(
 ) -> Simulation:
     """Draw sensors from the tolerances of a rig, calibrate each, and range with each.
 
-    >>> import workbench as wb
-    >>> simulation = wb.simulate("rigs/thesis-emulated.yaml", n=16, standoffs=[200, 600, 2000])
-    >>> simulation.parameters["sensor"].nunique()
-    16
+    Examples:
+        >>> import workbench as wb
+        >>> simulation = wb.simulate("rigs/thesis-emulated.yaml", n=16, standoffs=[200, 600, 2000])
+        >>> simulation.parameters["sensor"].nunique()
+        16
 
     Args:
         rig: a rig file, or its contents.

@@ -166,7 +166,7 @@ class WallClock:
         return time.time_ns()
 
     def continue_after(self, time_ns: int) -> None:
-        """Do nothing: real time goes on by itself."""
+        """Return at once: real time cannot be set."""
 
 
 @dataclass(frozen=True)

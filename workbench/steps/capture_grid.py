@@ -20,8 +20,9 @@ from workbench.procedure.engine.lasers import capture_lasers
 from workbench.procedure.engine.limits import capture_limit_prompts, check_captures
 from workbench.procedure.engine.placements import visit_placements
 from workbench.procedure.engine.plan import takes_added
-from workbench.procedure.engine.prompts import placement_prompts
+from workbench.procedure.engine.prompts import placement_prompts, standoff_prompt
 from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.standoff_check import check_standoff
 from workbench.procedure.engine.step import Step, StepModel, flat_placement
 from workbench.procedure.engine.visiting_order import RETURN_AT, returned, shuffled
 from workbench.steps.fit import FitStep
@@ -72,9 +73,12 @@ class CaptureGridStep(StepModel):
         return len(self.visits_mm) * self.repeats * len(rig.lasers)
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Prompts of the placements, then those of limits with `on_fail: ask`."""
-        limits = capture_limit_prompts(self.placements(name, rig), rig, self.limits)
-        return [*super().prompts(name, rig), *limits]
+        """Prompts of the placements, then those of limits with `on_fail: ask` and of doubtful standoffs."""
+        return self._prompts(self.placements(name, rig), rig)
+
+    def _prompts(self, placements: Sequence[Placement], rig: Rig) -> Sequence[Prompt]:
+        limits = capture_limit_prompts(placements, rig, self.limits)
+        return [*placement_prompts(placements), *limits, *map(standoff_prompt, placements)]
 
     def run(self, context: Context, name: str) -> str:
         """Capture at every placement; raises the errors of `visit_placements` and `check_captures`."""
@@ -82,6 +86,7 @@ class CaptureGridStep(StepModel):
         def work(placement: Placement) -> int:
             pairs = capture_lasers(context, placement, self.repeats)
             check_captures(context, name, placement, self.limits)
+            _check_standoff(context, placement)
             _advise(context)
             return pairs
 
@@ -91,9 +96,8 @@ class CaptureGridStep(StepModel):
         return counted(sum(visit_placements(context, placements, work)), "pair")
 
     def added_prompts(self, name: str, rig: Rig, added_mm: Sequence[float]) -> Sequence[Prompt]:
-        """Prompts of the added placements, then those of limits with `on_fail: ask`."""
-        added = self._added_placements(name, added_mm)
-        return [*placement_prompts(added), *capture_limit_prompts(added, rig, self.limits)]
+        """Prompts of the added placements; see `prompts`."""
+        return self._prompts(self._added_placements(name, added_mm), rig)
 
     def _added_placements(self, name: str, added_mm: Sequence[float]) -> list[Placement]:
         """Placements that repairs have added after the step's own."""
@@ -104,6 +108,13 @@ class CaptureGridStep(StepModel):
             visited.append(standoff_mm)
             added.append(flat_placement(name, standoff_mm, number if number > 1 else None))
         return added
+
+
+def _check_standoff(context: Context, placement: Placement) -> None:
+    """Compare the standoff with its prediction where a fit follows; not beside a board, as in `_advise`."""
+    upcoming = _next_fit(context.steps, context.step_index)
+    if upcoming is not None and not context.boards:
+        check_standoff(context, placement, len(upcoming[0]))
 
 
 def _advise(context: Context) -> None:

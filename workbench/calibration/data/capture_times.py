@@ -1,6 +1,6 @@
 """Times of the captures of a session, and its uninterrupted parts, as a drift of the image needs them.
 
-A drift goes on while the bench runs. After an interruption (a resumed or repaired session) the sensor may
+A drift continues while the bench runs. After an interruption (a resumed or repaired session) the sensor may
 have cooled or been moved, so that the image may begin anywhere. The running time therefore stands still
 between two parts, and every part has an offset of its own (`model.parameters.STEP`).
 """

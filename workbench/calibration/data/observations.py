@@ -213,10 +213,10 @@ def _mean_times(
     """`MeanObservations.time` and `MeanObservations.parts` of N cells."""
     number = {id(s): n for n, s in enumerate(captured)}
     own = [[number[id(s)] for s in members] for members in cells]
-    shares = np.eye(len(times.limits))[times.part]
+    shares = np.eye(max(len(times.limits), 1))[times.part]
     return (
         np.array([np.mean(times.time[one]) for one in own]),
-        np.array([np.mean(shares[one], axis=0) for one in own]).reshape(len(own), -1),
+        np.array([np.mean(shares[one], axis=0) for one in own]).reshape(-1, shares.shape[1]),
     )
 
 
