@@ -49,8 +49,8 @@ class Signer:
         """The document with its signature as the last element."""
         from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
         from lxml import etree
-        from signxml import XMLSigner
         from signxml.algorithms import CanonicalizationMethod, SignatureConstructionMethod, SignatureMethod
+        from signxml.signer import XMLSigner
 
         is_rsa = isinstance(_private_key(self.key), RSAPrivateKey)
         signer = XMLSigner(
