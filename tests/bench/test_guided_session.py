@@ -493,7 +493,8 @@ def test_the_doctor_finds_what_is_wrong(tmp_path: Path, emulator: str, bad: set[
     assert {finding.part for finding in found if not finding.ok} == bad
     fixed = "exposure_s" in emulator
     exposure = [] if fixed else ["exposure"]
-    parts = ["controller", "interlock", "camera", "latency", *exposure, "laser L1", "laser L4"]
+    automatic = [*exposure, "automatic control"]
+    parts = ["controller", "interlock", "camera", "latency", *automatic, "laser L1", "laser L4"]
     assert [f.part for f in found] == parts
 
 

@@ -114,6 +114,37 @@ def test_a_spoilt_placement_is_captured_again_and_nothing_else(copy: Path) -> No
     assert kept == old, "the captures that do not count are kept"
 
 
+@pytest.mark.parametrize("copy", ["good"], indirect=True)
+def test_captures_that_were_replaced_are_restored_and_exchanged_again(copy: Path) -> None:
+    first = results(copy)
+    repair(copy, recapture=("300",))
+    second = results(copy)
+    assert second["captures.csv"] != first["captures.csv"]
+    repair(copy, restore=("300",))
+    assert results(copy) == first
+    repair(copy, restore=("300",))
+    assert results(copy) == second
+
+
+@pytest.mark.parametrize("copy", ["good"], indirect=True)
+def test_captures_are_restored_after_a_recapture_that_was_stopped(copy: Path) -> None:
+    first = results(copy)
+    with pytest.raises(StoppedError):
+        repair(copy, stop_after=2, recapture=("300",))
+    repair(copy, restore=("300",))
+    assert results(copy) == first
+
+
+@pytest.mark.parametrize("copy", ["good"], indirect=True)
+def test_captures_whose_frames_are_gone_are_not_restored(copy: Path) -> None:
+    repair(copy, recapture=("300",))
+    shutil.rmtree(copy / "set-aside")
+    before = (copy / "journal.jsonl").read_bytes()
+    with pytest.raises(BadInputError, match="300mm"):
+        repair(copy, restore=("300",))
+    assert (copy / "journal.jsonl").read_bytes() == before
+
+
 @pytest.mark.parametrize("copy", ["refused"], indirect=True)
 def test_a_repair_that_is_stopped_goes_on_and_gives_the_same(copy: Path) -> None:
     other = shutil.copytree(copy.parent, copy.parent.with_name("g")) / "s"
@@ -152,6 +183,16 @@ def test_a_standoff_is_added_to_a_finished_session(copy: Path) -> None:
     sd = np.array([c.laser_ranger.parameters.sd for c in (before, calibration(copy))])
     assert (sd[1] <= 1.01 * sd[0]).all(), "but for the changed values at which they are computed"
     assert (sd[1] < sd[0]).any()
+
+
+@pytest.mark.parametrize("copy", ["good"], indirect=True)
+def test_the_prompt_of_an_added_placement_is_answered_from_a_file(copy: Path) -> None:
+    answers = copy.parent / "answers.yaml"
+    answers.write_text("short.1/900mm: 905\n")
+    command: list[str | Path] = [SCRIPT, "repair", "s", "--add", "900", "--reason", "r", "--answers", answers]
+    done = subprocess.run(command, cwd=copy.parent, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert 905.0 in standoffs(copy)
 
 
 @pytest.mark.parametrize("copy", ["good"], indirect=True)

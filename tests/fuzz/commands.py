@@ -5,6 +5,7 @@ The large libraries are imported once, before the forks; none of them has starte
 
 from __future__ import annotations
 
+import math
 import os
 import random
 import resource
@@ -13,10 +14,10 @@ import shutil
 import signal
 import sys
 import tempfile
+import time
 import traceback
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 
@@ -29,9 +30,9 @@ from tests.fuzz.doors import (
     RIG,
     ROOT,
     SESSION,
-    first_lines,
 )
 from tests.fuzz.mutation import mutate_bytes
+from tests.fuzz.outcome import Outcome
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import WorkbenchError
 
@@ -93,20 +94,14 @@ COMMANDS: tuple[tuple[str, str], ...] = (
 """Mutated file, and the command that reads it."""
 
 
-@dataclass
-class Commands:
-    """Commands that were run, by exit code, and what was found."""
-
-    codes: dict[int, int] = field(default_factory=dict)
-    found: dict[str, bytes] = field(default_factory=dict)
-
-
-def fuzz_commands(folder: Path, count: int, number: int) -> Commands:
-    """Run `count` commands on mutated files, the same for the same seed `number`."""
+def fuzz_commands(folder: Path, count: int, number: int, end_s: float = math.inf) -> Outcome:
+    """Run `count` commands on mutated files, the same for the same seed `number`; none after `end_s`."""
     for name in LIBRARIES:
         import_module(name)
-    rng, outcome = random.Random(number), Commands()  # noqa: S311 - no secret
+    rng, outcome = random.Random(number), Outcome()  # noqa: S311 - no secret
     for index in range(count):
+        if time.monotonic() >= end_s:
+            break
         mutated, line = COMMANDS[index % len(COMMANDS)]
         _lay_out(folder)
         content = mutate_bytes(SEEDS[mutated], rng)
@@ -119,10 +114,12 @@ def fuzz_commands(folder: Path, count: int, number: int) -> Commands:
     return outcome
 
 
-def fuzz_part(count: int, number: int) -> Commands:
-    """`fuzz_commands` in a folder of its own."""
+def fuzz_part(count: int, number: int, end_s: float = math.inf) -> Outcome:
+    """`fuzz_commands` in a folder of its own; nothing after `end_s`."""
+    if time.monotonic() >= end_s:
+        return Outcome()
     with tempfile.TemporaryDirectory() as folder:
-        return fuzz_commands(Path(folder) / "here", count, number)
+        return fuzz_commands(Path(folder) / "here", count, number, end_s)
 
 
 def _lay_out(folder: Path) -> None:
@@ -133,7 +130,7 @@ def _lay_out(folder: Path) -> None:
         (folder / name).write_bytes(first)
 
 
-def _run(folder: Path, arguments: Sequence[str], outcome: Commands, existing: Path) -> list[str]:
+def _run(folder: Path, arguments: Sequence[str], outcome: Outcome, existing: Path) -> list[str]:
     """What is wrong with one command."""
     out, err = folder / "stdout", folder / "stderr"
     before = set((folder / "out").iterdir())
@@ -147,7 +144,7 @@ def _run(folder: Path, arguments: Sequence[str], outcome: Commands, existing: Pa
         os.kill(pid, signal.SIGKILL)
     _, status, usage = os.wait4(pid, 0)
     code = os.waitstatus_to_exitcode(status)
-    outcome.codes[code] = outcome.codes.get(code, 0) + 1
+    outcome.results[f"exit {code}:"] += 1
     wrong = [] if code in CODES else [f"exit code {code}: {_last_line(err)}"]
     if b"Traceback (most recent call last)" in err.read_bytes():
         wrong.append(f"traceback: {_last_line(err)}")
@@ -184,6 +181,7 @@ def _child(folder: Path, arguments: Sequence[str], out: Path, err: Path) -> None
     """Run the command and end; never returns."""
     try:
         os.setsid()
+        signal.alarm(int(MOST_WALL_S))
         limit = int(2 * MOST_CPU_S)
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
         for number, path in ((0, Path(os.devnull)), (1, out), (2, err)):
@@ -208,10 +206,3 @@ def _child(folder: Path, arguments: Sequence[str], out: Path, err: Path) -> None
             sys.stdout.flush()
             sys.stderr.flush()
     os._exit(code)
-
-
-def report(outcome: Commands) -> list[str]:
-    """Lines for the terminal."""
-    total = sum(outcome.codes.values())
-    codes = ", ".join(f"exit {code}: {count}" for code, count in sorted(outcome.codes.items()))
-    return [f"commands        {total:7d}   {codes}", *first_lines(outcome.found, len(outcome.found))]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import os
 import random
 import resource
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import islice
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -19,6 +19,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis.strategies import SearchStrategy
 
 from tests.fuzz.mutation import edited_documents, edited_texts, mutate_bytes
+from tests.fuzz.outcome import Outcome
 from workbench.corners.board import find_board
 from workbench.model.board import Board
 from workbench.model.calibration import load_calibration
@@ -60,22 +61,6 @@ class Door:
     """Share of the inputs; the readers take from 20 microseconds to 20 ms."""
 
 
-@dataclass
-class Outcome:
-    """Numbers of inputs of one door, and what was found."""
-
-    read: int = 0
-    refused: int = 0
-    failed: int = 0
-    found: dict[str, bytes] = field(default_factory=dict)
-    """One input for each place in the code at which an unexpected error was raised, or a bound was passed."""
-
-    @property
-    def total(self) -> int:
-        """Number of inputs."""
-        return self.read + self.refused + self.failed
-
-
 def knock(door: Door, folder: Path, content: bytes, outcome: Outcome) -> None:
     """Read one input at a door."""
     path = folder / door.file
@@ -83,13 +68,13 @@ def knock(door: Door, folder: Path, content: bytes, outcome: Outcome) -> None:
     started, before = time.process_time(), _peak_bytes()
     try:
         door.read(path)
-        outcome.read += 1
+        outcome.results["read"] += 1
     except WorkbenchError as error:
-        outcome.refused += 1
+        outcome.results["refused"] += 1
         if not str(error).strip():
             outcome.found.setdefault("an error without a message", content)
     except Exception as error:  # any other than the program's own errors is what is looked for
-        outcome.failed += 1
+        outcome.results["failed"] += 1
         last = traceback.extract_tb(error.__traceback__)
         own = [frame for frame in last if "/workbench/" in frame.filename] or list(last)
         outcome.found.setdefault(f"{type(error).__name__} at {own[-1].filename}:{own[-1].lineno}", content)
@@ -104,21 +89,32 @@ def _peak_bytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def fuzz(door: Door, folder: Path, count: int, number: int) -> Outcome:
-    """Read `count` mutated inputs at a door, the same for the same seed `number`."""
+def fuzz(door: Door, folder: Path, count: int, number: int, end_s: float = math.inf) -> Outcome:
+    """Read `count` mutated inputs at a door, the same for the same seed `number`; fewer where time is over.
+
+    Args:
+        door: the door.
+        folder: empty folder for the inputs.
+        count: number of inputs.
+        number: seed.
+        end_s: time of the monotonic clock after which no further input is read, s.
+    """
     outcome = Outcome()
     for content in door.seeds:
         knock(door, folder, content, outcome)
-    assert outcome.read == len(door.seeds), f"{door.name}: a good input is refused"
+    assert outcome.results["read"] == len(door.seeds), f"{door.name}: a good input is refused"
     rng = random.Random(number)  # noqa: S311 - no secret
+
+    def take(content: bytes) -> None:
+        if time.monotonic() < end_s:
+            knock(door, folder, content, outcome)
+
     by_hypothesis = int(BY_HYPOTHESIS * count)
     for kind in _kinds(door):
         inputs = kind(rng.choice(door.seeds))
-        _draw(
-            inputs, by_hypothesis // len(_kinds(door)), number, lambda one: knock(door, folder, one, outcome)
-        )
-    while outcome.total < count:
-        knock(door, folder, mutate_bytes(door.seeds, rng), outcome)
+        _draw(inputs, by_hypothesis // len(_kinds(door)), number, take)
+    while outcome.run < count and time.monotonic() < end_s:
+        take(mutate_bytes(door.seeds, rng))
     return outcome
 
 
@@ -264,11 +260,13 @@ def doors() -> tuple[Door, ...]:
     )
 
 
-def fuzz_part(name: str, count: int, number: int) -> Outcome:
-    """`fuzz` of a door by its name, in a folder of its own."""
+def fuzz_part(name: str, count: int, number: int, end_s: float) -> Outcome:
+    """`fuzz` of a door by its name, in a folder of its own; nothing after `end_s`."""
+    if time.monotonic() >= end_s:
+        return Outcome()
     door = next(door for door in doors() if door.name == name)
     with tempfile.TemporaryDirectory() as folder:
-        return fuzz(door, Path(folder), count, number)
+        return fuzz(door, Path(folder), count, number, end_s)
 
 
 def counts(total: int) -> dict[str, int]:
@@ -281,11 +279,6 @@ def counts(total: int) -> dict[str, int]:
 def shares(count: int, parts: int) -> Iterator[int]:
     """`count` in `parts` nearly equal numbers."""
     yield from (count // parts + (n < count % parts) for n in range(parts))
-
-
-def first_lines(found: dict[str, bytes], most: int = 3) -> Sequence[str]:
-    """What was found, with the beginning of its input."""
-    return [f"{what}: {content[:200]!r}" for what, content in islice(found.items(), most)]
 
 
 def quiet_decoders() -> None:

@@ -14,14 +14,17 @@ from workbench.api.calibration import Calibration, load_calibration
 from workbench.model.arrays import Image
 from workbench.model.chart import Chart
 from workbench.model.errors import BadInputError
-from workbench.model.event import (
-    CaptureTaken,
-    TrialFinished,
-)
+from workbench.model.event import CaptureTaken, Record, TrialFinished
 from workbench.model.rig import Rig
 from workbench.report.certificate.session_record import recorded_calibration
 from workbench.report.frames import SESSION_COLUMNS, frame_of, frame_of_table
-from workbench.report.session_frames import captures_frame, readings_frame, residuals_frame, spots_frame
+from workbench.report.session_frames import (
+    captures_frame,
+    cross_validation_frame,
+    readings_frame,
+    residuals_frame,
+    spots_frame,
+)
 from workbench.session.capture_table import first_time_ns, part_name, seconds_after
 from workbench.session.frames import read_image
 from workbench.session.journal import read_journal
@@ -55,12 +58,13 @@ class Trial:
 class Session:
     """A session folder; see `open_session`.
 
-    >>> import workbench as wb
-    >>> session = wb.open_session("data/session-0.1.0")
-    >>> session.captures.groupby("laser_id").size().to_dict()
-    {'L1': 3, 'L4': 3, 'all': 1}
-    >>> session.spots.loc[0, ["u_px", "v_px"]].round(1).tolist()
-    [262.6, 249.6]
+    Examples:
+        >>> import workbench as wb
+        >>> session = wb.open_session("data/session-0.1.0")
+        >>> session.captures.groupby("laser_id").size().to_dict()
+        {'L1': 3, 'L4': 3, 'all': 1}
+        >>> session.spots.loc[0, ["u_px", "v_px"]].round(1).tolist()
+        [262.6, 249.6]
     """
 
     folder: Path
@@ -88,6 +92,11 @@ class Session:
     def residuals(self) -> pd.DataFrame:
         """Residuals of the last fit, observed - predicted: one row per laser and placement, px, 1 sigma."""
         return residuals_frame(self._events)
+
+    @cached_property
+    def cross_validation(self) -> pd.DataFrame:
+        """Placements of the last fit, each ranged by the fit without it; mm, 1 sigma as it predicts it."""
+        return cross_validation_frame(self._events)
 
     @cached_property
     def readings(self) -> pd.DataFrame:
@@ -179,10 +188,28 @@ class Session:
             ) from None
         return image[max(v - half, 0) : v + half + 1, max(u - half, 0) : u + half + 1]
 
+    def viewer(self, width_px: int = 1200, height_px: int = 700) -> object:
+        """The session in the Rerun viewer, as a widget for the last line of a notebook's cell.
+
+        The recording is made again from the frames, which takes some seconds.
+
+        Raises:
+            BadInputError: the extra `notebooks` is not installed, or a frame is missing or has changed.
+        """
+        from workbench.viewer.notebook import notebook_viewer  # loads Rerun
+
+        size = whole_of("width_px", width_px), whole_of("height_px", height_px)
+        return notebook_viewer(self.folder, self.rig, self._records, size)
+
+    @cached_property
+    def _records(self) -> list[Record]:
+        """Records that are in effect, in order."""
+        return list(effective(read_journal(self.folder)))
+
     @cached_property
     def _events(self) -> list[object]:
-        """Events that are in effect, in order."""
-        return [record.event for record in effective(read_journal(self.folder))]
+        """Their events."""
+        return [record.event for record in self._records]
 
     @cached_property
     def _captures(self) -> dict[str, CaptureTaken]:

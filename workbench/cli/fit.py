@@ -181,10 +181,10 @@ def _rig(request: Request) -> Rig:
     if not source.exists():
         raise BadInputError(f"{source}: no such file or folder; expected a captures file or a session folder")
     if source.suffix == ".rrd" and (source.parent / MANIFEST).is_file():
-        return load_session_rig(source.parent)
+        return load_session_rig(source.parent, bounded=True)
     if not source.is_dir():
         raise BadInputError(f"{source}: a captures file needs --rig; only a session contains its rig file")
-    return load_session_rig(source)
+    return load_session_rig(source, bounded=True)
 
 
 def _observations(

@@ -34,7 +34,10 @@ def repair(
     ] = None,
     restore: Annotated[
         list[str] | None,
-        typer.Option(metavar="PLACEMENT", help="Use a placement that was left out or skipped; repeatable."),
+        typer.Option(
+            metavar="PLACEMENT",
+            help="Undo --leave-out, --recapture or a skip; repeatable.",
+        ),
     ] = None,
     add: Annotated[
         list[float] | None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +11,7 @@ from rich.console import Console
 
 from workbench.cli.background import Background
 from workbench.cli.console import print_message
+from workbench.cli.in_force import note_if_not_in_force
 from workbench.cli.invocation import command_line
 from workbench.cli.refusal import ask_for_repair, refused_fit
 from workbench.cli.session_verdict import session_verdict
@@ -39,6 +40,7 @@ from workbench.report.figure_writer import FigureWriter
 from workbench.session.caller import now, operator
 from workbench.session.journal import JOURNAL, read_journal
 from workbench.session.manifest import MANIFEST, load_manifest
+from workbench.session.repairs import repairs_of
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
 from workbench.viewer.window import has_display, viewer_executable, watch
@@ -80,6 +82,8 @@ def run_procedures(
         WorkbenchError: see `workbench.procedure.engine.run.run`.
     """
     plan = Plan.load(rig_path, procedures, calibration)
+    if plan.calibration is not None:
+        note_if_not_in_force(plan.calibration.file, plan.calibration.calibration, sessions)
     session_dir = plan.new_session(sessions)
     with _repairable(session_dir, plan, screen) as ui:
         run(plan, session_dir, ui.consumers, _caller(), ui.stopping, ui.operator)
@@ -100,17 +104,22 @@ def resume_session(
     plan = plan_of(session_dir, now)
     records = list(read_journal(session_dir)) if (session_dir / JOURNAL).exists() else []
     kept = kept_placements(plan, records, repair)
-    with _repairable(session_dir, plan, screen, kept) as ui:
+    added_mm = [*repairs_of(records).added_mm, *(() if repair is None else repair.add_mm)]
+    with _repairable(session_dir, plan, screen, kept, added_mm) as ui:
         resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes, repair)
 
 
 @contextmanager
 def _repairable(
-    session_dir: Path, plan: Plan, screen: Screen, kept: Collection[str] = ()
+    session_dir: Path,
+    plan: Plan,
+    screen: Screen,
+    kept: Collection[str] = (),
+    added_mm: Sequence[float] = (),
 ) -> Iterator[SessionInterface]:
     """`session_interface`, then the verdict; lets a person repair a refused calibration at once."""
     try:
-        with session_interface(session_dir, plan, screen, kept) as ui:
+        with session_interface(session_dir, plan, screen, kept, added_mm) as ui:
             yield ui
     except LimitFailedError as refused:
         show_verdict(session_verdict(session_dir, refused))
@@ -136,7 +145,11 @@ def _repaired(session_dir: Path, screen: Screen) -> bool:
 
 @contextmanager
 def session_interface(
-    session_dir: Path, plan: Plan, screen: Screen, kept: Collection[str] = ()
+    session_dir: Path,
+    plan: Plan,
+    screen: Screen,
+    kept: Collection[str] = (),
+    added_mm: Sequence[float] = (),
 ) -> Iterator[SessionInterface]:
     """Terminal, recording, viewer, figures and operator for a session; adds to errors how to resume it.
 
@@ -145,6 +158,7 @@ def session_interface(
         plan: rig and procedures.
         screen: options.
         kept: keys of placements that are not captured again.
+        added_mm: standoffs that repairs have added, for the prompts of an answers file.
     """
     watched = watch if screen.view or (screen.view is None and has_display()) else None
     if watched is not None:
@@ -153,7 +167,7 @@ def session_interface(
     stop = StopAfterCapture()
     script = None
     if screen.answers is not None:
-        script = ScriptedOperator.load(screen.answers, plan.prompts(), NO_OPERATOR)
+        script = ScriptedOperator.load(screen.answers, plan.prompts(added_mm), NO_OPERATOR)
     steps = plan.steps()
     if not is_compiled():
         print_message("note: the first capture compiles the search for spots, once, in one or two minutes")

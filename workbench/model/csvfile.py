@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ SEPARATORS = {";": "semicolons (;)", "\t": "tabs", "|": "bars (|)"}
 """Column separators of other table formats, with their names for messages."""
 LARGEST_BYTES = 64 * 2**20
 """Largest file, some 500 000 rows."""
+LINE_END = re.compile("\r\n|\r|\n")
 FIRST_LINE = ("sep=", '"sep=')
 """Beginning of a line above the header by which spreadsheets state the separator."""
 
@@ -95,7 +97,7 @@ def _lines(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of each line, from the header on."""
     text, above = content.decode("utf-8-sig"), 0
     if text.lower().startswith(FIRST_LINE):
-        first, _, text = text.partition("\n")
+        first, text = (*LINE_END.split(text, maxsplit=1), "")[:2]
         above = 1
         separator = first.strip().strip('"')[len("sep=") :]
         if separator != ",":

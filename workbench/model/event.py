@@ -223,6 +223,8 @@ class LatencyMeasured(FileModel):
     """Number of frames in the stream that precede the first one exposed after a laser was switched."""
     darkening: float | None = None
     """Relative darkening of the background while a laser is on, by automatic exposure or gain; None: none."""
+    dimming: float | None = None
+    """Relative dimming of the spot after switching on, by automatic exposure or by the laser; None: none."""
 
 
 class StandoffAdvised(FileModel):

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_v
 from ruamel.yaml.scalarint import ScalarInt
 
 from workbench.model.board import Board
-from workbench.model.bounds import prior_within, within
+from workbench.model.bounds import applies, prior_within, within
 from workbench.model.device_block import DeviceBlock
 from workbench.model.lens import COEFFICIENTS, LensName, lens_parameters
 from workbench.model.yamlfile import FileModel, load_yaml_model
@@ -115,7 +115,7 @@ class CameraSpec(FileModel):
     @field_validator("height_px")
     @classmethod
     def _is_an_image(cls, height_px: int, info: ValidationInfo) -> int:
-        if (pixels := height_px * info.data.get("width_px", 0)) > MOST_PIXELS:
+        if applies(info) and (pixels := height_px * info.data.get("width_px", 0)) > MOST_PIXELS:
             raise ValueError(f"expected at most {MOST_PIXELS} pixels (width x height), got {pixels}")
         return height_px
 
@@ -123,7 +123,9 @@ class CameraSpec(FileModel):
     @classmethod
     def _is_near_the_image(cls, centre: Prior, info: ValidationInfo) -> Prior:
         side = info.data.get("width_px" if info.field_name == "cx_px" else "height_px")
-        if side is not None and not (abs(centre.value - side / 2) <= 2 * side and centre.sd <= 2 * side):
+        if side is None or not applies(info):
+            return centre
+        if not (abs(centre.value - side / 2) <= 2 * side and centre.sd <= 2 * side):
             raise ValueError(
                 f"expected the principal point within {2 * side} px of the image's centre, and an sd below"
                 f" this, got {centre.value:g} +- {centre.sd:g}"
@@ -258,6 +260,10 @@ LaserClass = Annotated[
 """Laser class according to IEC 60825-1."""
 
 
+UNKNOWN_SERIAL = "unknown"
+"""Serial number of a rig whose file states none."""
+
+
 class Rig(FileModel):
     """A rig file, format 1."""
 
@@ -265,7 +271,7 @@ class Rig(FileModel):
 
     format: Literal[1]
     rig: str
-    serial: Name = "unknown"
+    serial: Name = UNKNOWN_SERIAL
     driver: str | None = None
     """Driver of the bench: `opencv+serial` or None for separate `devices`; else an entry point in the group
     `workbench.benches`. A rig without driver and devices can be fitted but not run."""

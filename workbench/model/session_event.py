@@ -55,7 +55,7 @@ class SessionRepaired(FileModel):
     leave_out: tuple[str, ...] = ()
     """To be ignored; the captures stay on disk."""
     restore: tuple[str, ...] = ()
-    """To be used again after all, or captured if they were skipped."""
+    """To be used again; captured if they were skipped; if captured again, the captures before count."""
     add_mm: tuple[float, ...] = ()
     """Standoffs of additional placements in the last grid before the fit."""
     accept: bool = False

@@ -72,9 +72,9 @@ class Document:
         """Mistake for a schema violation, with its line."""
         return Mistake(line_of(self.data, problem.location), problem.message)
 
-    def mistakes(self, model: type[BaseModel]) -> list[Mistake]:
+    def mistakes(self, model: type[BaseModel], context: object = None) -> list[Mistake]:
         """Violations of the schema of `model`, with their lines."""
-        return [self.mistake(problem) for problem in schema_problems(model, self.data)]
+        return [self.mistake(problem) for problem in schema_problems(model, self.data, context=context)]
 
 
 def schema_problems(
@@ -127,14 +127,21 @@ def read_document(path: Path) -> Document:
     return parse_document(_read(path), path)
 
 
-def parse_yaml_model(text: str, path: Path, model: type[Model]) -> Model:
-    """Validate YAML `text` from the file `path` as `model`; raises the errors of `load_yaml_model`."""
+def parse_yaml_model(text: str, path: Path, model: type[Model], context: object = None) -> Model:
+    """Validate YAML `text` from the file `path` as `model`; raises the errors of `load_yaml_model`.
+
+    Args:
+        text: content.
+        path: file, for messages.
+        model: expected model.
+        context: context for the model's validators.
+    """
     document = parse_document(text, path)
     _check_kind(path, document.data, model)
     try:
-        found = model.model_validate(document.data)
+        found = model.model_validate(document.data, context=context)
     except ValidationError:
-        refuse(path, [*document.doubled, *document.mistakes(model)])
+        refuse(path, [*document.doubled, *document.mistakes(model, context)])
         raise
     refuse(path, document.doubled)
     return found

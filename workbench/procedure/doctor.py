@@ -21,6 +21,7 @@ from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.rig import LaserSpec, Rig
 from workbench.model.target import Placement
+from workbench.procedure.capture.automatic import darkening
 from workbench.procedure.capture.exposure import set_exposure
 from workbench.procedure.capture.latency import LEASE_S, count_latency
 from workbench.procedure.engine.prompts import laser_class_prompt, placement_prompt, safety_prompt
@@ -83,7 +84,8 @@ def examine_rig(
                 bench = Bench(camera, lasers, open_target(rig))
                 yield from _with_emission(rig, bench, operator_of(bench))
                 return
-        for part in ("latency", "exposure", *(f"laser {laser.id}" for laser in rig.lasers)):
+        laser_checks = [f"laser {laser.id}" for laser in rig.lasers]
+        for part in ("latency", "exposure", "automatic control", *laser_checks):
             yield _not_checked(part, "controller and camera")
 
 
@@ -118,6 +120,7 @@ def _with_emission(rig: Rig, bench: Bench, operator: Operator) -> Iterator[Check
     # The latency comes first: without it the frames of the later checks could be stale.
     yield _tried("latency", partial(_latency, rig, bench))
     yield from _exposure(rig, bench)
+    yield from _automatic_control(rig, bench)
     for laser in rig.lasers:
         yield _tried(f"laser {laser.id}", partial(_laser, rig, bench, laser))
 
@@ -179,6 +182,27 @@ def _exposure(rig: Rig, bench: Bench) -> Iterator[CheckResult]:
     if found is not None:
         ok = found.verdict != "unseen" and LEAST_PEAK <= found.peak < CLIPPED
         yield CheckResult("exposure", ok, found.text.removeprefix("exposure "))
+
+
+def _automatic_control(rig: Rig, bench: Bench) -> Iterator[CheckResult]:
+    """Look for automatic exposure, gain or white balance that the driver has not switched off."""
+    if not isinstance(bench.camera, StreamingCamera):
+        return
+    part = "automatic control"
+    bench.mark("doctor/automatic")
+    try:
+        share = darkening(bench.lasers, bench.camera, rig)
+    except RigNotReadyError as error:
+        yield CheckResult(part, False, str(error))
+        return
+    if share is None:
+        yield CheckResult(part, True, "none: the image does not darken while a laser is on")
+        return
+    found = (
+        f"while a laser is on the rest of the image darkens by {100 * share:.0f} %; switch the camera's"
+        " automatic exposure, gain and white balance off"
+    )
+    yield CheckResult(part, True, found, kind="noted")
 
 
 def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:

@@ -86,10 +86,13 @@ def _mean_position(
     found = [seen for row in rows if (seen := _position(ranger, row)) is not None]
     if not found:
         return None
-    position, stated, speckle_sd = np.moveaxis(np.array(found), 1, 0)
-    sd = np.where(np.isfinite(stated), stated, ranger.calibration.laser_ranger.noise.spot_sd_px)
+    spot_sd_px = ranger.calibration.laser_ranger.noise.spot_sd_px
     if len(found) == 1:  # thousands of scenes have no repeats
-        return position[0], np.where(np.isfinite(position[0]), sd[0], np.inf), speckle_sd[0]
+        position, stated, speckle_sd = found[0]
+        sd = np.where(np.isfinite(stated), stated, spot_sd_px)
+        return position, np.where(np.isfinite(position), sd, np.inf), speckle_sd
+    position, stated, speckle_sd = np.moveaxis(np.array(found), 1, 0)
+    sd = np.where(np.isfinite(stated), stated, spot_sd_px)
     kept = ~outliers(position, sd)
     scale = float(significant_scale(*scatter_chi2(position[kept], sd[kept])))
     return *weighted_mean(position[kept], scale * sd[kept]), np.sqrt((speckle_sd[kept] ** 2).mean(axis=0))

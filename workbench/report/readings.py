@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from math import degrees
 from typing import TYPE_CHECKING
 
+from rich.cells import cell_len, set_cell_size
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.console import Group as Lines
-from rich.console import RenderableType
 from rich.padding import Padding
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -30,7 +33,7 @@ def reading_list(readings: Sequence[Reading]) -> Lines:
     widths = max([*names, len("scene")]), max([*(len(_closest(r)) for r in readings), len(CLOSEST)])
     lines: list[RenderableType] = [
         Text("Ranges (mm, 1 sigma)", style="italic"),
-        _row(widths, "scene", CLOSEST, "shape", style="bold"),
+        _Row(widths, "scene", CLOSEST, "shape", style="bold"),
     ]
     for reading in readings:
         lines += _lines(reading, widths)
@@ -59,20 +62,43 @@ def _lines(r: Reading, widths: tuple[int, int]) -> Iterator[RenderableType]:
     words = _shapes(r) if done else "; ".join(part for part in (_status(r.status), _shapes(r)) if part)
     if len(r.scene) > LONGEST_SCENE:
         yield Text(r.scene, overflow="fold")
-    yield _row(widths, r.scene if len(r.scene) <= LONGEST_SCENE else "", _closest(r), words)
+    yield _Row(widths, r.scene if len(r.scene) <= LONGEST_SCENE else "", _closest(r), words)
     if not done or r.notes:
         for more in (_lasers(r), *r.notes):
             if more:
                 yield Padding(Text(more), (0, 0, 0, 4))
 
 
-def _row(widths: tuple[int, int], scene: str, closest: str, words: str, style: str = "") -> Table:
-    row = Table.grid(padding=(0, 2, 0, 0))
-    row.add_column(width=widths[0], no_wrap=True)
-    row.add_column(width=widths[1], justify="right", no_wrap=True)
-    row.add_column(overflow="fold")
-    row.add_row(*(Text(cell, style=style) for cell in (scene, closest, words)))
-    return row
+@dataclass(frozen=True)
+class _Row:
+    """Scene, closest range and words; the words are folded in their column where they do not fit."""
+
+    widths: tuple[int, int]
+    """Width of the first two columns."""
+    scene: str
+    closest: str
+    words: str
+    style: str = ""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Render a line that fits as it is: a table takes ten times as long, and scenes are thousands."""
+        scene, closest = set_cell_size(self.scene, self.widths[0]), self.closest.rjust(self.widths[1])
+        line = f"{scene}  {closest}  {self.words}"
+        if line.isprintable() and cell_len(line) <= options.max_width:
+            yield Segment(line, console.get_style(self.style))
+            yield Segment.line()
+        else:
+            yield self.table
+
+    @property
+    def table(self) -> Table:
+        """The row as a table of its own."""
+        row = Table.grid(padding=(0, 2, 0, 0))
+        row.add_column(width=self.widths[0], no_wrap=True)
+        row.add_column(width=self.widths[1], justify="right", no_wrap=True)
+        row.add_column(overflow="fold")
+        row.add_row(*(Text(cell, style=self.style) for cell in (self.scene, self.closest, self.words)))
+        return row
 
 
 def _closest(r: Reading) -> str:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import struct
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
+from glob import escape
 from itertools import count
 from pathlib import Path
 
@@ -60,6 +62,48 @@ class FrameStore:
         _RECENT.append((sha256, image.copy()))  # a camera may reuse its buffer
         return FrameRef(path=str(relative), sha256=sha256, time_ns=time_ns)
 
+    def bring_back(self, placement_key: str, frames: Sequence[FrameRef]) -> None:
+        """Move the frames of a placement from `set-aside/` back, in exchange for the present ones.
+
+        Frames that are in their place stay, so that a move that was interrupted can be repeated.
+
+        Args:
+            placement_key: key of the placement.
+            frames: all frames of its captures.
+
+        Raises:
+            BadInputError: the frames are in no folder.
+            StoppedError: the disk is full or cannot be written.
+        """
+        there = self.session_dir / "frames" / placement_key
+        where = self.find_frames(placement_key, frames)
+        if where == there:
+            return
+        self.set_aside(placement_key)
+        try:
+            there.parent.mkdir(parents=True, exist_ok=True)
+            where.rename(there)
+            sync_folder(there.parent)
+            sync_folder(where.parent)
+        except OSError as error:
+            raise StoppedError(f"{where}: cannot be moved to {there}: {error.strerror}") from error
+
+    def find_frames(self, placement_key: str, frames: Sequence[FrameRef]) -> Path:
+        """Folder of a placement that has the frames: in `frames/`, or in `set-aside/`.
+
+        Raises:
+            BadInputError: no folder has all of them, unchanged.
+        """
+        usual = self.session_dir / "frames" / placement_key
+        for folder in (usual, *sorted(self.session_dir.glob(f"set-aside/*/{escape(placement_key)}"))):
+            moved = {folder / (self.session_dir / one.path).relative_to(usual): one.sha256 for one in frames}
+            if all(path.is_file() and _sha256(path) == expected for path, expected in moved.items()):
+                return folder
+        raise BadInputError(
+            f"{self.session_dir}: expected the frames of {placement_key} in frames/ or set-aside/, got no"
+            " folder that has all of them unchanged; restore it from a copy"
+        )
+
     def set_aside(self, placement_key: str) -> None:
         """Move the frames of a placement that will be captured again to `set-aside/<number>/`.
 
@@ -78,6 +122,10 @@ class FrameStore:
             sync_folder(there.parent)
         except OSError as error:
             raise StoppedError(f"{there}: cannot be moved aside: {error.strerror}") from error
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def recent_image(sha256: str) -> Image | None:

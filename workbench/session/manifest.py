@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
+from workbench.model.bounds import RECORDED
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Name, Rig
 from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model
@@ -143,14 +144,19 @@ def _write(
     write_record(folder / MANIFEST, stream.getvalue().encode())
 
 
-def load_session_rig(session_dir: Path) -> Rig:
+def load_session_rig(session_dir: Path, *, bounded: bool = False) -> Rig:
     """Rig of a session, from the copy in its manifest.
+
+    Args:
+        session_dir: session folder.
+        bounded: whether the bounds of rig files apply, as for a computation; a recorded rig is shown without.
 
     Raises:
         BadInputError: `session_dir` is no session folder, or its manifest is damaged.
     """
     text = load_manifest(session_dir).rig.text
-    return parse_yaml_model(text, Path(f"{session_dir / MANIFEST} (rig)"), Rig)
+    context = None if bounded else RECORDED
+    return parse_yaml_model(text, Path(f"{session_dir / MANIFEST} (rig)"), Rig, context)
 
 
 def _read(path: Path) -> str:

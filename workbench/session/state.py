@@ -40,17 +40,50 @@ class PlacementCaptures:
     """Captures by key."""
     complete: bool = False
 
+    @property
+    def frames(self) -> list[ev.FrameRef]:
+        """All frames of the captures."""
+        return [one for taken in self.captures.values() for one in (taken.on, taken.off) if one is not None]
+
 
 def placement_captures(records: Iterable[ev.Record]) -> dict[str, PlacementCaptures]:
     """Latest captures of each placement by its key, complete or not.
 
     Frames stay valid when computed records become void: only `SetAside` and a repair discard captures.
     """
-    found: dict[str, PlacementCaptures] = {}
-    for event in (record.event for record in records):
+    return _Captures.of(records).found
+
+
+def replaced_captures(records: Iterable[ev.Record]) -> dict[str, PlacementCaptures]:
+    """Complete captures by the key of their placement that a repair has replaced last, to be restored."""
+    return {key: earlier[-1] for key, earlier in _Captures.of(records).replaced.items() if earlier}
+
+
+@dataclass
+class _Captures:
+    """Captures of all placements after some records."""
+
+    found: dict[str, PlacementCaptures] = field(default_factory=dict)
+    replaced: dict[str, list[PlacementCaptures]] = field(default_factory=dict)
+    """Complete captures that repairs have replaced, the last one at the end."""
+    left_out: set[str] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, records: Iterable[ev.Record]) -> _Captures:
+        captures = cls()
+        for record in records:
+            captures.add(record.event)
+        return captures
+
+    def add(self, event: ev.Event) -> None:
+        """Take the next event into account."""
+        found = self.found
         match event:
             case ev.TargetPlaced(placement=placement):
-                found[placement.key] = PlacementCaptures(event)
+                before = found.get(placement.key)
+                # Replayed captures are journalled again; a kill in between must not make them incomplete.
+                if before is None or not before.complete or before.placed != event:
+                    found[placement.key] = PlacementCaptures(event)
             case ev.ExposureSet() if event.key in found:
                 found[event.key].exposure = event
             case ev.CaptureTaken() if event.placement_key in found:
@@ -60,11 +93,26 @@ def placement_captures(records: Iterable[ev.Record]) -> dict[str, PlacementCaptu
             case ev.SetAside():
                 found.pop(event.key, None)
             case ev.SessionRepaired():
-                for key in event.recapture:
-                    found.pop(key, None)
+                self._repair(event)
             case _:
                 pass
-    return found
+
+    def _repair(self, event: ev.SessionRepaired) -> None:
+        for key in event.recapture:
+            self._replace(key)
+        for key in event.restore:
+            if key not in self.left_out and self.replaced.get(key):
+                earlier = self.replaced[key].pop()
+                self._replace(key)
+                self.found[key] = earlier
+        self.left_out |= set(event.leave_out)
+        self.left_out -= {*event.recapture, *event.restore}
+
+    def _replace(self, key: str) -> None:
+        """Keep the present captures of a placement as those that were replaced last."""
+        present = self.found.pop(key, None)
+        if present is not None and present.complete:
+            self.replaced.setdefault(key, []).append(present)
 
 
 def safe_part(records: Sequence[ev.Record]) -> list[ev.Record]:

@@ -19,7 +19,10 @@ from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.lasers import capture_lasers
 from workbench.procedure.engine.limits import capture_limit_prompts, check_captures
 from workbench.procedure.engine.placements import visit_placements
+from workbench.procedure.engine.plan import takes_added
+from workbench.procedure.engine.prompts import placement_prompts, standoff_prompt
 from workbench.procedure.engine.registry import register
+from workbench.procedure.engine.standoff_check import check_standoff
 from workbench.procedure.engine.step import Step, StepModel, flat_placement
 from workbench.procedure.engine.visiting_order import RETURN_AT, returned, shuffled
 from workbench.steps.fit import FitStep
@@ -70,9 +73,12 @@ class CaptureGridStep(StepModel):
         return len(self.visits_mm) * self.repeats * len(rig.lasers)
 
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
-        """Prompts of the placements, then those of limits with `on_fail: ask`."""
-        limits = capture_limit_prompts(self.placements(name, rig), rig, self.limits)
-        return [*super().prompts(name, rig), *limits]
+        """Prompts of the placements, then those of limits with `on_fail: ask` and of doubtful standoffs."""
+        return self._prompts(self.placements(name, rig), rig)
+
+    def _prompts(self, placements: Sequence[Placement], rig: Rig) -> Sequence[Prompt]:
+        limits = capture_limit_prompts(placements, rig, self.limits)
+        return [*placement_prompts(placements), *limits, *map(standoff_prompt, placements)]
 
     def run(self, context: Context, name: str) -> str:
         """Capture at every placement; raises the errors of `visit_placements` and `check_captures`."""
@@ -80,27 +86,35 @@ class CaptureGridStep(StepModel):
         def work(placement: Placement) -> int:
             pairs = capture_lasers(context, placement, self.repeats)
             check_captures(context, name, placement, self.limits)
+            _check_standoff(context, placement)
             _advise(context)
             return pairs
 
-        placements = [*self.placements(name, context.rig), *self._added(context, name)]
+        placements = [*self.placements(name, context.rig)]
+        if takes_added(context.steps, context.step_index):
+            placements += self._added_placements(name, context.recorder.repairs.added_mm)
         return counted(sum(visit_placements(context, placements, work)), "pair")
 
-    def _added(self, context: Context, name: str) -> list[Placement]:
-        """Placements that repairs have added, in the last grid before the fit."""
-        upcoming = _next_fit(context.steps, context.step_index)
-        if upcoming is None:
-            return []
-        later = context.steps[context.step_index + 1 :]
-        if any(isinstance(step, CaptureGridStep) for step in later[: later.index(upcoming[1])]):
-            return []
+    def added_prompts(self, name: str, rig: Rig, added_mm: Sequence[float]) -> Sequence[Prompt]:
+        """Prompts of the added placements; see `prompts`."""
+        return self._prompts(self._added_placements(name, added_mm), rig)
+
+    def _added_placements(self, name: str, added_mm: Sequence[float]) -> list[Placement]:
+        """Placements that repairs have added after the step's own."""
         visited = list(self.visits_mm)
         added = []
-        for standoff_mm in context.recorder.repairs.added_mm:
+        for standoff_mm in added_mm:
             number = visited.count(standoff_mm) + 1
             visited.append(standoff_mm)
             added.append(flat_placement(name, standoff_mm, number if number > 1 else None))
         return added
+
+
+def _check_standoff(context: Context, placement: Placement) -> None:
+    """Compare the standoff with its prediction where a fit follows; not beside a board, as in `_advise`."""
+    upcoming = _next_fit(context.steps, context.step_index)
+    if upcoming is not None and not context.boards:
+        check_standoff(context, placement, len(upcoming[0]))
 
 
 def _advise(context: Context) -> None:

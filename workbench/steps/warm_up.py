@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from workbench.model.fields import Count
+from workbench.model.number_text import counted
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
@@ -23,7 +24,7 @@ class WarmUpStep(StepModel):
     @property
     def title(self) -> str:
         """Number of frames."""
-        return f"Warm up for {self.frames} frames"
+        return f"Warm up for {counted(self.frames, 'frame')}"
 
     @property
     def default_duration_s(self) -> float:
@@ -33,4 +34,4 @@ class WarmUpStep(StepModel):
     def run(self, context: Context, name: str) -> str:
         """Grab the frames."""
         context.warm_up(name, self.frames)
-        return f"{self.frames} frames"
+        return counted(self.frames, "frame")

@@ -5,7 +5,7 @@ Camera frame, millimetres: x right, y down, z forward, origin in the pinhole.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import radians, tan
 
@@ -165,12 +165,15 @@ class Geometry:
         return np.column_stack([sight * depth[:, None], depth])
 
 
-def expected_spots(geometry: Geometry, placement: Placement | None) -> dict[str, FloatArray]:
-    """Expected spot (2,), px, of each laser on a flat target; empty without one."""
+def expected_spots(
+    geometry: Geometry, placement: Placement | None, lasers: Collection[str] | None = None
+) -> dict[str, FloatArray]:
+    """Expected spot (2,), px, of each of `lasers` (None: of all) on a flat target; empty without one."""
     if placement is None or not isinstance(placement.target, FlatTarget | BoardTarget):
         return {}
     target, standoff_mm = placement.target, placement.standoff_mm
-    return {laser: geometry.spot_on(laser, target, standoff_mm) for laser in geometry.rays}
+    chosen = geometry.rays if lasers is None else lasers
+    return {laser: geometry.spot_on(laser, target, standoff_mm) for laser in chosen}
 
 
 def expected_ellipses(geometry: Geometry, placement: Placement | None) -> dict[str, FloatArray]:

@@ -14,6 +14,7 @@ from workbench.model import event as ev
 from workbench.model.arrays import Image
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError
+from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.reading_text import reading_remark
 from workbench.model.rig import Rig
@@ -205,7 +206,7 @@ class OpenRecording:
 
     @_log.register
     def _(self, event: ev.LatencyMeasured, moment: Moment) -> None:
-        steps.log_text(self.stream, f"Camera latency: {event.frames} frames")
+        steps.log_text(self.stream, f"Camera latency: {counted(event.frames, 'frame')}")
 
     @_log.register
     def _(self, event: ev.ExposureSet, moment: Moment) -> None:
@@ -214,7 +215,7 @@ class OpenRecording:
 
     @_log.register
     def _(self, event: ev.StandoffAdvised, moment: Moment) -> None:
-        steps.log_text(self.stream, f"After {event.placements} placements, {event.text}")
+        steps.log_text(self.stream, f"After {counted(event.placements, 'placement')}, {event.text}")
         self._advice.take(event)
 
     @_log.register
@@ -265,7 +266,7 @@ class OpenRecording:
         trial.finish(event)
         self.stream.at(moment)
         self._lay_out("trial")
-        steps.log_text(self.stream, f"Trial {event.trial} finished, {len(event.tables)} tables")
+        steps.log_text(self.stream, f"Trial {event.trial} finished, {counted(len(event.tables), 'table')}")
 
     @_log.register
     def _(self, event: ev.TrialProgress, moment: Moment) -> None:
@@ -342,9 +343,5 @@ class OpenRecording:
 
     def _show_crops(self, spots: Sequence[Spot], lasers: Sequence[str]) -> None:
         if self._frames is not None:
-            expected = {
-                laser: spot
-                for laser, spot in expected_spots(self._geometry, self._placement).items()
-                if laser in lasers
-            }
+            expected = expected_spots(self._geometry, self._placement, lasers)
             self._crops.take(*self._frames, spots, expected)

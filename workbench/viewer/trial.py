@@ -10,6 +10,7 @@ import rerun as rr
 from workbench.figures.picture import Picture
 from workbench.model.chart import Chart
 from workbench.model.event import ReadingTaken, TrialFinished
+from workbench.model.number_text import counted
 from workbench.model.reading_chart import SENSOR, error_chart
 from workbench.model.reading_text import reading_remark
 from workbench.viewer import documents
@@ -73,7 +74,7 @@ class TrialView:
     def _so_far(self) -> None:
         self._draw(error_chart(LIVE_CHART, self.readings))
         remarks = [remark for one in self.readings if (remark := reading_remark(one))]
-        self._document("\n".join([f"{len(self.readings)} readings so far", *remarks]))
+        self._document("\n".join([f"{counted(len(self.readings), 'reading')} so far", *remarks]))
 
     def _draw(self, chart: Chart) -> None:
         entity = at.trial_picture(self.trial, chart.name)

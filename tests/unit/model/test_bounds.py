@@ -8,7 +8,7 @@ from typing import Annotated
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from workbench.model.bounds import prior_within, within
+from workbench.model.bounds import RECORDED, prior_within, within
 from workbench.model.rig import Prior
 
 LOW, HIGH, MOST_SD = -2.0, 5.0, 3.0
@@ -28,6 +28,11 @@ def test_a_number_beyond_its_bounds_is_refused_with_the_reason(value: float) -> 
         NUMBER.validate_python(value)
     with pytest.raises(ValidationError):
         PRIOR.validate_python({"value": value, "sd": 0.0})
+
+
+def test_a_recorded_number_has_no_bounds() -> None:
+    assert NUMBER.validate_python(1e300, context=RECORDED) == 1e300
+    assert PRIOR.validate_python({"value": 9.0, "sd": 9.0}, context=RECORDED).value == 9.0
 
 
 def test_a_deviation_beyond_its_bound_is_refused() -> None:

@@ -12,6 +12,15 @@ from workbench.model.errors import BadInputError
 REQUIRED, KNOWN = ("true_mm", "measured_mm"), ("true_mm", "measured_mm", "placement")
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_the_stated_separator_ends_with_any_line_end(end: str) -> None:
+    rows = parsed(end.join(("sep=,", "true_mm,measured_mm", "1,2", "3,4", "")))
+    assert [row.cells for row in rows] == [
+        {"true_mm": "1", "measured_mm": "2"},
+        {"true_mm": "3", "measured_mm": "4"},
+    ]
+
+
 def test_required_columns_in_any_order_are_accepted() -> None:
     check_header(Path("r.csv"), ["measured_mm", "placement", "true_mm"], REQUIRED, KNOWN)
 

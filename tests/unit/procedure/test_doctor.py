@@ -23,7 +23,8 @@ def noisy_rig(**emulator: object) -> Rig:
     return with_emulator(two_laser_rig(), sensor={}, **emulator)
 
 
-PARTS = ["controller", "interlock", "camera", "latency", "exposure", "laser L1", "laser L2"]
+LATER = ["latency", "exposure", "automatic control", "laser L1", "laser L2"]
+PARTS = ["controller", "interlock", "camera", *LATER]
 
 
 def results(folder: Path, rig: Rig, **camera: int) -> dict[str, bool]:
@@ -70,6 +71,14 @@ def test_a_driver_that_discards_too_few_frames_fails_and_is_put_right_for_the_re
     assert [part for part, ok in found.items() if not ok] == ["latency"]
 
 
+def test_a_camera_that_adjusts_itself_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("workbench.procedure.doctor.darkening", lambda *_: 0.23)
+    with plain_bench(noisy_rig(), tmp_path) as bench:
+        found = {one.part: one for one in examine(noisy_rig(), bench, Scripted())}
+    assert (found["automatic control"].kind, found["automatic control"].ok) == ("noted", True)
+    assert "23 %" in found["automatic control"].found
+
+
 def test_a_laser_that_is_not_seen_is_named(tmp_path: Path) -> None:
     beside = {"lasers": {"L2": {"tx": 3.0}}}
     found = results(tmp_path, noisy_rig(truth=beside))
@@ -98,7 +107,6 @@ MISSING: dict[str, dict[str, object]] = {
     "camera": {"source": "/dev/no-camera"},
     "lasers": {"port": "/dev/no-port"},
 }
-LATER = ["latency", "exposure", "laser L1", "laser L2"]
 
 
 def test_a_missing_device_does_not_end_the_check(tmp_path: Path) -> None:

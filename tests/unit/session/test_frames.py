@@ -30,6 +30,28 @@ def test_frames_are_lossless_and_their_hash_is_the_file_s(tmp_path: Path, dtype:
     np.testing.assert_array_equal(read, image)
 
 
+def test_frames_are_brought_back_in_exchange_for_the_present_ones(tmp_path: Path) -> None:
+    store, key = FrameStore(tmp_path), "p.1/500mm"
+    first = [store.save(f"{key}/L{n}/00", "on", np.full((4, 4), n, np.uint8), 0) for n in range(2)]
+    store.set_aside(key)
+    second = store.save(f"{key}/L0/00", "on", np.full((4, 4), 9, np.uint8), 0)
+    store.bring_back(key, first)
+    store.bring_back(key, first)
+    assert [read_image(tmp_path / one.path)[0, 0] for one in first] == [0, 1]
+    store.bring_back(key, [second])
+    assert read_image(tmp_path / second.path)[0, 0] == 9
+
+
+def test_changed_frames_are_not_brought_back(tmp_path: Path) -> None:
+    store, key = FrameStore(tmp_path), "p.1/500mm"
+    first = store.save(f"{key}/L1/00", "on", np.zeros((4, 4), np.uint8), 0)
+    store.set_aside(key)
+    path = next(tmp_path.glob("set-aside/**/*.png"))
+    path.write_bytes(path.read_bytes()[:-1] + b"x")
+    with pytest.raises(BadInputError, match="set-aside"):
+        store.bring_back(key, [first])
+
+
 def test_a_full_disk_leaves_no_half_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def no_space(handle: int) -> None:
         raise OSError(28, "No space left on device")

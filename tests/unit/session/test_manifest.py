@@ -45,6 +45,23 @@ def test_files_are_kept_word_for_word(session: Path) -> None:
     assert load_session_rig(session) == load_rig(RIG)
 
 
+def test_a_recorded_rig_beyond_the_bounds_of_today_is_read_but_not_computed_with(session: Path) -> None:
+    manifest = session / MANIFEST
+    text = manifest.read_text()
+    beyond = {
+        "value: 533.3, sd: 26.7": "value: 0.5, sd: 0.1",
+        "value: 319.5, sd: 40.0": "value: 9e3, sd: 40.0",
+    }
+    for number, other in beyond.items():
+        assert text.count(number) == 1
+        text = text.replace(number, other)
+    manifest.write_text(text)
+    rig = load_session_rig(session)
+    assert (rig.camera.f_px.value, rig.camera.cx_px.value) == (0.5, 9000.0)
+    with pytest.raises(BadInputError, match="f_px"):
+        load_session_rig(session, bounded=True)
+
+
 def test_versions_are_those_of_the_installed_packages(session: Path) -> None:
     versions = load_manifest(session).versions
     assert versions == recorded_versions()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from workbench.model import event as ev
 from workbench.model.target import Placement
 from workbench.session.repairs import repairs_of
-from workbench.session.state import effective, placement_captures
+from workbench.session.state import effective, placement_captures, replaced_captures
 
 A, B = "p.1/100mm", "p.1/200mm"
 
@@ -56,6 +56,33 @@ def test_captures_before_a_recapture_do_not_count_and_those_after_it_do() -> Non
     assert placement_captures(again) == {}
     assert placement_captures([*again, record(3, placed), record(4, ev.PlacementFinished(key=A))])[A].complete
     assert placement_captures([*captured, repaired(2, leave_out=(A,))])[A].complete
+
+
+def placed(n: int, attempt: int = 1) -> list[ev.Record]:
+    event = ev.TargetPlaced(placement=Placement(key=A, standoff_mm=100.0, attempt=attempt), by="person")
+    return [record(n, event), record(n + 1, ev.PlacementFinished(key=A))]
+
+
+def test_a_restored_placement_has_the_captures_before_the_last_recapture() -> None:
+    records = [*placed(0), repaired(2, recapture=(A,)), *placed(3, 2)]
+    assert replaced_captures(records)[A].placed.placement.attempt == 1
+    back = [*records, repaired(5, restore=(A,))]
+    assert placement_captures(back)[A].placed.placement.attempt == 1
+    assert placement_captures(back)[A].complete
+    assert replaced_captures(back)[A].placed.placement.attempt == 2
+    forth = [*back, repaired(6, restore=(A,))]
+    assert placement_captures(forth)[A].placed.placement.attempt == 2
+
+
+def test_restoring_a_placement_that_was_left_out_exchanges_no_captures() -> None:
+    records = [*placed(0), repaired(2, recapture=(A,)), *placed(3, 2), repaired(5, leave_out=(A,))]
+    assert placement_captures([*records, repaired(6, restore=(A,))])[A].placed.placement.attempt == 2
+
+
+def test_replayed_captures_stay_complete_while_they_are_journalled_again() -> None:
+    records = [*placed(0), repaired(2, restore=(A,)), placed(3)[0]]
+    assert placement_captures(records)[A].complete
+    assert not placement_captures([*placed(0), placed(2, 2)[0]])[A].complete
 
 
 def test_a_resumption_makes_no_repair_void() -> None:

@@ -42,7 +42,16 @@ def test_prompts_are_those_of_placements_and_of_limits_that_ask() -> None:
     step = parse_step(f"step: capture_grid, standoffs_mm: [300, 600], repeats: 1, {limits}")
     keys = [prompt.key for prompt in step.prompts("p.1", two_laser_rig())]
     assert keys[:2] == ["p.1/300mm", "p.1/600mm"]
-    assert keys[2:] == [f"p.1/{mm}mm/{one}/snr" for mm in (300, 600) for one in ("L1", "L2")]
+    assert keys[2:6] == [f"p.1/{mm}mm/{one}/snr" for mm in (300, 600) for one in ("L1", "L2")]
+    assert keys[6:] == ["p.1/300mm/standoff", "p.1/600mm/standoff"]
+
+
+def test_prompts_of_added_placements_are_those_of_placements_and_of_limits_that_ask() -> None:
+    limits = "limits: {snr: {in: [5, null], on_fail: ask}}"
+    step = parse_step(f"step: capture_grid, standoffs_mm: [300, 600], repeats: 1, {limits}")
+    keys = [prompt.key for prompt in step.added_prompts("p.1", two_laser_rig(), (600.0,))]
+    key = "p.1/02-600mm"
+    assert keys == [key, f"{key}/L1/snr", f"{key}/L2/snr", f"{key}/standoff"]
 
 
 def test_it_counts_the_pairs_that_it_took(tmp_path: Path) -> None:

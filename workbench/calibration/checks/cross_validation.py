@@ -89,7 +89,7 @@ def _leave_out(
     return CrossValidatedPlacement(
         placement=info.key,
         standoff_mm=info.standoff_mm,
-        error_mm=_range_error(fit, reduced, index, spots, first_order_mm),
+        error_mm=iterated_error(reduced, index, spots, info.standoff_mm, _offset_mm(fit)),
         sd_mm=sd,
         score=first_order_mm / sd,
         lasers=() if on_board else _laser_errors(fit, reduced, index, spots, w),
@@ -99,20 +99,20 @@ def _leave_out(
     )
 
 
-def _range_error(
-    fit: CalibrationFit, reduced: Refit, index: int, rows: BoolArray, first_order_mm: float
+def iterated_error(
+    reduced: Refit, index: int, rows: BoolArray, standoff_mm: float, offset_mm: float
 ) -> float | None:
     """Range by the spots of `rows` - standoff of their placement, mm; None beyond infinity.
 
     Args:
-        fit: the fit.
         reduced: the refit without the placement.
         index: index of the placement.
         rows: (R,) rows of its spots.
-        first_order_mm: the error by `range_error`.
+        standoff_mm: its standoff by the ruler.
+        offset_mm: depth of the pinhole behind the reference plane.
     """
-    standoff_mm, offset_mm = fit.cells.placements[index].standoff_mm, fit.rig.bench.offset_mm.value
-    depth_mm, step_mm = standoff_mm + offset_mm, first_order_mm
+    depth_mm = standoff_mm + offset_mm
+    step_mm = range_error(reduced, rows, by_standoff(reduced))[0]
     for _ in range(MOST_STEPS):
         inverse = (1.0 - step_mm / depth_mm) / depth_mm
         if inverse * (standoff_mm + offset_mm) < LEAST_INVERSE_DEPTH:
@@ -126,6 +126,10 @@ def _range_error(
     return depth_mm - offset_mm - standoff_mm
 
 
+def _offset_mm(fit: CalibrationFit) -> float:
+    return fit.rig.bench.offset_mm.value
+
+
 def _laser_errors(
     fit: CalibrationFit, reduced: Refit, index: int, spots: BoolArray, w: FloatArray
 ) -> tuple[LaserError, ...]:
@@ -134,8 +138,8 @@ def _laser_errors(
     for laser, laser_id in enumerate(fit.rig.laser_ids):
         own = spots & rows_of(fit.cells.laser == laser, reduced.problem)
         if (w[own] ** 2).sum() > 0:
-            first_order_mm, sd_mm = range_error(reduced, own, w)
-            error_mm = _range_error(fit, reduced, index, own, first_order_mm)
+            standoff_mm, sd_mm = fit.cells.placements[index].standoff_mm, range_error(reduced, own, w)[1]
+            error_mm = iterated_error(reduced, index, own, standoff_mm, _offset_mm(fit))
             errors.append(LaserError(laser_id=laser_id, error_mm=error_mm, sd_mm=sd_mm))
     return tuple(errors)
 

@@ -131,6 +131,8 @@ class MeanObservations:
     """The observations that each mean is taken over."""
     repeat_scale: float = 1.0
     """Factor on the stated deviations, estimated from the scatter of the repeats; 1 where they agree."""
+    repeat_freedom: float = 0.0
+    """Degrees of freedom of that scatter."""
     captures: tuple[Observation, ...] = ()
     """Every observation in the order of the captures, outliers included."""
     inconsistent: tuple[int, ...] = ()
@@ -172,7 +174,8 @@ def group(
     scatter = [_scatter(members, noise) for members in kept.values()]
     inconsistent = [n for n, one in enumerate(scatter) if is_inconsistent(one, usual)]
     alike = [one for n, one in enumerate(scatter) if n not in inconsistent]
-    scale = float(significant_scale(sum(chi2 for chi2, _ in alike), sum(free for _, free in alike)))
+    freedom = sum(free for _, free in alike)
+    scale = float(significant_scale(sum(chi2 for chi2, _ in alike), freedom))
     scales = [(chi2 / free) ** 0.5 if n in inconsistent else scale for n, (chi2, free) in enumerate(scatter)]
     means = [
         weighted_mean(positions(m), own * stated_sd(m, noise))
@@ -195,6 +198,7 @@ def group(
             parts=parts,
             members=tuple(tuple(m) for m in kept.values()),
             repeat_scale=scale,
+            repeat_freedom=freedom,
             captures=tuple(seen),
             inconsistent=tuple(inconsistent),
             times=times,

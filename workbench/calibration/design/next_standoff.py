@@ -117,7 +117,7 @@ class _Fitted:
 
 def _fit(rig: Rig, cells: MeanObservations, planned: int) -> _Fitted | None:
     """`fit` with the noise scaled to the residuals where they are too large; None: no finite result."""
-    whole = _padded(cells, len(rig.lasers), planned)
+    whole = padded(cells, len(rig.lasers), planned)
     table = table_of(rig, whole.placements)
     problem = LeastSquaresProblem.of(rig, table, whole, ())
     with np.errstate(over="ignore", invalid="ignore"):
@@ -171,7 +171,7 @@ def _worst_residual(rig: Rig, fitted: _Fitted) -> dict[str, Any]:
     }
 
 
-def _padded(cells: MeanObservations, lasers: int, planned: int) -> MeanObservations:
+def padded(cells: MeanObservations, lasers: int, planned: int) -> MeanObservations:
     """The mean observations, padded with unmeasured cells for all planned placements and all lasers.
 
     The fit after each placement then has the array shapes of the fit at the end: one compiled program.

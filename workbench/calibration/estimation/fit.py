@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import radians, tan
+from math import inf, radians, tan
 
 import numpy as np
 
@@ -80,6 +80,8 @@ class CalibrationFit:
     """Factor on the stated pixel noise, estimated from the residuals; 1 where they agree with it."""
     placement_scale: float
     """Factor on the stated deviations of placements, estimated from their errors; 1 likewise."""
+    placement_freedom: float
+    """Degrees of freedom of that estimate; infinite where the factor is 1."""
     placement_scatter_p: float
     """P value of the placement errors under their stated deviations."""
     chi2: float
@@ -94,6 +96,13 @@ class CalibrationFit:
     def sd(self) -> FloatArray:
         """(P,) posterior standard deviations."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def noise_freedom(self) -> float:
+        """Degrees of freedom of the spots' noise: of what scales it, else infinite."""
+        if self.noise_scale > 1:
+            return self.degrees_of_freedom
+        return self.cells.repeat_freedom if self.cells.repeat_scale > 1 else inf
 
     @cached_property
     def layout(self) -> Layout:
@@ -205,6 +214,7 @@ def fit_cells(
         rms_px=_rms(cells, residual),
         noise_scale=scale,
         placement_scale=scatter.scale,
+        placement_freedom=scatter.degrees_of_freedom,
         placement_scatter_p=scatter.p_value,
         chi2=solution.chi2,
         degrees_of_freedom=solution.degrees_of_freedom,

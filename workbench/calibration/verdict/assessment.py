@@ -11,6 +11,7 @@ import numpy as np
 
 from workbench.calibration.checks.cross_validation import alarms
 from workbench.calibration.checks.faults import find_faults
+from workbench.calibration.checks.mistaken_data import undecided_unit
 from workbench.calibration.checks.priors import contradicted_priors, doubted_priors
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.checks.residuals import explain, residual_tests
@@ -119,7 +120,7 @@ def assess(
     if refusing:
         reasons = [*refusing, *reasons]
     else:
-        warnings = [*direction_lines(directions), *warnings, *_warnings(fit)]
+        warnings = [*_unit_warning(fit), *direction_lines(directions), *warnings, *_warnings(fit)]
         reasons += [
             *contradicted_priors(fit),
             *map(_alarm, alarms(placements)),
@@ -248,6 +249,17 @@ def _largest_residual(fit: CalibrationFit) -> str:
     laser = fit.rig.laser_ids[fit.cells.laser[cell]]
     standoff = fit.cells.placements[fit.cells.placement[cell]].standoff_mm
     return f"{fit.residual_px[cell, axis]:+.2f} px in {'uv'[axis]} of laser {laser} at {standoff:g} mm"
+
+
+def _unit_warning(fit: CalibrationFit) -> list[str]:
+    """Doubt of the unit of all standoffs, where the priors do not decide."""
+    if (unit := undecided_unit(fit)) is None:
+        return []
+    nearest, farthest = (f"{limit(s.standoff_mm for s in fit.used):g}" for limit in (min, max))
+    return [
+        f"the standoffs ({nearest} to {farthest} mm) may be {unit}: by the rig file's priors that is about as"
+        " probable. Do: check the unit of standoff_mm; a measured baseline decides."
+    ]
 
 
 def _warnings(fit: CalibrationFit) -> list[str]:

@@ -15,7 +15,7 @@ from workbench.model.errors import RigNotReadyError, StoppedError
 from workbench.model.prompt import Answer, Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
-from workbench.procedure.capture.automatic import darkening
+from workbench.procedure.capture.automatic import find_automatic_control
 from workbench.procedure.capture.latency import count_latency
 from workbench.procedure.capture.pair import PairSource, spots_found
 from workbench.procedure.engine.prompts import SAFETY, safety_prompt
@@ -173,8 +173,8 @@ class Context:
             self.begin(key)
             frames = count_latency(self.bench.lasers, camera, self.rig, most_frames)
             camera.discard_frames = frames
-            share = darkening(self.bench.lasers, camera, self.rig)
-            measured = ev.LatencyMeasured(frames=frames, darkening=share)
+            found = find_automatic_control(self.bench.lasers, camera, self.rig)
+            measured = ev.LatencyMeasured(frames=frames, darkening=found.darkening, dimming=found.dimming)
         camera.discard_frames = measured.frames
         self.emit(measured)
         return measured

@@ -18,14 +18,16 @@ T = TypeVar("T")
 class RetakeError(Exception):
     """Request to capture the present placement again; the text is the reason."""
 
-    def __init__(self, why: str, by_limit: bool = False) -> None:
+    def __init__(self, why: str, by_limit: bool = False, place_again: bool = False) -> None:
         super().__init__(why)
         self.by_limit = by_limit
         """Whether a limit with `on_fail: retry` is the cause, not the operator."""
+        self.place_again = place_again
+        """Whether the target must be placed, and its standoff entered, again."""
 
 
-class _RetakeReplayedError(Exception):
-    """Request to capture a replayed placement again, for which the target must be placed first."""
+class _PlaceAgainError(Exception):
+    """Request to capture a placement again for which the target must be placed first."""
 
 
 class _SkipError(Exception):
@@ -79,7 +81,7 @@ def visit_placements(
         began[asked.key] = record.n
         try:
             results[asked.key] = _work(context, work, placed, record.n, answer)
-        except _RetakeReplayedError:  # neither the target's position nor a free beam path is known
+        except _PlaceAgainError:
             del began[asked.key]
             index -= 1
         except _SkipError as skip:
@@ -102,8 +104,9 @@ def _work(
             return work(placed)
         except RetakeError as again:
             _set_aside(context, placed.key, from_n, str(again), retry=again.by_limit)
-            if context.pairs.replayed is not None:
-                raise _RetakeReplayedError from again
+            # Of a replayed placement neither the target's position nor a free beam path is known.
+            if again.place_again or context.pairs.replayed is not None:
+                raise _PlaceAgainError from again
             FrameStore(context.session_dir).set_aside(placed.key)
             from_n = context.emit(ev.TargetPlaced(placement=placed, by=answer.by)).n
         except _SkipError as skip:
@@ -157,8 +160,14 @@ def _set_aside(
     context.forget(key)
 
 
-def settle(context: Context, prompt: Prompt, failed: str) -> None:
-    """Ask what to do about a failed limit at the present placement; returns if its captures are kept.
+def settle(context: Context, prompt: Prompt, failed: str, *, place_again: bool = False) -> None:
+    """Ask what to do about a failed check at the present placement; returns if its captures are kept.
+
+    Args:
+        context: session.
+        prompt: question.
+        failed: description of the failure, for the record.
+        place_again: whether `redo` asks for the target and its standoff again.
 
     Raises:
         RetakeError: the placement must be captured again.
@@ -166,7 +175,7 @@ def settle(context: Context, prompt: Prompt, failed: str) -> None:
     """
     answer = context.recorder.answer(prompt.key, prompt.do) or context.ask_now(prompt)
     if answer.action == "redo":
-        raise RetakeError(f"{failed}: {answer.reason}")
+        raise RetakeError(f"{failed}: {answer.reason}", place_again=place_again)
     if answer.action == "skip":
         raise _SkipError(answer)
     context.emit(ev.Answered(key=prompt.key, question=prompt.do, answer=answer))

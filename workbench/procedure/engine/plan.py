@@ -14,6 +14,7 @@ from workbench.model.rig import Rig
 from workbench.procedure.engine.existing_calibration import GIVES, ExistingCalibration
 from workbench.procedure.engine.procedure_file import Procedure, load_procedure
 from workbench.procedure.engine.prompts import safety_prompt
+from workbench.procedure.engine.step import Step
 
 
 @dataclass(frozen=True)
@@ -103,16 +104,33 @@ class Plan:
             for index, step in enumerate(procedure.steps, start=1)
         ]
 
-    def prompts(self) -> dict[str, Prompt]:
+    def prompts(self, added_mm: Sequence[float] = ()) -> dict[str, Prompt]:
         """Every possible prompt by its key, in order; an answers file may answer these.
 
         The final text of a prompt about a limit is known only when the limit fails; here it names the limit.
+
+        Args:
+            added_mm: standoffs that repairs have added.
         """
         found = [safety_prompt(self.rig)]
         for procedure in self.procedures:
             for index, step in enumerate(procedure.steps, start=1):
-                found += step.prompts(procedure.step_name(index), self.rig)
+                name = procedure.step_name(index)
+                found += step.prompts(name, self.rig)
+                if takes_added(procedure.steps, index - 1):
+                    found += step.added_prompts(name, self.rig, added_mm)
         return {prompt.key: prompt for prompt in found}
+
+
+GRID, FIT = "capture_grid", "fit"
+"""Kinds of the steps that take additional standoffs, and use them."""
+
+
+def takes_added(steps: Sequence[Step], index: int) -> bool:
+    """Whether a step is the last grid before a fit, which takes the standoffs that repairs add."""
+    kinds = [step.step for step in steps[index:]]
+    later = kinds[1 : kinds.index(FIT)] if FIT in kinds else []
+    return kinds[:1] == [GRID] and FIT in kinds and GRID not in later
 
 
 def _check_placements(rig: Rig, procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:

@@ -91,6 +91,30 @@ def captures_prompt(key: str, failed: str, placement: Placement, where: str = ""
     )
 
 
+def standoff_key(placement: Placement) -> str:
+    """Key of the question about a standoff that contradicts the other placements."""
+    return f"{placement.key}/standoff"
+
+
+def standoff_prompt(placement: Placement, failed: str = "The standoff contradicts the others.") -> Prompt:
+    """Question about a standoff that contradicts its prediction, while the target still stands there.
+
+    Args:
+        placement: placement as entered.
+        failed: description of the contradiction.
+    """
+    here = f"{placement.standoff_mm:g} mm"
+    return Prompt(
+        key=standoff_key(placement),
+        do=f"{failed} Keep these captures?",
+        expect=f"The ruler shows {here}, and the target is square to it.",
+        otherwise="Type redo: the target is placed, and its standoff entered, again.",
+        yes="keep them: the target stands as entered, another placement may be wrong",
+        at_bench=True,
+        may={"redo": "measure again", "skip": f"leave {here} out"},
+    )
+
+
 def _instead(placement: Placement, before: Placement | None) -> dict[Action, str]:
     """Further actions with their effects; at this prompt `redo` refers to the previous placement."""
     here = f"{placement.standoff_mm:g} mm"

@@ -9,16 +9,12 @@ from typing import TYPE_CHECKING
 
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
-from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.plan import FIT, GRID, Plan
 from workbench.session.repairs import repairs_of
-from workbench.session.state import placement_captures
+from workbench.session.state import placement_captures, replaced_captures
 
 if TYPE_CHECKING:
     from workbench.procedure.engine.run import Invocation
-
-
-GRID, FIT = "capture_grid", "fit"
-"""Kinds of the steps that take additional standoffs, and use them."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +53,16 @@ class Repair:
             )
         if doubled := [key for key in chosen if chosen.count(key) > 1]:
             raise BadInputError(f"repair: expected one decision for each placement, got two for {doubled[0]}")
-        out = {*repairs_of(records).left_out, *skipped_placements([r.event for r in records])}
+        out = {
+            *repairs_of(records).left_out,
+            *skipped_placements([r.event for r in records]),
+            *replaced_captures(records),
+        }
         if wrong := [key for key in restore if key not in out]:
             those = ", ".join(sorted(out)) or "none"
-            raise BadInputError(f"repair: {wrong[0]} is neither left out nor skipped; those are: {those}")
+            raise BadInputError(
+                f"repair: {wrong[0]} is neither left out, skipped nor captured again; those are: {those}"
+            )
         fitted = [p for p in plan.procedures if {GRID, FIT} <= {step.step for step in p.steps}]
         if self.add_mm and len(fitted) != 1:
             names = ", ".join(procedure.procedure for procedure in fitted) or "none"
@@ -129,8 +131,16 @@ def kept_placements(plan: Plan, records: Sequence[ev.Record], repair: Repair | N
     """
     complete = {key for key, one in placement_captures(records).items() if one.complete}
     keys = placement_keys(plan, records)
-    again = () if repair is None else repair.recapture
-    return frozenset(complete - {find_placement(name, keys) for name in again})
+    again, back = ((), ()) if repair is None else (repair.recapture, repair.restore)
+    restored = {find_placement(name, keys) for name in back} & replaced_captures(records).keys()
+    return frozenset(complete - {find_placement(name, keys) for name in again} | restored)
+
+
+def restored_frames(records: Sequence[ev.Record]) -> dict[str, list[ev.FrameRef]]:
+    """Frames of the complete captures of each placement that a repair has restored."""
+    captures = placement_captures(records)
+    keys = {key for r in records if isinstance(r.event, ev.SessionRepaired) for key in r.event.restore}
+    return {key: captures[key].frames for key in sorted(keys & captures.keys()) if captures[key].complete}
 
 
 def skipped_placements(events: Sequence[ev.Event]) -> list[str]:

@@ -7,7 +7,7 @@ complete placements are read from disk, and all results are computed again from 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeGuard
 
 from workbench.model import event as ev
@@ -28,6 +28,7 @@ class ReplayingJournal:
         consumers: Sequence[ev.Consumer],
         before: Sequence[ev.Record] = (),
         resumed: ev.SessionResumed | None = None,
+        on_resumed: Callable[[], None] | None = None,
     ) -> None:
         """Create a recorder.
 
@@ -36,6 +37,7 @@ class ReplayingJournal:
             consumers: receivers of every record, replayed ones first.
             before: records of the session so far; empty for a new session.
             resumed: event that is journalled before the first new one of a resumed session.
+            on_resumed: called when `resumed` is on disk: what it accepts must not count before it.
         """
         self._journal, self._consumers = journal, consumers
         self.repairs = repairs_of(before)
@@ -43,6 +45,7 @@ class ReplayingJournal:
         self._kept = deque(safe_part(before))
         self._from_n = 0
         self._resumed = resumed if before else None
+        self._on_resumed = on_resumed
         self._incidents: list[ev.Incident] = []
         """Incidents to journal with the next new event; replayed events have no place for them."""
         self._complete = {
@@ -88,10 +91,7 @@ class ReplayingJournal:
             if isinstance(record.event, ev.SessionRepaired):
                 self._pass_on(record)
         self._kept.clear()
-        if self._resumed is not None:
-            resumed = self._resumed.model_copy(update={"from_n": self._from_n})
-            self._resumed = None
-            self._show(self._journal.append(resumed))
+        self._journal_resumption()
         self._journal_incidents()
         record = self._show(self._journal.append(event))
         if not isinstance(event, ev.SessionFinished):  # the last record of a session
@@ -152,6 +152,15 @@ class ReplayingJournal:
             except ev.ConsumerFailedError as error:
                 self._incidents.append(error.incident)
         return record
+
+    def _journal_resumption(self) -> None:
+        if self._resumed is None:
+            return
+        record = self._journal.append(self._resumed.model_copy(update={"from_n": self._from_n}))
+        self._resumed = None
+        if self._on_resumed is not None:
+            self._on_resumed()
+        self._show(record)
 
     def _journal_incidents(self) -> None:
         while self._incidents:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -17,9 +18,10 @@ from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_mode
 from workbench.procedure.engine.existing_calibration import ExistingCalibration
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.procedure_file import Procedure
-from workbench.procedure.engine.repair import Repair
+from workbench.procedure.engine.repair import Repair, restored_frames
 from workbench.procedure.engine.replay import ReplayingJournal
 from workbench.procedure.engine.run import NO_OPERATOR, Invocation, open_context, run_steps
+from workbench.session.frames import FrameStore
 from workbench.session.journal import JOURNAL, Journal, read_journal
 from workbench.session.manifest import (
     MANIFEST,
@@ -55,8 +57,8 @@ def resume(
         repair: decisions about placements, which are journalled first; a finished session can be repaired.
 
     Raises:
-        BadInputError: `session_dir` is no session, the session is finished or running, files or versions have
-            changed, or the repair names no placement of the session.
+        BadInputError: `session_dir` is no session; the session is finished or running. Files or versions have
+            changed, the repair names no placement of the session, or frames to restore are missing.
         WorkbenchError: see `run`.
     """
     began_with = load_manifest(session_dir)
@@ -72,9 +74,9 @@ def resume(
         journal, before = Journal.reopen(session_dir)
         stack.enter_context(journal)
         decided = None if repair is None else repair.decided(plan, before, caller)
+        if decided is not None:
+            _check_frames(session_dir, before, decided)
         bench = stack.enter_context(open_bench(plan.rig, session_dir))
-        if changes:
-            replace_manifest(session_dir, began_with, now.rig, now.procedures)
         resumed = ev.SessionResumed(
             from_n=0,
             operator=caller.operator,
@@ -85,9 +87,21 @@ def resume(
         )
         if decided is not None:
             before = (*before, journal.append(decided))
-        recorder = ReplayingJournal(journal, consumers, before, resumed)
+        for key, frames in restored_frames(before).items():
+            FrameStore(session_dir).bring_back(key, frames)
+        accept = partial(replace_manifest, session_dir, began_with, now.rig, now.procedures)
+        if changes and not before:  # nothing was recorded with the earlier files
+            accept()
+        recorder = ReplayingJournal(journal, consumers, before, resumed, accept if changes else None)
         began = Invocation(began_with.operator, began_with.command, began_with.created)
         run_steps(plan, open_context(plan, session_dir, bench, operator, recorder, began, stopping))
+
+
+def _check_frames(session_dir: Path, records: Sequence[ev.Record], decided: ev.SessionRepaired) -> None:
+    """Refuse a repair that restores captures whose frames are missing, before it is journalled."""
+    repaired = ev.Record(n=len(records), time_ns=0, event=decided)
+    for key, frames in restored_frames([*records, repaired]).items():
+        FrameStore(session_dir).find_frames(key, frames)
 
 
 def files_now(session_dir: Path, began_with: Manifest) -> tuple[Manifest, tuple[str, ...]]:

@@ -47,6 +47,9 @@ class Step(Protocol):
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
         """Possible prompts, against which an answers file is checked before the session."""
 
+    def added_prompts(self, name: str, rig: Rig, added_mm: Sequence[float]) -> Sequence[Prompt]:
+        """Possible prompts of the placements at standoffs that repairs have added to this step."""
+
     @property
     def default_duration_s(self) -> float:
         """Duration without placements and captures, if no session has measured it."""
@@ -76,6 +79,10 @@ class StepModel(FileModel):
     def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
         """Prompts of the placements; see `Step`."""
         return placement_prompts(self.placements(name, rig))
+
+    def added_prompts(self, name: str, rig: Rig, added_mm: Sequence[float]) -> Sequence[Prompt]:
+        """None; see `Step`."""
+        return ()
 
     @property
     def default_duration_s(self) -> float:

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 from pydantic import model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.number_text import counted
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
@@ -35,7 +36,8 @@ class AccuracyTrialStep(TrialStepModel):
     @property
     def title(self) -> str:
         """Numbers of standoffs and readings."""
-        return f"Accuracy at {len(self.standoffs_mm)} standoffs, {self.readings} readings each"
+        where = f"Accuracy at {counted(len(self.standoffs_mm), 'standoff')}"
+        return f"{where}, {counted(self.readings, 'reading')} each"
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
         """One placement per standoff."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from workbench.model.event import ReadingTaken
+from workbench.model.number_text import counted
 from workbench.model.reading_chart import error_chart
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
@@ -65,7 +66,7 @@ def run_trial(
     run.finish(tables, [chart])
     require_readings(name, [one.taken for one in visited])
     check_results(context, name, results_of(ranges, limits), limits)
-    return f"{sum(row.readings for row in rows)} readings, table in {name}.csv; {verdict.text}"
+    return f"{counted(sum(row.readings for row in rows), 'reading')}, table in {name}.csv; {verdict.text}"
 
 
 def agreements(

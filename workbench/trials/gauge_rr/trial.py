@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from workbench.model.event import ReadingTaken
+from workbench.model.number_text import counted
 from workbench.model.table import Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
@@ -42,7 +43,7 @@ def run_trial(context: Context, name: str, step: GaugeTrialStep) -> str:
     run.finish([table], [gauge_chart(f"{name}-errors", frame)])
     require_readings(name, by_standoff.values())
     check_results(context, name, gauge_results(table), step.limits)
-    return f"{frame['measured_mm'].count()} readings in {name}.csv, statistics in {name}-table.csv"
+    return f"{counted(frame['measured_mm'].count(), 'reading')} in {name}.csv, statistics in {name}-table.csv"
 
 
 def gauge_results(table: Table) -> list[Result]:

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
 from workbench.model.limit import Limit
+from workbench.model.number_text import counted
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
@@ -52,7 +53,8 @@ class InclineTrialStep(TrialStepModel):
     def title(self) -> str:
         """Angles, and numbers of ranges and readings."""
         angles = ", ".join(f"{target.angle_deg:g}" for target in self.targets)
-        return f"Incline of {angles} deg at {len(self.ranges_mm)} ranges, {self.readings} readings each"
+        where = f"Incline of {angles} deg at {counted(len(self.ranges_mm), 'range')}"
+        return f"{where}, {counted(self.readings, 'reading')} each"
 
     def set_ups(self, name: str, rig: Rig) -> list[SetUp]:
         """Every set-up, one angle after the other.

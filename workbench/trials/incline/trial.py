@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from workbench.model.chart import Axis, Chart
 from workbench.model.event import ReadingTaken
+from workbench.model.number_text import counted
 from workbench.model.reading_chart import error_chart
 from workbench.model.table import Cell, Column, Table
 from workbench.model.target import Placement
@@ -73,7 +74,8 @@ def run_trial(context: Context, name: str, step: InclineTrialStep) -> str:
     require_readings(name, [of for _, of in taken])
     check_results(context, name, [one for row, of in taken for one in incline_results(row, of)], step.limits)
     angles = sum(row.angle.n for row in rows)
-    return f"{len(readings)} readings, {angles} with an angle, tables in {name}.csv and {name}-angle.csv"
+    count = f"{counted(len(readings), 'reading')}, {angles} with an angle"
+    return f"{count}, tables in {name}.csv and {name}-angle.csv"
 
 
 def _common_tilts(

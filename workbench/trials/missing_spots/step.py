@@ -10,6 +10,7 @@ from pydantic import model_validator
 from workbench.model.errors import BadInputError
 from workbench.model.fields import Count, Standoffs, require_different
 from workbench.model.limit import Limit
+from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
@@ -72,7 +73,8 @@ class MissingSpotsTrialStep(TrialStepModel):
     def title(self) -> str:
         """Numbers of lasers left off and blocked, of ranges and readings."""
         names = ", ".join(one.name for one in self.conditions[1:])
-        return f"Lasers {names} at {len(self.ranges_mm)} ranges, {self.readings} readings each"
+        where = f"Lasers {names} at {counted(len(self.ranges_mm), 'range')}"
+        return f"{where}, {counted(self.readings, 'reading')} each"
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
         """One placement per range.

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from workbench.model.chart import Axis, Chart
 from workbench.model.event import ReadingTaken
+from workbench.model.number_text import counted
 from workbench.model.table import Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
@@ -63,7 +64,7 @@ def run_trial(
     run.finish(tables, [missing_chart(name, taken)])
     require_readings(name, by_placement)
     check_results(context, name, missing_results(taken, summaries), step.limits)
-    return f"{len(readings)} readings, tables in {name}.csv and {name}-summary.csv"
+    return f"{counted(len(readings), 'reading')}, tables in {name}.csv and {name}-summary.csv"
 
 
 def missing_results(taken: Sequence[ByCondition], summaries: Sequence[MissingSummary]) -> list[Result]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from workbench.model.event import ReadingTaken
+from workbench.model.number_text import counted
 from workbench.model.reading_chart import error_chart
 from workbench.model.table import Table
 from workbench.model.target import Placement
@@ -55,7 +56,7 @@ def run_trial(context: Context, name: str, step: RepeatabilityTrialStep) -> str:
     run.finish([table, budget], charts)
     require_readings(name, by_standoff.values())
     check_results(context, name, precision_results(table), step.limits)
-    return f"{frame['measured_mm'].count()} readings in {name}.csv, statistics in {name}-table.csv"
+    return f"{counted(frame['measured_mm'].count(), 'reading')} in {name}.csv, statistics in {name}-table.csv"
 
 
 def precision_results(table: Table) -> list[Result]:

@@ -9,6 +9,7 @@ from pydantic import model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
 from workbench.model.limit import Limit
+from workbench.model.number_text import counted
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
@@ -47,8 +48,8 @@ class RoundTrialStep(TrialStepModel):
     def title(self) -> str:
         """Diameter, and numbers of ranges and readings."""
         return (
-            f"Cylinder of {self.target.diameter_mm:g} mm at {len(self.ranges_mm)} ranges,"
-            f" {self.readings} readings each"
+            f"Cylinder of {self.target.diameter_mm:g} mm at {counted(len(self.ranges_mm), 'range')},"
+            f" {counted(self.readings, 'reading')} each"
         )
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:

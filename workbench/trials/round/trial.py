@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from workbench.model.chart import Axis, Chart
 from workbench.model.event import ReadingTaken
+from workbench.model.number_text import counted
 from workbench.model.reading_chart import error_chart
 from workbench.model.table import Cell, Column, Table
 from workbench.model.target import Placement
@@ -56,7 +57,8 @@ def run_trial(context: Context, name: str, step: RoundTrialStep, placements: Seq
     require_readings(name, taken)
     check_results(context, name, [one for of in taken for one in round_results(target, of)], step.limits)
     radii = sum(reading.radius_mm is not None for reading in readings)
-    return f"{len(readings)} readings, {radii} with a radius, tables in {name}.csv and {name}-radius.csv"
+    count = f"{counted(len(readings), 'reading')}, {radii} with a radius"
+    return f"{count}, tables in {name}.csv and {name}-radius.csv"
 
 
 def cylinder_statistics(readings: Sequence[ReadingTaken]) -> ErrorStatistics:

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from workbench.model.fields import Count, Standoff, Standoffs, require_different
 from workbench.model.limit import Limit
+from workbench.model.number_text import counted
 from workbench.model.rig import NonNegativeFloat, Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
@@ -51,7 +52,8 @@ class VerifyTrialStep(TrialStepModel):
     @property
     def title(self) -> str:
         """Numbers of standoffs and readings."""
-        return f"Verify the calibration at {len(self.standoffs_mm)} standoffs, {self.readings} readings each"
+        where = f"Verify the calibration at {counted(len(self.standoffs_mm), 'standoff')}"
+        return f"{where}, {counted(self.readings, 'reading')} each"
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
         """One placement that need not be measured, then one per standoff."""

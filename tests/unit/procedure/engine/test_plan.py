@@ -71,8 +71,15 @@ def test_two_procedures_of_one_name_are_refused(tmp_path: Path) -> None:
 
 def test_prompts_are_keyed_in_the_order_in_which_they_come(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, a="  - {step: confirm, text: Open it.}\n" + CAPTURE)
-    assert list(plan.prompts()) == ["safety", "a.1", "a.2/300mm", "a.2/600mm"]
+    assert list(plan.prompts())[:4] == ["safety", "a.1", "a.2/300mm", "a.2/600mm"]
     assert all(key == prompt.key for key, prompt in plan.prompts().items())
+
+
+def test_prompts_of_added_placements_are_those_of_the_last_grid_before_the_fit(tmp_path: Path) -> None:
+    fit = "  - {step: fit}\n"
+    plan = plan_of(tmp_path, a=CAPTURE + CAPTURE.replace("300, 600", "400") + fit + CAPTURE)
+    added = [key for key in plan.prompts((900.0, 400.0)) if key not in plan.prompts()]
+    assert added == ["a.2/900mm", "a.2/02-400mm", "a.2/900mm/standoff", "a.2/02-400mm/standoff"]
 
 
 def test_a_session_whose_name_is_taken_gets_a_number(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.resume import files_now, first_change, resume
 from workbench.procedure.engine.resume import plan_of as plan_of_manifest
 from workbench.procedure.engine.run import Invocation, run
+from workbench.session.journal import read_journal
 from workbench.session.manifest import load_manifest
 
 STEPS = (
@@ -98,6 +99,47 @@ def test_a_procedure_that_changed_needs_a_reason(stopped: Path) -> None:
     assert placed(story(stopped))[-1] == "a.3/800mm"
     assert "800" in load_manifest(stopped).procedures[0].text
     assert "700" in (stopped / "session-1.yaml").read_text(), "the manifest up to now is kept"
+
+
+def test_a_kill_between_acceptance_and_manifest_asks_for_the_reason_again(
+    stopped: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (stopped.parent / "a.yaml").write_text((stopped.parent / "a.yaml").read_text().replace("700", "800"))
+    manifest = (stopped / "session.yaml").read_bytes()
+
+    class KilledError(BaseException):
+        pass
+
+    def killed(*_: object) -> None:
+        raise KilledError
+
+    monkeypatch.setattr("workbench.procedure.engine.resume.replace_manifest", killed)
+    with pytest.raises(KilledError):
+        resume(stopped, [], RESUMER, lambda: None, accepted_because="first")
+    monkeypatch.undo()
+    assert (stopped / "session.yaml").read_bytes() == manifest
+    with pytest.raises(BadInputError, match="changed"):
+        resume(stopped, [], RESUMER, lambda: None)
+    resume(stopped, [], RESUMER, lambda: None, accepted_because="second")
+    resumed = [r.event for r in read_journal(stopped) if isinstance(r.event, ev.SessionResumed)]
+    assert [event.accepted_because for event in resumed] == ["first", "second"]
+    assert placed(story(stopped))[-1] == "a.3/800mm"
+
+
+def test_a_manifest_is_replaced_only_after_the_acceptance_is_journalled(
+    stopped: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (stopped.parent / "a.yaml").write_text((stopped.parent / "a.yaml").read_text().replace("700", "800"))
+    journalled: list[str | None] = []
+
+    def replaced(folder: Path, *_: object) -> None:
+        last = list(read_journal(folder))[-1].event
+        assert isinstance(last, ev.SessionResumed)
+        journalled.append(last.accepted_because)
+
+    monkeypatch.setattr("workbench.procedure.engine.resume.replace_manifest", replaced)
+    resume(stopped, [], RESUMER, lambda: None, accepted_because="shorter")
+    assert journalled == ["shorter"]
 
 
 def test_a_comment_or_a_file_that_is_gone_is_no_change(stopped: Path) -> None:

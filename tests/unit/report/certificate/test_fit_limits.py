@@ -52,6 +52,16 @@ def test_a_value_that_is_not_known_has_no_verdict() -> None:
     assert fit_limit_rows(record(), None)[1][3:] == (None, "at most 0.2", "")
 
 
+def test_a_laser_without_residuals_has_no_standoff(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = record()
+    assert session.fit is not None
+    lost = session.rig.laser_ids[0]
+    others = tuple(one for one in session.fit.residuals if one.laser_id != lost)
+    monkeypatch.setitem(vars(session), "fit", session.fit.model_copy(update={"residuals": others}))
+    rows = {row[2]: row[3:] for row in fit_limit_rows(session, session.calibration)}
+    assert rows["standoffs"] == (0, "at least 3", "fail")
+
+
 @pytest.mark.parametrize("wrong", ["steps: [", "max_rms_px: x", "unknown: 1"])
 def test_a_procedure_of_another_version_gives_no_rows(wrong: str) -> None:
     assert fit_limit_rows(with_procedure("max_rms_px: 0.5", wrong), None) == []
