@@ -21,7 +21,7 @@ from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.rig import LaserSpec, Rig
 from workbench.model.target import Placement
-from workbench.procedure.capture.automatic import darkening
+from workbench.procedure.capture.automatic import find_automatic_control
 from workbench.procedure.capture.exposure import set_exposure
 from workbench.procedure.capture.latency import LEASE_S, count_latency
 from workbench.procedure.engine.prompts import laser_class_prompt, placement_prompt, safety_prompt
@@ -191,18 +191,14 @@ def _automatic_control(rig: Rig, bench: Bench) -> Iterator[CheckResult]:
     part = "automatic control"
     bench.mark("doctor/automatic")
     try:
-        share = darkening(bench.lasers, bench.camera, rig)
+        remark = find_automatic_control(bench.lasers, bench.camera, rig).text
     except RigNotReadyError as error:
         yield CheckResult(part, False, str(error))
         return
-    if share is None:
-        yield CheckResult(part, True, "none: the image does not darken while a laser is on")
+    if not remark:
+        yield CheckResult(part, True, "none: neither image nor spot darkens while a laser is on")
         return
-    found = (
-        f"while a laser is on the rest of the image darkens by {100 * share:.0f} %; switch the camera's"
-        " automatic exposure, gain and white balance off"
-    )
-    yield CheckResult(part, True, found, kind="noted")
+    yield CheckResult(part, True, remark, kind="noted")
 
 
 def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:

@@ -15,6 +15,7 @@ from workbench.devices.protocols import StreamingCamera
 from workbench.model.errors import StoppedError
 from workbench.model.prompt import Answer
 from workbench.model.rig import Rig
+from workbench.procedure.capture.automatic import AutomaticControl
 from workbench.procedure.doctor import examine, examine_rig
 
 
@@ -72,7 +73,8 @@ def test_a_driver_that_discards_too_few_frames_fails_and_is_put_right_for_the_re
 
 
 def test_a_camera_that_adjusts_itself_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("workbench.procedure.doctor.darkening", lambda *_: 0.23)
+    found_signs = AutomaticControl(darkening=0.23, dimming=None)
+    monkeypatch.setattr("workbench.procedure.doctor.find_automatic_control", lambda *_: found_signs)
     with plain_bench(noisy_rig(), tmp_path) as bench:
         found = {one.part: one for one in examine(noisy_rig(), bench, Scripted())}
     assert (found["automatic control"].kind, found["automatic control"].ok) == ("noted", True)

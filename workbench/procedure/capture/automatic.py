@@ -41,6 +41,22 @@ class AutomaticControl:
     dimming: float | None
     """Relative dimming of the spot after switching on; a laser whose power falls does the same."""
 
+    @property
+    def text(self) -> str:
+        """The sign and what to do about it; empty without a sign."""
+        if self.darkening is not None:
+            return (
+                f"The camera adjusts itself: while a laser is on, the rest of the image darkens by"
+                f" {100 * self.darkening:.0f} %. Switch its automatic exposure, gain and white balance off"
+            )
+        if self.dimming is not None:
+            return (
+                f"The spot dims by {100 * self.dimming:.0f} % after switching on: either the camera adjusts"
+                " itself (switch its automatic exposure and gain off), or the laser's power falls (check its"
+                " supply and temperature)"
+            )
+        return ""
+
 
 @dataclass(frozen=True)
 class _Alternation:
