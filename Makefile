@@ -9,7 +9,7 @@ INSTALLED := $(VENV)/.installed
 # The dependencies of the workbench alone, without those of its developers.
 RUNNABLE := $(VENV)/.runnable
 
-.PHONY: help demo test thorough quick wheel lint bench prove mutants crash fuzz lock clean schema pictures
+.PHONY: help demo test thorough quick wheel lint bench prove mutants crash fuzz lock clean schema pictures docs certificate
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
@@ -24,6 +24,8 @@ help:
 	@echo "make wheel  build the wheel, install it with the run-time dependencies only, run a session (two minutes)"
 	@echo "make lint   only the linters and the type checker"
 	@echo "make pictures  the viewer's screens in docs/images, of a new run of the demo (two minutes)"
+	@echo "make docs   the documentation site in build/website/site, with the figures of the notebooks (two minutes)"
+	@echo "make certificate  docs/certificate-demo.pdf and its picture, of a new run of the demo (a minute)"
 	@echo "make lock   update requirements.lock and requirements-run.lock from pyproject.toml"
 
 $(BIN)/python:
@@ -94,6 +96,12 @@ lock:
 
 pictures: $(INSTALLED)
 	$(BIN)/python -m tests.viewer.pictures docs/images
+
+docs: $(INSTALLED)
+	$(BIN)/python -m tests.website
+
+certificate: $(INSTALLED)
+	$(BIN)/python -m tests.viewer.certificate docs
 
 schema: $(INSTALLED)
 	$(BIN)/python -c 'import json; from workbench.model.calibration import Calibration; print(json.dumps(Calibration.model_json_schema(), indent=2))' > docs/calibration.schema.json

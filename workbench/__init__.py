@@ -23,14 +23,18 @@ if TYPE_CHECKING:
     from workbench.api import Rig as Rig
     from workbench.api import Session as Session
     from workbench.api import ShapePrior as ShapePrior
+    from workbench.api import Simulation as Simulation
     from workbench.api import Trial as Trial
     from workbench.api import WorkbenchError as WorkbenchError
     from workbench.api import compare as compare
     from workbench.api import design as design
+    from workbench.api import draw as draw
     from workbench.api import fit as fit
     from workbench.api import load_calibration as load_calibration
     from workbench.api import open_session as open_session
     from workbench.api import sessions as sessions
+    from workbench.api import simulate as simulate
+    from workbench.api import with_prior as with_prior
 
 __all__ = [
     "BadInputError",
@@ -43,14 +47,18 @@ __all__ = [
     "Rig",
     "Session",
     "ShapePrior",
+    "Simulation",
     "Trial",
     "WorkbenchError",
     "compare",
     "design",
+    "draw",
     "fit",
     "load_calibration",
     "open_session",
     "sessions",
+    "simulate",
+    "with_prior",
 ]
 
 

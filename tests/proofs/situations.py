@@ -35,7 +35,7 @@ from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, prior, thesis_ri
 from workbench.calibration.checks.priors import DOUBT_P
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import CalibrationFit, fit_cells
-from workbench.calibration.selection.drift import fits_drift
+from workbench.calibration.model.parameters import fits_drift
 from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict.assessment import Assessment
 from workbench.calibration.verdict.export import calibrate
@@ -71,6 +71,12 @@ class Capture:
     """Of the target at 280 mm."""
     moved_spots: float = 0.0
     """Share of the spots that lie 0.4 px away in all their repeats."""
+    pause: float = 0.0
+    """Pause after half of the captures, in running times of the session; the captures then have times."""
+    resumed: bool = False
+    """The pause was an interruption: the sensor is cold again, and the drift starts anew."""
+    step_px: float = 0.0
+    """Shift of the image while the session was interrupted."""
 
 
 @dataclass(frozen=True)
@@ -149,8 +155,28 @@ def observations(world: World, capture: Capture, seed: int) -> list[Observation]
                 u, v = centre + rng.normal(0.0, NOISE_PX, 2)
                 if 0 <= u <= 639 and 0 <= v <= 479:
                     found.append(Observation(f"{len(found)}", laser, key, standoff, repeat, u, v))
-    time = np.linspace(-0.5, 0.5, len(found)) * capture.drift_px
-    return [_shifted(s, float(t)) for s, t in zip(found, time, strict=True)]
+    if not capture.pause:
+        time = np.linspace(-0.5, 0.5, len(found)) * capture.drift_px
+        return [_shifted(s, float(t)) for s, t in zip(found, time, strict=True)]
+    return _with_pause(found, capture)
+
+
+def _with_pause(found: Sequence[Observation], capture: Capture) -> list[Observation]:
+    """The captures with their times, and shifted by a drift in real time; the shift is centred."""
+    running = np.linspace(0.0, 1.0, len(found))
+    later = (np.arange(len(found)) >= len(found) // 2).astype(float)
+    time = running + capture.pause * later
+    shift = running - 0.5 * later if capture.resumed else time / (1.0 + capture.pause)
+    shift_px = capture.drift_px * shift + capture.step_px * later
+    shift_px -= (shift_px.min() + shift_px.max()) / 2.0
+    return [
+        replace(
+            _shifted(one, float(u_px)),
+            time_s=1800.0 * float(t),
+            part="1" if capture.resumed and after else "",
+        )
+        for one, t, after, u_px in zip(found, time, later, shift_px, strict=True)
+    ]
 
 
 _shuffled = cache(shuffled)
@@ -278,6 +304,9 @@ TILT = _mentions("target_slope_x = ", "target_slope_y = ")
 SITUATIONS = (
     Situation("base: shuffled, two returns", _any_alarm, base=True),
     Situation("base: ascending", _any_alarm, capture=Capture(ascending=True), base=True),
+    Situation(
+        "base: interrupted and resumed", _any_alarm, capture=Capture(pause=1.0, resumed=True), base=True
+    ),
     Situation("base: tangential distortion free", _any_alarm, rig=_decentred, base=True),
     Situation(
         "common tilt of 1 deg (stated 0.5)", TILT, spread={"target_tilt_sd_deg": 1.0}, misstated=TARGET_TILT
@@ -289,6 +318,18 @@ SITUATIONS = (
     Situation("drift 0.32 px, ascending", DRIFT, capture=Capture(ascending=True, drift_px=0.32)),
     Situation("drift 0.16 px, shuffled, returns", DRIFT, capture=Capture(drift_px=0.16)),
     Situation("drift 0.32 px, shuffled, returns", DRIFT, capture=Capture(drift_px=0.32)),
+    Situation("drift 0.16 px, pause in the middle", DRIFT, capture=Capture(drift_px=0.16, pause=1.0)),
+    Situation("drift 0.32 px, pause in the middle", DRIFT, capture=Capture(drift_px=0.32, pause=1.0)),
+    Situation(
+        "drift 0.16 px in each part, resumed cold",
+        DRIFT,
+        capture=Capture(drift_px=0.32, pause=1.0, resumed=True),
+    ),
+    Situation(
+        "image moved by 0.3 px, then resumed",
+        DRIFT,
+        capture=Capture(pause=1.0, resumed=True, step_px=0.3),
+    ),
     Situation(
         "placement sd 1 mm (stated 0.3)",
         _mentions("placements scatter"),

@@ -57,4 +57,4 @@ def plain_bench(rig: Rig, folder: Path) -> Bench:
     sensor = ImageSensor(spec, ImageFormat(rig.camera.width_px, rig.camera.height_px), rig.camera.bits)
     lasers = PlainLasers(rig.laser_ids, spec.controller.interlock_closed)
     camera = EmulatedCamera(spec, scene, sensor, lambda: lasers.on)
-    return Bench(camera, lasers, scene, camera.mark, virtual=True)
+    return Bench(camera, lasers, scene, camera.mark, virtual=True, clock=camera.clock, rests=True)

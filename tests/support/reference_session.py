@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import shutil
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from workbench.model.contents import file_sha256
+from workbench.model.event import Record
 from workbench.model.laboratory import Ambient, Laboratory, Party, Recalibration, Standard
 from workbench.report.certificate.assemble import Certificate, Sources, certificate_of
 from workbench.report.certificate.predecessor import Predecessor
 from workbench.report.certificate.session_record import SessionRecord, read_session
 from workbench.session.certificate_numbers import AssignedNumber
+from workbench.session.journal import JOURNAL
+from workbench.session.manifest import MANIFEST
 
 REFERENCE = Path(__file__).parents[2] / "data/sessions/20261130-085045-reference"
 SERIAL = "reference-1"
@@ -43,10 +48,31 @@ LABORATORY = Laboratory.model_validate(
 )
 
 
+DAY = timedelta(days=1)
+DAY_NS = 86_400 * 10**9
+BEGAN = datetime(2026, 11, 30, 8, 50, 45, tzinfo=UTC)
+
+
 def copied(folder: Path, name: str = REFERENCE.name, frames: bool = False) -> Path:
     """Copy of the session in a folder of sessions, without frames unless they are asked for."""
     ignored = shutil.ignore_patterns() if frames else shutil.ignore_patterns("frames", "set-aside")
     return Path(shutil.copytree(REFERENCE, folder / name, ignore=ignored))
+
+
+def repeated(folder: Path, name: str, days: int) -> Path:
+    """Another session with the same results, which began some days later."""
+    session = copied(folder, name)
+    manifest, journal, calibration = (session / one for one in (MANIFEST, JOURNAL, "calibration.yaml"))
+    recorded = file_sha256(calibration)
+    first, later = (f"{BEGAN + n * DAY:%Y-%m-%dT%H:%M:%S%z}" for n in (0, days))
+    for path in (manifest, calibration):
+        path.write_text(path.read_text().replace(first, later))
+    text = journal.read_text().replace(recorded, file_sha256(calibration))
+    start, *others = text.splitlines(keepends=True)
+    record = Record.model_validate_json(start)
+    moved = record.model_copy(update={"time_ns": record.time_ns + days * DAY_NS})
+    journal.write_text("".join((moved.model_dump_json() + "\n", *others)))
+    return session
 
 
 def edit_calibration(session: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tests.support.ideal import exact, ideal_rig, laser
@@ -80,14 +80,19 @@ def running(
     rig: Rig | None = None,
     operator: Operator | None = None,
     before: Sequence[ev.Record] = (),
+    *,
+    rests: bool = True,
 ) -> Iterator[Running]:
-    """A session in `folder`/s that goes on after `before`; the operator says yes to everything by default."""
+    """A session in `folder`/s that goes on after `before`; the operator says yes to everything by default.
+
+    `rests`: as of `Bench`.
+    """
     session = folder / "s"
     session.mkdir(exist_ok=True)
     rig = rig or two_laser_rig()
     seen: list[ev.Record] = []
     stop: list[str] = []
-    with plain_bench(rig, folder) as bench, Journal(session) as journal:
+    with replace(plain_bench(rig, folder), rests=rests) as bench, Journal(session) as journal:
         recorder = ReplayingJournal(journal, [seen.append], before)
         context = Context(
             session,

@@ -5,8 +5,11 @@ Everything returns values or data frames and prints nothing. Errors are subclass
 
 from workbench.api.calibration import Calibration, CalibrationComparison, compare, fit, load_calibration
 from workbench.api.calibration_design import CalibrationDesign, design
+from workbench.api.charts import draw
+from workbench.api.priors import with_prior
 from workbench.api.ranger import Ranger
 from workbench.api.session import Session, Trial, open_session, sessions
+from workbench.api.simulation import Simulation, simulate
 from workbench.model.errors import BadInputError, LimitFailedError, WorkbenchError
 from workbench.model.rig import Rig
 from workbench.ranging.ranger import Reading
@@ -23,12 +26,16 @@ __all__ = [
     "Rig",
     "Session",
     "ShapePrior",
+    "Simulation",
     "Trial",
     "WorkbenchError",
     "compare",
     "design",
+    "draw",
     "fit",
     "load_calibration",
     "open_session",
     "sessions",
+    "simulate",
+    "with_prior",
 ]

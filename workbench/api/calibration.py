@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -16,7 +16,9 @@ from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.selection.model_terms import fit_calibration
 from workbench.calibration.verdict import comparison
 from workbench.calibration.verdict.export import accept_with_reason, calibrate, write_calibration
+from workbench.calibration.verdict.records import fit_finished
 from workbench.model.acceptance import Acceptance
+from workbench.model.arrays import FloatArray
 from workbench.model.calibration import Calibration as CalibrationFile
 from workbench.model.calibration import Provenance
 from workbench.model.calibration import load_calibration as load_calibration_file
@@ -25,6 +27,7 @@ from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.nested import fix_parameters
 from workbench.model.rig import Rig
 from workbench.report.frames import DIFFERENCE_COLUMNS, PARAMETER_COLUMNS, UNCERTAINTY_COLUMNS, frame_of
+from workbench.report.session_frames import cross_validation_frame, residuals_frame
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.session.caller import now, operator
 from workbench.session.manifest import workbench_version
@@ -34,16 +37,23 @@ from workbench.session.manifest import workbench_version
 class Calibration:
     """A calibrated sensor with its uncertainty.
 
-    >>> import workbench as wb
-    >>> calibration = wb.load_calibration("data/session-0.1.0/calibration.yaml")
-    >>> calibration.verdict
-    'accepted'
-    >>> calibration.parameters.loc["f_px", ["unit", "determined_by"]].tolist()
-    ['px', 'joint']
+    Examples:
+        >>> import workbench as wb
+        >>> calibration = wb.load_calibration("data/session-0.1.0/calibration.yaml")
+        >>> calibration.verdict
+        'accepted'
+        >>> calibration.parameters.loc["f_px", ["unit", "determined_by"]].tolist()
+        ['px', 'joint']
     """
 
     file: CalibrationFile
     """Contents of the calibration file (docs/calibration-format.md)."""
+    residuals: pd.DataFrame = field(default_factory=lambda: residuals_frame(()), repr=False, compare=False)
+    """Residuals of the fit, as in `Session.residuals`; empty for a calibration from a file."""
+    cross_validation: pd.DataFrame = field(
+        default_factory=lambda: cross_validation_frame(()), repr=False, compare=False
+    )
+    """Each placement ranged by the fit without it; empty for a calibration from a file."""
 
     @cached_property
     def parameters(self) -> pd.DataFrame:
@@ -75,6 +85,11 @@ class Calibration:
         """Reasons for a refusal."""
         return self.file.laser_ranger.fit.reasons
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the fit: null directions, parameters that rest on their priors, doubtful data."""
+        return self.file.laser_ranger.fit.warnings
+
     def range_uncertainty(self, ranges_mm: float | Collection[float]) -> pd.DataFrame:
         """Standard uncertainty of a single range by each laser, for spots of typical noise.
 
@@ -82,21 +97,31 @@ class Calibration:
             ranges_mm: range from the reference plane, or several.
 
         Returns:
-            One row per laser and range; `sd_mm` is 1 sigma, NaN where the spot is outside the image.
+            One row per laser and range, 1 sigma, NaN where the spot is outside the image. `sd_mm` has three
+            parts, whose squares add up: noise of the spot, its speckle, and the calibration.
 
         Raises:
             BadInputError: a range is no finite number.
         """
         at = np.array(millimetres_of("ranges_mm", ranges_mm))
         sensor = CalibratedSensor(self.file)
-        rows = []
-        for laser_id in sensor.ids:
-            sd = np.where(sensor.in_frame(laser_id, at), sensor.typical_ranges(laser_id, at).sigma_mm, np.nan)
-            rows += [
-                {"laser_id": laser_id, "range_mm": range_mm, "sd_mm": sd_mm}
-                for range_mm, sd_mm in zip(at.tolist(), sd.tolist(), strict=True)
-            ]
+        rows = [
+            dict(zip(UNCERTAINTY_COLUMNS, (laser_id, range_mm, *parts), strict=True))
+            for laser_id in sensor.ids
+            for range_mm, parts in zip(
+                at.tolist(), self._uncertainty(sensor, laser_id, at).tolist(), strict=True
+            )
+        ]
         return frame_of(rows, UNCERTAINTY_COLUMNS)
+
+    def _uncertainty(self, sensor: CalibratedSensor, laser_id: str, at: FloatArray) -> FloatArray:
+        """(n, 4) 1 sigma at ranges (n,): total, by noise, by speckle, by the calibration."""
+        found, noise = sensor.typical_ranges(laser_id, at), self.file.laser_ranger.noise
+        own_px = np.array([noise.spot_sd_px, noise.speckle_sd_px])
+        noise_mm, speckle_mm = found.spot_sd_mm * (own_px / np.hypot(*own_px))[:, None]
+        calibration_mm = np.sqrt(np.maximum(found.sigma_mm**2 - found.spot_sd_mm**2, 0.0))
+        parts = np.stack([found.sigma_mm, noise_mm, speckle_mm, calibration_mm], axis=1)
+        return np.where(sensor.in_frame(laser_id, at)[:, None], parts, np.nan)
 
     def accept(self, reason: str) -> Calibration:
         """The calibration, accepted in spite of a refusal; the file records the reason.
@@ -188,17 +213,19 @@ def fit(
     if not observations:
         raise BadInputError("captures: expected captures of the rig's lasers at known standoffs, found none")
     fitted = fit_calibration(model, observations, rejected, boards)
-    calibration, _ = calibrate(fitted, Acceptance(), _provenance(model, content))
-    return Calibration(calibration)
+    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(model, content))
+    record = [fit_finished(fitted, assessment)]
+    return Calibration(calibration, residuals_frame(record), cross_validation_frame(record))
 
 
 def compare(a: Calibration | str | Path, b: Calibration | str | Path) -> CalibrationComparison:
     """Compare two calibrations of one sensor, or their files, over the ranges and lasers that both have.
 
-    >>> import workbench as wb
-    >>> calibration = wb.load_calibration("data/session-0.1.0/calibration.yaml")
-    >>> wb.compare(calibration, calibration).identical
-    True
+    Examples:
+        >>> import workbench as wb
+        >>> calibration = wb.load_calibration("data/session-0.1.0/calibration.yaml")
+        >>> wb.compare(calibration, calibration).identical
+        True
 
     Raises:
         BadInputError: image size, lasers or standoffs differ.

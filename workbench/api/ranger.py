@@ -18,14 +18,15 @@ from workbench.spots import SpotFinder
 class Ranger:
     """Ranges and shape from pairs of frames; needs a calibration and nothing else.
 
-    >>> import workbench as wb
-    >>> session = wb.open_session("data/session-0.1.0")
-    >>> ranger = wb.Ranger(session.calibration)
-    >>> capture = session.captures.query("laser_id == 'all'").iloc[0]
-    >>> on, off = session.frame(capture["capture"]), session.frame(capture["capture"], off=True)
-    >>> reading = ranger.range(on, off)
-    >>> reading.status, round(reading.closest_mm)
-    ('done', 800)
+    Examples:
+        >>> import workbench as wb
+        >>> session = wb.open_session("data/session-0.1.0")
+        >>> ranger = wb.Ranger(session.calibration)
+        >>> capture = session.captures.query("laser_id == 'all'").iloc[0]
+        >>> on, off = session.frame(capture["capture"]), session.frame(capture["capture"], off=True)
+        >>> reading = ranger.range(on, off)
+        >>> reading.status, round(reading.closest_mm)
+        ('done', 800)
 
     Args:
         calibration: a calibration, or the path of its file.

@@ -14,14 +14,18 @@ from workbench.api.calibration import Calibration, load_calibration
 from workbench.model.arrays import Image
 from workbench.model.chart import Chart
 from workbench.model.errors import BadInputError
-from workbench.model.event import (
-    CaptureTaken,
-    TrialFinished,
-)
+from workbench.model.event import CaptureTaken, Record, TrialFinished
 from workbench.model.rig import Rig
 from workbench.report.certificate.session_record import recorded_calibration
 from workbench.report.frames import SESSION_COLUMNS, frame_of, frame_of_table
-from workbench.report.session_frames import captures_frame, readings_frame, residuals_frame, spots_frame
+from workbench.report.session_frames import (
+    captures_frame,
+    cross_validation_frame,
+    readings_frame,
+    residuals_frame,
+    spots_frame,
+)
+from workbench.session.capture_table import first_time_ns, part_name, seconds_after
 from workbench.session.frames import read_image
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_manifest, load_session_rig
@@ -54,12 +58,13 @@ class Trial:
 class Session:
     """A session folder; see `open_session`.
 
-    >>> import workbench as wb
-    >>> session = wb.open_session("data/session-0.1.0")
-    >>> session.captures.groupby("laser_id").size().to_dict()
-    {'L1': 3, 'L4': 3, 'all': 1}
-    >>> session.spots.loc[0, ["u_px", "v_px"]].round(1).tolist()
-    [262.6, 249.6]
+    Examples:
+        >>> import workbench as wb
+        >>> session = wb.open_session("data/session-0.1.0")
+        >>> session.captures.groupby("laser_id").size().to_dict()
+        {'L1': 3, 'L4': 3, 'all': 1}
+        >>> session.spots.loc[0, ["u_px", "v_px"]].round(1).tolist()
+        [262.6, 249.6]
     """
 
     folder: Path
@@ -87,6 +92,11 @@ class Session:
     def residuals(self) -> pd.DataFrame:
         """Residuals of the last fit, observed - predicted: one row per laser and placement, px, 1 sigma."""
         return residuals_frame(self._events)
+
+    @cached_property
+    def cross_validation(self) -> pd.DataFrame:
+        """Placements of the last fit, each ranged by the fit without it; mm, 1 sigma as it predicts it."""
+        return cross_validation_frame(self._events)
 
     @cached_property
     def readings(self) -> pd.DataFrame:
@@ -131,8 +141,13 @@ class Session:
             raise BadInputError(f"without: no capture has the standoff {min(unknown):g} mm")
         kept = captures[~captures["standoff_mm"].isin(excluded)]
         scene = kept["scene"].where(kept["scene"] != "", kept["placement"])
+        taken = [self._captures[key] for key in kept["capture"]]
+        zero_ns = first_time_ns(taken)
+        times_s = [seconds_after(zero_ns, capture) for capture in taken]
+        parts = [part_name(capture) for capture in taken]
         columns = ["laser_id", "standoff_mm", "repeat", "on", "off", "scene", "standoff_sd_mm"]
-        return kept.assign(scene=scene)[columns].reset_index(drop=True)
+        found = kept.assign(scene=scene, time_s=times_s, part=parts)
+        return found[[*columns, "time_s", "part"]].reset_index(drop=True)
 
     def frame(self, capture: str, off: bool = False) -> Image:
         """A frame, (height, width), uint8 or uint16: lasers on, or all off.
@@ -173,10 +188,28 @@ class Session:
             ) from None
         return image[max(v - half, 0) : v + half + 1, max(u - half, 0) : u + half + 1]
 
+    def viewer(self, width_px: int = 1200, height_px: int = 700) -> object:
+        """The session in the Rerun viewer, as a widget for the last line of a notebook's cell.
+
+        The recording is made again from the frames, which takes some seconds.
+
+        Raises:
+            BadInputError: the extra `notebooks` is not installed, or a frame is missing or has changed.
+        """
+        from workbench.viewer.notebook import notebook_viewer  # loads Rerun
+
+        size = whole_of("width_px", width_px), whole_of("height_px", height_px)
+        return notebook_viewer(self.folder, self.rig, self._records, size)
+
+    @cached_property
+    def _records(self) -> list[Record]:
+        """Records that are in effect, in order."""
+        return list(effective(read_journal(self.folder)))
+
     @cached_property
     def _events(self) -> list[object]:
-        """Events that are in effect, in order."""
-        return [record.event for record in effective(read_journal(self.folder))]
+        """Their events."""
+        return [record.event for record in self._records]
 
     @cached_property
     def _captures(self) -> dict[str, CaptureTaken]:

@@ -15,14 +15,14 @@ from workbench.cli.report import Outputs, write_document
 from workbench.model.errors import BadInputError
 from workbench.model.laboratory import load_laboratory
 from workbench.report.document import Document
-from workbench.report.history.calibrations import dated_calibrations, in_force
 from workbench.report.history.drift import distance_histories
+from workbench.report.history.in_force import dated_calibrations, in_force, newer_text
 from workbench.report.history.page import SensorHistory, history_document
 from workbench.report.history.verifications import verifications
 from workbench.report.terminal_table import TerminalTable
 from workbench.session.caller import now, operator
 from workbench.session.files import check_output
-from workbench.session.index import IndexedSession, indexed_sessions
+from workbench.session.index import IndexedSession, copies_text, indexed_sessions
 from workbench.session.sensor_log import SensorEntry, append_entry, read_entries
 
 
@@ -96,8 +96,14 @@ def sensor_history(folder: Path, serial: str, every: Sequence[IndexedSession]) -
         distance_histories(checked),
         entries,
         None if agreed is None else agreed.months,
-        remarks,
+        tuple(filter(None, (newer_text(force, calibrations), *remarks, *_left_out(every, own)))),
     )
+
+
+def _left_out(every: Sequence[IndexedSession], own: Sequence[IndexedSession]) -> tuple[str, ...]:
+    """Remarks on copies of the sensor's sessions, and on damaged sessions of this or of an unknown sensor."""
+    damaged = [one for one in every if one.status.state == "damaged" and (one in own or not one.serial)]
+    return copies_text(own), *(f"not counted: {one.status.why}" for one in damaged)
 
 
 def only_serial(every: Sequence[IndexedSession], folder: Path) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workbench.cli.console import print_message
+from workbench.cli.in_force import note_if_not_in_force, sessions_of
 from workbench.cli.live_window import LiveWindow, watching
 from workbench.cli.reading_json import plain
 from workbench.cli.stopping import StopAfterCapture
@@ -66,6 +67,7 @@ def range_live(request: LiveRequest, as_json: bool) -> None:
     """
     rig, calibration = load_bench_rig(request.rig), load_usable(request.calibration)
     check_same_sensor(rig, calibration)
+    note_if_not_in_force(request.calibration, calibration, sessions_of(request.calibration))
     stopping = StopAfterCapture()
     # A bench may need a session folder for its files; live ranging keeps none.
     with (

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from workbench.cli.in_force import note_if_not_in_force, sessions_of
 from workbench.cli.reading_json import plain
 from workbench.model.captures import check_images, errors_name_file, load_captures
 from workbench.model.errors import BadInputError
@@ -25,6 +26,7 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
         BadInputError: a file is wrong.
     """
     ranger = Ranger(load_usable(calibration))
+    note_if_not_in_force(calibration, ranger.calibration, sessions_of(captures, calibration))
     if (captures / MANIFEST).is_file():
         check_same_sensor(load_session_rig(captures), ranger.calibration)
     readings = []

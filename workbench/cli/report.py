@@ -16,6 +16,7 @@ from workbench.cli.sessions import find_session
 from workbench.model.contents import printable
 from workbench.model.errors import AnswerNeededError, BadInputError
 from workbench.model.laboratory import Laboratory
+from workbench.model.rig import UNKNOWN_SERIAL
 from workbench.report.certificate.assemble import Certificate, Sources, certificate_of, fingerprint
 from workbench.report.certificate.dcc import certificate_xml, required_parties
 from workbench.report.certificate.predecessor import Predecessor, load_predecessor
@@ -24,6 +25,7 @@ from workbench.report.document import Document
 from workbench.session.caller import now
 from workbench.session.certificate_numbers import assign_number
 from workbench.session.files import check_output, write_output
+from workbench.session.identity import session_identity
 from workbench.session.index import indexed_sessions
 
 DEFAULT_NAME = "certificate.html"
@@ -124,19 +126,21 @@ def numbered(session: SessionRecord, laboratory: Laboratory) -> Certificate:
 
 def _predecessor(session: SessionRecord) -> Predecessor | None:
     """The last calibration of the same sensor in the folder, made before the session's own."""
-    if not session.is_own_calibration or session.rig.serial == "unknown":
+    if not session.is_own_calibration or session.rig.serial == UNKNOWN_SERIAL:
         return None
+    own = session_identity(session.folder)
     before = [
         one
         for one in indexed_sessions(session.folder.parent)
         if one.serial == session.rig.serial
         and one.calibration
         and one.verdict in {"accepted", "exception"}
+        and (not own or one.identity != own)
         and (one.began, one.name) < (session.manifest.created, session.folder.name)
     ]
     if not before:
         return None
-    last = before[-1]
+    last = max(before, key=lambda one: (one.began, one.name))
     try:
         path = unchanged(last.status.session_dir / last.calibration, last.calibration_sha256)
         return load_predecessor(path)

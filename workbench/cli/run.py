@@ -11,6 +11,7 @@ from rich.console import Console
 
 from workbench.cli.background import Background
 from workbench.cli.console import print_message
+from workbench.cli.in_force import note_if_not_in_force
 from workbench.cli.invocation import command_line
 from workbench.cli.refusal import ask_for_repair, refused_fit
 from workbench.cli.session_verdict import session_verdict
@@ -81,6 +82,8 @@ def run_procedures(
         WorkbenchError: see `workbench.procedure.engine.run.run`.
     """
     plan = Plan.load(rig_path, procedures, calibration)
+    if plan.calibration is not None:
+        note_if_not_in_force(plan.calibration.file, plan.calibration.calibration, sessions)
     session_dir = plan.new_session(sessions)
     with _repairable(session_dir, plan, screen) as ui:
         run(plan, session_dir, ui.consumers, _caller(), ui.stopping, ui.operator)

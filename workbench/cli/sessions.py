@@ -13,11 +13,12 @@ from rich.padding import Padding
 from rich.text import Text
 
 from workbench.cli.brief_notes import merge_equal_kinds
+from workbench.cli.console import print_message
 from workbench.cli.verdict import split_reason
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.number_text import counted
-from workbench.session.index import IndexedSession, indexed_sessions, read_indexed
+from workbench.session.index import IndexedSession, copies_text, indexed_sessions, read_indexed
 from workbench.session.journal import read_journal
 from workbench.session.manifest import MANIFEST
 from workbench.session.state import SessionStatus, effective, session_statuses
@@ -62,6 +63,8 @@ def list_sessions(sessions: Path, as_json: bool, selection: Selection = Selectio
     else:
         every = indexed_sessions(sessions)
     found = [one for one in every if selection.includes(one)]
+    if copies := copies_text(found):
+        print_message(f"note: {copies}")
     if as_json:
         for each in found:
             print(json.dumps(_as_json(each)))

@@ -9,8 +9,9 @@ from workbench.cli.sessions import find_session
 from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError, LimitFailedError
-from workbench.report.certificate.session_record import read_session
-from workbench.report.history.calibrations import dated_calibrations, in_force, range_changes
+from workbench.report.certificate.session_record import check_recorded, read_session
+from workbench.report.history.calibrations import range_changes
+from workbench.report.history.in_force import dated_calibrations, in_force, newer_text, sensor_in_force
 from workbench.session.caller import now, operator
 from workbench.session.index import indexed_sessions
 from workbench.session.sensor_log import SensorEntry, append_entry, read_entries
@@ -39,6 +40,8 @@ def put_in_force(name: Path, serial: str, reason: str, sessions: Path) -> None:
     )
     append_entry(sessions, entry)
     print_message(f"{serial}: {entry.path} is in force since {entry.time[:10]}: {reason}")
+    if newer := _newer_text(sessions, serial):
+        print_message(f"note: {newer}")
     if before is None:
         print_message("no calibration was in force before")
         return
@@ -51,18 +54,25 @@ def put_in_force(name: Path, serial: str, reason: str, sessions: Path) -> None:
 
 def _before(sessions: Path, serial: str) -> Calibration | None:
     """The calibration in force until now; None if there is none, or its file has changed."""
-    own = [one for one in indexed_sessions(sessions) if one.serial == serial]
     try:
-        found = in_force(sessions, dated_calibrations(own)[0], read_entries(sessions, serial))
+        found = sensor_in_force(sessions, serial)
     except BadInputError as error:
         print_message(f"note: {error}")
         return None
     return None if found is None else found.calibration.calibration
 
 
+def _newer_text(sessions: Path, serial: str) -> str:
+    """Remark on a newer accepted calibration than the one now in force; empty if there is none."""
+    own = [one for one in indexed_sessions(sessions) if one.serial == serial]
+    calibrations = dated_calibrations(own)[0]
+    return newer_text(in_force(sessions, calibrations, read_entries(sessions, serial)), calibrations)
+
+
 def _file(name: Path, sessions: Path) -> Path:
     """Calibration file: as named, or that of a session."""
     if name.is_file():
+        check_recorded(name)
         return name
     session = read_session(find_session(name, sessions))
     if session.calibration_path is None:

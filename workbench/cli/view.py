@@ -97,6 +97,8 @@ def _of_session(session: Path, folder: Path, *, rebuild: bool) -> Path:
     That of a running session is made in `folder`: the session itself is still writing its own.
     """
     recording = (folder if is_running(session) else session) / RECORDING_FILE
+    for path in sorted(session.glob("calibration*.yaml")):
+        _note_if_edited(path)
     if rebuild or not is_complete(recording):
         from workbench.viewer.recording import rebuild as made_again
 
@@ -117,7 +119,19 @@ def _of_calibration(path: Path, folder: Path) -> Path:
     from workbench.model.calibration import load_calibration
     from workbench.viewer.calibration_view import record_calibration
 
+    _note_if_edited(path)
+
     return record_calibration(load_calibration(path), path.stem, folder / RECORDING_FILE)
+
+
+def _note_if_edited(calibration: Path) -> None:
+    """Print one line if the file of a session has changed since; what is shown then is not the record."""
+    from workbench.report.certificate.session_record import check_recorded
+
+    try:
+        check_recorded(calibration)
+    except BadInputError as error:
+        print_message(f"note: {error}")
 
 
 def _side_by_side(request: Request, folder: Path) -> Path:

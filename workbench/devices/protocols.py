@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Protocol, runtime_checkable
 
@@ -143,6 +144,31 @@ class Operator(Protocol):
         """
 
 
+class Clock(Protocol):
+    """Time of a bench, in which its sensor drifts."""
+
+    def now_ns(self) -> int:
+        """Present time, ns."""
+
+    def continue_after(self, time_ns: int) -> None:
+        """Continue after the last capture that counts; called before the captures of each placement.
+
+        Simulated time is set: the captures after a stop have the times that they would have had without it.
+        A real clock ignores it.
+        """
+
+
+class WallClock:
+    """Clock of the computer: UTC, ns since 1970."""
+
+    def now_ns(self) -> int:
+        """Present time."""
+        return time.time_ns()
+
+    def continue_after(self, time_ns: int) -> None:
+        """Return at once: real time cannot be set."""
+
+
 @dataclass(frozen=True)
 class Bench:
     """Devices of one rig, opened and closed together."""
@@ -157,6 +183,11 @@ class Bench:
     """Operator of an emulated bench, which answers prompts itself; None: a person answers."""
     virtual: bool = False
     """Whether the beams are simulated."""
+    clock: Clock = field(default_factory=WallClock)
+    """Time of the captures, by which a drift is fitted."""
+    rests: bool = False
+    """Whether nothing changes while the bench is closed, so that a resumed session continues the same part.
+    A real sensor may cool or be moved."""
 
     def __enter__(self) -> Bench:
         return self

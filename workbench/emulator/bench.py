@@ -74,6 +74,8 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
         operator=EmulatedOperator() if spec.answers else None,
         mark=camera.mark,
         virtual=True,
+        clock=camera.clock,
+        rests=not (spec.warm_up.f_relative or spec.drift.u_px_per_frame or spec.drift.v_px_per_frame),
         controller=controller,
         server=server,
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.devices.protocols import Frame
+from workbench.emulator.clock import SimulatedClock
 from workbench.emulator.keyed import generator
 from workbench.emulator.lens import Drift
 from workbench.emulator.scene import BenchScene
@@ -52,6 +53,7 @@ class EmulatedCamera:
         sensor: ImageSensor,
         lasers: Callable[[], tuple[str, ...]],
     ) -> None:
+        self.clock = SimulatedClock()
         self._spec, self._scene, self._sensor, self._lasers = spec, scene, sensor, lasers
         self.exposure_s = spec.camera.exposure_s
         self.exposure_unit = "us"
@@ -69,10 +71,12 @@ class EmulatedCamera:
     def mark(self, key: str) -> None:
         """Set the key of the next capture, from which the noise of its frames is derived."""
         self._key, self._number = key, 0
+        self.clock.switch()
 
     def grab(self) -> Frame:
         """Frame after discarding `discard_frames` frames."""
         for _ in range(self.discard_frames):
+            self.clock.expose(self._exposure_s())
             self._next()
         return self.read()
 
@@ -85,7 +89,11 @@ class EmulatedCamera:
             self._for_room_light = False
 
     def read(self) -> Frame:
-        """Next frame of the stream, delayed by the latency."""
+        """Next frame of the stream, delayed by the latency.
+
+        Frames that are lost in transfer take no time: which are lost depends on frames before the capture.
+        """
+        self.clock.expose(self._exposure_s())
         while True:
             exposure = self._next()
             chance = generator(self._spec.seed, "stream", exposure.key, exposure.number).random(2)

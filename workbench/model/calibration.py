@@ -159,6 +159,10 @@ class FitSummary(FileModel):
     rejected: int
     noise_scale: Annotated[float, Field(ge=1)]
     placement_scale: Annotated[float, Field(ge=1)] = 1.0
+    noise_degrees_of_freedom: Annotated[float, Field(gt=0)] | None = None
+    """Of the estimate of the spots' noise; null if it is as stated, and in files of earlier versions."""
+    placement_degrees_of_freedom: Annotated[float, Field(gt=0)] | None = None
+    """Of the estimate of the placements' deviations; null likewise."""
     verdict: Literal["accepted", "refused"]
     reasons: tuple[str, ...] = ()
     """Reasons for a refusal."""

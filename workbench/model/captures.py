@@ -31,9 +31,13 @@ OPTIONAL = (
     "tilt_deg",
     "exposure",
     "exposure_unit",
+    "time_s",
+    "part",
 )
 LARGEST = 1e6
 """Largest accepted number of millimetres or pixels."""
+LARGEST_S = 1e11
+"""Largest accepted time, some 3000 years: seconds since 1970 are accepted too."""
 NEAREST_MM = 1e-3
 SMALLEST_SD_PX = 1e-6
 MOST_REPEATS = 99_999_999
@@ -69,6 +73,10 @@ class CaptureRow(FileModel):
     """Exposure of the frames, for the record only."""
     exposure_unit: str = ""
     """Unit of `exposure`; empty: the camera driver's own."""
+    time_s: Annotated[float, Field(ge=-LARGEST_S, le=LARGEST_S)] = nan
+    """Time of the capture, from any zero."""
+    part: str = ""
+    """Name of the uninterrupted part of the session."""
 
     @property
     def placement_key(self) -> str:

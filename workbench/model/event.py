@@ -180,6 +180,16 @@ class CaptureTaken(FileModel):
     """Unit of `exposure`; None: the camera driver's own."""
     lit_s: float | None = None
     """Emission time, switching included; None for a frame in room light."""
+    clock_ns: int | None = None
+    """Time by the clock of the bench, ns: UTC, on a virtual bench simulated. None in sessions of versions
+    that did not record it."""
+    part: Annotated[int, Field(ge=0)] = 0
+    """Number of the uninterrupted part of the session, from 0; a resumption or a repair begins the next."""
+
+    @property
+    def time_ns(self) -> int:
+        """Time by the clock of the bench, or that of the lit frame, ns."""
+        return self.on.time_ns if self.clock_ns is None else self.clock_ns
 
 
 class SpotsFound(FileModel):
@@ -213,6 +223,8 @@ class LatencyMeasured(FileModel):
     """Number of frames in the stream that precede the first one exposed after a laser was switched."""
     darkening: float | None = None
     """Relative darkening of the background while a laser is on, by automatic exposure or gain; None: none."""
+    dimming: float | None = None
+    """Relative dimming of the spot after switching on, by automatic exposure or by the laser; None: none."""
 
 
 class StandoffAdvised(FileModel):

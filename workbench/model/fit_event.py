@@ -178,6 +178,9 @@ class FitFinished(FileModel):
     residual_tests: tuple[ResidualTest, ...] = ()
     needs_standoffs: bool = False
     """Refused because a laser was seen at too few standoffs, or because ranges are too uncertain."""
+    drift_px: tuple[float, float] | None = None
+    """Largest change of the image over the session in u and v, by drift and steps between its parts; null in
+    sessions of versions that did not record it."""
 
     @property
     def has_named_fault(self) -> bool:

@@ -201,8 +201,8 @@ class BenchSpec(FileModel):
     target_tilt_sd_deg: TiltSd = 0.5
     """Standard uncertainty of the common tilt about each of the two axes."""
     drift_u_px: Drift = exactly(0.0)
-    """Shift of the image from the first capture to the last, linear in the order of the captures. With sd 0
-    it is fixed at its value; the fit frees it if the data show a drift."""
+    """Shift of the image from the first capture to the last, linear in the running time of the session. With
+    sd 0 it is fixed at its value; the fit frees it if the data show a drift."""
     drift_v_px: Drift = exactly(0.0)
     reach_mm: tuple[PositiveFloat, PositiveFloat] = (100.0, 5000.0)
     """Nearest and farthest standoff at which the target can be placed without saturated spots."""
@@ -260,6 +260,10 @@ LaserClass = Annotated[
 """Laser class according to IEC 60825-1."""
 
 
+UNKNOWN_SERIAL = "unknown"
+"""Serial number of a rig whose file states none."""
+
+
 class Rig(FileModel):
     """A rig file, format 1."""
 
@@ -267,7 +271,7 @@ class Rig(FileModel):
 
     format: Literal[1]
     rig: str
-    serial: Name = "unknown"
+    serial: Name = UNKNOWN_SERIAL
     driver: str | None = None
     """Driver of the bench: `opencv+serial` or None for separate `devices`; else an entry point in the group
     `workbench.benches`. A rig without driver and devices can be fitted but not run."""

@@ -40,8 +40,9 @@ class Column(FileModel):
     format: str = ""
     """Python format specification of a number, for example `+.2f`. Empty: the shortest text.
 
-    `sd`: two significant digits. `digits of KEY`: as many decimals as two significant digits of the standard
-    deviation in column KEY of the same row. `duration`: seconds as `45 s`, `12 min` or `3.5 h`.
+    `sd`: two significant digits, `+sd` with its sign. `digits of KEY`: as many decimals as two significant
+    digits of the standard deviation in column KEY of the same row. `duration`: seconds as `45 s`, `12 min`
+    or `3.5 h`.
     """
     scale: float = 1.0
     """Factor of displayed numbers: 100 with the unit `%`. CSV and JSON contain unscaled numbers."""
@@ -124,8 +125,8 @@ def cell_text(table: Table, row: tuple[Cell, ...], index: int) -> str:
 
 def _number_text(table: Table, row: tuple[Cell, ...], column: Column, number: float) -> str:
     value = number * column.scale
-    if column.format == "sd":
-        return two_digits(value)
+    if column.format in {"sd", "+sd"}:
+        return f"{'+' if column.format == '+sd' and value > 0 else ''}{two_digits(value)}"
     if column.format == "duration":
         return duration(value)
     if column.sd_key:

@@ -32,6 +32,8 @@ MEANINGS: Mapping[str, Mapping[str, tuple[str, str]]] = {
         "v_px": ("px", V),
         "u_sd_px": ("px", "standard uncertainty of u_px"),
         "v_sd_px": ("px", "standard uncertainty of v_px"),
+        "u_speckle_sd_px": ("px", "standard uncertainty of u_px by speckle; empty: not known"),
+        "v_speckle_sd_px": ("px", "standard uncertainty of v_px by speckle; empty: not known"),
         "flux_dn": ("DN", "sum of the spot's light in digital numbers"),
         "width_px": ("px", "width of the spot (standard deviation of its profile)"),
         "peak_dn": ("DN", "brightest value of the spot"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from workbench.figures.figure import svg
 from workbench.model.chart import Chart
-from workbench.model.table import ALARM, Table
+from workbench.model.table import ALARM, MISSING, Table
 from workbench.model.table_layout import TextColumn, text_columns
 from workbench.report.document import Document, Fact
 from workbench.report.terminal_table import GAP, blocks
@@ -77,7 +77,14 @@ def _column_blocks(table: Table) -> list[list[HtmlColumn]]:
     named = others[:1] if len(set(first.cells)) < len(first.cells) else []
     width = WIDTH_CHARACTERS - sum(text.width + GAP for text in named)
     parts = blocks([first, *others[len(named) :]], width)
-    return [[described[id(text)] for text in (first, *named, *part[1:])] for part in parts]
+    found = [[described[id(text)] for text in (first, *named, *part[1:])] for part in parts]
+    return found if len(found) == 1 else [_without_empty_rows(block) for block in found]
+
+
+def _without_empty_rows(block: list[HtmlColumn]) -> list[HtmlColumn]:
+    """The block without the rows whose values are all in other blocks."""
+    rows = [n for n, row in enumerate(_rows(block)) if any(cell not in {MISSING, ""} for _, cell in row[1:])]
+    return [replace(column, cells=tuple(column.cells[n] for n in rows)) for column in block]
 
 
 def _html_column(table: Table, index: int, text: TextColumn) -> HtmlColumn:

@@ -18,6 +18,8 @@ SPOT_COLUMNS = (
     "v_px",
     "u_sd_px",
     "v_sd_px",
+    "u_speckle_sd_px",
+    "v_speckle_sd_px",
     "flux_dn",
     "width_px",
     "peak_dn",
@@ -39,6 +41,7 @@ CAPTURE_COLUMNS = (
     "off",
 )
 RESIDUAL_COLUMNS = ("laser_id", "standoff_mm", "u_px", "v_px", "u_sd_px", "v_sd_px")
+CROSS_VALIDATION_COLUMNS = ("placement", "standoff_mm", "error_mm", "sd_mm", "z", "alarm")
 READING_COLUMNS = (
     "trial",
     "scene",
@@ -60,10 +63,12 @@ READING_COLUMNS = (
 )
 SESSION_COLUMNS = ("session", "folder", "state", "procedures", "captures", "reason")
 PARAMETER_COLUMNS = ("unit", "value", "sd", "prior_sd", "data_share", "determined_by")
-UNCERTAINTY_COLUMNS = ("laser_id", "range_mm", "sd_mm")
+UNCERTAINTY_COLUMNS = ("laser_id", "range_mm", "sd_mm", "noise_mm", "speckle_mm", "calibration_mm")
 DIFFERENCE_COLUMNS = ("laser_id", "range_mm", "difference_mm", "sd_mm")
 DESIGN_PARAMETER_COLUMNS = ("unit", "prior_sd", "sd", "data_share", "determined_by")
 DESIGN_RANGE_COLUMNS = ("laser_id", "range_mm", "relative_sd", "relative_sd_of_calibration")
+SIMULATED_PARAMETER_COLUMNS = ("sensor", "parameter", "true", "value", "sd")
+SIMULATED_RANGE_COLUMNS = ("sensor", "laser_id", "range_mm", "error_mm", "sd_mm")
 
 
 def frame_of(rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> pd.DataFrame:

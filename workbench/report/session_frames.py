@@ -10,6 +10,7 @@ import pandas as pd
 from workbench.model.event import CaptureTaken, FitFinished, FrameRef, ReadingTaken, SpotsFound
 from workbench.report.frames import (
     CAPTURE_COLUMNS,
+    CROSS_VALIDATION_COLUMNS,
     READING_COLUMNS,
     RESIDUAL_COLUMNS,
     SPOT_COLUMNS,
@@ -42,15 +43,29 @@ def spots_frame(events: Sequence[object]) -> pd.DataFrame:
 
 def residuals_frame(events: Iterable[object]) -> pd.DataFrame:
     """Residuals of the last fit, observed - predicted: one row per laser and placement, px, 1 sigma."""
-    fits = [event for event in events if isinstance(event, FitFinished)]
-    rows = (record.model_dump() for record in (fits[-1].residuals if fits else ()))
+    rows = (record.model_dump() for fit in _last_fit(events) for record in fit.residuals)
     return frame_of(rows, RESIDUAL_COLUMNS)
+
+
+def cross_validation_frame(events: Iterable[object]) -> pd.DataFrame:
+    """Placements of the last fit, each ranged by the fit without it; mm, 1 sigma as that fit predicts it."""
+    rows = (
+        {name: getattr(placement, name) for name in CROSS_VALIDATION_COLUMNS}
+        for fit in _last_fit(events)
+        for placement in fit.left_out
+    )
+    return frame_of(rows, CROSS_VALIDATION_COLUMNS)
 
 
 def readings_frame(events: Iterable[object]) -> pd.DataFrame:
     """Readings of all trials; mm, 1 sigma, error = measured - true."""
     rows = (_reading_row(event) for event in events if isinstance(event, ReadingTaken))
     return frame_of(rows, READING_COLUMNS)
+
+
+def _last_fit(events: Iterable[object]) -> list[FitFinished]:
+    """The last fit, or nothing."""
+    return [event for event in events if isinstance(event, FitFinished)][-1:]
 
 
 def _captures(events: Iterable[object]) -> dict[str, CaptureTaken]:
@@ -92,6 +107,8 @@ def _spot_rows(capture: CaptureTaken, event: SpotsFound) -> list[dict[str, objec
             "v_px": spot.v_px,
             "u_sd_px": spot.u_sd_px,
             "v_sd_px": spot.v_sd_px,
+            "u_speckle_sd_px": spot.u_speckle_sd_px,
+            "v_speckle_sd_px": spot.v_speckle_sd_px,
             "flux_dn": spot.flux_dn,
             "width_px": spot.width_px,
             "peak_dn": spot.peak_dn,

@@ -18,16 +18,19 @@ if TYPE_CHECKING:  # a fit of a captures file needs a name from here and no even
 CALIBRATION_TABLE = "captures.csv"
 TRIAL_TABLE = "trial-captures.csv"
 NEEDED = ("laser_id", "standoff_mm", "repeat", "on", "off", "scene")
-COLUMNS = (*NEEDED, "standoff_sd_mm", "exposure", "exposure_unit")
+COLUMNS = (*NEEDED, "standoff_sd_mm", "exposure", "exposure_unit", "time_s", "part")
 """All columns. Those that are not needed are written only if a capture has a value for them."""
 
 
 def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
     """Write a captures file into the session folder; returns its sha256.
 
-    The scene of a calibration capture is its placement: captures at one placement share its error.
+    The scene of a calibration capture is its placement: captures at one placement share its error. Times
+    count from the first capture of the file.
     """
-    rows = [_row(capture) for capture in captures]
+    taken = list(captures)
+    zero_ns = first_time_ns(taken)
+    rows = [_row(capture, zero_ns) for capture in taken]
     stated = [n < len(NEEDED) or any(row[n] for row in rows) for n in range(len(COLUMNS))]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
@@ -37,7 +40,12 @@ def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _row(capture: CaptureTaken) -> tuple[str, ...]:
+def first_time_ns(captures: Iterable[CaptureTaken]) -> int:
+    """Zero of `time_s` in a captures file: the time of the first capture; 0 without captures."""
+    return min((capture.time_ns for capture in captures), default=0)
+
+
+def _row(capture: CaptureTaken, zero_ns: int) -> tuple[str, ...]:
     return (
         capture.laser_id,
         repr(capture.standoff_mm),
@@ -48,4 +56,16 @@ def _row(capture: CaptureTaken) -> tuple[str, ...]:
         "" if capture.standoff_sd_mm is None else repr(capture.standoff_sd_mm),
         "" if capture.exposure is None else repr(capture.exposure),
         capture.exposure_unit or "",
+        repr(seconds_after(zero_ns, capture)),
+        part_name(capture),
     )
+
+
+def seconds_after(zero_ns: int, capture: CaptureTaken) -> float:
+    """`time_s` of a capture."""
+    return (capture.time_ns - zero_ns) / 1e9
+
+
+def part_name(capture: CaptureTaken) -> str:
+    """`part` of a capture; empty in a session without interruption, and in the first part of others."""
+    return str(capture.part) if capture.part else ""

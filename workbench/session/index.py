@@ -8,23 +8,27 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from pydantic import TypeAdapter, ValidationError
+from pydantic_core import PydanticSerializationError
 
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
+from workbench.session.identity import identity_of
 from workbench.session.journal import JOURNAL, is_running, read_journal
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.session.state import SessionStatus, effective, session_status
 
 INDEX = ".sessions.sqlite3"
-FORMAT = 2
+FORMAT = 3
 """Number of the index's format; another one is made again."""
+MOST_NAMED = 3
+"""Largest number of copies that a remark names."""
 BUSY_S = 2.5
 """Longest wait for another program that writes the index."""
 IN_USE = {sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
@@ -54,6 +58,14 @@ class IndexedSession:
     """Hash of that file when it was exported."""
     verified: bool = False
     """Whether the session has readings of a trial."""
+    identity: str = ""
+    """Hash that copies of the session share; empty if it cannot be identified."""
+    records: int = 0
+    """Number of records of the journal, void ones included."""
+    own_name: str = ""
+    """Name of the folder in which the session began; empty if it is not known."""
+    copies: tuple[str, ...] = ()
+    """Names of other folders with the same session, which count as this one."""
 
     @property
     def name(self) -> str:
@@ -66,7 +78,10 @@ CONTENT = TypeAdapter(IndexedSession)
 
 
 def indexed_sessions(folder: Path) -> list[IndexedSession]:
-    """All sessions of a folder, ordered by name and therefore by time; the index is brought up to date.
+    """Sessions of a folder, ordered by name and therefore by time; the index is brought up to date.
+
+    Copies and links of one session are one entry: that with most records, a folder rather than a link, the
+    one with the name that the session began with.
 
     Raises:
         BadInputError: there is no such folder.
@@ -75,7 +90,37 @@ def indexed_sessions(folder: Path) -> list[IndexedSession]:
         got = "a file" if folder.exists() else "no such folder"
         raise BadInputError(f"{folder}: expected a folder of sessions, got {got}")
     stamps = {entry.name: stamp for entry, stamp in _stamps(folder)}
-    return [_live(one) for one in _current(folder, stamps)]
+    return [_live(one) for one in _without_copies(_current(folder, stamps))]
+
+
+def copies_text(sessions: Iterable[IndexedSession]) -> str:
+    """Remark on copies of sessions in one line; empty without copies."""
+    copied = [one for one in sessions if one.copies]
+    if not copied:
+        return ""
+    pairs = [f"{copy} (of {one.name})" for one in copied for copy in one.copies]
+    more = f" and {len(pairs) - MOST_NAMED} more" if len(pairs) > MOST_NAMED else ""
+    are = "folder is a copy" if len(pairs) == 1 else "folders are copies"
+    return f"{len(pairs)} {are} of another session and not counted: {', '.join(pairs[:MOST_NAMED])}{more}"
+
+
+def _without_copies(sessions: Iterable[IndexedSession]) -> list[IndexedSession]:
+    groups: dict[str, list[IndexedSession]] = {}
+    for one in sessions:
+        groups.setdefault(one.identity or one.name, []).append(one)
+    return sorted((_merged(group) for group in groups.values()), key=lambda one: one.name)
+
+
+def _merged(group: list[IndexedSession]) -> IndexedSession:
+    """The session of a group of copies that counts, with the names of the others."""
+    if len(group) == 1:
+        return group[0]
+    first, *others = sorted(group, key=_order_of_copies)
+    return replace(first, copies=tuple(one.name for one in others))
+
+
+def _order_of_copies(one: IndexedSession) -> tuple[int, bool, bool, str]:
+    return -one.records, one.status.session_dir.is_symlink(), one.name != one.own_name, one.name
 
 
 def _current(folder: Path, stamps: dict[str, str]) -> list[IndexedSession]:
@@ -102,7 +147,7 @@ def _updated(database: sqlite3.Connection, folder: Path, stamps: dict[str, str])
     kept = stamps.keys() - changed
     sessions = {name: _parsed(folder / name, known[name][1]) for name in kept}
     fresh = {name: read_indexed(folder / name) for name in changed}
-    texts = {name: _text(session) for name, session in fresh.items()}
+    texts = {name: text for name, session in fresh.items() if (text := _text(session)) is not None}
     _store(database, texts, stamps, set(known) - set(stamps))
     return [one for _, one in sorted((sessions | fresh).items())]
 
@@ -151,29 +196,61 @@ def _store(
 
 
 def read_indexed(folder: Path) -> IndexedSession:
-    """A session, from its files."""
+    """A session, from its files; one that is damaged has the error in its status."""
     status = session_status(folder)
+    serial = began = ""
     try:
         manifest = load_manifest(folder)
         serial, began = manifest.rig.serial, manifest.created
-    except BadInputError:
-        serial = began = ""
-    if status.state == "damaged" or not (folder / JOURNAL).exists():
-        return IndexedSession(status, serial, began, "none")
-    events = [record.event for record in effective(read_journal(folder))]
-    fits = [event for event in events if isinstance(event, ev.FitFinished)]
-    exported = [event for event in events if isinstance(event, ev.CalibrationExported)]
-    verdict: Verdict = fits[-1].verdict if fits else "none"
-    if verdict == "refused" and exported:
-        verdict = "exception"
-    readings = any(isinstance(event, ev.ReadingTaken) for event in events)
-    file, sha256 = (exported[-1].path, exported[-1].sha256) if exported else ("", "")
-    return IndexedSession(status, serial, began, verdict, file, sha256, readings)
+        records = list(read_journal(folder)) if (folder / JOURNAL).exists() else []
+    except BadInputError as error:
+        status = replace(status, state="damaged", why=str(error))
+        records = []
+    first = records[0].event if records else None
+    return replace(
+        _with_results(IndexedSession(status, serial, began, "none"), records),
+        identity=identity_of(folder, began, serial) if serial else "",
+        records=len(records),
+        own_name=first.session if isinstance(first, ev.SessionStarted) else "",
+    )
 
 
-def _text(session: IndexedSession) -> str:
+def _with_results(session: IndexedSession, records: Iterable[ev.Record]) -> IndexedSession:
+    """The session with the results of its records in effect: verdict, calibration, readings.
+
+    An exported calibration is an exception only if it follows the refused fit: an earlier one is of an
+    earlier fit.
+    """
+    verdict: Verdict = "none"
+    exported: ev.CalibrationExported | None = None
+    verified = False
+    for record in effective(records):
+        match record.event:
+            case ev.FitFinished() as fit:
+                verdict = fit.verdict
+            case ev.CalibrationExported() as event:
+                exported = event
+                verdict = "exception" if verdict == "refused" else verdict
+            case ev.ReadingTaken():
+                verified = True
+            case _:
+                pass
+    session = replace(session, verdict=verdict, verified=verified)
+    return (
+        session
+        if exported is None
+        else replace(session, calibration=exported.path, calibration_sha256=exported.sha256)
+    )
+
+
+def _text(session: IndexedSession) -> str | None:
+    """Content of a row; None if a name in it is no Unicode: such a session is read each time."""
     status = replace(session.status, session_dir=Path())
-    return CONTENT.dump_json(replace(session, status=status)).decode()
+    try:
+        session.name.encode()
+        return CONTENT.dump_json(replace(session, status=status)).decode()
+    except (UnicodeEncodeError, PydanticSerializationError):
+        return None
 
 
 def _parsed(folder: Path, content: str) -> IndexedSession:

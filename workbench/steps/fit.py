@@ -14,7 +14,7 @@ from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
-from workbench.session.capture_table import CALIBRATION_TABLE, write_capture_table
+from workbench.session.capture_table import CALIBRATION_TABLE, first_time_ns, write_capture_table
 
 
 @register
@@ -48,12 +48,14 @@ class FitStep(StepModel):
 
         # In the order of time, which a drift follows: after a repair it is not that of the procedure.
         captures = sorted(
-            (c for c in context.captures if c.purpose == "calibration"), key=lambda one: one.on.time_ns
+            (c for c in context.captures if c.purpose == "calibration"),
+            key=lambda one: (one.part, one.time_ns),
         )
         if not captures:
             raise BadInputError(f"step {name}: no captures to fit; expected a capture_grid step before it")
         sha256 = write_capture_table(context.session_dir / CALIBRATION_TABLE, captures)
-        spots = [observe_capture(context, capture) for capture in captures if capture.laser_id != BOARD]
+        zero_ns = first_time_ns(captures)
+        spots = [observe_capture(context, one, zero_ns) for one in captures if one.laser_id != BOARD]
         found = on_boards(context.rig.board, context.boards, spots)
         observations = [f for f in found if isinstance(f, Observation)]
         rejected = [f for f in (*found, *context.boards.values()) if isinstance(f, Rejected)]

@@ -32,9 +32,16 @@ class MeasureLatencyStep(StepModel):
         """Measure the latency and set the camera to discard as many frames."""
         measured = context.measure_latency(name, self.most_frames)
         outcome = f"{counted(measured.frames, 'frame')}, discarded before each capture"
-        if measured.darkening is None:
-            return outcome
-        return (
-            f"{outcome}. The camera adjusts itself: while a laser is on the rest of the image darkens by"
-            f" {100 * measured.darkening:.0f} %. Switch its automatic exposure, gain and white balance off"
-        )
+        if measured.darkening is not None:
+            return (
+                f"{outcome}. The camera adjusts itself: while a laser is on, the rest of the image darkens"
+                f" by {100 * measured.darkening:.0f} %. Switch its automatic exposure, gain and white balance"
+                " off"
+            )
+        if measured.dimming is not None:
+            return (
+                f"{outcome}. The spot dims by {100 * measured.dimming:.0f} % after switching on: either the"
+                " camera adjusts itself (switch its automatic exposure and gain off), or the laser's power"
+                " falls (check its supply and temperature)"
+            )
+        return outcome

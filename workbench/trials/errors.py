@@ -13,7 +13,9 @@ from workbench.model.event import ReadingTaken
 from workbench.model.table import Cell, Column, Table
 
 EXPANSION = 2.0
-"""Coverage factor k of an expanded uncertainty U."""
+"""Coverage factor k of an expanded uncertainty U whose standard uncertainty is known."""
+EXPANSION_PROBABILITY = 0.9544997361036416
+"""Coverage probability of k = 2 for a normal distribution."""
 
 
 @dataclass(frozen=True)

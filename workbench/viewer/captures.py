@@ -8,6 +8,7 @@ from workbench.model.event import CaptureTaken
 from workbench.model.spot import Spot
 from workbench.model.table import Column, Table
 from workbench.model.target import Placement
+from workbench.session.capture_table import part_name
 from workbench.viewer.stream import Moment
 
 
@@ -92,6 +93,8 @@ def capture_record(capture: CaptureTaken) -> dict[str, str | float | int]:
         "nominal_sd_mm": unknown if capture.standoff_sd_mm is None else float(capture.standoff_sd_mm),
         "repeat": capture.repeat,
         "source": capture.on.path,
+        "clock_ns": capture.time_ns,
+        "part": part_name(capture),
     }
 
 

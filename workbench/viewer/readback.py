@@ -46,8 +46,9 @@ def observations_of_recording(
     if not captures:
         raise BadInputError(f"{path}: expected a recording of a calibration, it has no captures")
     boards = _boards(captures, frames, rig)
+    zero_ns = min(row.get("clock_ns", 0) for row in captures.values())
     found = [
-        _observation(row, spots.get(number, {}), rig, path)
+        _observation(row, spots.get(number, {}), rig, path, zero_ns)
         for number, row in sorted(captures.items())
         if row["purpose"] == "calibration" and row["laser_id"] != BOARD
     ]
@@ -88,7 +89,7 @@ def _rows(path: Path) -> tuple[dict[int, Row], dict[int, Row], dict[int, bytes]]
     )
 
 
-def _observation(row: Row, spots: Row, rig: Rig, path: Path) -> Observation | Rejected:
+def _observation(row: Row, spots: Row, rig: Rig, path: Path, zero_ns: int) -> Observation | Rejected:
     if row["laser_id"] not in rig.laser_ids:
         raise BadInputError(f"{path}: expected lasers {', '.join(rig.laser_ids)}, got {row['laser_id']}")
     observation = Observation(
@@ -100,6 +101,8 @@ def _observation(row: Row, spots: Row, rig: Rig, path: Path) -> Observation | Re
         u_px=float("nan"),
         v_px=float("nan"),
         standoff_sd_mm=row["nominal_sd_mm"],
+        time_s=(row["clock_ns"] - zero_ns) / 1e9 if "clock_ns" in row else float("nan"),
+        part=row.get("part", ""),
     )
     count = len(spots.get("u_px") or ())
     found = tuple(

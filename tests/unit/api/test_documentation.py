@@ -22,12 +22,15 @@ DATA_FRAMES = {
     "Session.captures": frames.CAPTURE_COLUMNS,
     "Session.spots": frames.SPOT_COLUMNS,
     "Session.residuals": frames.RESIDUAL_COLUMNS,
+    "Session.cross_validation": frames.CROSS_VALIDATION_COLUMNS,
     "Session.readings": frames.READING_COLUMNS,
     "Calibration.parameters": frames.PARAMETER_COLUMNS,
     "Calibration.range_uncertainty()": frames.UNCERTAINTY_COLUMNS,
     "CalibrationComparison.differences": frames.DIFFERENCE_COLUMNS,
     "CalibrationDesign.parameters": frames.DESIGN_PARAMETER_COLUMNS,
     "CalibrationDesign.ranges": frames.DESIGN_RANGE_COLUMNS,
+    "Simulation.parameters": frames.SIMULATED_PARAMETER_COLUMNS,
+    "Simulation.ranges": frames.SIMULATED_RANGE_COLUMNS,
 }
 
 
@@ -54,7 +57,7 @@ def test_examples_of_the_page_run() -> None:
     assert result.attempted > 10
 
 
-@pytest.mark.parametrize("name", ["calibration", "ranger", "session"])
+@pytest.mark.parametrize("name", ["calibration", "priors", "ranger", "session", "simulation"])
 def test_examples_of_the_docstrings_run(name: str) -> None:
     result = doctest.testmod(importlib.import_module(f"workbench.api.{name}"))
     assert result.failed == 0

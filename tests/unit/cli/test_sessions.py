@@ -18,6 +18,7 @@ from workbench.model import event as ev
 from workbench.model.fit_event import Fault
 from workbench.session.index import IndexedSession
 from workbench.session.journal import Journal
+from workbench.session.manifest import MANIFEST
 from workbench.session.state import SessionStatus
 
 OLD = Path(__file__).parents[3] / "data/session-0.1.0"
@@ -71,7 +72,7 @@ def ended(folder: Path, name: str, code: int, message: str, *events: ev.Event) -
     """Folder of a session that ended with an exit code."""
     session = folder / name
     session.mkdir()
-    (session / "session.yaml").write_text("format: 1\n")
+    shutil.copy(REFERENCE / MANIFEST, session)
     with Journal(session) as journal:
         journal.append(ev.SessionStarted(session=name, rig="r", procedures=("p",)))
         for event in (*events, ev.SessionFinished(exit_code=code, message=message)):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 from tests.support.command_line import Run, refused
-from tests.support.reference_session import REFERENCE, SERIAL, copied, edit_calibration
+from tests.support.reference_session import REFERENCE, SERIAL, copied, edit_calibration, repeated
 
 
 def in_force(workbench: Run, sessions: Path) -> str:
@@ -16,15 +17,18 @@ def in_force(workbench: Run, sessions: Path) -> str:
 
 def test_roll_back_to_an_earlier_calibration(workbench: Run, tmp_path: Path) -> None:
     copied(tmp_path, "a")
-    copied(tmp_path, "b")
+    repeated(tmp_path, "b", days=1)
     assert in_force(workbench, tmp_path).startswith("b,")
     options = ["--rig", SERIAL, "--sessions", tmp_path]
     done = workbench("use", "a", "--reason", "the newer one is worse", *options)
     assert done.code == 0
     assert "at 500 mm: " in done.err
+    assert "newer" in done.err
     assert in_force(workbench, tmp_path).startswith("a,")
     assert "the newer one is worse" in in_force(workbench, tmp_path)
-    assert workbench("use", tmp_path / "b/calibration.yaml", "--reason", "repaired", *options).code == 0
+    back = workbench("use", tmp_path / "b/calibration.yaml", "--reason", "repaired", *options)
+    assert back.code == 0
+    assert "newer" not in back.err
     assert in_force(workbench, tmp_path).startswith("b,")
 
 
@@ -38,12 +42,13 @@ def test_a_calibration_of_another_sensor_is_refused(workbench: Run, tmp_path: Pa
 def test_an_edited_calibration_of_a_session_is_refused(workbench: Run, tmp_path: Path) -> None:
     session = copied(tmp_path)
     edit_calibration(session)
-    done = workbench("use", session.name, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
-    refused(done, 2, "calibration.yaml", "workbench fit")
+    for name in (session.name, session / "calibration.yaml"):
+        done = workbench("use", name, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
+        refused(done, 2, "calibration.yaml", "workbench fit")
 
 
 def test_a_refused_calibration_is_not_put_in_force(workbench: Run, tmp_path: Path) -> None:
-    path = copied(tmp_path) / "calibration.yaml"
+    path = Path(shutil.copy(REFERENCE / "calibration.yaml", tmp_path))
     path.write_text(path.read_text().replace('verdict: "accepted"', 'verdict: "refused"'))
     refused(workbench("use", path, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path), 3, "refused")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from types import SimpleNamespace
 from typing import cast
 
@@ -53,3 +54,11 @@ def test_lasers_close_before_the_camera_and_the_camera_in_any_case(error: Except
         with pytest.raises(LaserOffNotConfirmedError), bench:
             pass
     assert closed == ["lasers", "camera"]
+
+
+def test_a_real_bench_has_the_time_of_the_computer_and_may_change_while_it_is_closed() -> None:
+    bench = Bench(cast(Camera, None), cast(LaserBank, None), cast(Target, None))
+    before_ns = time.time_ns()
+    bench.clock.continue_after(0)
+    assert before_ns <= bench.clock.now_ns() <= time.time_ns()
+    assert not bench.rests

@@ -41,6 +41,19 @@ def table(rows: int, columns: int) -> Table:
     )
 
 
+def test_rows_without_a_value_in_a_block_of_columns_are_left_out_of_it() -> None:
+    columns = [Column(key=f"c{n}", name=f"a rather long heading {n}") for n in range(14)]
+    names, filled = ("left", "right", "none"), (range(1, 3), range(12, 14), range(0))
+    rows = [
+        (name, *("value" * 3 if n in own else None for n in range(1, 14)))
+        for name, own in zip(names, filled, strict=True)
+    ]
+    wide = document_html(document(Table(name="t", title="t", columns=columns, rows=rows)), "now")
+    narrow = Table(name="t", title="t", columns=columns[:3], rows=[row[:3] for row in rows])
+    assert [wide.count(f">{name}<") for name in names] == [1, 1, 0]
+    assert [document_html(document(narrow), "now").count(f">{name}<") for name in names] == [1, 1, 1]
+
+
 def test_markup_in_any_text_is_escaped() -> None:
     page = document_html(document(table(3, 3)), MARKUP)
     assert "<script>" not in page

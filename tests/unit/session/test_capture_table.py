@@ -56,6 +56,27 @@ def test_a_trials_scene_is_its_own(tmp_path: Path) -> None:
 def test_columns_that_no_capture_states_are_left_out(tmp_path: Path) -> None:
     path = tmp_path / "captures.csv"
     write_capture_table(path, [taken("p.1/300mm/L1/00")])
-    assert path.read_text().splitlines()[0] == ",".join(NEEDED)
+    assert path.read_text().splitlines()[0] == ",".join([*NEEDED, "time_s"])
     write_capture_table(path, [taken("p.1/300mm/L1/00"), taken("p.1/300mm/L1/01", exposure=3.0)])
-    assert path.read_text().splitlines()[0] == ",".join([*NEEDED, "exposure"])
+    assert path.read_text().splitlines()[0] == ",".join([*NEEDED, "exposure", "time_s"])
+
+
+def test_times_count_from_the_first_capture_by_the_clock_of_the_bench(tmp_path: Path) -> None:
+    path = tmp_path / "captures.csv"
+    captures = [
+        taken("p.1/300mm/L1/00", clock_ns=20_000_000_000),
+        taken("p.1/300mm/L1/01", clock_ns=20_250_000_000),
+        taken("p.1/600mm/L1/00", clock_ns=19_000_000_000, part=1),
+    ]
+    write_capture_table(path, captures)
+    rows = load_captures(path)
+    assert [row.time_s for row in rows] == [1.0, 1.25, 0.0]
+    assert [row.part for row in rows] == ["", "", "1"]
+
+
+def test_without_a_clock_times_are_those_of_the_lit_frames(tmp_path: Path) -> None:
+    """Sessions of earlier versions."""
+    path = tmp_path / "captures.csv"
+    frames = [FrameRef(path="x", sha256="", time_ns=time_ns) for time_ns in (5_000_000_000, 7_000_000_000)]
+    write_capture_table(path, [taken(f"p.1/300mm/L1/0{n}", on=frame) for n, frame in enumerate(frames)])
+    assert [row.time_s for row in load_captures(path)] == [0.0, 2.0]

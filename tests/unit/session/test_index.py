@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 from contextlib import closing
@@ -10,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.reference_session import copied
+from tests.support.reference_session import REFERENCE, copied, repeated
+from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.session import index
-from workbench.session.index import INDEX, IndexedSession, indexed_sessions
-from workbench.session.journal import JOURNAL, Journal
+from workbench.session.index import INDEX, IndexedSession, copies_text, indexed_sessions, read_indexed
+from workbench.session.journal import JOURNAL, Journal, read_journal
 from workbench.session.state import session_statuses
 
 OLD = Path(__file__).parents[3] / "data/session-0.1.0"
@@ -131,12 +133,79 @@ def test_an_index_of_another_format_is_made_again(folder: Path) -> None:
     assert indexed_sessions(folder) == before
 
 
-def test_a_damaged_session_is_listed(folder: Path) -> None:
+def test_a_damaged_session_is_listed_with_its_error_beside_the_others(folder: Path) -> None:
+    sound = repeated(folder, "c", days=1)
     (folder / "a" / JOURNAL).write_text("damaged\n")
     (folder / "b/session.yaml").write_text("damaged: [\n")
-    found = indexed_sessions(folder)
-    assert (found[0].status.state, found[0].verdict) == ("damaged", "none")
-    assert (found[1].serial, found[1].began) == ("", "")
+    for _ in range(2):
+        found = indexed_sessions(folder)
+        assert [one.status.state for one in found] == ["damaged", "damaged", "finished"]
+        assert (found[0].serial, found[0].verdict) == ("emulated-1", "none")
+        assert str(folder / "a" / JOURNAL) in found[0].status.why
+        assert (found[1].serial, found[1].began) == ("", "")
+        assert str(folder / "b/session.yaml") in found[1].status.why
+        assert (found[2].name, found[2].verdict) == (sound.name, "accepted")
+
+
+def test_a_name_that_is_no_unicode_does_not_hide_other_sessions(folder: Path) -> None:
+    name = os.fsdecode(b"c\xff")
+    repeated(folder, name, days=1)
+    for _ in range(2):
+        assert [one.name for one in indexed_sessions(folder)] == ["a", "b", name]
+
+
+def test_copies_and_links_count_once(folder: Path) -> None:
+    before = indexed_sessions(folder)
+    assert copies_text(before) == ""
+    copied(folder, "0")
+    shutil.copytree(folder / "b", folder / "1")
+    (folder / "2").symlink_to("b")
+    for _ in range(2):
+        found = indexed_sessions(folder)
+        assert [one.name for one in found] == ["0", "a"]
+        assert found[0].copies == ("1", "b", "2")
+    assert len(copies_text(found).splitlines()) == 1
+
+
+def test_the_copy_with_most_records_counts_then_the_one_with_its_first_name(folder: Path) -> None:
+    copied(folder)  # by its own name
+    assert [(one.name, one.copies) for one in indexed_sessions(folder)[:1]] == [(REFERENCE.name, ("b",))]
+    journal, records = Journal.reopen(folder / "b")
+    with journal:
+        journal.append(records[-1].event)
+    assert [one.name for one in indexed_sessions(folder)] == ["a", "b"]
+
+
+def with_events(folder: Path, *events: ev.Event) -> IndexedSession:
+    session = repeated(folder, "c", days=1)
+    lines = (session / JOURNAL).read_text().splitlines(keepends=True)
+    records = [ev.Record.model_validate_json(line) for line in lines]
+    others = [
+        one.event for one in records if not isinstance(one.event, ev.FitFinished | ev.CalibrationExported)
+    ]
+    times = records[0].time_ns
+    kept = [
+        ev.Record(n=n, time_ns=times, event=one) for n, one in enumerate((others[0], *events, *others[1:]))
+    ]
+    (session / JOURNAL).write_text("".join(f"{one.model_dump_json()}\n" for one in kept))
+    return read_indexed(session)
+
+
+def test_an_exception_is_an_export_after_the_refused_fit(folder: Path) -> None:
+    events = [one.event for one in read_journal(folder / "b")]
+    accepted = next(one for one in events if isinstance(one, ev.FitFinished))
+    refused = accepted.model_copy(update={"verdict": "refused"})
+    export = ev.CalibrationExported(path="calibration.yaml", sha256="0")
+    verdicts = {
+        (refused, export): "exception",
+        (accepted, export, refused): "refused",
+        (refused, export, accepted, export): "accepted",
+        (refused,): "refused",
+        (): "none",
+    }
+    for order, verdict in verdicts.items():
+        assert with_events(folder, *order).verdict == verdict
+        shutil.rmtree(folder / "c")
 
 
 def test_a_missing_folder_is_an_error(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.model.captures import load_captures
 from workbench.model.errors import BadInputError
-from workbench.model.event import SpotsFound
+from workbench.model.event import CaptureTaken, SpotsFound
 from workbench.model.rig import Rig
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_session_rig
@@ -49,10 +49,19 @@ def test_observations_are_those_of_the_captures_table(rig: Rig, recording: Path)
             other.repeat,
             other.saturated,
         )
+        assert one.part == other.part
         # The recording has the spots of the journal; the table's images are searched by today's program.
         numbers = (one.u_px, one.v_px, one.u_sd_px, one.v_sd_px)
         assert np.isclose(journalled, numbers, rtol=1e-9).all(axis=1).any()
         assert abs(one.u_px - other.u_px) < 3 * one.u_sd_px
+
+
+def test_times_are_those_of_the_journal(rig: Rig, recording: Path) -> None:
+    found, _, _ = observations_of_recording(recording, rig)
+    taken = [r.event for r in read_journal(SESSION) if isinstance(r.event, CaptureTaken)]
+    first_ns = min(capture.time_ns for capture in taken)
+    by_source = {capture.on.path: (capture.time_ns - first_ns) / 1e9 for capture in taken}
+    assert [one.time_s for one in found] == [by_source[one.source] for one in found]
 
 
 @pytest.mark.filterwarnings("ignore:RRD file has no footer")

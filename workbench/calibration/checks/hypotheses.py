@@ -29,10 +29,10 @@ from workbench.calibration.checks.cross_validation import (
 )
 from workbench.calibration.checks.hypothesis import DECISIVE, Hypothesis, from_priors, scored
 from workbench.calibration.checks.mistaken_data import (
-    PULLED_SD,
     exchanged_coordinates,
     exchanged_lasers,
     flipped_images,
+    is_pulled,
     other_units,
 )
 from workbench.calibration.checks.priors import prior_strain
@@ -148,8 +148,7 @@ def _candidates(fit: CalibrationFit, state: Refit, first: bool) -> Iterator[Hypo
         yield from flipped_images(fit, state)
         yield from exchanged_coordinates(fit, state)
         yield from exchanged_lasers(fit, state)
-    pulled = np.abs(state.y[fit.table.is_sensor]).max() > PULLED_SD
-    if first and (improbable or pulled):
+    if first and (improbable or is_pulled(fit, state)):
         yield from other_units(state)
     if improbable or first:
         yield from _wrong_standoffs(fit, state)

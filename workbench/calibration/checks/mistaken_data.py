@@ -11,7 +11,7 @@ import numpy as np
 from workbench.calibration.checks.hypothesis import Hypothesis, HypothesisKind, from_priors, scored
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.problem import LeastSquaresProblem
-from workbench.calibration.estimation.refit import Refit
+from workbench.calibration.estimation.refit import Refit, measured, optimum_of, problem_of, refit
 
 UNITS = {"centimetres": 10.0, "inches": 25.4, "metres": 1000.0}
 """Units that a ruler may have been read in, mm."""
@@ -19,6 +19,9 @@ UNIT_LIKELY = 6.0
 """Score from which a unit of all standoffs is adopted. Centimetres are a usual mistake, and cost no more than
 a factor of 3: odds of 20 to 1 are enough. By Markov's inequality at most 1 in 20 sound fits scores as much;
 by chance alone it takes a prior that is wrong by three of its deviations."""
+UNIT_POSSIBLE = -2.0
+"""Score from which a unit is possible: the data do not decide, at odds of less than 3 to 1 against it. Such
+priors are too wide to distinguish a long focal length and baseline from standoffs in centimetres."""
 PULLED_SD = 2.0
 """Distance of a parameter of the sensor from its prior, in its deviations, below which no unit could score
 UNIT_LIKELY."""
@@ -71,6 +74,21 @@ def other_units(state: Refit) -> Iterator[Hypothesis]:
         wider = np.linalg.slogdet(scaled.covariance)[1] - np.linalg.slogdet(before.covariance)[1]
         score = before.cost - scaled.cost + float(wider) - UNIT_COST
         yield Hypothesis("unit", (index,), after, score, score > UNIT_LIKELY)
+
+
+def undecided_unit(fit: CalibrationFit) -> str | None:
+    """Unit of the standoffs that is about as probable as millimetres by the priors; None if there is none."""
+    problem = problem_of(fit)
+    state = refit(problem, measured(problem), optimum_of(fit))
+    if not is_pulled(fit, state):
+        return None
+    best = max(other_units(state), key=lambda h: h.score)
+    return list(UNITS)[best.subject[0]] if best.score > UNIT_POSSIBLE else None
+
+
+def is_pulled(fit: CalibrationFit, state: Refit) -> bool:
+    """Whether a parameter of the sensor is so far from its prior that a unit could be the cause."""
+    return bool(np.abs(state.y[fit.table.is_sensor]).max() > PULLED_SD)
 
 
 def exchanged_lasers(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:

@@ -78,9 +78,12 @@ def doubted_priors(fit: CalibrationFit) -> list[str]:
 
 
 def _is_drift(fit: CalibrationFit) -> BoolArray:
-    """(P,) whether each parameter is the drift of the image: it has a limit, its prior is no measurement."""
+    """(P,) whether each parameter is the drift of the image, or a step of it between two parts.
+
+    They have a limit; their prior is no measurement.
+    """
     drift = np.zeros(len(fit.values), bool)
-    drift[fit.layout.drift] = True
+    drift[fit.layout.drift] = drift[fit.layout.steps] = True
     return drift
 
 

@@ -22,6 +22,7 @@ from workbench.calibration.data.averaging import (
     usual_scale,
     weighted_mean,
 )
+from workbench.calibration.data.capture_times import NO_TIMES, CaptureTimes
 from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.errors import BadInputError
@@ -52,6 +53,10 @@ class Observation:
     u_speckle_sd_px: float = float("nan")
     """1 sigma by speckle, which the repeats share; `u_sd_px` does not include it."""
     v_speckle_sd_px: float = float("nan")
+    time_s: float = float("nan")
+    """Time of the capture, from any zero."""
+    part: str = ""
+    """Name of the uninterrupted part of the session."""
 
     @property
     def seen(self) -> bool:
@@ -119,15 +124,21 @@ class MeanObservations:
     speckle_sd_px: FloatArray
     """(N, 2) 1 sigma of that shared error."""
     time: FloatArray
-    """(N,) mean place of the repeats in the order of capture: -0.5 first of the session, 0.5 last."""
+    """(N,) mean running time of the repeats: -0.5 first capture of the session, 0.5 last."""
+    parts: FloatArray
+    """(N, P) share of the repeats in each part of the session."""
     members: tuple[tuple[Observation, ...], ...]
     """The observations that each mean is taken over."""
     repeat_scale: float = 1.0
     """Factor on the stated deviations, estimated from the scatter of the repeats; 1 where they agree."""
+    repeat_freedom: float = 0.0
+    """Degrees of freedom of that scatter."""
     captures: tuple[Observation, ...] = ()
     """Every observation in the order of the captures, outliers included."""
     inconsistent: tuple[int, ...] = ()
     """Cells whose repeats scatter far more than those of all others; their sd is that of the scatter."""
+    times: CaptureTimes = NO_TIMES
+    """Of `captures`."""
 
 
 def group(
@@ -163,13 +174,16 @@ def group(
     scatter = [_scatter(members, noise) for members in kept.values()]
     inconsistent = [n for n, one in enumerate(scatter) if is_inconsistent(one, usual)]
     alike = [one for n, one in enumerate(scatter) if n not in inconsistent]
-    scale = float(significant_scale(sum(chi2 for chi2, _ in alike), sum(free for _, free in alike)))
+    freedom = sum(free for _, free in alike)
+    scale = float(significant_scale(sum(chi2 for chi2, _ in alike), freedom))
     scales = [(chi2 / free) ** 0.5 if n in inconsistent else scale for n, (chi2, free) in enumerate(scatter)]
     means = [
         weighted_mean(positions(m), own * stated_sd(m, noise))
         for m, own in zip(kept.values(), scales, strict=True)
     ]
     speckle_sd = [np.sqrt((stated_speckle_sd(m, noise) ** 2).mean(axis=0)) for m in kept.values()]
+    times = CaptureTimes.of(np.array([s.time_s for s in seen]), [s.part for s in seen])
+    time, parts = _mean_times(seen, times, list(kept.values()))
     seen_at = {placement for placement, _ in kept}
     order = [key for key in placements if key in seen_at]
     return (
@@ -180,21 +194,30 @@ def group(
             position_px=np.array([mean for mean, _ in means]).reshape(-1, 2),
             sd_px=np.hypot([sd for _, sd in means], speckle_sd).reshape(-1, 2),
             speckle_sd_px=np.reshape(speckle_sd, (-1, 2)),
-            time=_mean_times(seen, list(kept.values())),
+            time=time,
+            parts=parts,
             members=tuple(tuple(m) for m in kept.values()),
             repeat_scale=scale,
+            repeat_freedom=freedom,
             captures=tuple(seen),
             inconsistent=tuple(inconsistent),
+            times=times,
         ),
         rejected,
     )
 
 
-def _mean_times(captured: Sequence[Observation], cells: Sequence[Sequence[Observation]]) -> FloatArray:
-    """(N,) `MeanObservations.time`, by the order in which the observations were captured."""
-    last = max(len(captured) - 1, 1)
-    time = {id(s): n / last - 0.5 for n, s in enumerate(captured)}
-    return np.array([np.mean([time[id(s)] for s in members]) for members in cells])
+def _mean_times(
+    captured: Sequence[Observation], times: CaptureTimes, cells: Sequence[Sequence[Observation]]
+) -> tuple[FloatArray, FloatArray]:
+    """`MeanObservations.time` and `MeanObservations.parts` of N cells."""
+    number = {id(s): n for n, s in enumerate(captured)}
+    own = [[number[id(s)] for s in members] for members in cells]
+    shares = np.eye(max(len(times.limits), 1))[times.part]
+    return (
+        np.array([np.mean(times.time[one]) for one in own]),
+        np.array([np.mean(shares[one], axis=0) for one in own]).reshape(-1, shares.shape[1]),
+    )
 
 
 def as_grid(cells: MeanObservations, lasers: int) -> tuple[FloatArray, FloatArray]:

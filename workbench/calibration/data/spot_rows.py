@@ -165,6 +165,8 @@ def _sight_row(rig: Rig, lasers: Mapping[str, LaserSpec], row: CaptureRow) -> Ob
         v_sd_px=row.v_sd_px,
         standoff_sd_mm=row.standoff_sd_mm,
         yaw_deg=0.0 if isnan(row.tilt_deg) else row.tilt_deg,
+        time_s=row.time_s,
+        part=row.part,
     )
     if row.on is None:
         return _in_picture(rig, observation)

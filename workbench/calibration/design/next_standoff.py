@@ -189,6 +189,7 @@ def padded(cells: MeanObservations, lasers: int, planned: int) -> MeanObservatio
         sd_px=sd.reshape(-1, 2),
         speckle_sd_px=np.full((len(laser), 2), np.nan),
         time=np.zeros(len(laser)),
+        parts=np.ones((len(laser), 1)),
         members=(),
     )
 

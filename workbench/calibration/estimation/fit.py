@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import radians, tan
+from math import inf, radians, tan
 
 import numpy as np
 
@@ -25,12 +25,14 @@ from workbench.calibration.model.parameters import (
     PLACEMENT,
     POSE,
     PRINT,
+    STEP,
     Parameter,
     ParameterTable,
     board_parameters,
     placement_parameters,
     sensor_parameter,
     sensor_parameters,
+    step_parameters,
     unit_of,
 )
 from workbench.model.arrays import FloatArray, IndexArray
@@ -44,6 +46,8 @@ POSE_SD = {"slope_x": 1.0, "slope_y": 1.0, "board_x_mm": 100.0, "board_y_mm": 10
 """Priors of a board's pose about its starting value: far wider than the error of that value."""
 FLAT_PRIOR_SD = 1e3
 """Factor on a prior's sd that makes the prior negligible."""
+WHOLE = np.array([[-0.5, 0.5]])
+"""Running time at the first and at the last capture of a session."""
 MAX_SCALE_ROUNDS = 10
 SCALE_TOLERANCE = 1.001
 """The noise scale has converged where the residuals ask for less than this factor more."""
@@ -76,6 +80,8 @@ class CalibrationFit:
     """Factor on the stated pixel noise, estimated from the residuals; 1 where they agree with it."""
     placement_scale: float
     """Factor on the stated deviations of placements, estimated from their errors; 1 likewise."""
+    placement_freedom: float
+    """Degrees of freedom of that estimate; infinite where the factor is 1."""
     placement_scatter_p: float
     """P value of the placement errors under their stated deviations."""
     chi2: float
@@ -91,6 +97,13 @@ class CalibrationFit:
         """(P,) posterior standard deviations."""
         return np.sqrt(np.diag(self.covariance))
 
+    @property
+    def noise_freedom(self) -> float:
+        """Degrees of freedom of the spots' noise: of what scales it, else infinite."""
+        if self.noise_scale > 1:
+            return self.degrees_of_freedom
+        return self.cells.repeat_freedom if self.cells.repeat_scale > 1 else inf
+
     @cached_property
     def layout(self) -> Layout:
         """Layout of the P parameters."""
@@ -105,9 +118,18 @@ class CalibrationFit:
 
     @property
     def drift_px(self) -> FloatArray:
-        """(2,) shift of the image in u and v from the first capture to the last; 0 where it is not fitted."""
-        free = self.table.prior_sd[self.layout.drift] > 0
-        return np.where(free, self.values[self.layout.drift], 0.0)
+        """(2,) largest change of the image in u and v over the session; 0 where no drift is fitted.
+
+        By drift and steps: positive where the larger coordinate is the later one. Without interruption it
+        is the shift from the first capture to the last.
+        """
+        layout = self.layout
+        drift = np.where(self.table.prior_sd[layout.drift] > 0, self.values[layout.drift], 0.0)
+        offsets = layout.offsets_by_step @ self.values[layout.steps].reshape(-1, len(STEP))
+        limits = self.cells.times.limits if layout.parts > 1 else WHOLE
+        course = (limits[:, :, None] * drift + offsets[:, None]).reshape(-1, 2)
+        sign = np.where(course.argmax(axis=0) >= course.argmin(axis=0), 1.0, -1.0)
+        return np.asarray(sign * np.ptp(course, axis=0), np.float64)
 
     @property
     def corner_rms_px(self) -> float:
@@ -168,7 +190,7 @@ def fit_cells(
     Raises:
         LimitFailedError: the result is not finite.
     """
-    table = table_of(rig, cells.placements, boards)
+    table = table_of(rig, cells.placements, boards, layout_of(rig, cells, boards).parts)
     solution, scale = _solve(LeastSquaresProblem.of(rig, table, cells, boards))
     errors = _placement_errors(table)
     scatter = placement_scatter(solution.y[errors], solution.covariance[np.ix_(errors, errors)])
@@ -192,6 +214,7 @@ def fit_cells(
         rms_px=_rms(cells, residual),
         noise_scale=scale,
         placement_scale=scatter.scale,
+        placement_freedom=scatter.degrees_of_freedom,
         placement_scatter_p=scatter.p_value,
         chi2=solution.chi2,
         degrees_of_freedom=solution.degrees_of_freedom,
@@ -257,14 +280,14 @@ def share_of(information: FloatArray) -> FloatArray:
 
 
 def table_of(
-    rig: Rig, placements: Sequence[PlacementInfo], boards: Sequence[BoardView] = ()
+    rig: Rig, placements: Sequence[PlacementInfo], boards: Sequence[BoardView] = (), parts: int = 1
 ) -> ParameterTable:
     """All parameters of a fit, in the order of `Layout`, with the priors of the rig and of the captures."""
     nuisances = placement_parameters(rig, [p.key for p in placements])
     by_key = {p.key: p for p in placements}
     flat = tuple(_with_stated_prior(n, by_key) for n in nuisances)
     if not boards:
-        return ParameterTable((*sensor_parameters(rig), *flat))
+        return ParameterTable((*sensor_parameters(rig), *flat, *step_parameters(parts)))
     printed = tuple(sensor_parameter(name, getattr(rig.bench, name)) for name in PRINT)
     poses = {view.placement.key: guess_pose(rig, view) for view in boards}
     return ParameterTable(
@@ -274,6 +297,7 @@ def table_of(
             *(_with_pose_prior(parameter, poses) for parameter in flat),
             *board_parameters(rig),
             *(_pose_parameter(key, name, pose) for key, pose in poses.items() for name in POSE),
+            *step_parameters(parts),
         )
     )
 

@@ -17,6 +17,7 @@ of the others.
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,8 @@ class PlacementScatter(NamedTuple):
     placements are left."""
     outliers: tuple[int, ...]
     """Indices, among the J placements, of those at a wrong standoff."""
+    degrees_of_freedom: float = inf
+    """Of the estimated variance; infinite where the deviations are as stated."""
 
 
 def placement_scatter(errors: FloatArray, covariance: FloatArray) -> PlacementScatter:
@@ -77,7 +80,9 @@ def placement_scatter(errors: FloatArray, covariance: FloatArray) -> PlacementSc
     if len(errors) - len(outliers) < FEWEST:
         return PlacementScatter(1.0, 1.0, tuple(outliers))
     if p < SCALED_P:
-        return PlacementScatter(float(np.sqrt(_variance(seen, variance))), p, tuple(outliers))
+        found = _variance(seen, variance)
+        freedom = _degrees_of_freedom(seen, variance, found)
+        return PlacementScatter(float(np.sqrt(found)), p, tuple(outliers), freedom)
     return PlacementScatter(1.0, p, tuple(outliers))
 
 
@@ -118,6 +123,15 @@ def _variance(seen: _Seen, variance: FloatArray) -> float:
 
     found = minimize_scalar(misfit, bounds=(0.0, np.log(LARGEST_SCALE)), method="bounded")
     return float(np.exp(2.0 * found.x))
+
+
+def _degrees_of_freedom(seen: _Seen, variance: FloatArray, estimate: float) -> float:
+    """2 / (relative variance of the estimated variance), by its Fisher information at the estimate."""
+    common = variance == 1.0
+    covariance = _covariance(seen, np.where(common, estimate, variance))
+    added = estimate * seen.root[:, common] @ seen.root[:, common].T
+    share = np.linalg.solve(covariance, added)
+    return float(np.trace(share @ share))
 
 
 def _p_value(seen: _Seen, variance: FloatArray) -> float:

@@ -17,7 +17,7 @@ from workbench.calibration.data.observations import MeanObservations
 from workbench.calibration.estimation.jit_cache import jit_cached
 from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.calibration.model.layout import Layout
-from workbench.calibration.model.parameters import ParameterTable
+from workbench.calibration.model.parameters import ParameterTable, fits_drift
 from workbench.calibration.model.prediction import (
     CornerData,
     SpotData,
@@ -85,7 +85,7 @@ class LeastSquaresProblem:
             mean=table.prior_mean,
             sd=table.prior_sd,
             standoff_mm=np.array([p.standoff_mm for p in cells.placements]),
-            spots=SpotData(cells.laser, cells.placement, cells.time),
+            spots=SpotData(cells.laser, cells.placement, cells.time, cells.parts),
             corners=_corner_data(cells, boards, rig.board),
             position_px=np.where(measured, position, 0.0),
             inverse_sd=np.where(measured, 1.0 / sd, 0.0),
@@ -129,27 +129,30 @@ class LeastSquaresProblem:
 
 def layout_of(rig: Rig, cells: MeanObservations, boards: Sequence[BoardView]) -> Layout:
     """Layout of the parameters that `fit.table_of` makes."""
-    return Layout(rig.camera.lens, len(rig.lasers), len(cells.placements), len(boards))
+    parts = cells.parts.shape[1] if fits_drift(rig) else 1
+    return Layout(rig.camera.lens, len(rig.lasers), len(cells.placements), len(boards), parts)
 
 
 def _corner_data(cells: MeanObservations, boards: Sequence[BoardView], board: Board) -> CornerData:
     order = [p.key for p in cells.placements]
     counts = [len(b.corners.ids) for b in boards]
     ids = np.concatenate([np.array([], np.intp), *(b.corners.ids for b in boards)])
+    seen = [_board_time(cells, order.index(b.placement.key)) for b in boards]
     return CornerData(
         board=np.repeat(np.arange(len(boards)), counts),
         placement=np.repeat(np.array([order.index(b.placement.key) for b in boards], np.intp), counts),
         printed_mm=board.corners_mm[ids],
-        time=np.repeat(
-            np.array([_board_time(cells, order.index(b.placement.key)) for b in boards], float), counts
-        ),
+        time=np.repeat(np.array([time for time, _ in seen], float), counts),
+        parts=np.repeat(np.array([own for _, own in seen]).reshape(-1, cells.parts.shape[1]), counts, axis=0),
     )
 
 
-def _board_time(cells: MeanObservations, placement: int) -> float:
-    """Mean time of the spots captured with a board, as in `SpotData.time`; 0 where there are none."""
-    beside = cells.time[cells.placement == placement]
-    return float(beside.mean()) if len(beside) else 0.0
+def _board_time(cells: MeanObservations, placement: int) -> tuple[float, FloatArray]:
+    """Mean time and shares of the parts of the spots beside a board; the session's middle without any."""
+    beside = cells.placement == placement
+    if not beside.any():
+        return 0.0, np.full(cells.parts.shape[1], 1.0 / cells.parts.shape[1])
+    return float(cells.time[beside].mean()), np.asarray(cells.parts[beside].mean(axis=0))
 
 
 @jit_cached(static=1)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from workbench.calibration.model.parameters import DRIFT, PLACEMENT, POSE, PRINT, REFERENCE
-from workbench.model.arrays import IndexArray
+from workbench.calibration.model.parameters import DRIFT, PLACEMENT, POSE, PRINT, REFERENCE, STEP
+from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.board import BOW
 from workbench.model.lens import LensName
 from workbench.optics.lens import LensModel
@@ -19,7 +19,8 @@ class Layout(NamedTuple):
     """Indices of each block of parameters, by lens model and number of lasers, placements and boards.
 
     The order is lens, reference, rays; print scale if there are boards; placements; sag and poses of the
-    boards. The layout of one laser and one placement is that of the inputs of `prediction.predict_cell`.
+    boards; steps between the parts of the session. The layout of one laser and one placement is that of the
+    inputs of `prediction.predict_cell`.
     """
 
     lens_name: LensName
@@ -27,6 +28,8 @@ class Layout(NamedTuple):
     placements: int = 1
     boards: int = 0
     """Placements at which the board was seen."""
+    parts: int = 1
+    """Uninterrupted parts of the session that the image may have shifted between; 1 without a drift."""
 
     @property
     def model(self) -> LensModel:
@@ -107,3 +110,15 @@ class Layout(NamedTuple):
     def poses(self) -> slice:
         """POSE of every board."""
         return slice(self.bow.stop, self.bow.stop + len(POSE) * self.boards)
+
+    @property
+    def steps(self) -> slice:
+        """STEP between each part of the session and the next."""
+        start = self.poses.stop if self.boards else self.errors.stop
+        return slice(start, start + len(STEP) * (self.parts - 1))
+
+    @property
+    def offsets_by_step(self) -> FloatArray:
+        """(parts, parts - 1) offset of the image in each part from the mean of all, by unit steps."""
+        after = np.tri(self.parts, self.parts - 1, -1)
+        return np.asarray(after - after.mean(axis=0), np.float64)

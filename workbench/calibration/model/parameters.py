@@ -15,7 +15,11 @@ from workbench.model.rig import TARGET_TILT, Prior, Rig
 from workbench.optics.rays import RAY
 
 DRIFT = ("drift_u_px", "drift_v_px")
-"""Shift of the image over the session, from the first capture to the last."""
+"""Shift of the image over the running time of the session, from the first capture to the last."""
+DRIFT_SD_PX = 0.5
+"""Prior deviation of a drift that the data show, px over the session, and of a step."""
+STEP = ("step_u_px", "step_v_px")
+"""Shift of the image from the end of one part of the session to the beginning of the next."""
 REFERENCE = ("offset_mm", "ruler_scale", *TARGET_TILT, *DRIFT)
 """Of the bench during the session; `offset_mm` alone is of use afterwards."""
 PLACEMENT = ("error_mm", "slope_x", "slope_y")
@@ -24,7 +28,7 @@ PRINT = ("print_scale",)
 POSE = ("board_x_mm", "board_y_mm", "board_roll_rad")
 """Pose of the board on the plane of a placement, see `workbench.optics.board.Pose`."""
 
-ParameterKind = Literal["sensor", "placement"]
+ParameterKind = Literal["sensor", "placement", "part"]
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,8 @@ class Parameter:
     unit: str
     prior: Prior
     kind: ParameterKind
-    """`sensor`: part of the calibration; `placement`: a nuisance parameter of the target or a placement."""
+    """`sensor`: belongs to the calibration; `placement`: a nuisance parameter of the target or a placement;
+    `part`: one of the parts of the session."""
 
 
 def sensor_parameters(rig: Rig) -> tuple[Parameter, ...]:
@@ -65,6 +70,21 @@ def board_parameters(rig: Rig) -> tuple[Parameter, ...]:
     """Nuisance parameters: sag of the board's paper."""
     flat = Prior(value=0.0, sd=rig.bench.board_flatness_sd_mm)
     return tuple(Parameter(name, unit_of(name), flat, "placement") for name in BOW)
+
+
+def fits_drift(rig: Rig) -> bool:
+    """Whether the drift is a free parameter; with it are the steps between the parts of a session."""
+    return any(getattr(rig.bench, name).sd > 0 for name in DRIFT)
+
+
+def step_parameters(parts: int) -> tuple[Parameter, ...]:
+    """Nuisance parameters: steps of the image between the parts of a session."""
+    step = Prior(value=0.0, sd=DRIFT_SD_PX)
+    return tuple(
+        Parameter(f"part {number}.{name}", unit_of(name), step, "part")
+        for number in range(1, parts)
+        for name in STEP
+    )
 
 
 def unit_of(name: str) -> str:

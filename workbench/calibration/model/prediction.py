@@ -9,7 +9,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from workbench.calibration.model.layout import Layout
-from workbench.calibration.model.parameters import PLACEMENT, POSE
+from workbench.calibration.model.parameters import PLACEMENT, POSE, STEP
 from workbench.model.board import BOW_RADIUS_MM
 from workbench.model.lens import LensName
 from workbench.optics.board import Pose, point_on_board
@@ -24,7 +24,9 @@ class SpotData(NamedTuple):
     placement: ArrayLike
     """(N,) index of the placement."""
     time: ArrayLike
-    """(N,) when it was captured, from -0.5 (first capture of the session) to 0.5 (last)."""
+    """(N,) running time at its capture, from -0.5 (first capture of the session) to 0.5 (last)."""
+    parts: ArrayLike
+    """(N, P) share of each part of the session."""
 
 
 class CornerData(NamedTuple):
@@ -38,6 +40,8 @@ class CornerData(NamedTuple):
     """(K, 2) nominal position of the corner on the board."""
     time: ArrayLike
     """(K,) as of `SpotData`."""
+    parts: ArrayLike
+    """(K, P) as of `SpotData`."""
 
 
 def predict_cell(
@@ -71,7 +75,8 @@ def predict_spots(values: Array, layout: Layout, spots: SpotData, standoff_mm: A
     errors = values[layout.errors].reshape(-1, len(PLACEMENT))[spots.placement]
     inputs = (*values[layout.common], *rays.T, *errors.T)
     standoff_mm = standoff_mm[spots.placement]
-    return jnp.stack(predict_cell(layout.lens_name, inputs, standoff_mm, spots.time), axis=1)
+    seen = jnp.stack(predict_cell(layout.lens_name, inputs, standoff_mm, spots.time), axis=1)
+    return seen + _offsets(values, layout, spots.parts) if layout.parts > 1 else seen
 
 
 def predict_corners(values: Array, layout: Layout, corners: CornerData, standoff_mm: Array) -> Array:
@@ -85,7 +90,14 @@ def predict_corners(values: Array, layout: Layout, corners: CornerData, standoff
     across_mm, down_mm = printed * (1.0 + values[layout.print_scale.start])
     x, y, z = point_on_board(pose, across_mm, down_mm, sag_mm)
     seen = jnp.stack(layout.model.project(values[layout.lens], x / z, y / z), axis=1)
-    return seen + values[layout.drift] * jnp.asarray(corners.time)[:, None]
+    seen = seen + values[layout.drift] * jnp.asarray(corners.time)[:, None]
+    return seen + _offsets(values, layout, corners.parts) if layout.parts > 1 else seen
+
+
+def _offsets(values: Array, layout: Layout, parts: ArrayLike) -> Array:
+    """(N, 2) offsets of the image by the steps between the parts of the session, by shares (N, P)."""
+    steps = values[layout.steps].reshape(-1, len(STEP))
+    return jnp.asarray(parts) @ layout.offsets_by_step @ steps
 
 
 def _plane(

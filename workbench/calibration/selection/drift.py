@@ -3,9 +3,11 @@
 A mount that creeps or a camera that warms up shifts the image. Where standoffs are visited from near to far
 the shift follows the standoff and is taken for baselines and pointing: residuals hardly show it. The test
 is that of a missing trend (C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50). Let r be the residuals in
-standard deviations, and R = 1 - J C J^T their covariance. A shift that is linear in the order of capture is
-W, one column for u and one for v. The score `W^T r` has the covariance S = W^T R W. The estimated drift is
-`S^-1 W^T r`, with all other parameters free.
+standard deviations, and R = 1 - J C J^T their covariance. W has a column for u and one for v: a shift of
+1 px that is linear in the running time of the session. For each interruption W has two more, a step of 1 px
+from each part of the session to the next, since the sensor may have cooled or been moved. The score `W^T r`
+has the covariance S = W^T R W, so that `r^T W S^-1 W^T r` is chi-square without a shift, with two degrees
+of freedom for each part. The estimates are `S^-1 W^T r`, with all other parameters free.
 """
 
 from __future__ import annotations
@@ -19,9 +21,9 @@ from workbench.calibration.checks.hypotheses import explain_misfit
 from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import CalibrationFit, fit
-from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.calibration.estimation.refit import optimum_of, problem_of
-from workbench.calibration.model.parameters import DRIFT
+from workbench.calibration.model.layout import Layout
+from workbench.calibration.model.parameters import DRIFT, DRIFT_SD_PX, fits_drift
 from workbench.model.arrays import FloatArray
 from workbench.model.fit_event import Rejected
 from workbench.model.rig import Prior, Rig
@@ -29,8 +31,6 @@ from workbench.model.stats import chi2_sf
 
 SHOWN_P = 0.003
 """P value below which the drift is fitted."""
-PRIOR_SD_PX = 0.5
-"""Prior deviation of a drift that the data show, px over the session."""
 UNKNOWN_SHARE = 1e-6
 """Squared component of an axis in the unknown directions above which the axis is not estimated."""
 LEAST_INFORMATION = 1e-6
@@ -39,16 +39,16 @@ LEAST_INFORMATION = 1e-6
 
 @dataclass(frozen=True)
 class DriftTest:
-    """Drift that the data show, from the first capture to the last."""
+    """Drift that the data show from the first capture to the last, and steps between interrupted parts."""
 
     shift_px: FloatArray
-    """(2,) in u and v; 0 where it is not estimated."""
+    """(K,) drift in u and v, then the steps between the parts likewise; 0 where it is not estimated."""
     sd_px: FloatArray
-    """(2,) standard deviation; infinite where nothing is known."""
+    """(K,) standard deviation; infinite where nothing is known."""
     p_value: float
-    """Of no drift; 1 where nothing is known."""
+    """Of neither drift nor steps; 1 where nothing is known."""
     score: float
-    """Twice the log evidence of a drift against none."""
+    """Twice the log evidence of drift and steps against none."""
 
 
 def drift_test(fitted: CalibrationFit) -> DriftTest:
@@ -57,24 +57,37 @@ def drift_test(fitted: CalibrationFit) -> DriftTest:
     residual, jacobian = problem.linearise(optimum_of(fitted), fitted.noise_scale)
     sd = fitted.table.prior_sd
     covariance = fitted.covariance / np.outer(*(np.where(sd > 0, sd, np.inf),) * 2)
-    shift = _shifts(problem) / fitted.noise_scale
+    shift = shift_columns(fitted)
     along = jacobian.T @ shift
     information = shift.T @ shift - along.T @ covariance @ along
     return score_test(information, -shift.T @ residual)
 
 
-def score_test(information: FloatArray, score: FloatArray) -> DriftTest:
-    """The test by the information on a drift (2, 2), 1/px^2, and its score (2,), 1/px.
+def shift_columns(fitted: CalibrationFit) -> FloatArray:
+    """(R, 2 P) change of the residuals, in their deviations, with a drift of 1 px, then with each step."""
+    data, parts = problem_of(fitted).data, fitted.cells.parts.shape[1]
+    time = np.concatenate([np.asarray(data.spots.time, float), np.asarray(data.corners.time, float)])
+    shares = np.concatenate([np.asarray(data.spots.parts, float), np.asarray(data.corners.parts, float)])
+    offsets = shares @ Layout(fitted.rig.camera.lens, parts=parts).offsets_by_step
+    inverse_sd = np.asarray(data.inverse_sd) / fitted.noise_scale
+    by_axis = np.column_stack([time, offsets])[:, None] * inverse_sd[:, :, None]
+    shift = np.zeros((2 * len(time), 2 * parts))
+    shift[0::2, 0::2], shift[1::2, 1::2] = by_axis[:, 0], by_axis[:, 1]
+    return shift
 
-    An axis is estimated only where the data constrain it completely. Where they determine one combination of
+
+def score_test(information: FloatArray, score: FloatArray) -> DriftTest:
+    """The test by the information on K shifts (K, K), 1/px^2, and its score (K,), 1/px.
+
+    A shift is estimated only where the data constrain it completely. Where they determine one combination of
     u and v alone, the estimate of least norm would share it between them.
     """
     values, vectors = np.linalg.eigh(information)
     known = values > LEAST_INFORMATION
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
     chi2 = float(score @ inverse @ score)
-    spread = np.eye(2) + PRIOR_SD_PX**2 * information
-    evidence = score @ np.linalg.solve(spread, PRIOR_SD_PX**2 * score) - np.linalg.slogdet(spread)[1]
+    spread = np.eye(len(score)) + DRIFT_SD_PX**2 * information
+    evidence = score @ np.linalg.solve(spread, DRIFT_SD_PX**2 * score) - np.linalg.slogdet(spread)[1]
     axis_known = (vectors[:, ~known] ** 2).sum(axis=1) < UNKNOWN_SHARE
     return DriftTest(
         shift_px=np.where(axis_known, inverse @ score, 0.0),
@@ -84,14 +97,9 @@ def score_test(information: FloatArray, score: FloatArray) -> DriftTest:
     )
 
 
-def fits_drift(rig: Rig) -> bool:
-    """Whether the drift is a free parameter."""
-    return any(getattr(rig.bench, name).sd > 0 for name in DRIFT)
-
-
 def with_drift(rig: Rig) -> Rig:
     """The rig with the drift free."""
-    free = {name: Prior(value=getattr(rig.bench, name).value, sd=PRIOR_SD_PX) for name in DRIFT}
+    free = {name: Prior(value=getattr(rig.bench, name).value, sd=DRIFT_SD_PX) for name in DRIFT}
     return rig.model_copy(update={"bench": rig.bench.model_copy(update=free)})
 
 
@@ -122,13 +130,3 @@ def drift_is_shown(fitted: CalibrationFit) -> bool:
         return False
     faults = [h for h in explain_misfit(fitted) if h.kind != "spot"]
     return test.score > max((h.score for h in faults), default=0.0)
-
-
-def _shifts(problem: LeastSquaresProblem) -> FloatArray:
-    """(R, 2) change of the residuals, in their stated deviations, with a drift of 1 px in u and in v."""
-    data = problem.data
-    time = np.concatenate([np.asarray(data.spots.time, float), np.asarray(data.corners.time, float)])
-    by_axis = np.asarray(data.inverse_sd) * time[:, None]
-    shift = np.zeros((2 * len(time), 2))
-    shift[0::2, 0], shift[1::2, 1] = by_axis.T
-    return shift

@@ -197,7 +197,7 @@ def _called_for(fitted: CalibrationFit) -> list[TermSummary]:
     """
     rig = fitted.rig
     tried = [name for name in fitted.layout.model.trial_sd if rig.camera.lens_priors[name].sd == 0]
-    table = table_of(_freed(rig, tried), fitted.cells.placements, fitted.boards)
+    table = table_of(_freed(rig, tried), fitted.cells.placements, fitted.boards, fitted.layout.parts)
     problem = LeastSquaresProblem.of(rig, table, fitted.cells, fitted.boards)
     sd = table.prior_sd
     y = np.divide(fitted.values - table.prior_mean, sd, out=np.zeros_like(sd), where=sd > 0)

@@ -11,23 +11,24 @@ import numpy as np
 
 from workbench.calibration.checks.cross_validation import alarms
 from workbench.calibration.checks.faults import find_faults
+from workbench.calibration.checks.mistaken_data import undecided_unit
 from workbench.calibration.checks.priors import contradicted_priors, doubted_priors
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.checks.residuals import explain, residual_tests
-from workbench.calibration.checks.settling import warm_up_advice
+from workbench.calibration.checks.settling import BY_ORDER, warm_up_advice
 from workbench.calibration.estimation.fit import CalibrationFit
-from workbench.calibration.selection.drift import drift_test, fits_drift
+from workbench.calibration.model.parameters import DRIFT, fits_drift
+from workbench.calibration.selection.drift import SHOWN_P, drift_test
 from workbench.calibration.verdict.observability import NullDirection, direction_lines
 from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import DeterminedBy
 from workbench.model.fit_event import CrossValidatedPlacement, Fault, ResidualTest
 from workbench.model.number_text import counted
+from workbench.model.stats import chi2_isf
 
 WARNED_P = 0.01
 """P value of the placement errors below which their scatter is a warning."""
-NOTICED_SD = 3.4
-"""A drift of this many standard deviations is noticed in half of the sessions (`drift.SHOWN_P`)."""
 LARGEST_HIDDEN_PX = 0.2
 """Drift that a session must be able to show; otherwise its order of captures is a note."""
 SPECKLE_SCALE = 1.5
@@ -119,7 +120,7 @@ def assess(
     if refusing:
         reasons = [*refusing, *reasons]
     else:
-        warnings = [*direction_lines(directions), *warnings, *_warnings(fit)]
+        warnings = [*_unit_warning(fit), *direction_lines(directions), *warnings, *_warnings(fit)]
         reasons += [
             *contradicted_priors(fit),
             *map(_alarm, alarms(placements)),
@@ -142,7 +143,7 @@ def _missed_limits(fit: CalibrationFit, limits: Acceptance, max_relative_range_s
     reasons = []
     if not np.abs(fit.drift_px).max() <= limits.max_drift_px:
         reasons.append(
-            f"the image drifted by {_drift_text(fit)} from the first capture to the last, expected at most"
+            f"the image drifted by {_drift_text(fit)}, expected at most"
             f" {limits.max_drift_px:g} px. {warm_up_advice(fit)}, and capture again"
         )
     if not fit.placement_scale <= limits.max_placement_scale:
@@ -219,14 +220,27 @@ def _alarm(one: CrossValidatedPlacement) -> str:
 
 
 def _hidden_drift_px(fit: CalibrationFit) -> float:
-    """Drift that would not be noticed, along the axes that the data constrain; 0 without any."""
+    """Drift that half of the sessions would not show, along the axes that the data constrain; 0 without any.
+
+    The test of K shifts shows one of them where its square, in standard deviations, has a chi-square of K
+    degrees of freedom beyond the test's threshold.
+    """
     sd_px = drift_test(fit).sd_px
-    return NOTICED_SD * float(sd_px[np.isfinite(sd_px)].max(initial=0.0))
+    drift_sd_px = sd_px[: len(DRIFT)]
+    noticed_sd = float(chi2_isf(SHOWN_P, len(sd_px))) ** 0.5
+    return float(noticed_sd * drift_sd_px[np.isfinite(drift_sd_px)].max(initial=0.0))
+
+
+def _by_order(fit: CalibrationFit) -> str:
+    """Remark on a drift by the order of the captures; empty where they have times."""
+    return "" if np.isfinite(fit.cells.times.duration_s) else f"; {BY_ORDER}"
 
 
 def _drift_text(fit: CalibrationFit) -> str:
     u, v = fit.drift_px
-    return f"{u:+.2f} px in u and {v:+.2f} px in v"
+    parts = fit.layout.parts
+    when = "from the first capture to the last" if parts == 1 else f"over {parts} parts of the session"
+    return f"{u:+.2f} px in u and {v:+.2f} px in v {when}"
 
 
 def _largest_residual(fit: CalibrationFit) -> str:
@@ -235,6 +249,17 @@ def _largest_residual(fit: CalibrationFit) -> str:
     laser = fit.rig.laser_ids[fit.cells.laser[cell]]
     standoff = fit.cells.placements[fit.cells.placement[cell]].standoff_mm
     return f"{fit.residual_px[cell, axis]:+.2f} px in {'uv'[axis]} of laser {laser} at {standoff:g} mm"
+
+
+def _unit_warning(fit: CalibrationFit) -> list[str]:
+    """Doubt of the unit of all standoffs, where the priors do not decide."""
+    if (unit := undecided_unit(fit)) is None:
+        return []
+    nearest, farthest = (f"{limit(s.standoff_mm for s in fit.used):g}" for limit in (min, max))
+    return [
+        f"the standoffs ({nearest} to {farthest} mm) may be {unit}: by the rig file's priors that is about as"
+        " probable. Do: check the unit of standoff_mm; a measured baseline decides."
+    ]
 
 
 def _warnings(fit: CalibrationFit) -> list[str]:
@@ -266,13 +291,14 @@ def _warnings(fit: CalibrationFit) -> list[str]:
     if hidden > LARGEST_HIDDEN_PX:
         warnings.append(
             f"a drift of the image of up to {hidden:.2g} px over the session would not be noticed (expected"
-            f" {LARGEST_HIDDEN_PX:g} px at most), because it follows the standoff. Do: visit the standoffs in"
-            " shuffled order (order: shuffled), and return to two of them at the end (returns: 2)."
+            f" {LARGEST_HIDDEN_PX:g} px at most{_by_order(fit)}), because it follows the standoff. Do: visit"
+            " the standoffs in shuffled order (order: shuffled), and return to two of them at the end"
+            " (returns: 2)."
         )
     if np.any(fit.drift_px):
         warnings.append(
-            f"the image drifted by {_drift_text(fit)} from the first capture to the last; the fit allows for"
-            f" it, and the sd of the image centre includes half the drift. {warm_up_advice(fit)}."
+            f"the image drifted by {_drift_text(fit)}; the fit allows for it, and the sd of the image centre"
+            f" includes half the drift. {warm_up_advice(fit)}."
         )
     if fit.noise_scale > 1:
         warnings.append(

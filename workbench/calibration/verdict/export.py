@@ -138,6 +138,8 @@ def _calibration(
                 rejected=len(fit.rejected),
                 noise_scale=fit.noise_scale,
                 placement_scale=fit.placement_scale,
+                noise_degrees_of_freedom=_finite_or_none(fit.noise_freedom),
+                placement_degrees_of_freedom=_finite_or_none(fit.placement_freedom),
                 verdict=assessment.verdict,
                 reasons=assessment.reasons,
                 warnings=assessment.warnings,
@@ -151,6 +153,10 @@ def _calibration(
             provenance=provenance,
         ),
     )
+
+
+def _finite_or_none(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def _parameters(fit: CalibrationFit) -> Parameters:

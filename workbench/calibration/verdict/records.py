@@ -51,6 +51,7 @@ def fit_finished(fit: CalibrationFit, assessment: Assessment) -> FitFinished:
         faults=assessment.faults,
         residual_tests=assessment.residual_tests,
         needs_standoffs=assessment.needs_standoffs,
+        drift_px=(float(fit.drift_px[0]), float(fit.drift_px[1])),
     )
 
 

@@ -1,14 +1,20 @@
-"""Automatic exposure, gain or white balance: the background darkens while a laser is on."""
+"""Automatic exposure, gain or white balance: the image darkens because a laser is on.
+
+Two signs are looked for. In a lit room the background darkens while the laser is on. In a dark room there is
+no background to darken: the spot itself dims within the frames after switching on. A lamp that fades darkens
+the background too, but in frames with the laser off as well. Each lit frame is therefore compared with the
+mean of the dark ones before and after it.
+"""
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from dataclasses import dataclass
 
 import numpy as np
 
 from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.devices.protocols import LaserBank, StreamingCamera
-from workbench.model.arrays import BoolArray
+from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.rig import Rig
 from workbench.procedure.capture.latency import LEASE_S
 
@@ -16,39 +22,107 @@ PAIRS = 4
 SETTLING_FRAMES = 6
 """Frames that pass after each switching, beyond those that are stale: automatic controls act over several."""
 SIGNIFICANT_SD = 5.0
-"""Least mean change of the background in standard errors over the pairs."""
+"""Least mean change in standard errors over the pairs."""
 LEAST_CHANGE_DN = 1.0
 LEAST_SHARE = 0.01
 """Least relative darkening that matters: smaller ones are compensated with the ambient light."""
+LEAST_DIMMING = 0.05
+"""Least relative dimming of the spot; the power of a laser diode may fall by a few percent at first."""
+SPOT_SHARE = 0.5
+"""Pixels of the spot have more than this share of its brightest pixel."""
 
 
-def darkening(lasers: LaserBank, camera: StreamingCamera, rig: Rig) -> float | None:
-    """Relative darkening of the background while the first laser is on; None where there is none.
+@dataclass(frozen=True)
+class AutomaticControl:
+    """Signs of a camera that adjusts itself; None: no such sign."""
 
-    A sensor with fixed settings adds the light of the laser, and a lamp flickers in both directions. Only a
-    camera that adjusts itself to the spot darkens the rest of the image, each time.
+    darkening: float | None
+    """Relative darkening of the background while the laser is on."""
+    dimming: float | None
+    """Relative dimming of the spot after switching on; a laser whose power falls does the same."""
+
+
+@dataclass(frozen=True)
+class _Alternation:
+    """Frames of a laser that is switched on and off in turn, float, (n, height, width)."""
+
+    off: FloatArray
+    """(PAIRS + 1, ...) settled frames with the laser off, around those with it on."""
+    first: FloatArray
+    """(PAIRS, ...) first frames with the laser on."""
+    settled: FloatArray
+    """(PAIRS, ...) settled frames with the laser on."""
+
+
+def find_automatic_control(lasers: LaserBank, camera: StreamingCamera, rig: Rig) -> AutomaticControl:
+    """Switch the first laser on and off in turn, and look for signs of automatic control.
 
     Raises:
         RigNotReadyError: a device does not answer.
     """
-    backgrounds = [[_background(lasers, camera, rig, on) for on in (False, True)] for _ in range(PAIRS)]
-    off, on = np.array(backgrounds).T
-    change = off - on
-    error = max(float(change.std(ddof=1)), 1e-3) / PAIRS**0.5
-    mean = float(change.mean())
-    if mean < LEAST_CHANGE_DN or mean < SIGNIFICANT_SD * error or mean < LEAST_SHARE * float(off.mean()):
+    frames = _alternate(lasers, camera, rig.lasers[0].id)
+    outside = _outside(rig, frames.off.shape[1:])
+    return AutomaticControl(_darkening(frames, outside), _dimming(frames, outside))
+
+
+def _alternate(lasers: LaserBank, camera: StreamingCamera, laser_id: str) -> _Alternation:
+    off, first, settled = [_settled(camera)], [], []
+    for _ in range(PAIRS):
+        with lasers.lit([laser_id], for_s=LEASE_S):
+            first.append(camera.grab().image)
+            settled.append(_settled(camera))
+        camera.grab()  # the stale frames
+        off.append(_settled(camera))
+    return _Alternation(*(np.array(images, float) for images in (off, first, settled)))
+
+
+def _settled(camera: StreamingCamera) -> FloatArray:
+    for _ in range(SETTLING_FRAMES - 1):
+        camera.read()
+    return np.asarray(camera.read().image, float)
+
+
+def _darkening(frames: _Alternation, outside: BoolArray) -> float | None:
+    """Relative darkening of the background, each lit frame against the dark ones before and after it.
+
+    A sensor with fixed settings adds the light of the laser, and a lamp flickers in both directions.
+    """
+    off = frames.off[:, outside].mean(axis=1)
+    change = (off[:-1] + off[1:]) / 2 - frames.settled[:, outside].mean(axis=1)
+    mean, level = float(change.mean()), float(off.mean())
+    is_seen = mean >= LEAST_CHANGE_DN and mean >= LEAST_SHARE * level and _is_significant(change)
+    return mean / level if is_seen else None
+
+
+def _dimming(frames: _Alternation, outside: BoolArray) -> float | None:
+    """Relative dimming of the spot from its first frame to the settled one.
+
+    Ambient light is subtracted, scaled to that of each frame outside the spot's band.
+    """
+    first, settled = (
+        _without_ambient(lit, frames.off[:-1], outside) for lit in (frames.first, frames.settled)
+    )
+    spot = first.mean(axis=0)
+    mask = ~outside & (spot > SPOT_SHARE * spot[~outside].max(initial=0.0))
+    light, later = first[:, mask].sum(axis=1), settled[:, mask].sum(axis=1)
+    if not mask.any() or light.min() <= 0:
         return None
-    return mean / float(off.mean())
+    share = 1 - later / light
+    return float(share.mean()) if share.mean() >= LEAST_DIMMING and _is_significant(share) else None
 
 
-def _background(lasers: LaserBank, camera: StreamingCamera, rig: Rig, on: bool) -> float:
-    """Mean of a frame outside the band of the first laser, DN."""
-    first = rig.lasers[0]
-    with lasers.lit([first.id], for_s=LEASE_S) if on else nullcontext():
-        for _ in range(SETTLING_FRAMES):
-            camera.read()
-        image = camera.grab().image
-    return float(image[_outside(rig, image.shape)].mean())
+def _without_ambient(lit: FloatArray, off: FloatArray, outside: BoolArray) -> FloatArray:
+    """(n, height, width) light of the laser in each lit frame."""
+    ambient, dark = (images[:, outside].mean(axis=1) for images in (lit, off))
+    known = dark >= LEAST_CHANGE_DN
+    ratio = np.where(known, ambient / np.where(known, dark, 1.0), 1.0)
+    return lit - ratio[:, None, None] * off
+
+
+def _is_significant(values: FloatArray) -> bool:
+    """Whether the mean of n values is far above 0, by their scatter."""
+    error = max(float(values.std(ddof=1)), 1e-3) / len(values) ** 0.5
+    return bool(values.mean() >= SIGNIFICANT_SD * error)
 
 
 def _outside(rig: Rig, shape: tuple[int, ...]) -> BoolArray:

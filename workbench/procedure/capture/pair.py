@@ -35,6 +35,8 @@ class PairSource:
     bench: Bench
     replayed: PlacementCaptures | None = None
     """Captures on disk, if the present placement is replayed."""
+    part: int = 0
+    """Part of the session that new captures belong to."""
     may_emit: bool = False
     """Whether the operator has confirmed that the lasers may be switched on."""
     _exposure: ev.ExposureSet | None = None
@@ -127,6 +129,7 @@ class PairSource:
         began = time.monotonic()
         with self.bench.lasers.lit([i for i in laser_ids if i not in left_off], for_s=LEASE_S):
             on = self.bench.camera.grab()
+            clock_ns = self.bench.clock.now_ns()
         lit_s = time.monotonic() - began
         frames = FrameStore(self.session_dir)
         with ThreadPoolExecutor(1) as beside:  # the lit frame is stored while the dark one is exposed
@@ -149,6 +152,8 @@ class PairSource:
             exposure=None if self._exposure is None else self._exposure.exposure,
             exposure_unit=None if self._exposure is None else self._exposure.unit or None,
             lit_s=lit_s,
+            clock_ns=clock_ns,
+            part=self.part,
         )
         return on.image, off.image, taken
 
@@ -169,6 +174,8 @@ class PairSource:
             standoff_sd_mm=placement.standoff_sd_mm,
             repeat=repeat,
             on=FrameStore(self.session_dir).save(key, "on", frame.image, frame.time_ns),
+            clock_ns=self.bench.clock.now_ns(),
+            part=self.part,
         )
         return frame.image, taken
 

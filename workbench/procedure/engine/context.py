@@ -15,7 +15,7 @@ from workbench.model.errors import RigNotReadyError, StoppedError
 from workbench.model.prompt import Answer, Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
-from workbench.procedure.capture.automatic import darkening
+from workbench.procedure.capture.automatic import find_automatic_control
 from workbench.procedure.capture.latency import count_latency
 from workbench.procedure.capture.pair import PairSource, spots_found
 from workbench.procedure.engine.prompts import SAFETY, safety_prompt
@@ -60,7 +60,9 @@ class Context:
     pairs: PairSource = field(init=False)
 
     def __post_init__(self) -> None:
-        self.pairs = PairSource(self.session_dir, self.rig, self.bench)
+        parts = [capture.part for capture in self.recorder.complete_captures]
+        part = max(parts) + (not self.bench.rests) if parts else 0
+        self.pairs = PairSource(self.session_dir, self.rig, self.bench, part=part)
 
     def emit(self, event: ev.Event) -> ev.Record:
         """Journal an event, then pass it to every consumer."""
@@ -171,11 +173,16 @@ class Context:
             self.begin(key)
             frames = count_latency(self.bench.lasers, camera, self.rig, most_frames)
             camera.discard_frames = frames
-            share = darkening(self.bench.lasers, camera, self.rig)
-            measured = ev.LatencyMeasured(frames=frames, darkening=share)
+            found = find_automatic_control(self.bench.lasers, camera, self.rig)
+            measured = ev.LatencyMeasured(frames=frames, darkening=found.darkening, dimming=found.dimming)
         camera.discard_frames = measured.frames
         self.emit(measured)
         return measured
+
+    def continue_clock(self) -> None:
+        """Set simulated time to the last capture that counts; called before those of each placement."""
+        counted = (*self.recorder.complete_captures, *self.captures)
+        self.bench.clock.continue_after(max((capture.time_ns for capture in counted), default=0))
 
     def check_stop(self) -> None:
         """Raise an error if a stop was requested.

@@ -13,10 +13,17 @@ from workbench.model.fit_event import Rejected
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
+from workbench.session.capture_table import part_name, seconds_after
 
 
-def observe_capture(context: Context, capture: ev.CaptureTaken) -> Observation | Rejected:
-    """Observation from a capture of one laser, or the reason why there is none."""
+def observe_capture(context: Context, capture: ev.CaptureTaken, zero_ns: int = 0) -> Observation | Rejected:
+    """Observation from a capture of one laser, or the reason why there is none.
+
+    Args:
+        context: session.
+        capture: the capture.
+        zero_ns: zero of the observation's time, as in the captures file.
+    """
     laser = context.rig.lasers[context.rig.laser_ids.index(capture.laser_id)]
     observation = Observation(
         source=capture.on.path,
@@ -27,6 +34,8 @@ def observe_capture(context: Context, capture: ev.CaptureTaken) -> Observation |
         u_px=nan,
         v_px=nan,
         standoff_sd_mm=nan if capture.standoff_sd_mm is None else capture.standoff_sd_mm,
+        time_s=seconds_after(zero_ns, capture),
+        part=part_name(capture),
     )
     return observe(context.findings[capture.key], laser, observation)
 

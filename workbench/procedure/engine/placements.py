@@ -99,6 +99,7 @@ def _work(
 ) -> T:
     """Call the work at a placement, again if it requests that."""
     while True:
+        context.continue_clock()
         try:
             return work(placed)
         except RetakeError as again:

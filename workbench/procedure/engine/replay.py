@@ -102,6 +102,12 @@ class ReplayingJournal:
         """Captures at a placement that was complete before the resumption and counts; None for others."""
         return None if key in self.repairs.left_out else self._complete.get(key)
 
+    @property
+    def complete_captures(self) -> list[ev.CaptureTaken]:
+        """Captures at the placements that were complete before the resumption and count."""
+        complete = (one for key, one in self._complete.items() if key not in self.repairs.left_out)
+        return [capture for one in complete for capture in one.captures.values()]
+
     def retries(self, key: str) -> int:
         """Number of retries of a placement by limits in this session, including before resumptions."""
         return self._retries[key]

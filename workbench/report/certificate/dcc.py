@@ -10,23 +10,27 @@ from datetime import datetime
 from xml.etree import ElementTree as ET
 
 from workbench.model import event as ev
-from workbench.model.calibration import Parameters
+from workbench.model.calibration import FitSummary, Parameters
 from workbench.model.contents import printable
 from workbench.model.errors import BadInputError
 from workbench.model.laboratory import LABORATORY_FILE, Laboratory, Party, Span, Standard
 from workbench.model.table import Cell, Table
 from workbench.report.certificate.assemble import STATEMENTS, Certificate
+from workbench.report.certificate.coverage import expanded_parameter
 from workbench.report.certificate.method import DECISION_RULE
 from workbench.report.certificate.results import COVERAGE
 from workbench.report.certificate.session_record import SessionRecord, text_sha256
 from workbench.report.document import NOT_STATED
 from workbench.session.manifest import DISTRIBUTION, workbench_version
-from workbench.trials.errors import EXPANSION
+from workbench.trials.errors import EXPANSION, EXPANSION_PROBABILITY
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 SCHEMA = "3.2.0"
 LANGUAGE = "en"
-COVERAGE_PROBABILITY = 0.95
+K_DIGITS = 4
+"""Digits after the point of a coverage factor."""
+STUDENT_PROBABILITY = 0.95
+"""Coverage probability of a table's own k, by Student's distribution."""
 UNITS = {"mm": r"\milli\metre", "px": r"\one", "": r"\one", "deg": r"\degree", "%": r"\percent"}
 """Units of D-SI by ours; a pixel is a count."""
 DEGREE_CELSIUS, PERCENT = r"\degreecelsius", r"\percent"
@@ -147,7 +151,7 @@ def _measurement(parent: ET.Element, certificate: Certificate) -> None:
     calibration = session.calibration
     if calibration is not None:
         _range_uncertainty(results, certificate)
-        _parameters(results, calibration.laser_ranger.parameters)
+        _parameters(results, calibration.laser_ranger.parameters, calibration.laser_ranger.fit)
     for trial in session.events(ev.TrialFinished):
         for table in trial.tables:
             _trial_errors(results, table)
@@ -200,14 +204,21 @@ def _range_uncertainty(results: ET.Element, certificate: Certificate) -> None:
         _quantity(data, "Range from the reference plane"),
         [one.range_mm for one in found],
         UNITS["mm"],
-        [EXPANSION * (one.mean_sd_mm or 0.0) for one in found],
+        [one.mean_expanded_mm or 0.0 for one in found],
+        [one.mean_k for one in found],
     )
+    freedom = [one.mean_degrees_of_freedom for one in found]
+    if all(nu is not None for nu in freedom):  # else infinite: no number of XML
+        quantity = _quantity(data, "Effective degrees of freedom of the uncertainty")
+        _real_list(quantity, [nu for nu in freedom if nu is not None], UNITS[""], ())
 
 
-def _parameters(results: ET.Element, found: Parameters) -> None:
+def _parameters(results: ET.Element, found: Parameters, fit: FitSummary) -> None:
     data = _result(results, "Parameters of the sensor")
-    for name, unit, value, sd in zip(found.names, found.units, found.values, found.sd, strict=True):
-        _real_list(_quantity(data, name), [value], UNITS.get(unit, r"\one"), [EXPANSION * sd])
+    columns = zip(found.names, found.units, found.values, found.sd, found.data_share, strict=True)
+    for name, unit, value, sd, share in columns:
+        u = expanded_parameter(sd, share, fit)
+        _real_list(_quantity(data, name), [value], UNITS.get(unit, r"\one"), [u.expanded], [u.k])
 
 
 def _trial_errors(results: ET.Element, table: Table) -> None:
@@ -226,8 +237,10 @@ def _trial_errors(results: ET.Element, table: Table) -> None:
             [float(row[key] or 0.0) for row in rows] for key in ("standoff_mm", "error_mm", "expanded_mm")
         )
         factors = [float(row.get("k") or EXPANSION) for row in rows]
+        probability = STUDENT_PROBABILITY if "k" in keys else EXPANSION_PROBABILITY
         _real_list(_quantity(data, "True range"), true_mm, UNITS["mm"], ())
-        _real_list(_quantity(data, "Measured - true range"), error_mm, UNITS["mm"], expanded_mm, factors)
+        errors = _quantity(data, "Measured - true range")
+        _real_list(errors, error_mm, UNITS["mm"], expanded_mm, factors, probability)
 
 
 def _real_list(
@@ -236,6 +249,7 @@ def _real_list(
     unit: str,
     expanded: Sequence[float],
     factors: Sequence[float] = (EXPANSION,),
+    probability: float = EXPANSION_PROBABILITY,
 ) -> None:
     """List of values with one unit; with their expanded uncertainties and coverage factors, if known."""
     found = ET.SubElement(quantity, _si("realListXMLList"))
@@ -244,8 +258,10 @@ def _real_list(
     if expanded:
         uncertainty = ET.SubElement(found, _si("expandedUncXMLList"))
         ET.SubElement(uncertainty, _si("uncertaintyXMLList")).text = _numbers(expanded)
-        ET.SubElement(uncertainty, _si("coverageFactorXMLList")).text = _numbers(factors)
-        ET.SubElement(uncertainty, _si("coverageProbabilityXMLList")).text = repr(COVERAGE_PROBABILITY)
+        ET.SubElement(uncertainty, _si("coverageFactorXMLList")).text = _numbers(
+            round(factor, K_DIGITS) for factor in factors
+        )
+        ET.SubElement(uncertainty, _si("coverageProbabilityXMLList")).text = f"{probability:.4g}"
 
 
 def _numbers(values: Iterable[float]) -> str:

@@ -5,6 +5,7 @@ The journal has a record for every limit but these: the fit itself refuses a cal
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 from pydantic import ValidationError
@@ -44,7 +45,7 @@ def fit_limit_rows(session: SessionRecord, calibration: Calibration | None) -> l
         _row(step, "relative_range_sd", _range_sd(calibration), limits.max_relative_range_sd),
         _row(step, "drift_px", _drift_px(fit), limits.max_drift_px),
         _row(step, "placement_scale", _placement_scale(calibration), limits.max_placement_scale),
-        _standoffs_row(step, fit, limits.min_standoffs),
+        _standoffs_row(step, session, fit, limits.min_standoffs),
     ]
 
 
@@ -66,11 +67,11 @@ def _row(step: str, quantity: str, value: float | None, most: float) -> Row:
     return step, "fit", quantity, value, f"at most {most:g}", verdict
 
 
-def _standoffs_row(step: str, fit: FitFinished, least: int) -> Row:
-    counts: dict[str, set[float]] = {}
-    for one in fit.residuals:
-        counts.setdefault(one.laser_id, set()).add(one.standoff_mm)
-    fewest = min(map(len, counts.values()), default=0)
+def _standoffs_row(step: str, session: SessionRecord, fit: FitFinished, least: int) -> Row:
+    """Fewest standoffs of a laser of the rig; none for a laser without residuals."""
+    seen = {(one.laser_id, one.standoff_mm) for one in fit.residuals}
+    counts = Counter(laser_id for laser_id, _ in seen)
+    fewest = min(counts[laser_id] for laser_id in session.rig.laser_ids)
     verdict = "pass" if fewest >= least else "fail"
     return step, "fit", "standoffs", fewest, f"at least {least}", verdict
 
@@ -84,5 +85,5 @@ def _placement_scale(calibration: Calibration | None) -> float | None:
 
 
 def _drift_px(fit: FitFinished) -> float | None:
-    found = [abs(one.value) for one in fit.parameters if one.name in DRIFT]
-    return max(found, default=None)
+    recorded = fit.drift_px or [one.value for one in fit.parameters if one.name in DRIFT]
+    return max(map(abs, recorded), default=None)

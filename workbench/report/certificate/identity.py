@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from workbench.model import event as ev
 from workbench.model.laboratory import Laboratory, Party, Span
 from workbench.model.number_text import duration
-from workbench.model.rig import Rig
+from workbench.model.rig import UNKNOWN_SERIAL, Rig
 from workbench.model.table import Column, Table
 from workbench.report.certificate.session_record import SessionRecord
 from workbench.report.document import NOT_STATED, Fact, Section
@@ -43,7 +43,7 @@ def sensor_section(rig: Rig) -> Section:
     named = ", ".join(ids) if len(ids) <= MOST_NAMED else f"{ids[0]} to {ids[-1]}"
     facts = (
         Fact("Rig", rig.rig),
-        Fact("Serial number", rig.serial if rig.serial != "unknown" else NOT_STATED),
+        Fact("Serial number", rig.serial if rig.serial != UNKNOWN_SERIAL else NOT_STATED),
         Fact("Lasers", f"{len(ids)}: {named}"),
         Fact("Laser class", rig.laser_class or NOT_STATED),
         Fact(

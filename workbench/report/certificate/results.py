@@ -19,6 +19,7 @@ from workbench.model.fit_tables import (
 )
 from workbench.model.rig import ImageAxis
 from workbench.model.table import Column, Table
+from workbench.report.certificate.coverage import is_recorded
 from workbench.report.certificate.range_uncertainty import (
     MOST_LASERS,
     RangeUncertainty,
@@ -33,10 +34,14 @@ from workbench.report.document import Fact, Section
 MOST_POINTS = 1500
 """Largest number of residuals that are drawn one by one."""
 COVERAGE = (
-    "Expanded uncertainties U are standard uncertainties u times the coverage factor k = 2, which for a"
-    " normal distribution gives a coverage probability of about 95 %, as in the GUM (JCGM 100). Where a"
-    " table has its own k or states 95 %, that factor follows from Student's distribution. sd and u are"
-    " one standard deviation."
+    "Expanded uncertainties U are standard uncertainties u times a coverage factor k for a coverage"
+    " probability of about 95 %, as in the GUM (JCGM 100): 95.45 %, k = 2 for a normal distribution. Where"
+    " the calibration estimated its noise from few data, k is that of Student's distribution with the"
+    " effective degrees of freedom nu (Welch and Satterthwaite). Where a trial's table has its own k or"
+    " states 95 %, the probability is 95 % exactly. sd and u are one standard deviation."
+)
+NOT_RECORDED = (
+    "The version that made the calibration did not record the degrees of freedom of its noise: k = 2 is used."
 )
 LINEARITY = (
     "Linearity: independent deviations are from the straight line that makes the largest one smallest (best"
@@ -77,7 +82,10 @@ def uncertainty_section(calibration: Calibration | None, found: Sequence[RangeUn
     if calibration is None:
         return Section(key, title, texts=("There is no calibration: the range uncertainty is not known.",))
     curve = uncertainty_chart(range_uncertainties(calibration, curve_mm(calibration)))
-    return Section(key, title, texts=(COVERAGE, INPUTS), tables=(uncertainty_table(found),), charts=(curve,))
+    remark = () if is_recorded(calibration.laser_ranger.fit) else (NOT_RECORDED,)
+    return Section(
+        key, title, texts=(COVERAGE, *remark, INPUTS), tables=(uncertainty_table(found),), charts=(curve,)
+    )
 
 
 def validation_section(fit: ev.FitFinished | None) -> Section:

@@ -139,6 +139,21 @@ def recorded_calibration(folder: Path, events: Iterable[object]) -> Path | None:
     return unchanged(folder / found[-1].path, found[-1].sha256) if found else None
 
 
+def check_recorded(path: Path) -> None:
+    """Compare a calibration file in a session's folder with the hash that the session recorded.
+
+    Files elsewhere, and files that the session did not write, pass.
+
+    Raises:
+        BadInputError: the file has changed since, or the journal is damaged.
+    """
+    path = path.resolve()
+    if not (path.parent / MANIFEST).is_file() or not (path.parent / JOURNAL).exists():
+        return
+    events = [record.event for record in effective(read_journal(path.parent))]
+    recorded_calibration(path.parent, [one for one in events if getattr(one, "path", None) == path.name])
+
+
 def unchanged(path: Path, sha256: str) -> Path:
     """The file of a calibration, which may be missing.
 

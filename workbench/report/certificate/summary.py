@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration
 from workbench.model.number_text import counted, two_digits
+from workbench.report.certificate.coverage import k_text
 from workbench.report.certificate.range_uncertainty import RangeUncertainty
 from workbench.report.certificate.session_record import SessionRecord
 from workbench.report.document import KeyNumber
-from workbench.trials.errors import EXPANSION
 
 DASH = "-"
 KEY_RANGE_MM = 1000.0
@@ -43,21 +43,28 @@ def _at_one_metre(found: Sequence[RangeUncertainty]) -> KeyNumber:
     if not inside:
         return KeyNumber("U at 1 m", DASH, "not known")
     one = min(inside, key=lambda each: abs(each.range_mm - KEY_RANGE_MM))
-    expanded_mm = EXPANSION * (one.mean_sd_mm or 0.0)
+    expanded_mm = one.mean_expanded_mm or 0.0
     name = "U at 1 m" if one.range_mm == KEY_RANGE_MM else f"U at {one.range_mm:g} mm"
-    return KeyNumber(name, f"{two_digits(expanded_mm)} mm", "k = 2, a single range, mean of the lasers")
+    note = f"{_k_text(one)}, a single range, mean of the lasers"
+    return KeyNumber(name, f"{two_digits(expanded_mm)} mm", note)
 
 
 def _largest(found: Sequence[RangeUncertainty]) -> KeyNumber:
     inside = [
-        (EXPANSION * one.mean_sd_mm / one.range_mm, one) for one in found if one.inside and one.mean_sd_mm
+        (expanded / one.range_mm, one) for one in found if one.inside and (expanded := one.mean_expanded_mm)
     ]
     if not inside:
         return KeyNumber("Largest U", DASH, "not known")
     relative, one = max(inside, key=lambda pair: pair[0])
     return KeyNumber(
-        "Largest U", f"{two_digits(100 * relative)} %", f"k = 2, of the range, at {one.range_mm:g} mm"
+        "Largest U",
+        f"{two_digits(100 * relative)} %",
+        f"{_k_text(one)}, of the range, at {one.range_mm:g} mm",
     )
+
+
+def _k_text(one: RangeUncertainty) -> str:
+    return k_text(one.mean_k, one.mean_degrees_of_freedom)
 
 
 def _residual(session: SessionRecord) -> KeyNumber:

@@ -8,7 +8,8 @@ from workbench.model.chart import Axis, Chart, Series
 from workbench.model.table import Cell, Column, Table
 from workbench.report.certificate.predecessor import verdict_text
 from workbench.report.document import Section
-from workbench.report.history.calibrations import DatedCalibration, RangeChange, compared, range_changes
+from workbench.report.history.calibrations import RangeChange, compared, range_changes
+from workbench.report.history.in_force import DatedCalibration
 
 MOST_PARAMETERS = 6
 """Largest number of parameters in the chart: those that changed most."""

@@ -1,46 +1,18 @@
-"""Calibrations of a sensor over time: which is in force, and the change of ranges against another one."""
+"""Change of a sensor's ranges between two calibrations."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from workbench.calibration.verdict.comparison import Comparison, compare
-from workbench.model.calibration import Calibration, load_calibration
-from workbench.model.contents import file_sha256
+from workbench.model.calibration import Calibration
 from workbench.model.errors import BadInputError
-from workbench.report.certificate.session_record import unchanged
 from workbench.sensor.calibrated import CalibratedSensor
-from workbench.session.index import IndexedSession
-from workbench.session.sensor_log import SensorEntry
 
 FIVE_MM = (200.0, 500.0, 1000.0, 2000.0, 4000.0)
 """Distances at which calibrations are compared."""
-
-
-@dataclass(frozen=True)
-class DatedCalibration:
-    """A calibration that a session exported."""
-
-    session: str
-    day: str
-    path: Path
-    sha256: str
-    calibration: Calibration
-
-
-@dataclass(frozen=True)
-class InForce:
-    """The calibration in force."""
-
-    calibration: DatedCalibration
-    since: str
-    why: str
-    by: str
-    """Operator who put it in force; empty: the newest one is in force."""
 
 
 @dataclass(frozen=True)
@@ -50,58 +22,6 @@ class RangeChange:
     range_mm: float
     change_mm: float
     sd_mm: float
-
-
-def dated_calibrations(sessions: Sequence[IndexedSession]) -> tuple[list[DatedCalibration], list[str]]:
-    """Usable calibrations of the sessions, in order of time, and remarks on the files of others."""
-    found, remarks = [], []
-    for one in sessions:
-        if not one.calibration or one.verdict not in {"accepted", "exception"}:
-            continue
-        path = one.status.session_dir / one.calibration
-        try:
-            found.append(dated(unchanged(path, one.calibration_sha256), one.name, one.began[:10]))
-        except BadInputError as error:
-            remarks.append(str(error))
-    return found, remarks
-
-
-def dated(path: Path, session: str, day: str) -> DatedCalibration:
-    """Read a calibration.
-
-    Raises:
-        BadInputError: the file is missing or wrong.
-    """
-    calibration = load_calibration(path)
-    return DatedCalibration(session, day, path, file_sha256(path), calibration)
-
-
-def in_force(
-    folder: Path, calibrations: Sequence[DatedCalibration], entries: Sequence[SensorEntry]
-) -> InForce | None:
-    """The calibration that was put in force last, else the newest one; None if there is none.
-
-    Raises:
-        BadInputError: the file that was put in force is missing, or has changed since.
-    """
-    chosen = [one for one in entries if one.kind == "in_force"]
-    if not chosen:
-        if not calibrations:
-            return None
-        newest = calibrations[-1]
-        return InForce(newest, newest.day, "the newest accepted calibration", "")
-    last = chosen[-1]
-    path = folder / last.path
-    found = dated(path, path.parent.name, "")
-    if found.sha256 != last.sha256:
-        raise BadInputError(
-            f"{path}: expected the calibration put in force on {last.time[:10]} (sha256"
-            f" {last.sha256[:12]}), the file has changed; restore it, or put another one in force with"
-            " `workbench use`"
-        )
-    made = found.calibration.laser_ranger.provenance.created[:10]
-    calibration = DatedCalibration(found.session, made, path, found.sha256, found.calibration)
-    return InForce(calibration, last.time[:10], last.text, last.operator)
 
 
 def range_changes(before: Calibration, after: Calibration) -> tuple[RangeChange, ...]:

@@ -11,8 +11,8 @@ from workbench.model.table import Column, Table
 from workbench.report.certificate.recalibration import months_later
 from workbench.report.document import Document, Fact, KeyNumber, Section, Tone, Verdict
 from workbench.report.history.calibration_section import calibration_section
-from workbench.report.history.calibrations import DatedCalibration, InForce
 from workbench.report.history.drift import DistanceHistory
+from workbench.report.history.in_force import DatedCalibration, InForce
 from workbench.report.history.verification_section import verification_section
 from workbench.report.history.verifications import Verification, unmonitored_mm
 from workbench.session.sensor_log import SensorEntry

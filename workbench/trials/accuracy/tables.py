@@ -59,9 +59,9 @@ BUDGET = (
         for key in SOURCES
     ),
     Column(key="explained_mm", name="explained u", unit="mm", format="sd"),
-    Column(key="unexplained_mm2", name="unexplained", unit="mm2", format="+.2g"),
-    Column(key="unexplained_low_mm2", name="low", unit="mm2", format="+.2g"),
-    Column(key="unexplained_high_mm2", name="high", unit="mm2", format="+.2g"),
+    Column(key="unexplained_mm2", name="unexplained", unit="mm2", format="+sd"),
+    Column(key="unexplained_low_mm2", name="low", unit="mm2", format="+sd"),
+    Column(key="unexplained_high_mm2", name="high", unit="mm2", format="+sd"),
     Column(key="variance_ratio", name="variance ratio", format=".2f"),
     Column(key="p", name="p", format=".2g"),
     Column(key="alarm", name="alarm"),

@@ -13,9 +13,10 @@ sides separate it. On another mount, with the tilt t', the error is t' + (c - t)
 on t that t' does not hide.
 
 The estimate is the mean of t given the ranges of all lasers, from the joint Gaussian of the calibration's
-parameters and its tilt. The distance of every set-up is free. Its angle is measured again: the uncertainties
-of the angles are independent. The estimate contains the information of the calibration: it is a prior for new
-captures, not for those of the calibration.
+parameters and its tilt. The distance of every set-up is free. An angle is set and measured once, then the
+target is placed at each range: the error of an angle is common to its ranges, independent of other angles.
+The tilt of a placement about the other axis is independent. The estimate contains the information of the
+calibration: it is a prior for new captures, not for those of the calibration.
 """
 
 from __future__ import annotations
@@ -85,8 +86,10 @@ def common_tilts(
     if not set(TARGET_TILT) <= set(names):
         return []
     parts = [_at_set_up(sensor, one, bench) for one in set_ups]
-    errors, gradient = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-    covariance = gradient @ sensor.covariance @ gradient.T + block_diag(*(own for _, _, own in parts))
+    errors, gradient, by_angle = (np.concatenate([part[k] for part in parts]) for k in (0, 1, 2))
+    covariance = gradient @ sensor.covariance @ gradient.T + block_diag(*(part[3] for part in parts))
+    angle = np.repeat([_angle_index(set_ups, one) for one in set_ups], [len(part[0]) for part in parts])
+    covariance += np.where(angle[:, None] == angle, np.outer(by_angle, by_angle), 0.0)
     found = []
     for axis, name in zip(("vertical", "horizontal"), TARGET_TILT, strict=True):
         index = names.index(name)
@@ -104,10 +107,21 @@ def common_tilts(
     return found
 
 
+def _angle_index(set_ups: Sequence[InclinePoints], one: InclinePoints) -> int:
+    """Index of the first set-up with the same angle, whose error all its ranges share."""
+    turns = [(other.target.axis, other.target.angle_deg) for other in set_ups]
+    return turns.index((one.target.axis, one.target.angle_deg))
+
+
 def _at_set_up(
     sensor: CalibratedSensor, one: InclinePoints, bench: BenchSpec
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Errors (n,) of the ranges, derivatives (n, P) by the parameters, covariance (n, n) of the set-up."""
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """One target at one range, n lasers.
+
+    Returns:
+        Errors (n,) of the ranges, and their derivatives (n, P) by the parameters. Their change (n,) by one
+        standard uncertainty of the angle. Covariance (n, n) of everything else at this set-up.
+    """
     parameters, points = sensor.calibration.laser_ranger.parameters, one.points
     columns = [parameters.names.index(name) for name in TARGET_TILT]
     angle_deg = one.target.angle_deg
@@ -119,8 +133,10 @@ def _at_set_up(
     errors = points.range_mm - expected
     gradient = np.einsum("k,nkp->np", slopes, points.place_by_parameter) - points.by_parameter
     gradient[:, columns] += lever / (1.0 + common**2)
-    own_sd = np.where(turned != 0.0, radians(one.target.reference_sd_deg), radians(bench.tilt_sd_deg))
+    about = 0 if one.target.axis == "vertical" else 1
+    by_tilt = lever[:, 1 - about] * radians(bench.tilt_sd_deg)
     own = np.diag((points.spot_sd_mm * (1.0 - points.tangent @ slopes)) ** 2) + FREE_SD_MM**2
-    own += (lever * own_sd**2) @ lever.T
+    own += np.outer(by_tilt, by_tilt)
+    by_angle = lever[:, about] * radians(one.target.reference_sd_deg)
     # The distance is free: only differences of the ranges count.
-    return errors - errors.mean(), gradient, own
+    return errors - errors.mean(), gradient, by_angle, own

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from scipy.stats import t
 
+from workbench.model.stats import t_ppf
 from workbench.trials.statistics.estimate import CONFIDENCE
 
 
@@ -53,4 +53,4 @@ def combine(u: Sequence[float], dofs: Sequence[float], confidence: float = CONFI
     """
     dof = effective_degrees_of_freedom(u, dofs)
     combined = float(np.sqrt(np.square(np.asarray(u, float)).sum()))
-    return CombinedUncertainty(combined, dof, float(t.ppf(0.5 + confidence / 2, dof)))
+    return CombinedUncertainty(combined, dof, float(t_ppf(0.5 + confidence / 2, dof)))

@@ -11,7 +11,7 @@ import pytest
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.checks.faults import find_faults
 from workbench.calibration.checks.hypotheses import explain_misfit
-from workbench.calibration.checks.mistaken_data import UNITS
+from workbench.calibration.checks.mistaken_data import UNITS, undecided_unit
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.estimation.fit import CalibrationFit, fit
@@ -66,6 +66,31 @@ def test_centimetres_are_named_by_the_pull_of_wide_priors_alone() -> None:
     (fault,) = find_faults(fitted, ())
     assert fault.name == "unit"
     assert fault.refuses
+
+
+def drawn_fit(f_px: float, y_mm: float, unit_mm: float) -> CalibrationFit:
+    """Fit of a sensor that the wide priors allow, standoffs in a unit."""
+    rig = load_rig(ROOT / "rigs/webcam-laser.yaml")
+    rows = [
+        row.model_copy(update={"v_px": round(239.5 + f_px * y_mm / row.standoff_mm)})
+        for row in load_captures(ROOT / "data/webcam-laser-rows.csv")
+        if 239.5 + f_px * y_mm / row.standoff_mm > 0
+    ]
+    observations, rejected, boards = observations_of_rows(rig, rows)
+    return fit(rig, [in_unit(s, unit_mm) for s in observations], rejected, boards)
+
+
+@pytest.mark.parametrize(("f_px", "y_mm"), [(695.0, -87.0), (898.0, -79.0)])
+def test_a_unit_that_wide_priors_do_not_decide_is_possible(f_px: float, y_mm: float) -> None:
+    fitted = drawn_fit(f_px, y_mm, 10.0)
+    assert find_faults(fitted, ()) == ()
+    assert undecided_unit(fitted) == "centimetres"
+    assert undecided_unit(drawn_fit(f_px, y_mm, 1.0)) is None
+
+
+@pytest.mark.parametrize(("f_px", "y_mm"), [(650.0, -50.0), (900.0, -75.0), (400.0, -30.0), (850.0, -30.0)])
+def test_millimetres_of_likely_sensors_are_not_doubted(f_px: float, y_mm: float) -> None:
+    assert undecided_unit(drawn_fit(f_px, y_mm, 1.0)) is None
 
 
 def test_millimetres_need_no_other_unit() -> None:

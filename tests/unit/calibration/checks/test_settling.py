@@ -34,9 +34,9 @@ def steady() -> DriftProfile:
     return DriftProfile.of(fitted(0.0, 1.0))
 
 
-def drawn(shape: FloatArray, u_px: float) -> list[Settling | None]:
+def drawn(shape: FloatArray, u_px: float, profile: DriftProfile | None = None) -> list[Settling | None]:
     """Settling of simulated residuals: noise, parameters drawn from their priors, a drift in u and v."""
-    random, profile = np.random.default_rng(3), steady()
+    random, profile = np.random.default_rng(3), profile or steady()
     measured = (profile.inverse_sd > 0).ravel()
     shift = (profile.inverse_sd * shape[:, None] * [u_px, -u_px / 2]).ravel()
     found = []
@@ -75,3 +75,43 @@ def test_the_advice_of_a_session_follows_from_its_own_settling() -> None:
     settles, still = warm_up_advice(fitted(1.0, 0.15)), warm_up_advice(fitted(0.0, 1.0))
     assert "times the duration of this session" in settles
     assert settles != still
+
+
+@cache
+def interrupted() -> DriftProfile:
+    """Profile of a session whose second half was captured after an interruption."""
+    seen = World(RIG, 1).observations()
+    order = shuffled(tuple({s.standoff_mm for s in seen}))
+    seen = sorted(seen, key=lambda s: order.index(s.standoff_mm))
+    half = len(seen) // 2
+    return DriftProfile.of(
+        fit(
+            with_drift(RIG),
+            [replace(s, time_s=float(n), part="1" if n >= half else "") for n, s in enumerate(seen)],
+        )
+    )
+
+
+def test_each_part_settles_anew_with_its_own_amplitude() -> None:
+    """Intervals as above; a shift by 1 px when cold, and by 0.5 px after the interruption."""
+    profile, time_constant = interrupted(), 0.1
+    amplitude = profile.parts @ [1.0, 0.5]
+    found = drawn(amplitude * np.exp(-profile.time / time_constant), 1.0, profile)
+    known = [one for one in found if one is not None]
+    assert len(known) >= RUNS - 3
+    inside = [one.interval[0] / 1.03 <= time_constant <= one.interval[1] * 1.03 for one in known]
+    assert sum(inside) > 49
+    assert np.median([one.time_constant for one in known]) == pytest.approx(time_constant, rel=0.15)
+
+
+def test_a_steady_drift_of_each_part_has_no_time_constant() -> None:
+    profile = interrupted()
+    steady_in_parts = profile.time * (profile.parts @ [1.0, -0.6])
+    assert sum(one is not None for one in drawn(steady_in_parts, 0.5, profile)) <= 3
+
+
+def test_the_advice_states_times_where_the_captures_have_them() -> None:
+    whole = fitted(1.0, 0.15)
+    by_time = replace(whole, cells=replace(whole.cells, times=replace(whole.cells.times, duration_s=4000.0)))
+    assert " min" in warm_up_advice(by_time)
+    assert " min" not in warm_up_advice(whole)

@@ -41,6 +41,10 @@ def test_errors_four_times_as_large_are_scaled_by_about_four(seed: int) -> None:
     scales = np.array([one.scale for one in found])
     assert np.mean(scales > 1) > 0.9
     assert np.median(scales) == pytest.approx(4.0, rel=0.15)
+    # 2 / nu is the relative variance of the estimated variances; that of 200 is known to some 20 %.
+    variances = scales[scales > 1] ** 2
+    freedom = np.median([one.degrees_of_freedom for one in found if one.scale > 1])
+    assert 2 * (variances.mean() / variances.std()) ** 2 == pytest.approx(freedom, rel=0.4)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -56,6 +60,7 @@ def test_one_placement_far_off_is_an_outlier_and_no_scatter(seed: int) -> None:
 def test_data_that_say_nothing_of_the_placements_leave_the_scale() -> None:
     nothing = placement_scatter(np.zeros(PLACEMENTS), np.eye(PLACEMENTS) * (1 - 1e-9))
     assert (nothing.scale, nothing.p_value, nothing.outliers) == (1.0, 1.0, ())
+    assert nothing.degrees_of_freedom == np.inf
 
 
 def test_two_placements_beside_an_outlier_have_no_scatter() -> None:

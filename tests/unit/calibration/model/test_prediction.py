@@ -21,6 +21,9 @@ from workbench.model.rig import Prior, Rig
 LASER, PLACEMENT = np.array([0, 3, 1, 2]), np.array([0, 1, 1, 0])
 STANDOFF_MM = np.array([150.0, 900.0])
 TIME = np.array([-0.5, 0.1, 0.3, 0.5])
+PARTS = np.array([[1.0, 0.0], [0.75, 0.25], [0.0, 1.0], [0.0, 1.0]])
+"""Share of the repeats before and after an interruption."""
+STEP_PX = np.array([0.6, -0.4])
 ERRORS = np.array([[0.4, 0.02, -0.03], [-0.7, -0.01, 0.04]])
 
 
@@ -35,15 +38,17 @@ def drifting(rig: Rig) -> Rig:
 @pytest.mark.parametrize("rig", [drifting(thesis_rig()), fisheye_rig()], ids=["plumb_bob", "equidistant"])
 def test_spots_lie_where_opencv_puts_the_ray_s_point_on_the_plane(rig: Rig, seed: int) -> None:
     world = World(rig, seed)
-    layout = Layout(rig.camera.lens, 4, 2)
-    values = jnp.array([*world.values.values(), *ERRORS.ravel()])
-    found = predict_spots(values, layout, SpotData(LASER, PLACEMENT, TIME), jnp.asarray(STANDOFF_MM))
+    layout = Layout(rig.camera.lens, 4, 2, parts=2)
+    values = jnp.array([*world.values.values(), *ERRORS.ravel(), *STEP_PX])
+    spots = SpotData(LASER, PLACEMENT, TIME, PARTS)
+    found = predict_spots(values, layout, spots, jnp.asarray(STANDOFF_MM))
     for n, (laser, placement) in enumerate(zip(LASER, PLACEMENT, strict=True)):
         error_mm, *slopes = ERRORS[placement]
         z0 = STANDOFF_MM[placement] * (1 + world.values["ruler_scale"]) + world.values["offset_mm"]
         turn = np.arctan(slopes) + world.common_tilt
         expected = world.pixel(rig.laser_ids[laser], z0 + error_mm, *turn)
         expected = expected + TIME[n] * np.array([world.values["drift_u_px"], world.values["drift_v_px"]])
+        expected = expected + STEP_PX * (PARTS[n, 1] - 0.5)
         np.testing.assert_allclose(found[n], expected, rtol=1e-9)
 
 
@@ -63,12 +68,14 @@ def test_one_cell_is_the_spot_of_its_inputs() -> None:
 def test_corners_lie_where_a_turned_and_shifted_board_has_them(roll_rad: float) -> None:
     """A print 0.2 % too large, bent by some tenths of a millimetre, on a tilted plane; by rotations."""
     world = World(drifting(board_rig()), 2)
-    layout = Layout("plumb_bob", 4, 2, 1)
+    layout = Layout("plumb_bob", 4, 2, 1, parts=2)
     scale, bow, (x_mm, y_mm) = 0.002, np.array([0.3, -0.2, 0.1]), (5.0, -8.0)
-    values = [*world.values.values(), scale, *ERRORS.ravel(), *bow, x_mm, y_mm, roll_rad]
-    assert len(values) == layout.poses.stop
+    values = [*world.values.values(), scale, *ERRORS.ravel(), *bow, x_mm, y_mm, roll_rad, *STEP_PX]
+    assert len(values) == layout.steps.stop
     printed = np.array([[0.0, 0.0], [100.0, 0.0], [-60.0, 70.0]])
-    corners = CornerData(np.zeros(3, int), np.ones(3, int), printed, np.full(3, 0.3))
+    corners = CornerData(
+        np.zeros(3, int), np.ones(3, int), printed, np.full(3, 0.3), np.tile(PARTS[1], (3, 1))
+    )
     found = predict_corners(jnp.array(values), layout, corners, jnp.asarray(STANDOFF_MM))
     error_mm = ERRORS[1, 0]
     slope_x, slope_y = np.tan(np.arctan(ERRORS[1, 1:]) + world.common_tilt)
@@ -84,5 +91,5 @@ def test_corners_lie_where_a_turned_and_shifted_board_has_them(roll_rad: float) 
     middle = np.array([x_mm, y_mm, z0 + slope_x * x_mm + slope_y * y_mm])
     points = middle + (own @ turn.T) @ axes
     camera = [world.values[name] for name in board_rig().camera.lens_priors]
-    shift = 0.3 * np.array([world.values["drift_u_px"], world.values["drift_v_px"]])
+    shift = 0.3 * np.array([world.values["drift_u_px"], world.values["drift_v_px"]]) - 0.25 * STEP_PX
     np.testing.assert_allclose(found, opencv_pixels("plumb_bob", camera, points) + shift, rtol=1e-9)

@@ -76,7 +76,7 @@ def test_a_named_direction_shows_in_no_spot(fitted: CalibrationFit) -> None:
     """By the model itself, not by its derivatives: all spots move by far less than one sd in all."""
     cells = fitted.cells
     layout = Layout("plumb_bob", 4, len(cells.placements))
-    spots = SpotData(cells.laser, cells.placement, cells.time)
+    spots = SpotData(cells.laser, cells.placement, cells.time, cells.parts)
     standoffs = jnp.array([p.standoff_mm for p in cells.placements])
     names = [p.name for p in fitted.table.parameters]
 

@@ -120,3 +120,45 @@ def test_a_resumed_session_repeats_what_was_not_whole(tmp_path: Path, whole: boo
         new = [taken for taken in session.context.captures if taken.on.time_ns > ended_ns]
     assert operator.keys == ([] if whole else ["safety", KEYS[1]])
     assert {taken.placement_key for taken in new} == (set() if whole else {KEYS[1]})
+
+
+def captured(session: Running, placements: list[Placement]) -> list[tuple[str, int, int]]:
+    """Key, time and part of each capture at the placements, two in each."""
+    visit_placements(
+        session.context, placements, lambda placement: capture_lasers(session.context, placement, 1)
+    )
+    return [(one.key, one.time_ns, one.part) for one in session.context.captures]
+
+
+@pytest.mark.parametrize("records", [3, 12])
+def test_a_virtual_session_has_the_same_times_after_a_stop(tmp_path: Path, records: int) -> None:
+    """Stopped within its first placement and within its second."""
+    with running(tmp_path) as session:
+        whole = captured(session, PLACEMENTS)
+        before = session.records[:records]
+    (tmp_path / "s/journal.jsonl").unlink()
+    with running(tmp_path, before=before) as session:
+        assert captured(session, PLACEMENTS) == whole
+    assert {part for _, _, part in whole} == {0}
+    assert [time_ns for _, time_ns, _ in whole] == sorted({time_ns for _, time_ns, _ in whole})
+
+
+def test_a_placement_captured_again_follows_the_captures_that_count(tmp_path: Path) -> None:
+    with running(tmp_path) as session:
+        whole = captured(session, PLACEMENTS)
+    (tmp_path / "s/journal.jsonl").unlink()
+    with running(tmp_path, operator=Scripted({KEYS[1]: [REDO]})) as session:
+        assert captured(session, PLACEMENTS) == whole
+
+
+@pytest.mark.parametrize(("complete", "part"), [(1, 1), (0, 0)])
+def test_a_resumed_session_of_a_real_bench_begins_another_part(
+    tmp_path: Path, complete: int, part: int
+) -> None:
+    with running(tmp_path) as session:
+        captured(session, PLACEMENTS[:1])
+        before = session.records if complete else session.records[:-1]
+    (tmp_path / "s/journal.jsonl").unlink()
+    with running(tmp_path, before=before, rests=False) as session:
+        found = captured(session, PLACEMENTS[:2])
+    assert [own for _, _, own in found] == [0, 0, part, part]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.dcc_reader import parsed, read_dcc
-from tests.support.reference_session import LABORATORY, MARKUP, REFERENCE, certificate
+from tests.support.reference_session import LABORATORY, MARKUP, REFERENCE, certificate, record
 from workbench.model.errors import BadInputError
 from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.dcc import certificate_xml
@@ -37,12 +37,32 @@ def test_another_reader_finds_identity_and_quantities(
     assert [float(v) for v in expanded["uncertaintyXMLList"].split()] == pytest.approx(
         [2 * (one.mean_sd_mm or 0) for one in inside]
     )
-    assert expanded["coverageFactorXMLList"] == "2.0"
+    assert {float(k) for k in expanded["coverageFactorXMLList"].split()} == {2.0}
+    assert expanded["coverageProbabilityXMLList"] == "0.9545"
     assert values["unitXMLList"] == r"\milli\metre"
     (f_px,) = [value for name, value in results.items() if name.endswith(" f_px")]
     calibration = found.sources.session.calibration
     assert calibration is not None
     assert float(f_px["realListXMLList"]["valueXMLList"]) == calibration.camera_matrix.data[0]
+
+
+def test_few_degrees_of_freedom_are_stated_with_their_factor() -> None:
+    session = record()
+    calibration = session.calibration
+    assert calibration is not None
+    fit = calibration.laser_ranger.fit.model_copy(update={"noise_degrees_of_freedom": 7.0})
+    ranger = calibration.laser_ranger.model_copy(update={"fit": fit})
+    vars(session)["calibration"] = calibration.model_copy(update={"laser_ranger": ranger})
+    found = certificate(session=session)
+    assert "nu = 7" in found.document.key_numbers[1].note
+    assert found.uncertainties[3].mean_degrees_of_freedom == pytest.approx(7.0)
+    root = parsed(certificate_xml(found, PRINTED))
+    lists = root.iterfind(".//dcc:quantity/si:realListXMLList", NAMES)
+    ranges, freedom, *_ = [one for one in lists if " " in one.findtext("si:valueXMLList", "", NAMES)]
+    factors = ranges.findtext(".//si:coverageFactorXMLList", "", NAMES).split()
+    assert [float(k) for k in factors] == pytest.approx([2.4288] * len(factors), abs=1e-3)
+    nus = freedom.findtext("si:valueXMLList", "", NAMES).split()
+    assert [float(nu) for nu in nus] == pytest.approx([7.0] * len(factors))
 
 
 def test_errors_of_trials_have_the_coverage_factors_of_their_table() -> None:
@@ -53,7 +73,9 @@ def test_errors_of_trials_have_the_coverage_factors_of_their_table() -> None:
     for result in root.iterfind(".//dcc:result", NAMES):
         if result.findtext("dcc:name/dcc:content", "", NAMES).endswith("mean error of range mean"):
             factors = result.findtext(".//si:coverageFactorXMLList", "", NAMES).split()
-            assert [float(factor) for factor in factors] == pytest.approx([row["k"] for row in rows])
+            assert [float(factor) for factor in factors] == pytest.approx(
+                [row["k"] for row in rows], abs=1e-4
+            )
             break
     else:
         pytest.fail("no result of the trial")

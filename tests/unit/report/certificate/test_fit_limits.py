@@ -36,8 +36,30 @@ def test_a_value_above_its_limit_fails(limit: str, verdict: str) -> None:
     assert fit_limit_rows(session, None)[0][-1] == verdict
 
 
+def test_the_drift_of_an_interrupted_session_includes_its_steps() -> None:
+    session = record()
+    assert session.fit is not None
+    shifted = session.fit.model_copy(update={"drift_px": (0.3, -1.2)})
+    records = [
+        record.model_copy(update={"event": shifted}) if record.event == session.fit else record
+        for record in session.all_records
+    ]
+    rows = {row[2]: row[3:] for row in fit_limit_rows(replace(session, all_records=tuple(records)), None)}
+    assert rows["drift_px"] == (1.2, "at most 1", "fail")
+
+
 def test_a_value_that_is_not_known_has_no_verdict() -> None:
     assert fit_limit_rows(record(), None)[1][3:] == (None, "at most 0.2", "")
+
+
+def test_a_laser_without_residuals_has_no_standoff(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = record()
+    assert session.fit is not None
+    lost = session.rig.laser_ids[0]
+    others = tuple(one for one in session.fit.residuals if one.laser_id != lost)
+    monkeypatch.setitem(vars(session), "fit", session.fit.model_copy(update={"residuals": others}))
+    rows = {row[2]: row[3:] for row in fit_limit_rows(session, session.calibration)}
+    assert rows["standoffs"] == (0, "at least 3", "fail")
 
 
 @pytest.mark.parametrize("wrong", ["steps: [", "max_rms_px: x", "unknown: 1"])

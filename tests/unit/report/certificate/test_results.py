@@ -33,7 +33,7 @@ def test_uncertainty_has_its_coverage_factor() -> None:
     calibration = record().calibration
     assert calibration is not None
     section = uncertainty_section(calibration, range_uncertainties(calibration, table_mm(calibration)))
-    assert "k = 2" in section.texts[0]
+    assert "95.45 %" in section.texts[0]
     assert [chart.name for chart in section.charts] == ["range_uncertainty"]
 
 

@@ -10,7 +10,7 @@ import pytest
 from tests.support.reference_session import copied
 from tests.unit.report.certificate.test_predecessor import shifted
 from workbench.report.history.calibration_section import calibration_section
-from workbench.report.history.calibrations import dated_calibrations
+from workbench.report.history.in_force import dated_calibrations
 from workbench.session.index import indexed_sessions
 
 
