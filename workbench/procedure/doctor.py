@@ -21,7 +21,8 @@ from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.rig import LaserSpec, Rig
 from workbench.model.target import Placement
-from workbench.procedure.capture.automatic import darkening
+from workbench.procedure.capture.automatic import find_automatic_control
+from workbench.procedure.capture.automatic_advice import automatic_control_advice
 from workbench.procedure.capture.exposure import set_exposure
 from workbench.procedure.capture.latency import LEASE_S, count_latency
 from workbench.procedure.engine.prompts import laser_class_prompt, placement_prompt, safety_prompt
@@ -191,18 +192,12 @@ def _automatic_control(rig: Rig, bench: Bench) -> Iterator[CheckResult]:
     part = "automatic control"
     bench.mark("doctor/automatic")
     try:
-        share = darkening(bench.lasers, bench.camera, rig)
+        found = find_automatic_control(bench.lasers, bench.camera, rig)
     except RigNotReadyError as error:
         yield CheckResult(part, False, str(error))
         return
-    if share is None:
-        yield CheckResult(part, True, "none: the image does not darken while a laser is on")
-        return
-    found = (
-        f"while a laser is on the rest of the image darkens by {100 * share:.0f} %; switch the camera's"
-        " automatic exposure, gain and white balance off"
-    )
-    yield CheckResult(part, True, found, kind="noted")
+    advice = automatic_control_advice(found.darkening, found.dimming)
+    yield CheckResult(part, True, advice or "none was seen", kind="noted" if advice else "checked")
 
 
 def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from workbench.model.number_text import counted
+from workbench.procedure.capture.automatic_advice import automatic_control_advice
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
@@ -32,16 +33,5 @@ class MeasureLatencyStep(StepModel):
         """Measure the latency and set the camera to discard as many frames."""
         measured = context.measure_latency(name, self.most_frames)
         outcome = f"{counted(measured.frames, 'frame')}, discarded before each capture"
-        if measured.darkening is not None:
-            return (
-                f"{outcome}. The camera adjusts itself: while a laser is on, the rest of the image darkens"
-                f" by {100 * measured.darkening:.0f} %. Switch its automatic exposure, gain and white balance"
-                " off"
-            )
-        if measured.dimming is not None:
-            return (
-                f"{outcome}. The spot dims by {100 * measured.dimming:.0f} % after switching on: either the"
-                " camera adjusts itself (switch its automatic exposure and gain off), or the laser's power"
-                " falls (check its supply and temperature)"
-            )
-        return outcome
+        advice = automatic_control_advice(measured.darkening, measured.dimming)
+        return f"{outcome}. {advice}" if advice else outcome
