@@ -20,6 +20,6 @@ def build(folder: Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", str(config)]
     # Material announces its end of life, and that of MkDocs 1: docs/decisions/0010-documentation-site.md.
     environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
-    return subprocess.run(  # noqa: S603  # no shell
+    return subprocess.run(  # no shell
         command, env=environment, capture_output=True, text=True, check=False
     )

@@ -23,7 +23,7 @@ def write_notebook(notebook: Path, folder: Path, *, run: bool) -> None:
         folder: where to write.
         run: whether to run it, in the folder where it stands.
     """
-    content = nbformat.read(notebook, as_version=4)
+    content = nbformat.reads(notebook.read_text(), as_version=4)
     if run:
         NotebookClient(content, timeout=SECONDS, resources={"metadata": {"path": notebook.parent}}).execute()
     parts = [part for cell in content.cells for part in _cell(cell, folder, notebook.stem)]

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from workbench.model.number_text import counted
-from workbench.procedure.capture.automatic_advice import automatic_control_advice
+from workbench.procedure.capture.automatic import AutomaticControl
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
@@ -33,5 +33,5 @@ class MeasureLatencyStep(StepModel):
         """Measure the latency and set the camera to discard as many frames."""
         measured = context.measure_latency(name, self.most_frames)
         outcome = f"{counted(measured.frames, 'frame')}, discarded before each capture"
-        advice = automatic_control_advice(measured.darkening, measured.dimming)
-        return f"{outcome}. {advice}" if advice else outcome
+        remark = AutomaticControl(measured.darkening, measured.dimming).text
+        return f"{outcome}. {remark}" if remark else outcome

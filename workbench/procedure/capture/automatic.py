@@ -16,7 +16,7 @@ from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.devices.protocols import LaserBank, StreamingCamera
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.rig import Rig
-from workbench.procedure.capture.latency import LEASE_S
+from workbench.procedure.capture.latency import SERIES_LEASE_S
 
 PAIRS = 4
 SETTLING_FRAMES = 6
@@ -40,6 +40,22 @@ class AutomaticControl:
     """Relative darkening of the background while the laser is on."""
     dimming: float | None
     """Relative dimming of the spot after switching on; a laser whose power falls does the same."""
+
+    @property
+    def text(self) -> str:
+        """The sign and what to do about it; empty without a sign."""
+        if self.darkening is not None:
+            return (
+                f"The camera adjusts itself: while a laser is on, the rest of the image darkens by"
+                f" {100 * self.darkening:.0f} %. Switch its automatic exposure, gain and white balance off"
+            )
+        if self.dimming is not None:
+            return (
+                f"The spot dims by {100 * self.dimming:.0f} % after switching on: either the camera adjusts"
+                " itself (switch its automatic exposure and gain off), or the laser's power falls (check its"
+                " supply and temperature)"
+            )
+        return ""
 
 
 @dataclass(frozen=True)
@@ -68,7 +84,7 @@ def find_automatic_control(lasers: LaserBank, camera: StreamingCamera, rig: Rig)
 def _alternate(lasers: LaserBank, camera: StreamingCamera, laser_id: str) -> _Alternation:
     off, first, settled = [_settled(camera)], [], []
     for _ in range(PAIRS):
-        with lasers.lit([laser_id], for_s=LEASE_S):
+        with lasers.lit([laser_id], for_s=SERIES_LEASE_S):
             first.append(camera.grab().image)
             settled.append(_settled(camera))
         camera.grab()  # the stale frames
