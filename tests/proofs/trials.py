@@ -28,6 +28,7 @@ from workbench.model.event import ReadingTaken
 from workbench.model.target import Placement
 from workbench.procedure.engine.step import flat_placement
 from workbench.trials.accuracy.agreement import Agreement
+from workbench.trials.accuracy.completeness import Completeness
 from workbench.trials.accuracy.limits import AccuracyLimits
 from workbench.trials.accuracy.ranges import CLOSEST, MEAN
 from workbench.trials.accuracy.verdict import verdict_of
@@ -315,7 +316,7 @@ def _decided(ranges: Sequence[Agreement]) -> tuple[bool, bool]:
     (mean,) = [one for one in ranges if one.name == MEAN]
     bound = max(u.expanded / mm for u, mm in zip(mean.uncertainty, mean.true_mm.tolist(), strict=True))
     limits = AccuracyLimits.model_validate({"mean_relative_error": {"in": [-bound, bound]}})
-    verdict = verdict_of(ranges, limits)
+    verdict = verdict_of(ranges, limits, Completeness(len(mean.placements)))
     return verdict.is_biased, verdict.decision == "fail"
 
 

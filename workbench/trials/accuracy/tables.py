@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from workbench.model.table import Cell, Column, Table
 from workbench.trials.accuracy.agreement import Agreement, budget_of
+from workbench.trials.accuracy.completeness import Completeness
 from workbench.trials.accuracy.limits import AccuracyLimits
 from workbench.trials.accuracy.ranges import CLOSEST
 from workbench.trials.accuracy.statistics import AccuracyRow
-from workbench.trials.accuracy.verdict import Verdict, error_results
-from workbench.trials.limits import decision_on
+from workbench.trials.accuracy.verdict import Verdict, range_decision
 from workbench.trials.reading_frame import table_of
 from workbench.trials.statistics.error_budget import ALARM_PROBABILITY
 
@@ -89,13 +89,19 @@ def accuracy_table(name: str, rows: Sequence[AccuracyRow]) -> Table:
     )
 
 
-def verdict_table(name: str, ranges: Sequence[Agreement], verdict: Verdict, limits: AccuracyLimits) -> Table:
-    """Table of the worst error of each range, with the verdict in its title."""
+def verdict_table(
+    name: str, ranges: Sequence[Agreement], verdict: Verdict, limits: AccuracyLimits, done: Completeness
+) -> Table:
+    """Table of the worst error of each range, with the verdict in its title.
+
+    An expected range that no reading has is a row without an error.
+    """
     caption = (
         "worst: largest error / U; U: 95 %; p: all standoffs together; inside: share of readings in their"
         " 95 % interval, low: lower end of its own (Clopper-Pearson, by placement)"
     )
-    rows = [_verdict_row(one, limits) for one in ranges]
+    rows = [_verdict_row(one, limits, done) for one in ranges]
+    rows += [_lost_row(one, limits, done) for one in _never_measured(ranges, done)]
     columns = VERDICT if verdict.decision is None else (*VERDICT, DECISION)
     return table_of(f"{name}-verdict", f"Accuracy: {verdict.text}", columns, rows, caption)
 
@@ -126,7 +132,7 @@ def detail_tables(name: str, ranges: Sequence[Agreement]) -> list[Table]:
     return [table.model_copy(update={"is_detail": True}) for table in tables if table.rows]
 
 
-def _verdict_row(one: Agreement, limits: AccuracyLimits) -> dict[str, Cell]:
+def _verdict_row(one: Agreement, limits: AccuracyLimits, done: Completeness) -> dict[str, Cell]:
     worst, coverage = one.worst, one.coverage
     return {
         "range": one.name,
@@ -139,7 +145,22 @@ def _verdict_row(one: Agreement, limits: AccuracyLimits) -> dict[str, Cell]:
         "p": one.bias.probability,
         "coverage": coverage.value,
         "coverage_low": coverage.low,
-        "decision": decision_on(error_results(one), limits) or "-",
+        "decision": range_decision(one.name, one, limits, done) or "-",
+    }
+
+
+def _never_measured(ranges: Sequence[Agreement], done: Completeness) -> list[str]:
+    """Names of the expected ranges that no reading of the trial has."""
+    measured = {one.name for one in ranges}
+    return [name for name in dict.fromkeys(one.name for one in done.lost) if name not in measured]
+
+
+def _lost_row(name: str, limits: AccuracyLimits, done: Completeness) -> dict[str, Cell]:
+    return {
+        "range": name,
+        "readings": 0,
+        "missing": sum(one.readings for one in done.lost_of(name)),
+        "decision": range_decision(name, None, limits, done) or "-",
     }
 
 
