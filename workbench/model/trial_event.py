@@ -7,6 +7,7 @@ from typing import Literal
 
 from workbench.model.chart import Chart
 from workbench.model.table import Table
+from workbench.model.target import is_measured
 from workbench.model.yamlfile import FileModel
 
 NOT_VALID = "NO"
@@ -100,6 +101,11 @@ class ReadingTaken(FileModel):
     def reference_mm(self) -> float:
         """True value of `range_mm`."""
         return self.standoff_mm if self.true is None else self.true.range_mm
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether the target's standoff was measured; without that the true range is not known."""
+        return is_measured(self.standoff_mm, self.reference_sd_mm)
 
     @property
     def error_mm(self) -> float | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from workbench.model.errors import LimitFailedError
 from workbench.model.event import LimitChecked, ReadingTaken
@@ -34,7 +34,7 @@ class Result:
     low: float | None = None
     """Lower end of the 95 % interval; None: the value has no uncertainty."""
     high: float | None = None
-    is_skipped: bool = False
+    is_skipped: bool = field(default=False, kw_only=True)
     """Whether the operator skipped the placement: neither conformity nor non-conformity."""
 
     @classmethod

@@ -92,7 +92,7 @@ class TrialRun:
 
     def _check(self, placed: Placement) -> None:
         self._placements[placed.key] = placed
-        if placed.standoff_sd_mm is not None and placed.standoff_sd_mm >= placed.standoff_mm:
+        if not placed.is_measured:
             return  # neither distance nor angle of the target were asked for
         readings = self._readings(placed.key)
         complete = [one for one in readings if not one.left_off and not one.blocked]

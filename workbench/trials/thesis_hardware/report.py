@@ -39,9 +39,13 @@ def side_by_side(name: str, rows: Sequence[Row]) -> Table:
             Column(key="ratio", name="ratio", format=".2g"),
             Column(key="goal", name="goal", format=".3g"),
             Column(key="reached", name="met"),
+            Column(key="readings", name="n"),
+            Column(key="missing", name="missing"),
+            Column(key="expanded", name="U", format=".2g"),
         ),
         rows=tuple(_cells(row) for row in rows),
-        caption="error: mean absolute value of the readings at a range; off: lasers left off",
+        caption="error: mean absolute value of the readings at a range; met: at every range; n, missing:"
+        " readings with and without the quantity; U (k = 2): of the error where it is largest; off: lasers left off",
     )
 
 
@@ -79,16 +83,26 @@ def goal_table(name: str, rows: Sequence[Row]) -> list[Table]:
 
 
 def reason(row: Row) -> str:
-    """Reason why a goal is not reached, from the stated uncertainty there."""
+    """Reason why a goal is not reached, from the stated uncertainty there and the computed size of causes."""
     if row.ours is None:
         return "no reading has this quantity"
+    lacking = f"no value at {', '.join(f'{mm:.0f}' for mm in row.lacking_mm)} mm" if row.lacking_mm else ""
+    if row.goal is None or row.ours <= row.goal:
+        return lacking
+    return "; ".join(part for part in (lacking, _reason_of_error(row, row.ours, row.goal)) if part)
+
+
+def _reason_of_error(row: Row, ours: float, goal: float) -> str:
     if row.expanded is None:
-        return "fewer spots: their noise and speckle are averaged less"
-    if row.limit:
-        return row.limit
-    if row.ours > row.expanded:
-        return "error exceeds U: the target is not as stated, or the sensor has changed"
-    return "within U: noise and speckle of the spots, calibration, and reference"
+        return "no U of a ratio: fewer spots average noise and speckle less"
+    is_within = ours <= row.expanded
+    excess = ours - (goal if is_within else row.expanded)
+    explains = row.cause_size is not None and row.cause_size >= excess
+    if row.cause is not None and explains and (is_within or not row.cause.is_in_u):
+        return f"{'within U: ' if is_within else ''}{row.cause.text}"
+    if is_within:
+        return "within U: noise and speckle of the spots, calibration, and reference"
+    return "error exceeds U: the target is not as stated, or the sensor has changed"
 
 
 def figures(name: str, readings: Sequence[ReadingTaken]) -> list[Chart]:
@@ -123,6 +137,9 @@ def _cells(row: Row) -> tuple[Cell, ...]:
         row.ratio,
         _shown(row, row.goal),
         "" if reached is None else "yes" if reached else "NO",
+        row.readings,
+        row.missing,
+        _shown(row, row.expanded) if row.unit == "%" else None,
     )
 
 

@@ -56,7 +56,7 @@ class ThesisComparisonStep(StepModel):
         from workbench.trials.thesis_hardware.comparison import compare, comparison_results
         from workbench.trials.thesis_hardware.report import figures, goal_table, side_by_side
 
-        rows = compare(context.readings)
+        rows = compare(context.readings, context.rig)
         tables = [side_by_side(name, rows), *goal_table(name, rows)]
         finish_trial(context, name, tables, figures(name, context.readings))
         check_results(context, name, comparison_results(rows), self.limits)
