@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from workbench.model.table import Cell, Column, Table
 from workbench.trials.accuracy.agreement import Agreement, budget_of
 from workbench.trials.accuracy.completeness import Completeness
+from workbench.trials.accuracy.joint_tests import JointTest, joint_tests
 from workbench.trials.accuracy.limits import AccuracyLimits
-from workbench.trials.accuracy.ranges import CLOSEST
 from workbench.trials.accuracy.statistics import AccuracyRow
 from workbench.trials.accuracy.verdict import Verdict, range_decision
 from workbench.trials.reading_frame import table_of
-from workbench.trials.statistics.error_budget import ALARM_PROBABILITY
 
 COLUMNS = (
     Column(key="standoff_mm", name="true", unit="mm"),
@@ -44,6 +43,7 @@ BIAS = (
     Column(key="standoff_mm", name="true", unit="mm", format=".1f"),
     Column(key="readings", name="n"),
     Column(key="error_mm", name="mean error", unit="mm", format="+.3g"),
+    Column(key="u_mm", name="u", unit="mm", format="sd"),
     Column(key="expanded_mm", name="U", unit="mm", format="sd"),
     Column(key="k", name="k", format=".2f"),
     Column(key="z", name="z", format="+.2f"),
@@ -109,7 +109,12 @@ def verdict_table(
 def detail_tables(name: str, ranges: Sequence[Agreement]) -> list[Table]:
     """Bias at each standoff, error budget, and linearity of each range."""
     bias = [row for one in ranges for row in _bias_rows(one)]
-    budget = [row for one in ranges for row in _budget_rows(one)]
+    tests = joint_tests(ranges)
+    budget = [
+        row
+        for one in ranges
+        for row in (*_budget_rows(one), *(_test_row(test) for test in tests if test.range == one.name))
+    ]
     linear = [row for one in ranges for row in _linearity_row(one)]
     tables = [
         table_of(f"{name}-bias", "Bias at each standoff", BIAS, bias, "z: mean error / u; E_n: k = 2"),
@@ -118,8 +123,8 @@ def detail_tables(name: str, ranges: Sequence[Agreement]) -> list[Table]:
             "Error budget of the mean errors",
             BUDGET,
             budget,
-            "unexplained: error^2 - explained u^2, 95 % interval; alarm: p < 2.5 %; `repeats`: their scatter;"
-            " `all standoffs`: with the full covariance",
+            "unexplained: error^2 - explained u^2, 95 % interval; `repeats`: their scatter; `all standoffs`:"
+            " with the full covariance; alarm: p < 5 % / number of these tests",
         ),
         table_of(
             f"{name}-linearity",
@@ -171,6 +176,7 @@ def _bias_rows(one: Agreement) -> list[dict[str, Cell]]:
             "standoff_mm": float(one.true_mm[n]),
             "readings": int(one.readings[n]),
             "error_mm": float(one.errors_mm[n]),
+            "u_mm": one.uncertainty[n].u,
             "expanded_mm": one.uncertainty[n].expanded,
             "k": one.uncertainty[n].k,
             "z": float(one.bias.z[n]),
@@ -195,24 +201,19 @@ def _budget_rows(one: Agreement) -> list[dict[str, Cell]]:
                 "unexplained_mm2": unexplained,
                 "unexplained_low_mm2": low,
                 "unexplained_high_mm2": high,
-                "alarm": budget.alarm,
                 "note": "",
             }
         )
-    total = one.bias
-    rows.append(_total_row(one, total.chi2 / total.degrees_of_freedom, total.probability, "all standoffs"))
-    if one.repeats is not None and one.name != CLOSEST:  # its scatter also has that of the selected shape
-        rows.append(_total_row(one, one.repeats.ratio, one.repeats.probability, "repeats"))
     return rows
 
 
-def _total_row(one: Agreement, ratio: float, p: float, note: str) -> dict[str, Cell]:
+def _test_row(one: JointTest) -> dict[str, Cell]:
     return {
-        "range": one.name,
-        "variance_ratio": ratio,
-        "p": p,
-        "alarm": p < ALARM_PROBABILITY,
-        "note": note,
+        "range": one.range,
+        "variance_ratio": one.ratio,
+        "p": one.probability,
+        "alarm": one.alarm,
+        "note": one.note,
     }
 
 

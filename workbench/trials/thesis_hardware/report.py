@@ -45,7 +45,7 @@ def side_by_side(name: str, rows: Sequence[Row]) -> Table:
         ),
         rows=tuple(_cells(row) for row in rows),
         caption="error: mean absolute value of the readings at a range; met: at every range; n, missing:"
-        " readings with and without the quantity; U (k = 2): of the error where it is largest; off: lasers left off",
+        " readings with and without the quantity; U (k = 2): of the largest error; off: lasers left off",
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tests.support.accuracy_runs import COMPLETE, STANDOFFS_MM, accuracy_run, incomplete_run
 from tests.support.rangers import IDS, thesis_ranger
 from tests.support.rigs import thesis_rig
@@ -56,5 +58,9 @@ def test_details_are_left_to_the_files() -> None:
     assert [row["range"] for row in linear] == [CLOSEST, MEAN, *IDS]
     notes = [row["note"] for row in budget if row["range"] == MEAN]
     assert notes == [""] * len(STANDOFFS_MM) + ["all standoffs", "repeats"]
+    first = RANGES[0].uncertainty[0]
+    assert (bias[0]["u_mm"], bias[0]["expanded_mm"]) == pytest.approx((first.u, first.k * first.u))
     of_sources = [row for row in budget if row["note"] == ""]
     assert all(isinstance(row[key], float) for row in of_sources for key in SOURCES)
+    assert {row["alarm"] for row in of_sources} == {None}
+    assert all(isinstance(row["alarm"], bool) for row in budget if row["note"])
