@@ -135,7 +135,7 @@ def summary_table(name: str, summaries: Sequence[MissingSummary]) -> Table:
         columns=(Column(key="left_off", name="off"), Column(key="blocked", name="blocked"), *columns),
         rows=rows,
         caption="low, high: 95 % interval of the share in their interval; lost, at most: one-sided 95 % bound"
-        " of the share without a range (Clopper-Pearson, by placement)",
+        " of the share without a range (Clopper-Pearson, by placement; the interval by effective ones)",
     )
 
 
