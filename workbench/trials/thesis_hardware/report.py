@@ -39,13 +39,43 @@ def side_by_side(name: str, rows: Sequence[Row]) -> Table:
             Column(key="ratio", name="ratio", format=".2g"),
             Column(key="goal", name="goal", format=".3g"),
             Column(key="reached", name="met"),
-            Column(key="readings", name="n"),
-            Column(key="missing", name="missing"),
-            Column(key="expanded", name="U", format=".2g"),
         ),
         rows=tuple(_cells(row) for row in rows),
-        caption="error: mean absolute value of the readings at a range; met: at every range; n, missing:"
-        " readings with and without the quantity; U (k = 2): of the largest error; off: lasers left off",
+        caption="error: mean absolute value of the readings at a range; met: at every range; off: lasers"
+        " left off",
+    )
+
+
+def readings_table(name: str, rows: Sequence[Row]) -> Table:
+    """Table of the readings of every row, and of U where its value is largest."""
+    columns = (
+        Column(key="figure", name="fig."),
+        Column(key="target", name="target"),
+        Column(key="quantity", name="quantity"),
+        Column(key="to_mm", name="to", unit="mm"),
+        Column(key="readings", name="n"),
+        Column(key="missing", name="missing"),
+        Column(key="at_mm", name="at", unit="mm", format=".0f"),
+        Column(key="expanded", name="U there", format=".2g"),
+    )
+    return Table(
+        name=f"{name}-readings",
+        title="Readings of each row",
+        columns=columns,
+        rows=tuple(
+            (
+                row.figure,
+                row.target,
+                _quantity(row),
+                row.to_mm,
+                row.readings,
+                row.missing,
+                row.at_mm,
+                _shown(row, row.expanded) if row.unit == "%" else None,
+            )
+            for row in rows
+        ),
+        caption="n, missing: with and without the quantity; U: k = 2, of the error, in its unit",
     )
 
 
@@ -137,9 +167,6 @@ def _cells(row: Row) -> tuple[Cell, ...]:
         row.ratio,
         _shown(row, row.goal),
         "" if reached is None else "yes" if reached else "NO",
-        row.readings,
-        row.missing,
-        _shown(row, row.expanded) if row.unit == "%" else None,
     )
 
 

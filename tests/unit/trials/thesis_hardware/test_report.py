@@ -10,7 +10,7 @@ from tests.support.four_lasers import reading
 from workbench.model.event import TrueValues
 from workbench.trials.thesis_hardware.causes import PARABOLA, TILT, Cause
 from workbench.trials.thesis_hardware.comparison import Row
-from workbench.trials.thesis_hardware.report import figures, goal_table, reason, side_by_side
+from workbench.trials.thesis_hardware.report import figures, goal_table, readings_table, reason, side_by_side
 
 ROW = Row("33", "flat", "mean range error", "%", 2000.0, 0.025, 0.004, 0.005, 400.0, 0.006)
 MISSED = replace(ROW, ours=0.0055)
@@ -65,7 +65,7 @@ def test_a_cause_is_named_only_where_its_size_explains_the_excess(
 
 
 def test_the_table_has_the_number_of_readings_the_missing_ones_and_u() -> None:
-    (record,) = side_by_side("t", [replace(ROW, readings=70, missing=5)]).records()
+    (record,) = readings_table("t", [replace(ROW, readings=70, missing=5)]).records()
     assert (record["readings"], record["missing"]) == (70, 5)
     assert record["expanded"] == pytest.approx(0.6)
 
