@@ -27,6 +27,8 @@ worker that computes keeps their processes from running, as nothing does at a be
 
 SLOW = {
     "tests/unit/api/test_arguments.py",
+    "tests/unit/api/test_documentation.py",
+    "tests/unit/api/test_simulation.py",
     "tests/unit/calibration/checks/test_cross_validation.py",
     "tests/unit/calibration/checks/test_faults.py",
     "tests/unit/calibration/checks/test_hypotheses.py",
@@ -35,6 +37,7 @@ SLOW = {
     "tests/unit/calibration/data/test_boards.py",
     "tests/unit/calibration/design/test_expected_spot.py",
     "tests/unit/calibration/design/test_forecast.py",
+    "tests/unit/calibration/design/test_simulation.py",
     "tests/unit/calibration/design/test_standoffs.py",
     "tests/unit/calibration/estimation/test_batch.py",
     "tests/unit/calibration/estimation/test_fisheye.py",
@@ -96,6 +99,7 @@ SLOW = {
     "tests/unit/viewer/test_compaction.py",
     "tests/unit/viewer/test_comparison.py",
     "tests/unit/viewer/test_fit.py",
+    "tests/unit/viewer/test_notebook.py",
     "tests/unit/viewer/test_recording.py",
     "tests/unit/viewer/test_trial.py",
     "tests/unit/viewer/test_window.py",

@@ -16,6 +16,7 @@ import pytest
 from tests.crash.short import RESUMER, begin, go_on, results, with_small_pictures, write_files
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration, load_calibration
+from workbench.model.captures import load_captures
 from workbench.model.errors import BadInputError, LimitFailedError, StoppedError
 from workbench.procedure.engine.repair import Repair, find_placement
 from workbench.procedure.engine.resume import resume
@@ -143,6 +144,22 @@ def test_captures_whose_frames_are_gone_are_not_restored(copy: Path) -> None:
     with pytest.raises(BadInputError, match="300mm"):
         repair(copy, restore=("300",))
     assert (copy / "journal.jsonl").read_bytes() == before
+
+
+def test_a_repair_of_a_drifting_bench_begins_another_part(tmp_path: Path) -> None:
+    """Its drift begins again, as that of a sensor that has cooled."""
+    rig, _ = write_files(tmp_path, PROCEDURE)
+    with_small_pictures(rig)
+    rig.write_text(f"{rig.read_text().rstrip()}\n  drift: {{u_px_per_frame: 0.001}}\n")
+    begin(tmp_path, tmp_path / "s")
+    repair(tmp_path / "s", recapture=("300",))
+    rows = load_captures(tmp_path / "s/captures.csv")
+    assert {row.standoff_mm for row in rows if row.part == "1"} == {300.0}
+    first = [row.time_s for row in rows if not row.part]
+    again = [row.time_s for row in rows if row.part]
+    assert len(again) == 4
+    assert max(first) < min(again)
+    assert first == sorted(first)
 
 
 @pytest.mark.parametrize("copy", ["refused"], indirect=True)

@@ -16,6 +16,7 @@ from tests.benchmarks import (
     calibration,
     capture,
     detection,
+    listing,
     ranging,
     recording,
     rows,
@@ -36,6 +37,7 @@ def main() -> None:
         "rows": (rows.lines,),
         "ranging": (ranging.lines,),
         "capture": (capture.lines, recording.lines),
+        "listing": (listing.lines,),
     }
     for subject, tables in subjects.items():
         with (RESULTS / f"{today}-{subject}.txt").open("w") as file:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,40 +15,48 @@ from workbench.emulator.sensor import ImageSensor
 from workbench.emulator.spec import emulator_spec
 from workbench.emulator.spot import ImageFormat
 from workbench.emulator.truth import draw_truth
-from workbench.model.errors import RigNotReadyError
+from workbench.model.errors import LeaseEndedError, RigNotReadyError
 from workbench.model.rig import Rig
 
 
 @dataclass
 class PlainLasers:
-    """Lasers that are on inside `lit`, and off outside of it."""
+    """Lasers that are on inside `lit` until the lease ends, and off outside of it."""
 
     ids: tuple[str, ...]
     interlock_closed: bool
     identity: str = "plain lasers"
-    on: tuple[str, ...] = ()
+    ends_s: float = 0.0
+    """End of the lease on the clock of `time.monotonic`."""
+    _lit: tuple[str, ...] = ()
+
+    @property
+    def on(self) -> tuple[str, ...]:
+        return self._lit if time.monotonic() < self.ends_s else ()
 
     @contextmanager
     def lit(self, ids: Sequence[str], for_s: float) -> Iterator[None]:
         if not self.interlock_closed:
             raise RigNotReadyError("interlock open")
-        self.on = tuple(ids)
+        self._lit, self.ends_s = tuple(ids), time.monotonic() + for_s
         try:
             yield
         finally:
-            self.on = ()
+            self._lit = ()
+        if time.monotonic() > self.ends_s:
+            raise LeaseEndedError("the lease ended before the end of the block")
 
     def beat(self) -> None:
         pass
 
     def all_off(self) -> None:
-        self.on = ()
+        self._lit = ()
 
     def state(self) -> LaserState:
         return LaserState(self.on, self.interlock_closed)
 
     def close(self) -> None:
-        self.on = ()
+        self._lit = ()
 
 
 def plain_bench(rig: Rig, folder: Path) -> Bench:

@@ -39,6 +39,12 @@ def test_index_of_the_documentation_lists_every_page() -> None:
     assert missing == ["README.md"]
 
 
+def test_overview_of_the_decisions_lists_every_one() -> None:
+    folder = ROOT / "docs/decisions"
+    listed = re.findall(r"\((0\d{3}-[\w-]+\.md)\)", (folder / "README.md").read_text())
+    assert listed == sorted(page.name for page in folder.glob("0*.md"))
+
+
 def _anchors(page: Path) -> set[str]:
     """Anchors of the headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(), flags=re.MULTILINE)

@@ -188,7 +188,7 @@ class Session:
             ) from None
         return image[max(v - half, 0) : v + half + 1, max(u - half, 0) : u + half + 1]
 
-    def viewer(self, width_px: int = 1200, height_px: int = 700) -> object:
+    def viewer(self, height_px: int = 700) -> object:
         """The session in the Rerun viewer, as a widget for the last line of a notebook's cell.
 
         The recording is made again from the frames, which takes some seconds.
@@ -198,8 +198,8 @@ class Session:
         """
         from workbench.viewer.notebook import notebook_viewer  # loads Rerun
 
-        size = whole_of("width_px", width_px), whole_of("height_px", height_px)
-        return notebook_viewer(self.folder, self.rig, self._records, size)
+        height = whole_of("height_px", height_px)
+        return notebook_viewer(self.folder, self.rig, self._records, height)
 
     @cached_property
     def _records(self) -> list[Record]:

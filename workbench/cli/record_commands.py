@@ -26,6 +26,12 @@ def report_(
     dcc: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Digital Calibration Certificate (XML) to write.")
     ] = None,
+    sign: Annotated[
+        Path | None, typer.Option(metavar="KEY", help="With --dcc: sign it with this private key (PEM).")
+    ] = None,
+    cert: Annotated[
+        Path | None, typer.Option(metavar="CERT", help="X.509 certificate of that key (PEM).")
+    ] = None,
     compare: Annotated[
         tuple[Path, Path] | None,
         typer.Option(metavar="A B", help="Instead: compare the calibrations of two sessions."),
@@ -36,10 +42,14 @@ def report_(
 ) -> None:
     """Write the certificate of a session. HTML, PDF, Digital Calibration Certificate."""
     from workbench.cli.report import Outputs, compare_sessions, report_session
+    from workbench.report.certificate.signature import Signer
 
     if (session is None) == (compare is None):
         raise typer.BadParameter("expected either a session or --compare A B")
-    outputs = Outputs(output, pdf, dcc, json)
+    if (sign is None) != (cert is None) or (sign is not None and dcc is None):
+        raise typer.BadParameter("expected --sign KEY, --cert CERT and --dcc FILE together")
+    signer = None if sign is None or cert is None else Signer.load(sign, cert)
+    outputs = Outputs(output, pdf, dcc, json, signer)
     if compare is not None:
         compare_sessions(compare, sessions, outputs)
     elif session is not None:

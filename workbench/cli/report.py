@@ -21,6 +21,7 @@ from workbench.report.certificate.assemble import Certificate, Sources, certific
 from workbench.report.certificate.dcc import certificate_xml, required_parties
 from workbench.report.certificate.predecessor import Predecessor, load_predecessor
 from workbench.report.certificate.session_record import SessionRecord, read_session, unchanged
+from workbench.report.certificate.signature import Signer
 from workbench.report.document import Document
 from workbench.session.caller import now
 from workbench.session.certificate_numbers import assign_number
@@ -40,6 +41,8 @@ class Outputs:
     pdf: Path | None = None
     dcc: Path | None = None
     as_json: bool = False
+    signer: Signer | None = None
+    """Signer of the Digital Calibration Certificate; None: it is not signed."""
 
     @property
     def files(self) -> list[Path]:
@@ -65,7 +68,8 @@ def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool)
         outputs = Outputs(html=folder / DEFAULT_NAME)
     write_document(certificate.document, outputs)
     if outputs.dcc is not None:
-        write_output(outputs.dcc, certificate_xml(certificate, datetime.now(UTC)))
+        xml = certificate_xml(certificate, datetime.now(UTC))
+        write_output(outputs.dcc, xml if outputs.signer is None else outputs.signer.sign(xml))
     if outputs.as_json:
         print(json.dumps(certificate.as_json()))
     _print_summary(certificate, outputs)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import time
 from collections.abc import Iterator, Sequence
 from typing import cast
 
@@ -15,7 +16,7 @@ from workbench.devices.guarded_line import GuardedLine
 from workbench.devices.guardian_client import GuardianClient
 from workbench.devices.protocols import LaserState
 from workbench.model.device_block import DeviceBlock
-from workbench.model.errors import BadInputError
+from workbench.model.errors import BadInputError, LeaseEndedError
 
 HANG_S = 0.5
 """Time without a beat after which lasers are switched off, s."""
@@ -66,12 +67,19 @@ class GuardedLaserBank:
             raise BadInputError(
                 f"lease: expected more than 0 and at most {LONGEST_LEASE_S:g} s, got {for_s:g}"
             )
+        began = time.monotonic()
         try:
             self._guardian.ask(f"LIT {mask} {math.ceil(for_s * 1000)}")
             self._lit = True
             yield
         finally:
+            lit_s = time.monotonic() - began
             self.all_off()
+        if lit_s > for_s:
+            raise LeaseEndedError(
+                f"the lasers: expected all frames with them on within {for_s:g} s, it took {lit_s:.1f} s, and"
+                " they were switched off before; use a faster camera, or a computer that is less busy"
+            )
 
     def beat(self) -> None:
         """Renew the lease, see `protocols.LaserBank`; without effect while all lasers are off."""

@@ -105,6 +105,7 @@ class LaserBank(Protocol):
         Leaving the block switches every laser off and verifies it at the device.
 
         Raises:
+            LeaseEndedError: the block took longer than `for_s`, so that the lasers were off at its end.
             RigNotReadyError: the controller refuses or does not answer.
             LaserOffNotConfirmedError: the controller did not confirm that all lasers are off.
         """

@@ -33,6 +33,10 @@ class RigNotReadyError(WorkbenchError):
     exit_code = 4
 
 
+class LeaseEndedError(RigNotReadyError):
+    """Lasers were switched off at the end of their lease, before all frames with them on were taken."""
+
+
 class StoppedError(WorkbenchError):
     """The command was stopped before its end; all captures are on disk (exit 5)."""
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from workbench.devices.protocols import Bench
+from workbench.devices.attempts import within_lease
+from workbench.devices.protocols import Bench, Frame
 from workbench.model.arrays import Image
 from workbench.model.errors import BadInputError
 from workbench.ranging.acquire import acquire
@@ -76,8 +77,7 @@ class LiveRanger:
 
     def _shoot(self, scene: str, ids: tuple[str, ...]) -> Finding:
         self.bench.mark(f"{scene}/{ids[0] if len(ids) == 1 else 'all'}")
-        with self.bench.lasers.lit(ids, for_s=LEASE_S):
-            on = self.bench.camera.grab()
+        on = within_lease(lambda: self._grab_lit(ids))
         off = self.bench.camera.grab()
         self._second_frame_at = time.perf_counter()
         self._dark = off.image
@@ -85,6 +85,10 @@ class LiveRanger:
         if ids == self.ranger.sensor.ids:
             self.seen = on.image, off.image, finding.spots
         return finding
+
+    def _grab_lit(self, ids: tuple[str, ...]) -> Frame:
+        with self.bench.lasers.lit(ids, for_s=LEASE_S):
+            return self.bench.camera.grab()
 
     def _look_for_stuck_beam(self, reading: Reading) -> Reading:
         """Check the last frame with all lasers off; a light known from before becomes a note.

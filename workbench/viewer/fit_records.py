@@ -39,6 +39,7 @@ def _events(
     yield ev.SessionStarted(session=name, rig=fitted.rig.rig, procedures=("fit",))
     yield ev.StepStarted(procedure="fit", index=1, step="fit", title="Captures of the file", shots=len(rows))
     before: str | None = None
+    parts = list(dict.fromkeys(row.part for row in rows))
     for row in rows:
         if row.laser_id == BOARD or not isfinite(row.standoff_mm):
             continue
@@ -48,13 +49,13 @@ def _events(
             yield ev.TargetPlaced(placement=Placement(key=key, standoff_mm=row.standoff_mm, target=target))
             before = key
         source = f"row {row.row}"
-        yield _capture(row, source, key)
+        yield _capture(row, source, key, parts.index(row.part))
         yield _spots(row, source, fitted.rig)
     yield finished
     yield ev.SessionFinished(exit_code=0, message=f"calibration {finished.verdict}")
 
 
-def _capture(row: CaptureRow, source: str, placement_key: str) -> ev.CaptureTaken:
+def _capture(row: CaptureRow, source: str, placement_key: str, part: int) -> ev.CaptureTaken:
     time_ns = row.row * SECOND_NS
     return ev.CaptureTaken(
         key=source,
@@ -67,6 +68,8 @@ def _capture(row: CaptureRow, source: str, placement_key: str) -> ev.CaptureTake
         off=None if row.off is None else ev.FrameRef(path=str(row.off), sha256="", time_ns=time_ns),
         exposure=row.exposure if isfinite(row.exposure) else None,
         exposure_unit=row.exposure_unit or None,
+        clock_ns=round(row.time_s * SECOND_NS) if isfinite(row.time_s) else None,
+        part=part,
     )
 
 

@@ -85,6 +85,7 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "Session.captures_for_fit(without)": SESSION.captures_for_fit,
     "Session.frame(capture)": SESSION.frame,
     "Session.crop(spot)": SESSION.crop,
+    "Session.viewer(height_px)": SESSION.viewer,
     "Session.crop(half_px)": lambda x: SESSION.crop(SESSION.spots.iloc[0], x),
 }
 

@@ -51,8 +51,9 @@ def test_documented_columns_are_those_of_the_data_frames() -> None:
     assert documented == DATA_FRAMES
 
 
-def test_examples_of_the_page_run() -> None:
-    result = doctest.testfile(str(PAGE), module_relative=False)
+@pytest.mark.parametrize("page", [PAGE, ROOT / "docs/how-to/ros-and-opencv.md"], ids=lambda page: page.stem)
+def test_examples_of_the_page_run(page: Path) -> None:
+    result = doctest.testfile(str(page), module_relative=False)
     assert result.failed == 0
     assert result.attempted > 10
 

@@ -47,7 +47,7 @@ def test_all_parts_are_reported_with_the_devices_that_are_connected(
     outcome = workbench("doctor", rig, "--no-input")
     refused(outcome, 4, "/dev/ttyACM99", "/dev/video99", "/dev/video3 (Grey camera)", "No serial port")
     words = [line[:4] for line in outcome.err.splitlines() if line[:4] in ("FAIL", "----")]
-    assert words == ["FAIL", "----", "FAIL", *["----"] * 6]
+    assert words == ["FAIL", "----", "FAIL", *["----"] * 7]
 
 
 def test_a_device_that_this_user_may_not_open_has_its_group(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -10,11 +11,13 @@ import numpy as np
 import pytest
 
 from tests.support.command_line import Run, refused
+from tests.support.rigs import World
 from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.fit import _rejected_json
 from workbench.model.calibration import load_calibration
 from workbench.model.fit_event import Rejected
 from workbench.model.fit_tables import parameter_table
+from workbench.model.rig import load_rig
 
 ROOT = Path(__file__).parents[3]
 WEBCAM = ROOT / "data/webcam-laser-rows.csv"
@@ -68,6 +71,68 @@ def test_rejected_rows_are_listed_with_their_reasons(workbench: Run, tmp_path: P
     assert [r["row"] for r in rejected] == [11, 12]
     assert "standoff_mm" in rejected[0]["reason"]
     assert "got 2" in rejected[1]["reason"]
+
+
+@pytest.mark.parametrize(
+    "spelt",
+    [
+        lambda text: text.replace(",", ", "),
+        lambda text: text + ",,,,\n,,,,\n\n",
+        lambda text: text.replace(",0,", ",0.0,"),
+        lambda text: text.replace("1,200,", '1,"200",'),
+        lambda text: "sep=,\r\n" + text.replace("\n", "\r\n"),
+    ],
+)
+def test_tables_as_spreadsheets_write_them_give_the_same_fit(
+    workbench: Run, tmp_path: Path, spelt: Callable[[str], str]
+) -> None:
+    results = []
+    for name, text in (("plain", WEBCAM.read_text()), ("spelt", spelt(WEBCAM.read_text()))):
+        (tmp_path / f"{name}.csv").write_text(text)
+        output = tmp_path / f"{name}.yaml"
+        outcome = workbench("fit", tmp_path / f"{name}.csv", "--rig", WEBCAM_RIG, "-o", output, "--json")
+        results.append(json.loads(outcome.out)["parameters"])
+    assert results[0] == results[1]
+
+
+def test_a_thousands_separator_is_refused_with_its_row(workbench: Run, tmp_path: Path) -> None:
+    captures = tmp_path / "c.csv"
+    captures.write_text(WEBCAM.read_text() + '1,"1,300",0,,200\n')
+    outcome = workbench("fit", captures, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
+    refused(outcome, 2, "row 11, column standoff_mm", "1,300")
+
+
+def test_a_laser_id_with_a_leading_zero_is_a_text_in_quotes(workbench: Run, tmp_path: Path) -> None:
+    rig, captures = tmp_path / "rig.yaml", tmp_path / "c.csv"
+    captures.write_text(WEBCAM.read_text().replace("\n1,", "\n01,"))
+    text = WEBCAM_RIG.read_text()
+    (line,) = (line for line in text.splitlines() if "id:" in line)
+    number = text.splitlines().index(line) + 1
+    rig.write_text(text.replace(line, "  - id: 01"))
+    refused(workbench("check", rig), 2, f"rig.yaml:{number}: lasers[0].id")
+    rig.write_text(text.replace(line, '  - id: "01"'))
+    assert workbench("check", rig).code == 0
+    outcome = workbench("fit", captures, "--rig", rig, "-o", tmp_path / "c.yaml", "--json")
+    result = json.loads(outcome.out)
+    assert (outcome.code, result["observations"], result["rejected"]) == (0, 9, [])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_placements_that_scatter_more_than_stated_enlarge_the_deviations(
+    workbench: Run, tmp_path: Path, seed: int
+) -> None:
+    """Three times the stated error at 11 placements: the scale's own deviation is a quarter."""
+    path = ROOT / "rigs/thesis-emulated.yaml"
+    rig = load_rig(path)
+    bench = rig.bench.model_copy(update={"placement_sd_mm": 3 * rig.bench.placement_sd_mm})
+    rows = World(rig.model_copy(update={"bench": bench}), seed).observations(repeats=3)
+    lines = (f"{s.laser_id},{s.standoff_mm:g},{s.repeat},{s.u_px:.4f},{s.v_px:.4f}" for s in rows)
+    (tmp_path / "c.csv").write_text("\n".join(["laser_id,standoff_mm,repeat,u_px,v_px", *lines, ""]))
+    outcome = workbench("fit", tmp_path / "c.csv", "--rig", path, "-o", tmp_path / "c.yaml", "--json")
+    assert outcome.code == 0
+    assert 1.75 < load_calibration(tmp_path / "c.yaml").laser_ranger.fit.placement_scale < 5.0
+    z = [one["score"] for one in json.loads(outcome.out)["left_out"]]
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6
 
 
 def test_a_refused_calibration_is_reported_and_not_written(workbench: Run, tmp_path: Path) -> None:

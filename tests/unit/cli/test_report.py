@@ -7,8 +7,10 @@ import shutil
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric import ec
 
 from tests.support.command_line import Run, refused
+from tests.support.laboratory_key import write_key
 from tests.support.pango import need_pango
 from tests.support.reference_session import MARKUP, REFERENCE, copied, edit_calibration
 from workbench.session.certificate_numbers import REGISTER
@@ -38,6 +40,20 @@ def test_certificate_in_every_format(workbench: Run, tmp_path: Path) -> None:
     assert MARKUP not in files[0].read_text()
     assert files[1].read_bytes().startswith(b"%PDF")
     assert f"{found['number']}<" in files[2].read_text()
+
+
+def test_a_digital_certificate_is_signed(workbench: Run, tmp_path: Path) -> None:
+    pytest.importorskip("signxml", reason="the optional extra `sign` is not installed")
+    session, file = copied(tmp_path), tmp_path / "out.xml"
+    (tmp_path / "lab.yaml").write_text(LAB)
+    key = ec.generate_private_key(ec.SECP256R1())
+    pem, cert = write_key(tmp_path, key)
+    refused(workbench("report", session, "--sign", pem, "--cert", cert), 2, "--dcc")
+    refused(workbench("report", session, "--dcc", file, "--sign", pem), 2, "--cert")
+    refused(workbench("report", session, "--dcc", file, "--sign", cert, "--cert", cert), 2, cert)
+    assert not (tmp_path / REGISTER).exists()
+    assert workbench("report", session, "--dcc", file, "--sign", pem, "--cert", cert).code == 0
+    assert "X509Certificate>" in file.read_text()
 
 
 def test_the_same_session_keeps_its_number_and_its_content(workbench: Run, tmp_path: Path) -> None:

@@ -15,7 +15,13 @@ from workbench.devices.protocols import LaserBank
 from workbench.emulator.controller import IDENTITY, Controller
 from workbench.emulator.pty import PtyServer
 from workbench.emulator.spec import ControllerSpec, Fault
-from workbench.model.errors import BadInputError, LaserOffNotConfirmedError, RigNotReadyError, StoppedError
+from workbench.model.errors import (
+    BadInputError,
+    LaserOffNotConfirmedError,
+    LeaseEndedError,
+    RigNotReadyError,
+    StoppedError,
+)
 
 IDS = ("L1", "L2", "L3", "L4")
 
@@ -101,12 +107,18 @@ def test_off_after_an_error_in_the_block(wired: Wired, bank: GuardedLaserBank) -
     assert wired.controller.lit() == ()
 
 
-def test_the_lease_ends_inside_a_block_that_lingers(wired: Wired, bank: GuardedLaserBank) -> None:
-    with bank.lit(["L1"], for_s=0.001):
-        deadline = time.monotonic() + 5
-        while wired.controller.lit() and time.monotonic() < deadline:
-            time.sleep(0.001)
-        assert wired.controller.lit() == ()
+def test_a_block_that_outlasts_its_lease_ends_with_an_error(wired: Wired, bank: GuardedLaserBank) -> None:
+    """Frames at its end were taken with the lasers off, as if no spot were there."""
+
+    def linger() -> None:
+        with bank.lit(["L1"], for_s=0.001):
+            deadline = time.monotonic() + 5
+            while wired.controller.lit() and time.monotonic() < deadline:
+                time.sleep(0.001)
+            assert wired.controller.lit() == ()
+
+    with pytest.raises(LeaseEndedError):
+        linger()
 
 
 @pytest.mark.parametrize("ids", [[], ["L9"], ["L1", "all"]])

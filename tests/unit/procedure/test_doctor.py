@@ -72,9 +72,13 @@ def test_a_driver_that_discards_too_few_frames_fails_and_is_put_right_for_the_re
     assert [part for part, ok in found.items() if not ok] == ["latency"]
 
 
-def test_a_camera_that_adjusts_itself_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found_signs = AutomaticControl(darkening=0.23, dimming=None)
-    monkeypatch.setattr("workbench.procedure.doctor.find_automatic_control", lambda *_: found_signs)
+@pytest.mark.parametrize("signs", [(0.23, None), (None, 0.23)])
+def test_a_camera_that_adjusts_itself_is_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, signs: tuple[float | None, float | None]
+) -> None:
+    monkeypatch.setattr(
+        "workbench.procedure.doctor.find_automatic_control", lambda *_: AutomaticControl(*signs)
+    )
     with plain_bench(noisy_rig(), tmp_path) as bench:
         found = {one.part: one for one in examine(noisy_rig(), bench, Scripted())}
     assert (found["automatic control"].kind, found["automatic control"].ok) == ("noted", True)

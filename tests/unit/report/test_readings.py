@@ -6,10 +6,11 @@ import io
 from types import SimpleNamespace
 from typing import Any, cast
 
+import pytest
 from rich.console import Console
 
 from workbench.ranging.ranger import Reading
-from workbench.report.readings import reading_line, reading_list
+from workbench.report.readings import _Row, reading_line, reading_list
 
 
 def reading(scene: str, status: str = "done", notes: tuple[str, ...] = ()) -> Reading:
@@ -68,3 +69,16 @@ def test_a_name_longer_than_a_screen_is_folded() -> None:
     lines = shown([reading("b" * 200), reading("c" * 30)])
     assert "".join(lines).count("b") == 200
     assert any(line.startswith("c" * 30 + "  1002.3 +- 1.2  incline") for line in lines)
+
+
+@pytest.mark.parametrize("width", [30, 50, 80])
+@pytest.mark.parametrize("scene", ["a", "b" * 20, "\u65e5\u672c", "tab\there"])
+def test_a_row_is_written_as_its_table_is(width: int, scene: str) -> None:
+    """Where it fits it is written without one."""
+    row = _Row((20, 8), scene, "1.2", "incline -0.82 +- 0.19 deg")
+    written = []
+    for part in (row, row.table):
+        stream = io.StringIO()
+        Console(file=stream, width=width).print(part, highlight=False)
+        written.append(stream.getvalue())
+    assert written[0] == written[1]

@@ -53,6 +53,15 @@ def test_each_row_is_a_capture_with_the_spot_that_it_states(found: FittedSource,
         assert [(spot.laser_id, spot.u_px, spot.v_px) for spot in event.spots] == stated
 
 
+def test_captures_have_the_times_and_parts_of_their_rows(found: FittedSource) -> None:
+    stated = [{"time_s": 1.5 * n, "part": "cold" if n > 4 else ""} for n in range(len(found.rows))]
+    rows = [row.model_copy(update=update) for row, update in zip(found.rows, stated, strict=True)]
+    events = [record.event for record in records_of(found, rows)]
+    taken = [event for event in events if isinstance(event, ev.CaptureTaken)]
+    assert [one.time_ns for one in taken] == [1_500_000_000 * n for n in range(len(rows))]
+    assert [one.part for one in taken] == [0] * 5 + [1] * (len(rows) - 5)
+
+
 def test_the_target_is_placed_once_for_each_placement(records: list[ev.Record]) -> None:
     placed: list[str] = []
     for record in records:

@@ -20,8 +20,8 @@ SESSION = ROOT / "data/session-0.1.0"
 class Widget:
     """Stand-in of `rerun_notebook.Viewer`, a package of 17 MB that the tests do not install."""
 
-    def __init__(self, width: int, height: int) -> None:
-        self.size = width, height
+    def __init__(self, width: str, height: int, theme: str) -> None:
+        self.shape = width, height, theme
         self.sent = b""
 
     def send_rrd(self, data: bytes) -> None:
@@ -32,8 +32,8 @@ def test_the_widget_gets_the_recording_of_the_session(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "rerun_notebook", SimpleNamespace(Viewer=Widget))
-    widget: Any = wb.open_session(SESSION).viewer(width_px=900, height_px=500)
-    assert widget.size == (900, 500)
+    widget: Any = wb.open_session(SESSION).viewer(height_px=500)
+    assert widget.shape == ("auto", 500, "dark")
     (tmp_path / "sent.rrd").write_bytes(widget.sent)
     recordings = RrdReader(tmp_path / "sent.rrd").recordings()
     assert [one.application_id for one in recordings]

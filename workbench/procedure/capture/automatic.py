@@ -16,7 +16,7 @@ from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.devices.protocols import LaserBank, StreamingCamera
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.rig import Rig
-from workbench.procedure.capture.latency import LEASE_S
+from workbench.procedure.capture.latency import SERIES_LEASE_S
 
 PAIRS = 4
 SETTLING_FRAMES = 6
@@ -84,7 +84,7 @@ def find_automatic_control(lasers: LaserBank, camera: StreamingCamera, rig: Rig)
 def _alternate(lasers: LaserBank, camera: StreamingCamera, laser_id: str) -> _Alternation:
     off, first, settled = [_settled(camera)], [], []
     for _ in range(PAIRS):
-        with lasers.lit([laser_id], for_s=LEASE_S):
+        with lasers.lit([laser_id], for_s=SERIES_LEASE_S):
             first.append(camera.grab().image)
             settled.append(_settled(camera))
         camera.grab()  # the stale frames

@@ -18,6 +18,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from workbench.devices.attempts import within_lease
 from workbench.devices.protocols import Bench, Camera, ExposableCamera, StreamingCamera, settable
 from workbench.model.arrays import Image
 from workbench.model.errors import RigNotReadyError
@@ -92,8 +93,7 @@ def set_exposure(
         begin(f"{placement_key}/exposure/{number:02d}")
         taken = camera.set_exposure(exposure)
         before = camera.grab().image
-        with bench.lasers.lit(rig.laser_ids, for_s=LEASE_S):
-            on = [camera.grab().image, _next_frame(camera)]
+        on = within_lease(lambda: _grab_lit(bench, camera, rig.laser_ids))
         off = [before, camera.grab().image]
         return ExposureTrial(taken, measure_brightness(on, off, searched, 2**rig.camera.bits - 1))
 
@@ -110,6 +110,12 @@ def set_exposure(
         verdict=verdict_of(peak, seen=best.seen.lit > 0),
         trials=len(tried),
     )
+
+
+def _grab_lit(bench: Bench, camera: Camera, laser_ids: Sequence[str]) -> list[Image]:
+    """`LIT_FRAMES` frames with lasers on; raises the errors of `LaserBank.lit`."""
+    with bench.lasers.lit(laser_ids, for_s=LEASE_S):
+        return [camera.grab().image, *(_next_frame(camera) for _ in range(LIT_FRAMES - 1))]
 
 
 def _next_frame(camera: Camera) -> Image:

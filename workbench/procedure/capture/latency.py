@@ -16,6 +16,8 @@ from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import Rig
 from workbench.spots import Spot, find_spots
 
+SERIES_LEASE_S = 10.0
+"""Longest emission for a series of some twenty frames, s."""
 LEASE_S = 2.0
 """Longest emission for one capture: enough for many frames, short for eye safety."""
 PHASES = (0.0, 0.5, 0.95)
@@ -86,7 +88,7 @@ def _count(
     dark: Image = np.maximum.reduce([camera.read().image for _ in range(most_frames + 1)])
     time.sleep(phase * (time.monotonic() - began) / (most_frames + 1))
     before: Spot | None = None
-    with lasers.lit([first.id], for_s=LEASE_S):
+    with lasers.lit([first.id], for_s=SERIES_LEASE_S):
         for frames in range(most_frames + 2):
             spots = find(camera.read().image, dark).spots
             if before and spots:

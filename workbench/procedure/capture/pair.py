@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from workbench.calibration.data.spot_rows import prior_scanline
-from workbench.devices.protocols import Bench
+from workbench.devices.attempts import within_lease
+from workbench.devices.protocols import Bench, Frame
 from workbench.model import event as ev
 from workbench.model.arrays import Image
 from workbench.model.captures import ALL_LASERS, BOARD
@@ -126,11 +127,8 @@ class PairSource:
         left_off: Sequence[str],
     ) -> tuple[Image, Image, ev.CaptureTaken]:
         self._refuse_unsafe()
-        began = time.monotonic()
-        with self.bench.lasers.lit([i for i in laser_ids if i not in left_off], for_s=LEASE_S):
-            on = self.bench.camera.grab()
-            clock_ns = self.bench.clock.now_ns()
-        lit_s = time.monotonic() - began
+        lit = [i for i in laser_ids if i not in left_off]
+        on, clock_ns, lit_s = within_lease(lambda: self._grab_lit(lit))
         frames = FrameStore(self.session_dir)
         with ThreadPoolExecutor(1) as beside:  # the lit frame is stored while the dark one is exposed
             storing = beside.submit(frames.save, key, "on", on.image, on.time_ns)
@@ -156,6 +154,14 @@ class PairSource:
             part=self.part,
         )
         return on.image, off.image, taken
+
+    def _grab_lit(self, laser_ids: Sequence[str]) -> tuple[Frame, int, float]:
+        """Frame with lasers on, the bench's time, and how long they were on, s."""
+        began = time.monotonic()
+        with self.bench.lasers.lit(laser_ids, for_s=LEASE_S):
+            on = self.bench.camera.grab()
+            clock_ns = self.bench.clock.now_ns()
+        return on, clock_ns, time.monotonic() - began
 
     def _refuse_unsafe(self) -> None:
         if not self.may_emit:

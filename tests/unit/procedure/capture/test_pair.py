@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -70,6 +71,24 @@ def test_nothing_fires_before_the_beams_are_confirmed_to_be_safe(source: PairSou
     for fire in (lambda: take(source), lambda: source.set_exposure(PLACEMENT.key, lambda key: None)):
         with pytest.raises(RuntimeError):
             fire()
+
+
+def test_a_frame_after_the_end_of_the_lease_is_taken_again(
+    source: PairSource, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A computer that stalls while a laser is on: the lasers are off before the frame is exposed."""
+    monkeypatch.setattr("workbench.procedure.capture.pair.LEASE_S", 0.5)
+    grab, stalls = source.bench.camera.grab, iter([0.6])
+
+    def stalled_grab() -> Frame:
+        time.sleep(next(stalls, 0.0))
+        return grab()
+
+    monkeypatch.setattr(source.bench.camera, "grab", stalled_grab)
+    on, off, taken = source.pair(KEY, ("L1",), PLACEMENT, 0, None)
+    assert len(find_spots(on, off, expected=1).spots) == 1
+    assert taken.lit_s is not None
+    assert taken.lit_s < 0.5
 
 
 def test_a_whole_placement_is_served_from_disk(source: PairSource) -> None:
