@@ -1,7 +1,8 @@
 """Statistics of the trials on simulated sensors: `python -m tests.proofs.trials`, part of `make prove`.
 
 Each run draws a sensor from a calibration's covariance, a ruler and a rail, then placements, speckle and
-noise. Spots are computed by numpy, nothing is rendered. Figures outside their bounds are missed.
+noise. Spots are computed by numpy, nothing is rendered. A figure is missed if its runs contradict the bounds
+of the specification. A miss is printed with its reason where one is known.
 """
 
 from __future__ import annotations
@@ -10,14 +11,15 @@ import argparse
 import datetime as dt
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from math import hypot
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
+from tests.proofs.figure import Figure, KnownMiss
 from tests.proofs.rendered import CHANGES, verifications
 from tests.support.accuracy_runs import accuracy_run
 from tests.support.rangers import thesis_ranger
@@ -28,6 +30,8 @@ from workbench.model.event import ReadingTaken
 from workbench.model.target import Placement
 from workbench.procedure.engine.step import flat_placement
 from workbench.trials.accuracy.agreement import Agreement
+from workbench.trials.accuracy.completeness import Completeness
+from workbench.trials.accuracy.joint_tests import joint_tests
 from workbench.trials.accuracy.limits import AccuracyLimits
 from workbench.trials.accuracy.ranges import CLOSEST, MEAN
 from workbench.trials.accuracy.verdict import verdict_of
@@ -49,42 +53,16 @@ from workbench.trials.verify.verdict import lasers_verdict, ranges_verdict
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "docs" / "benchmarks"
+MANY = 10
+"""Factor of the runs of trials that take milliseconds."""
 COVERAGE = (0.93, 0.97)
+EVEN = (-0.1, 0.1)
 STANDOFFS_MM = (140.0, 180.0, 250.0, 350.0, 500.0, 750.0, 1100.0, 1700.0, 2000.0, 2700.0, 3800.0)
 VERIFIED_MM = (200.0, 300.0, 500.0, 800.0, 1200.0, 2000.0)
+FEW_PLACEMENTS = "at 3 standoffs with 8 placements a test at 5 % finds about 77 %; the procedure has 10"
+NEAR_END = "the near end of a target that is not quite square is closer than its standoff"
 UNKNOWN_CHANGE = 0.12
 """Power that a verification may lose against the test that knows the change: it looks for a dozen changes."""
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One figure of the proof with its bounds."""
-
-    trial: str
-    quantity: str
-    value: float
-    bounds: tuple[float, float]
-    runs: int
-
-    @property
-    def is_missed(self) -> bool:
-        """Whether the figure lies outside its bounds by more than two standard deviations of its runs."""
-        low, high = self.bounds
-        return not low - self.margin <= self.value <= high + self.margin
-
-    @property
-    def margin(self) -> float:
-        """Two standard deviations of a share, or of a mean z, of the runs."""
-        share = min(max(self.value, 0.02), 0.98) if 0 <= self.value <= 1 else 0.5
-        sd = (share * (1 - share)) ** 0.5 if self.bounds[0] >= 0 else 1.0
-        return float(2 * sd / self.runs**0.5)
-
-    def line(self) -> str:
-        """A line of the table."""
-        low, high = self.bounds
-        missed = "  MISSED" if self.is_missed else ""
-        figure = f"{self.trial:<14}{self.quantity:<58}{self.value:>8.3f}"
-        return f"{figure}  {low:g} to {high:g} ({self.runs}){missed}"
 
 
 Proof = Callable[[int], Iterator[Figure]]
@@ -96,34 +74,60 @@ def bench(seed: int, change: Mapping[str, float] | None = None, same_bench: bool
 
 
 def accuracy(runs: int) -> Iterator[Figure]:
-    """Bias, verdict and coverage of the accuracy trial."""
+    """Bias, verdict, coverage and alarms of the accuracy trial."""
     found = [{one.name: one for one in accuracy_run(bench(seed), STANDOFFS_MM)} for seed in range(runs)]
     for name in (CLOSEST, MEAN, "L1", "L4"):
-        z = np.array([run[name].bias.z.mean() for run in found])
-        even = (-0.3, 0.1) if name == CLOSEST else (-0.1, 0.1)
-        yield Figure("accuracy", f"mean z of the {name} range over standoffs", float(z.mean()), even, runs)
-        inside = np.mean([run[name].coverage.value for run in found])
-        yield Figure("accuracy", f"coverage of the {name} range", float(inside), COVERAGE, runs)
+        z = [float(run[name].bias.z.mean()) for run in found]
+        known = KnownMiss(NEAR_END, (-0.5, 0.1)) if name == CLOSEST else None
+        yield _mean_z("accuracy", f"mean z of the {name} range over standoffs", z, known)
+        inside = _mean(run[name].coverage.value for run in found)
+        yield Figure("accuracy", f"coverage of the {name} range", inside, COVERAGE, runs)
     decided = [_decided(list(run.values())) for run in found]
-    yield Figure("accuracy", "good sensors called biased", _mean(one[0] for one in decided), (0, 0.05), runs)
-    yield Figure(
-        "accuracy", "good sensors failed by MPE = U", _mean(one[1] for one in decided), (0, 0.05), runs
-    )
     raised = [_decided([_raised(run[MEAN])]) for run in found]
-    yield Figure("accuracy", "bias of 3 U called biased", _mean(one[0] for one in raised), (0.95, 1), runs)
-    yield Figure(
-        "accuracy", "bias of 3 U failed by MPE = U", _mean(one[1] for one in raised), (0.95, 1), runs
-    )
-    alarms = [_alarm(run[MEAN]) for run in found]
-    yield Figure("accuracy", "alarm of a complete budget", _mean(alarms), (0, 0.05), runs)
-    noise = thesis_ranger().calibration.laser_ranger.noise.spot_sd_px
+    for text, shares, bounds in (("good sensors", decided, (0, 0.05)), ("bias of 3 U", raised, (0.95, 1))):
+        for n, verdict in enumerate(("called biased", "failed by MPE = U")):
+            share = _mean(one[n] for one in shares)
+            yield Figure("accuracy", f"{text} {verdict}", share, bounds, runs)
+    share = _mean(_alarm(run.values()) for run in found)
+    yield Figure("accuracy", "any alarm of a complete budget", share, (0, 0.05), runs)
+    yield from _unknown_sources(runs)
+
+
+def _unknown_sources(runs: int) -> Iterator[Figure]:
+    """Power of the accuracy trial's budget."""
+    noise_px = thesis_ranger().calibration.laser_ranger.noise.spot_sd_px
     noisy = [
-        {one.name: one for one in accuracy_run(bench(seed).with_unknown(noise_px=noise), STANDOFFS_MM)}[MEAN]
+        _alarm(accuracy_run(bench(seed).with_unknown(noise_px=noise_px), STANDOFFS_MM))
         for seed in range(runs)
     ]
+    yield Figure("accuracy", "alarm with noise as large as the noise left out", _mean(noisy), (0.8, 1), runs)
+    misplaced = [_alarm(_misplaced(accuracy_run(bench(seed), STANDOFFS_MM), seed)) for seed in range(runs)]
+    best = float(chi2.sf(chi2.isf(0.05, len(STANDOFFS_MM)) / 2, len(STANDOFFS_MM)))
+    reason = f"a test at 5 % of {len(STANDOFFS_MM)} independent errors finds {best:.0%}"
     yield Figure(
-        "accuracy", "alarm with noise of equal size left out", _mean(map(_alarm, noisy)), (0.8, 1), runs
+        "accuracy",
+        "alarm with placement error as large as all sources left out",
+        _mean(misplaced),
+        (0.8, 1),
+        runs,
+        known=KnownMiss(reason, (best - 0.2, 1)),
     )
+
+
+def _misplaced(ranges: Sequence[Agreement], seed: int) -> list[Agreement]:
+    """The same errors with a further one at each placement, as large as the mean range's uncertainty."""
+    (mean,) = [one for one in ranges if one.name == MEAN]
+    further = np.random.default_rng([7, seed]).normal(0.0, mean.u_mm).tolist()
+    return [
+        replace(
+            one,
+            placements=tuple(
+                replace(placed, errors_mm=placed.errors_mm + error_mm)
+                for placed, error_mm in zip(one.placements, further, strict=True)
+            ),
+        )
+        for one in ranges
+    ]
 
 
 def precision(runs: int) -> Iterator[Figure]:
@@ -149,9 +153,15 @@ def budget(runs: int) -> Iterator[Figure]:
                 alarms.append(bool(rows[-1]["alarm"]))
                 inside += [row["coverage"] for row in rows[:-1]]
             text = "with as much left out" if unknown else "of a complete budget"
-            bounds = (0.8, 1.0) if unknown and placements == 10 else (0.5, 1.0) if unknown else (0.0, 0.05)
+            known = KnownMiss(FEW_PLACEMENTS, (0.65, 1.0)) if placements == 8 else None
+            bounds = (0.8, 1.0) if unknown else (0.0, 0.05)
             yield Figure(
-                "repeatability", f"alarm {text}, {placements} placements", _mean(alarms), bounds, runs
+                "repeatability",
+                f"alarm {text}, {placements} placements",
+                _mean(alarms),
+                bounds,
+                runs,
+                known=known if unknown else None,
             )
             if not unknown:
                 share = float(np.mean(np.array(inside, np.float64)))
@@ -171,7 +181,7 @@ def gauge(runs: int) -> Iterator[Figure]:
         inside["EV"] += study.equipment.low <= 0.4 <= study.equipment.high
         inside["GRR"] += study.gauge.low <= hypot(0.2, 0.4) <= study.gauge.high
     for name, count in inside.items():
-        yield Figure("gauge R&R", f"95 % interval of {name}", count / trials, (0.93, 0.99), trials)
+        yield Figure("gauge R&R", f"95 % interval of {name}", count / trials, COVERAGE, trials)
 
 
 def incline(runs: int) -> Iterator[Figure]:
@@ -180,7 +190,7 @@ def incline(runs: int) -> Iterator[Figure]:
         spec = InclineSpec(kind="incline", angle_deg=angle_deg)
         for range_mm in (200.0, 500.0):
             z_angle, z_range = [], []
-            for seed in range(runs):
+            for seed in range(MANY * runs):
                 row = incline_row(spec, range_mm, _closest(bench(seed), spec, range_mm))
                 z_angle.append(_z(row.angle.mean, row.angle.expanded))
                 z_range.append(_z(row.range.mean, row.range.expanded))
@@ -194,7 +204,7 @@ def cylinder(runs: int) -> Iterator[Figure]:
     spec = CylinderSpec(kind="cylinder", diameter_mm=178.0)
     for range_mm in (200.0, 500.0):
         z_radius, z_range = [], []
-        for seed in range(runs):
+        for seed in range(MANY * runs):
             readings = _closest(bench(seed), spec, range_mm)
             radius, closest = radius_statistics(spec, readings), cylinder_statistics(readings)
             z_radius.append(_z(radius.mean, radius.expanded))
@@ -208,14 +218,16 @@ def missing_spots(runs: int) -> Iterator[Figure]:
     spec = FlatTargetSpec()
     for number in (0, 1, 3):
         inside, z = [], []
-        for seed in range(runs):
-            ids = missing_sets(thesis_ranger().sensor.ids, Condition(number), runs)[seed]
+        sets = missing_sets(thesis_ranger().sensor.ids, Condition(number), MANY * runs)
+        for seed, ids in enumerate(sets):
             readings = _closest(bench(seed), spec, 500.0, without=ids)
             inside += [not one.is_outside for one in readings[:1]]
             found = range_statistics(readings)
             z.append(_z(found.mean, found.expanded))
-        yield Figure("missing spots", f"coverage, {number} off", _mean(inside), (0.92, 0.99), runs)
-        yield Figure("missing spots", f"mean z, {number} off", float(np.nanmean(z)), (-0.4, 0.1), runs)
+        known = KnownMiss("the uncertainty by the near end is overstated", (0.93, 1.0))
+        share = _mean(inside)
+        yield Figure("missing spots", f"coverage, {number} off", share, COVERAGE, len(inside), known=known)
+        yield _mean_z("missing spots", f"mean z, {number} off", z, KnownMiss(NEAR_END, (-0.4, 0.1)))
 
 
 def verify(runs: int) -> Iterator[Figure]:
@@ -236,13 +248,17 @@ def verify(runs: int) -> Iterator[Figure]:
         for text, (change, name) in CHANGES.items():
             found = [_verified(bench(seed, change, same), same, change) for seed in range(runs)]
             best = _mean(one[2] for one in found)
-            yield Figure("verify", f"best test: {text}, {where}", best, (0, 1), runs)
-            least = 0.95 if best >= 0.95 else best - UNKNOWN_CHANGE
-            yield Figure(
-                "verify", f"refused: {text}, {where}", _mean(one[0] for one in found), (least, 1), runs
-            )
+            yield Figure("verify", f"best test: {text}, {where}", best, None, runs)
+            known = None
+            if best < 0.95:
+                known = KnownMiss(f"no test at 5 % finds more than {best:.0%}", (best - UNKNOWN_CHANGE, 1))
+            refused = _mean(one[0] for one in found)
+            yield Figure("verify", f"refused: {text}, {where}", refused, (0.95, 1), runs, known=known)
             right = _mean(name in named_as for one, named_as, _ in found if one)
-            yield Figure("verify", f"named where refused: {text}, {where}", right, (0.7, 1), runs)
+            known = None if best >= 0.95 else KnownMiss("another ruler has nearly the same errors", (0.6, 1))
+            yield Figure(
+                "verify", f"named where refused: {text}, {where}", right, (0.7, 1), runs, known=known
+            )
 
 
 def rendered(_: int) -> Iterator[Figure]:
@@ -252,7 +268,7 @@ def rendered(_: int) -> Iterator[Figure]:
     for one in changed:
         yield Figure("verify", f"refused: {one.change}, rendered", one.refused, (1, 1), 1)
         named = float(CHANGES[one.change][1] in one.verdict)
-        yield Figure("verify", f"named: {one.change}, rendered", named, (0, 1), 1)
+        yield Figure("verify", f"named: {one.change}, rendered", named, (1, 1), 1)
 
 
 def target_check(runs: int) -> Iterator[Figure]:
@@ -288,22 +304,25 @@ PROOFS: tuple[Proof, ...] = (
 
 
 def main() -> int:
-    """Run, print, write; 1 if a figure is missed."""
+    """Run, print, write; 1 if a figure is missed without a known reason."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=200, help="simulated runs of each trial")
     runs = parser.parse_args().runs
     today = dt.datetime.now(tz=dt.UTC).date().isoformat()
-    lines, missed = [f"Trials, {today}: `python -m tests.proofs.trials --runs {runs}`"], 0
+    lines = [f"Trials, {today}: `python -m tests.proofs.trials --runs {runs}`"]
+    missed, unjustified = 0, 0
     for proof in PROOFS:
         for figure in proof(runs):
             lines.append(figure.line())
             missed += figure.is_missed
+            unjustified += figure.is_unjustified
             print(lines[-1], flush=True)
-    lines.append(f"{missed} figures missed" if missed else "Every figure is reached.")
+    summary = f"{missed} figures missed, {missed - unjustified} of them with a known reason"
+    lines.append(summary if missed else "Every figure is reached.")
     print(lines[-1])
     RESULTS.mkdir(parents=True, exist_ok=True)
     (RESULTS / f"{today}-trials.txt").write_text("\n".join(lines) + "\n")
-    return 1 if missed else 0
+    return 1 if unjustified else 0
 
 
 def _mean(values: Iterable[float]) -> float:
@@ -315,7 +334,7 @@ def _decided(ranges: Sequence[Agreement]) -> tuple[bool, bool]:
     (mean,) = [one for one in ranges if one.name == MEAN]
     bound = max(u.expanded / mm for u, mm in zip(mean.uncertainty, mean.true_mm.tolist(), strict=True))
     limits = AccuracyLimits.model_validate({"mean_relative_error": {"in": [-bound, bound]}})
-    verdict = verdict_of(ranges, limits)
+    verdict = verdict_of(ranges, limits, Completeness(len(mean.placements)))
     return verdict.is_biased, verdict.decision == "fail"
 
 
@@ -333,10 +352,9 @@ def _raised(one: Agreement) -> Agreement:
     return Agreement(one.name, one.bench, raised, one.missing)
 
 
-def _alarm(one: Agreement) -> bool:
-    """Alarm of the repeats or of all standoffs."""
-    assert one.repeats is not None
-    return one.repeats.alarm or one.bias.probability < 0.025
+def _alarm(ranges: Iterable[Agreement]) -> bool:
+    """Any alarm of the budget."""
+    return any(one.alarm for one in joint_tests(list(ranges)))
 
 
 def _precision_frame(one: SimulatedBench, placements: int, unknown: float) -> pd.DataFrame:
@@ -369,12 +387,18 @@ def _z(error: float | None, expanded: float | None) -> float:
     return np.nan if error is None or not expanded else 2 * error / expanded
 
 
+def _mean_z(trial: str, quantity: str, z: Sequence[float], known: KnownMiss | None = None) -> Figure:
+    """Figure of a mean z, which must be even."""
+    found = np.array(z)[np.isfinite(z)]
+    sd = float(found.std(ddof=1))
+    return Figure(trial, quantity, float(found.mean()), EVEN, len(found), sd, known)
+
+
 def _scores(trial: str, quantity: str, z: Sequence[float]) -> Iterator[Figure]:
     found = np.array(z)[np.isfinite(z)]
-    yield Figure(
-        trial, f"coverage of the {quantity}", float((np.abs(found) <= 1.96).mean()), COVERAGE, len(found)
-    )
-    yield Figure(trial, f"mean z of the {quantity}", float(found.mean()), (-0.15, 0.15), len(found))
+    share = float((np.abs(found) <= 1.96).mean())
+    yield Figure(trial, f"coverage of the {quantity}", share, COVERAGE, len(found))
+    yield _mean_z(trial, f"mean z of the {quantity}", z)
 
 
 def _verified(

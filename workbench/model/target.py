@@ -68,6 +68,11 @@ TargetShape = Annotated[
 ]
 
 
+def is_measured(standoff_mm: float, standoff_sd_mm: float | None) -> bool:
+    """Whether a standoff is measured: one that need not be has an uncertainty of its own size."""
+    return standoff_sd_mm is None or standoff_sd_mm < standoff_mm
+
+
 class Placement(FileModel):
     """One positioning of the target. All captures with the same `key` share its placement error."""
 
@@ -81,3 +86,8 @@ class Placement(FileModel):
     """Number of times that the session has been at this placement; repairs count."""
     blocked: tuple[str, ...] = ()
     """Lasers whose beams are blocked before they meet the target."""
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether the standoff was to be measured."""
+        return is_measured(self.standoff_mm, self.standoff_sd_mm)

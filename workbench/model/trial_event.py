@@ -7,6 +7,7 @@ from typing import Literal
 
 from workbench.model.chart import Chart
 from workbench.model.table import Table
+from workbench.model.target import is_measured
 from workbench.model.yamlfile import FileModel
 
 NOT_VALID = "NO"
@@ -107,6 +108,11 @@ class ReadingTaken(FileModel):
         if self.true is not None:
             return self.true.range_mm
         return self.standoff_mm if self.flat_true_mm is None else self.flat_true_mm
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether the target's standoff was measured; without that the true range is not known."""
+        return is_measured(self.standoff_mm, self.reference_sd_mm)
 
     @property
     def error_mm(self) -> float | None:

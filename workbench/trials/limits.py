@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from workbench.model.errors import LimitFailedError
 from workbench.model.event import LimitChecked, ReadingTaken
 from workbench.model.limit import Limit, Verdict
 from workbench.model.prompt import Prompt
 from workbench.model.table import Cell
+from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.limits import CONTINUE, stated_limits
@@ -29,10 +30,12 @@ class Result:
     of: str
     """Subject of the result, for example `500 mm`."""
     value: float | None
-    """None: not measured, which fails every limit."""
+    """None: not measured, which fails every limit unless the operator skipped the placement."""
     low: float | None = None
     """Lower end of the 95 % interval; None: the value has no uncertainty."""
     high: float | None = None
+    is_skipped: bool = field(default=False, kw_only=True)
+    """Whether the operator skipped the placement: neither conformity nor non-conformity."""
 
     @classmethod
     def of_error(cls, quantity: str, of: str, error: float | None, expanded: float | None) -> Result:
@@ -43,6 +46,8 @@ class Result:
 
     def decision(self, limit: Limit) -> Decision:
         """Decision against a limit with guard bands."""
+        if self.is_skipped:
+            return "neither"
         if self.value is None:
             return "fail"
         low = self.value if self.low is None else self.low
@@ -67,6 +72,15 @@ def decision_on(results: Sequence[Result], limits: FileModel) -> Decision | None
     return "fail" if "fail" in found else "neither" if "neither" in found else "pass"
 
 
+def skipped_results(skipped: Sequence[Placement], limits: FileModel) -> list[Result]:
+    """Results of skipped placements, one for each limit: without them no limit is decided to be kept."""
+    return [
+        Result(name, f"{placement.standoff_mm:.6g} mm, skipped", None, is_skipped=True)
+        for name, _ in stated_limits(limits)
+        for placement in skipped
+    ]
+
+
 def check_results(context: Context, step: str, results: Sequence[Result], limits: FileModel) -> str:
     """Compare the results of a trial with the limits of the same names; returns a summary.
 
@@ -82,7 +96,9 @@ def check_results(context: Context, step: str, results: Sequence[Result], limits
     """
     remarks = []
     for name, limit in stated_limits(limits):
-        own = [one for one in results if one.quantity == name] or [Result(name, "trial", None)]
+        own = [one for one in results if one.quantity == name]
+        if all(one.is_skipped for one in own):
+            own.append(Result(name, "trial", None))
         _journal(context, step, own, limit)
         if failed := [one for one in own if one.verdict(limit) == "fail"]:
             text = f"{name}: expected {limit.describe()}, got {_values(failed)}"

@@ -12,12 +12,13 @@ from workbench.model.table import Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.placements import settle, visit_placements
+from workbench.trials.limits import Result, check_results, skipped_results
 from workbench.trials.lost_spots import lost_spots, lost_table
 from workbench.trials.readings import session_ranger
 from workbench.trials.results import finish_trial
 from workbench.trials.spot_map import SpotMap
 from workbench.trials.target_check import other_target
-from workbench.trials.trial_step import outside_prompt
+from workbench.trials.trial_step import ResultLimits, outside_prompt
 
 T = TypeVar("T")
 MOST_OUTSIDE = 2
@@ -38,6 +39,8 @@ class TrialRun:
         self._map = SpotMap.of_calibration(self.ranger.calibration, context.rig)
         self._remarks: dict[str, str] = {}
         self._placements: dict[str, Placement] = {}
+        self.skipped: list[Placement] = []
+        """Planned placements that the operator skipped."""
 
     def visit(self, placements: Sequence[Placement], work: Callable[[Placement], T]) -> list[T]:
         """Run the work at each placement, then check its readings; see `visit_placements`.
@@ -49,12 +52,28 @@ class TrialRun:
             AnswerNeededError, StoppedError, LaserOffNotConfirmedError: see `Context.ask`.
         """
 
-        def checked(placed: Placement) -> T:
+        def checked(placed: Placement) -> tuple[str, T]:
             result = work(placed)
             self._check(placed)
-            return result
+            return placed.key, result
 
-        return visit_placements(self.context, placements, checked)
+        visited = dict(visit_placements(self.context, placements, checked))
+        self.skipped += [one for one in placements if one.key not in visited]
+        return list(visited.values())
+
+    def expected_ids(self, placement: Placement) -> list[str]:
+        """Lasers whose spots the map of spots expects at a placement."""
+        lost = self._map.lost(placement)
+        return [one for one in self._map.ids if one not in lost]
+
+    def check(self, results: Sequence[Result], limits: ResultLimits) -> None:
+        """Compare the results with the limits; a skipped placement leaves every limit undecided.
+
+        Raises:
+            WorkbenchError: see `check_results`.
+        """
+        skipped = skipped_results(self.skipped, limits)
+        check_results(self.context, self.name, [*results, *skipped], limits)
 
     def finish(self, tables: Sequence[Table], charts: Sequence[Chart] = ()) -> None:
         """Write and journal the results, with lost spots and remarks; see `finish_trial`.
@@ -73,7 +92,7 @@ class TrialRun:
 
     def _check(self, placed: Placement) -> None:
         self._placements[placed.key] = placed
-        if placed.standoff_sd_mm is not None and placed.standoff_sd_mm >= placed.standoff_mm:
+        if not placed.is_measured:
             return  # neither distance nor angle of the target were asked for
         readings = self._readings(placed.key)
         complete = [one for one in readings if not one.left_off and not one.blocked]

@@ -10,8 +10,9 @@ from tests.support.running import Scripted, running
 from tests.support.trial_readings import reading_taken
 from workbench.model.errors import LimitFailedError
 from workbench.model.event import LimitChecked
+from workbench.model.target import Placement
 from workbench.trials.accuracy.limits import AccuracyLimits
-from workbench.trials.limits import Result, check_results, decision_on, require_readings
+from workbench.trials.limits import Result, check_results, decision_on, require_readings, skipped_results
 
 
 def limits(**stated: object) -> AccuracyLimits:
@@ -62,6 +63,20 @@ def test_a_quantity_that_was_not_measured_fails_its_limit(tmp_path: Path) -> Non
     stated = limits(laser_error_mm={"in": [-1, 1]})
     with running(tmp_path) as session, pytest.raises(LimitFailedError, match="laser_error_mm"):
         check_results(session.context, "p.1", [error(0.1)], stated)
+
+
+def test_a_skipped_placement_forbids_pass_but_not_fail(tmp_path: Path) -> None:
+    stated = limits(mean_error_mm={"in": [-1, 1]})
+    skipped = skipped_results([Placement(key="p.1/400mm", standoff_mm=400.0)], stated)
+    assert [(one.quantity, one.value) for one in skipped] == [("mean_error_mm", None)]
+    assert decision_on([error(0.1), *skipped], stated) == "neither"
+    assert decision_on([error(2.0), *skipped], stated) == "fail"
+    with running(tmp_path) as session:
+        check_results(session.context, "p.1", [error(0.1), *skipped], stated)
+        found = [one.verdict for one in session.events if isinstance(one, LimitChecked)]
+        with pytest.raises(LimitFailedError):
+            check_results(session.context, "p.1", skipped, stated)
+    assert found == ["pass", "marginal"]
 
 
 def test_a_retry_of_a_result_is_refused() -> None:

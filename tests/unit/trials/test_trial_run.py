@@ -12,11 +12,13 @@ import pytest
 from tests.support.four_lasers import calibrated, finished
 from tests.support.running import Running, Scripted
 from tests.support.steps import parse_step
-from workbench.model.event import ReadingTaken, SetAside, TrialProgress
+from workbench.model.errors import LimitFailedError
+from workbench.model.event import LimitChecked, ReadingTaken, SetAside, TrialProgress
 from workbench.model.prompt import Action, Answer, Prompt
 from workbench.model.target import FlatTarget, Placement
 
 TEXT = "step: accuracy_trial, standoffs_mm: [300, 400], readings: 2"
+PRECISION = "step: repeatability_trial, standoffs_mm: [300, 400], placements: 3, repeats: 2"
 
 
 def misplace(session: Running, key: str, times: int, **change: object) -> None:
@@ -83,6 +85,39 @@ def test_readings_outside_are_kept_or_taken_again_with_a_reason(tmp_path: Path, 
         return
     assert len(aside) == 1
     assert "the card had slipped" in str(tables["p.1-remarks"].rows)
+
+
+@pytest.mark.parametrize("key", ["p.1/400mm", "p.1/400mm/outside"])
+@pytest.mark.parametrize("step", [TEXT, PRECISION])
+def test_a_skipped_placement_leaves_the_limits_undecided(tmp_path: Path, key: str, step: str) -> None:
+    """Skipped before its readings, or after them because the target stood 30 mm away."""
+    key = key if step == TEXT else key.replace("p.1/", "p.1/01-")
+    operator = Scripted({key: [Answer(action="skip", reason="no room")]})
+    quantity = "mean_error_mm" if step == TEXT else "repeatability_sd_mm"
+    with calibrated(tmp_path, operator) as session:
+        misplace(session, key.removesuffix("/outside"), 1, standoff_mm=430.0)
+        parse_step(f"{step}, limits: {{{quantity}: {{in: [-90, 90]}}}}").run(session.context, "p.1")
+        found = [one.verdict for one in session.events if isinstance(one, LimitChecked)]
+        titles = [table.title for table in finished(session).tables]
+    assert set(found) == {"pass", "marginal"}
+    assert step == PRECISION or "1 of 2" in titles[0]
+
+
+def test_a_spot_that_was_expected_and_lost_fails_its_limit(tmp_path: Path) -> None:
+    """The map of spots expects all four lasers; the beam of one is blocked at each standoff."""
+    with calibrated(tmp_path) as session:
+        place = session.context.bench.target.place
+        blocked = {"blocked": ("L3",)}
+        patch.object(
+            session.context.bench.target, "place", lambda asked: place(asked.model_copy(update=blocked))
+        ).start()
+        with pytest.raises(LimitFailedError):
+            parse_step(f"{TEXT}, limits: {{laser_error_mm: {{in: [-8, 8]}}}}").run(session.context, "p.1")
+        lost = [one for one in session.events if isinstance(one, LimitChecked) and one.value is None]
+        verdict = finished(session).tables[0]
+    assert [one.verdict for one in lost] == ["fail", "fail"]
+    (row,) = [row for row in verdict.records() if row["range"] == "L3"]
+    assert (row["readings"], row["missing"], row["decision"]) == (0, 4, "fail")
 
 
 def place_again(session: Running, key: str) -> None:

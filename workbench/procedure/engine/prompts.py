@@ -151,7 +151,7 @@ def _how(placement: Placement) -> str:
     """Instructions for a target that is not flat and square, with its reference uncertainties."""
     target, standoff_sd = placement.target, placement.standoff_sd_mm
     ruler = "" if standoff_sd is None else f" Standard uncertainty of the standoff: {standoff_sd:g} mm."
-    if standoff_sd is not None and standoff_sd >= placement.standoff_mm:
+    if not placement.is_measured:
         ruler = " The standoff need not be measured."
     if isinstance(target, CylinderTarget):
         aside = f"at x = {target.shift_mm:g} mm" if target.shift_mm else "on the optical axis"

@@ -22,8 +22,6 @@ SAME_DISTANCE = 0.05
 """Largest relative difference of two standoffs of one distance."""
 LEAST_SHARE = 0.8
 """Least number of sessions with a monitored distance, as a share of those with the most frequent one."""
-LARGEST_REFERENCE_SD = 0.1
-"""Largest relative reference uncertainty of a standoff that counts as known."""
 
 
 @dataclass(frozen=True)
@@ -131,13 +129,10 @@ def _verification(session_dir: Path, indexed: IndexedSession) -> Verification | 
 
 
 def _relative_error(reading: ev.ReadingTaken) -> float | None:
-    """Error of a range over the true range; None without a range, or where the true range is not known.
-
-    A target that need not be measured has a reference uncertainty of the size of its range.
-    """
+    """Error of a range over the true range; None without a range, or where the true range is not known."""
     if reading.error_mm is None or reading.true is not None or reading.reference_sd_mm is None:
         return None
-    if reading.reference_sd_mm > LARGEST_REFERENCE_SD * reading.standoff_mm:
+    if not reading.is_measured:
         return None
     return reading.error_mm / reading.standoff_mm
 

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 
 from workbench.model.table import Cell, Column, Table
 from workbench.trials.accuracy.agreement import Agreement, budget_of
+from workbench.trials.accuracy.completeness import Completeness
+from workbench.trials.accuracy.joint_tests import JointTest, joint_tests
 from workbench.trials.accuracy.limits import AccuracyLimits
-from workbench.trials.accuracy.ranges import CLOSEST
 from workbench.trials.accuracy.statistics import AccuracyRow
-from workbench.trials.accuracy.verdict import Verdict, error_results
-from workbench.trials.limits import decision_on
+from workbench.trials.accuracy.verdict import Verdict, range_decision
 from workbench.trials.reading_frame import table_of
-from workbench.trials.statistics.error_budget import ALARM_PROBABILITY
 
 COLUMNS = (
     Column(key="standoff_mm", name="true", unit="mm"),
@@ -44,6 +43,7 @@ BIAS = (
     Column(key="standoff_mm", name="true", unit="mm", format=".1f"),
     Column(key="readings", name="n"),
     Column(key="error_mm", name="mean error", unit="mm", format="+.3g"),
+    Column(key="u_mm", name="u", unit="mm", format="sd"),
     Column(key="expanded_mm", name="U", unit="mm", format="sd"),
     Column(key="k", name="k", format=".2f"),
     Column(key="z", name="z", format="+.2f"),
@@ -89,13 +89,19 @@ def accuracy_table(name: str, rows: Sequence[AccuracyRow]) -> Table:
     )
 
 
-def verdict_table(name: str, ranges: Sequence[Agreement], verdict: Verdict, limits: AccuracyLimits) -> Table:
-    """Table of the worst error of each range, with the verdict in its title."""
+def verdict_table(
+    name: str, ranges: Sequence[Agreement], verdict: Verdict, limits: AccuracyLimits, done: Completeness
+) -> Table:
+    """Table of the worst error of each range, with the verdict in its title.
+
+    An expected range that no reading has is a row without an error.
+    """
     caption = (
         "worst: largest error / U; U: 95 %; p: all standoffs together; inside: share of readings in their"
         " 95 % interval, low: lower end of its own (Clopper-Pearson, by placement)"
     )
-    rows = [_verdict_row(one, limits) for one in ranges]
+    rows = [_verdict_row(one, limits, done) for one in ranges]
+    rows += [_lost_row(one, limits, done) for one in _never_measured(ranges, done)]
     columns = VERDICT if verdict.decision is None else (*VERDICT, DECISION)
     return table_of(f"{name}-verdict", f"Accuracy: {verdict.text}", columns, rows, caption)
 
@@ -103,7 +109,12 @@ def verdict_table(name: str, ranges: Sequence[Agreement], verdict: Verdict, limi
 def detail_tables(name: str, ranges: Sequence[Agreement]) -> list[Table]:
     """Bias at each standoff, error budget, and linearity of each range."""
     bias = [row for one in ranges for row in _bias_rows(one)]
-    budget = [row for one in ranges for row in _budget_rows(one)]
+    tests = joint_tests(ranges)
+    budget = [
+        row
+        for one in ranges
+        for row in (*_budget_rows(one), *(_test_row(test) for test in tests if test.range == one.name))
+    ]
     linear = [row for one in ranges for row in _linearity_row(one)]
     tables = [
         table_of(f"{name}-bias", "Bias at each standoff", BIAS, bias, "z: mean error / u; E_n: k = 2"),
@@ -112,8 +123,8 @@ def detail_tables(name: str, ranges: Sequence[Agreement]) -> list[Table]:
             "Error budget of the mean errors",
             BUDGET,
             budget,
-            "unexplained: error^2 - explained u^2, 95 % interval; alarm: p < 2.5 %; `repeats`: their scatter;"
-            " `all standoffs`: with the full covariance",
+            "unexplained: error^2 - explained u^2, 95 % interval; `repeats`: their scatter; `all standoffs`:"
+            " with the full covariance; alarm: p < 5 % / number of these tests",
         ),
         table_of(
             f"{name}-linearity",
@@ -126,7 +137,7 @@ def detail_tables(name: str, ranges: Sequence[Agreement]) -> list[Table]:
     return [table.model_copy(update={"is_detail": True}) for table in tables if table.rows]
 
 
-def _verdict_row(one: Agreement, limits: AccuracyLimits) -> dict[str, Cell]:
+def _verdict_row(one: Agreement, limits: AccuracyLimits, done: Completeness) -> dict[str, Cell]:
     worst, coverage = one.worst, one.coverage
     return {
         "range": one.name,
@@ -139,7 +150,22 @@ def _verdict_row(one: Agreement, limits: AccuracyLimits) -> dict[str, Cell]:
         "p": one.bias.probability,
         "coverage": coverage.value,
         "coverage_low": coverage.low,
-        "decision": decision_on(error_results(one), limits) or "-",
+        "decision": range_decision(one.name, one, limits, done) or "-",
+    }
+
+
+def _never_measured(ranges: Sequence[Agreement], done: Completeness) -> list[str]:
+    """Names of the expected ranges that no reading of the trial has."""
+    measured = {one.name for one in ranges}
+    return [name for name in dict.fromkeys(one.name for one in done.lost) if name not in measured]
+
+
+def _lost_row(name: str, limits: AccuracyLimits, done: Completeness) -> dict[str, Cell]:
+    return {
+        "range": name,
+        "readings": 0,
+        "missing": sum(one.readings for one in done.lost_of(name)),
+        "decision": range_decision(name, None, limits, done) or "-",
     }
 
 
@@ -150,6 +176,7 @@ def _bias_rows(one: Agreement) -> list[dict[str, Cell]]:
             "standoff_mm": float(one.true_mm[n]),
             "readings": int(one.readings[n]),
             "error_mm": float(one.errors_mm[n]),
+            "u_mm": one.uncertainty[n].u,
             "expanded_mm": one.uncertainty[n].expanded,
             "k": one.uncertainty[n].k,
             "z": float(one.bias.z[n]),
@@ -174,24 +201,19 @@ def _budget_rows(one: Agreement) -> list[dict[str, Cell]]:
                 "unexplained_mm2": unexplained,
                 "unexplained_low_mm2": low,
                 "unexplained_high_mm2": high,
-                "alarm": budget.alarm,
                 "note": "",
             }
         )
-    total = one.bias
-    rows.append(_total_row(one, total.chi2 / total.degrees_of_freedom, total.probability, "all standoffs"))
-    if one.repeats is not None and one.name != CLOSEST:  # its scatter also has that of the selected shape
-        rows.append(_total_row(one, one.repeats.ratio, one.repeats.probability, "repeats"))
     return rows
 
 
-def _total_row(one: Agreement, ratio: float, p: float, note: str) -> dict[str, Cell]:
+def _test_row(one: JointTest) -> dict[str, Cell]:
     return {
-        "range": one.name,
-        "variance_ratio": ratio,
-        "p": p,
-        "alarm": p < ALARM_PROBABILITY,
-        "note": note,
+        "range": one.range,
+        "variance_ratio": one.ratio,
+        "p": one.probability,
+        "alarm": one.alarm,
+        "note": one.note,
     }
 
 

@@ -12,12 +12,13 @@ from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.accuracy.agreement import Agreement, Bench, PlacementErrors
+from workbench.trials.accuracy.completeness import Completeness, lost_ranges
 from workbench.trials.accuracy.limits import AccuracyLimits
 from workbench.trials.accuracy.ranges import CLOSEST, MEAN, RangeError, range_errors
 from workbench.trials.accuracy.statistics import accuracy_row
 from workbench.trials.accuracy.tables import accuracy_table, detail_tables, verdict_table
 from workbench.trials.accuracy.verdict import results_of, verdict_of
-from workbench.trials.limits import check_results, require_readings
+from workbench.trials.limits import require_readings
 from workbench.trials.readings import take_full_reading
 from workbench.trials.reference import Reference
 from workbench.trials.trial_run import TrialRun
@@ -30,6 +31,8 @@ class PlacementReadings:
     taken: Sequence[ReadingTaken]
     reference: Reference
     errors: Sequence[Mapping[str, RangeError]]
+    expected: Sequence[str] = ()
+    """Names of the ranges that the map of spots expects here."""
 
 
 def run_trial(
@@ -49,7 +52,8 @@ def run_trial(
         reference = Reference.of(context.rig.bench, placement)
         both = [take_full_reading(context, ranger, name, placement, number) for number in range(count)]
         errors = [range_errors(ranger.sensor, reading, taken, reference) for taken, reading in both]
-        return PlacementReadings([taken for taken, _ in both], reference, errors)
+        expected = (CLOSEST, MEAN, *run.expected_ids(placement))
+        return PlacementReadings([taken for taken, _ in both], reference, errors, expected)
 
     visited = run.visit(placements, work)
     rows = [accuracy_row(one.taken) for one in visited]
@@ -58,15 +62,16 @@ def run_trial(
     if not ranges:
         run.finish([accuracy_table(name, rows)], [chart])
         require_readings(name, [one.taken for one in visited])
-    verdict = verdict_of(ranges, limits)
+    done = completeness(visited, run.skipped)
+    verdict = verdict_of(ranges, limits, done)
     tables = [
-        verdict_table(name, ranges, verdict, limits),
+        verdict_table(name, ranges, verdict, limits, done),
         accuracy_table(name, rows),
         *detail_tables(name, ranges),
     ]
     run.finish(tables, [chart])
     require_readings(name, [one.taken for one in visited])
-    check_results(context, name, results_of(ranges, limits), limits)
+    run.check(results_of(ranges, limits, done), limits)
     return f"{counted(sum(row.readings for row in rows), 'reading')}, table in {name}.csv; {verdict.text}"
 
 
@@ -86,3 +91,13 @@ def agreements(
         if placements:
             found.append(Agreement(name, bench, tuple(placements), missing))
     return found
+
+
+def completeness(visited: Sequence[PlacementReadings], skipped: Sequence[Placement]) -> Completeness:
+    """What the trial was to measure and did not."""
+    lost = [
+        found
+        for one in visited
+        for found in lost_ranges(one.reference.standoff_mm, one.expected, [list(of) for of in one.errors])
+    ]
+    return Completeness(len(visited), tuple(skipped), tuple(lost))

@@ -28,7 +28,7 @@ from workbench.trials.incline.statistics import (
     incline_row,
 )
 from workbench.trials.incline.step import InclineTrialStep
-from workbench.trials.limits import Result, check_results, error_result, range_results, require_readings
+from workbench.trials.limits import Result, error_result, range_results, require_readings
 from workbench.trials.readings import ClosestRange, take_readings
 from workbench.trials.target_check import Points
 from workbench.trials.trial_run import TrialRun
@@ -72,7 +72,7 @@ def run_trial(context: Context, name: str, step: InclineTrialStep) -> str:
     charts = [error_chart(f"{name}-errors", readings), angle_chart(name, taken)]
     run.finish(tables, charts)
     require_readings(name, [of for _, of in taken])
-    check_results(context, name, [one for row, of in taken for one in incline_results(row, of)], step.limits)
+    run.check([one for row, of in taken for one in incline_results(row, of)], step.limits)
     angles = sum(row.angle.n for row in rows)
     count = f"{counted(len(readings), 'reading')}, {angles} with an angle"
     return f"{count}, tables in {name}.csv and {name}-angle.csv"

@@ -20,7 +20,7 @@ from workbench.trials.errors import (
     quantity_chart,
     range_statistics,
 )
-from workbench.trials.limits import Result, check_results, range_results, require_readings
+from workbench.trials.limits import Result, range_results, require_readings
 from workbench.trials.missing_spots.sets import ALL, Condition, block, missing_sets
 from workbench.trials.missing_spots.statistics import MissingSummary, missing_summary
 from workbench.trials.missing_spots.step import MissingSpotsTrialStep
@@ -63,7 +63,7 @@ def run_trial(
     tables = [error_table(name, taken), summary_table(name, summaries), *missing_table(name, readings)]
     run.finish(tables, [missing_chart(name, taken)])
     require_readings(name, by_placement)
-    check_results(context, name, missing_results(taken, summaries), step.limits)
+    run.check(missing_results(taken, summaries), step.limits)
     return f"{counted(len(readings), 'reading')}, tables in {name}.csv and {name}-summary.csv"
 
 
@@ -135,7 +135,7 @@ def summary_table(name: str, summaries: Sequence[MissingSummary]) -> Table:
         columns=(Column(key="left_off", name="off"), Column(key="blocked", name="blocked"), *columns),
         rows=rows,
         caption="low, high: 95 % interval of the share in their interval; lost, at most: one-sided 95 % bound"
-        " of the share without a range (Clopper-Pearson, by placement)",
+        " of the share without a range (Clopper-Pearson, by placement; the interval by effective ones)",
     )
 
 

@@ -9,7 +9,7 @@ from workbench.model.table import Table
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.trials.dither import dither
-from workbench.trials.limits import Result, cell_number, check_results, require_readings
+from workbench.trials.limits import Result, cell_number, require_readings
 from workbench.trials.reading_frame import reading_frame, reading_rows
 from workbench.trials.readings import take_reading
 from workbench.trials.repeatability.budget import budget_table
@@ -55,7 +55,7 @@ def run_trial(context: Context, name: str, step: RepeatabilityTrialStep) -> str:
     charts = [error_chart(f"{name}-errors", taken), precision_chart(f"{name}-precision", table)]
     run.finish([table, budget], charts)
     require_readings(name, by_standoff.values())
-    check_results(context, name, precision_results(table), step.limits)
+    run.check(precision_results(table), step.limits)
     return f"{counted(frame['measured_mm'].count(), 'reading')} in {name}.csv, statistics in {name}-table.csv"
 
 

@@ -21,7 +21,7 @@ from workbench.trials.errors import (
     quantity_chart,
     range_statistics,
 )
-from workbench.trials.limits import Result, check_results, error_result, range_results, require_readings
+from workbench.trials.limits import Result, error_result, range_results, require_readings
 from workbench.trials.readings import ClosestRange, take_readings
 from workbench.trials.round.step import RoundTrialStep
 from workbench.trials.targets import CylinderSpec
@@ -55,7 +55,7 @@ def run_trial(context: Context, name: str, step: RoundTrialStep, placements: Seq
     charts = [error_chart(f"{name}-errors", readings), radius_chart(name, target, readings)]
     run.finish(tables, charts)
     require_readings(name, taken)
-    check_results(context, name, [one for of in taken for one in round_results(target, of)], step.limits)
+    run.check([one for of in taken for one in round_results(target, of)], step.limits)
     radii = sum(reading.radius_mm is not None for reading in readings)
     count = f"{counted(len(readings), 'reading')}, {radii} with a radius"
     return f"{count}, tables in {name}.csv and {name}-radius.csv"

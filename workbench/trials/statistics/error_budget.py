@@ -57,11 +57,6 @@ class BudgetTest:
     probability: float
     """Probability of a larger ratio if the sources are complete."""
 
-    @property
-    def alarm(self) -> bool:
-        """Whether the sources do not explain the observed variance, beside a second test: both share 5 %."""
-        return self.probability < ALARM_PROBABILITY
-
 
 def budget_test(budgets: Sequence[ErrorBudget]) -> BudgetTest:
     """Test the budgets of independent standoffs together, for more power than one standoff has.

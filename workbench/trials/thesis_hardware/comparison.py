@@ -7,15 +7,17 @@ largest of its ranges. The thesis's values are stated in its text or read off it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import inf
 from statistics import fmean
 from typing import Literal
 
 from workbench.model.event import ReadingTaken
+from workbench.model.rig import Rig
 from workbench.trials.errors import ErrorStatistics
 from workbench.trials.limits import Result
+from workbench.trials.thesis_hardware.causes import COMMON_TILT, PARABOLA, TILT, Cause
 from workbench.trials.thesis_hardware.quantities import (
     ANGLE,
     CLOSEST_RANGE,
@@ -51,31 +53,28 @@ class Claim:
     """Relative error, or standard deviation in the unit of the quantity; None: the thesis states none."""
     goal: float | None = None
     """Largest relative error that the workbench aims at."""
-    limit: str = ""
-    """Limit of the error besides noise and calibration; empty: none is known."""
+    cause: Cause | None = None
+    """Cause of the error besides noise and calibration; None: none is known."""
 
 
-TILT = "the target's squareness: its near end is closer than the ruler shows"
-PARABOLA = "the printed range is that of a parabola, which four lasers cannot distinguish from a circle"
-COMMON_TILT = "the tilt common to all placements; it cancels in the difference of two angles"
 CLAIMS = (
     Claim("33", "flat", MEAN_RANGE, is_mean, to_mm=200, thesis=0.025, goal=0.005),
     Claim("33", "flat", MEAN_RANGE, is_mean, to_mm=2000, thesis=0.025, goal=0.005),
     Claim("33", "flat", MEAN_RANGE, is_mean, to_mm=4500, thesis=0.035, goal=0.01),
-    Claim("33", "flat", CLOSEST_RANGE, is_without(0), to_mm=2000, thesis=0.025, goal=0.005, limit=TILT),
-    Claim("33", "flat", CLOSEST_RANGE, is_without(0), to_mm=4500, thesis=0.035, goal=0.01, limit=TILT),
+    Claim("33", "flat", CLOSEST_RANGE, is_without(0), to_mm=2000, thesis=0.025, goal=0.005, cause=TILT),
+    Claim("33", "flat", CLOSEST_RANGE, is_without(0), to_mm=4500, thesis=0.035, goal=0.01, cause=TILT),
     Claim("34", "flat", MEAN_RANGE, is_mean, "sd", thesis=40.0),
     Claim("7.2.2", "1 off", CLOSEST_RANGE, is_without(1), thesis=0.06),
     Claim("7.2.2", "3 off", CLOSEST_RANGE, is_without(3), thesis=0.06),
     Claim("35", "30 deg", CLOSEST_RANGE, is_incline(30), thesis=0.06),
     Claim("36", "60 deg", CLOSEST_RANGE, is_incline(60), thesis=0.06),
-    Claim("37", "30 deg", ANGLE, is_incline(30), to_mm=500, thesis=0.25, goal=0.02, limit=COMMON_TILT),
-    Claim("37", "30 deg", ANGLE, is_incline(30), to_mm=1000, thesis=0.25, goal=0.05, limit=COMMON_TILT),
-    Claim("38", "60 deg", ANGLE, is_incline(60), to_mm=500, thesis=0.08, goal=0.02, limit=COMMON_TILT),
-    Claim("38", "60 deg", ANGLE, is_incline(60), to_mm=1000, thesis=0.08, goal=0.05, limit=COMMON_TILT),
+    Claim("37", "30 deg", ANGLE, is_incline(30), to_mm=500, thesis=0.25, goal=0.02, cause=COMMON_TILT),
+    Claim("37", "30 deg", ANGLE, is_incline(30), to_mm=1000, thesis=0.25, goal=0.05, cause=COMMON_TILT),
+    Claim("38", "60 deg", ANGLE, is_incline(60), to_mm=500, thesis=0.08, goal=0.02, cause=COMMON_TILT),
+    Claim("38", "60 deg", ANGLE, is_incline(60), to_mm=1000, thesis=0.08, goal=0.05, cause=COMMON_TILT),
     Claim("39", "inclines", CLOSEST_RANGE, is_incline(30, 60), "sd", thesis=6.0),
     Claim("40", "inclines", ANGLE, is_incline(30, 60), "sd", thesis=4.0),
-    Claim("41", "cylinder", CLOSEST_RANGE, is_round, thesis=0.05, goal=0.005, limit=PARABOLA),
+    Claim("41", "cylinder", CLOSEST_RANGE, is_round, thesis=0.05, goal=0.005, cause=PARABOLA),
     Claim("41", "cylinder", CYLINDER_RANGE, is_round, thesis=0.05, goal=0.005),
     Claim("42", "cylinder", CLOSEST_RANGE, is_round, "sd"),
     Claim("", "cylinder", RADIUS, is_round, to_mm=500, goal=0.05),
@@ -101,10 +100,16 @@ class Row:
     """Range of the largest value."""
     expanded: float | None = None
     """Expanded uncertainty U (k = 2) of the error at `at_mm`, relative."""
+    readings: int = 0
+    """Number of readings with the quantity."""
     missing: int = 0
     """Number of readings without the quantity."""
-    limit: str = ""
-    """Limit of the error besides noise and calibration; empty: none is known."""
+    lacking_mm: tuple[float, ...] = ()
+    """True ranges of the placements where no reading has the quantity."""
+    cause: Cause | None = None
+    """Cause of the error besides noise and calibration; None: none is known."""
+    cause_size: float | None = None
+    """Computed size of the cause at `at_mm`, relative; None: not known."""
 
     @property
     def ratio(self) -> float | None:
@@ -113,13 +118,18 @@ class Row:
 
     @property
     def is_reached(self) -> bool | None:
-        """Whether the goal is reached; None without a goal. A value that is missing reaches none."""
-        return None if self.goal is None else self.ours is not None and self.ours <= self.goal
+        """Whether the goal is reached at every placement; None without a goal."""
+        return None if self.goal is None else self.complete is not None and self.complete <= self.goal
+
+    @property
+    def complete(self) -> float | None:
+        """`ours`, or None where a placement lacks the quantity: its value there is not known."""
+        return None if self.lacking_mm else self.ours
 
 
-def compare(readings: Sequence[ReadingTaken]) -> list[Row]:
+def compare(readings: Sequence[ReadingTaken], rig: Rig) -> list[Row]:
     """Rows of every claim, and of the errors with lasers left off relative to those of all lasers."""
-    return [*(_row(claim, readings) for claim in CLAIMS), *(_missing_row(n, readings) for n in (1, 3))]
+    return [*(_row(claim, readings, rig) for claim in CLAIMS), *(_missing_row(n, readings) for n in (1, 3))]
 
 
 def comparison_results(rows: Sequence[Row]) -> list[Result]:
@@ -131,36 +141,54 @@ def comparison_results(rows: Sequence[Row]) -> list[Result]:
         )
         for quantity, reference in (("goal_ratio", row.goal), ("thesis_ratio", row.thesis)):
             if reference is not None:
-                found.append(Result(quantity, of, None if row.ours is None else row.ours / reference))
+                found.append(Result(quantity, of, None if row.complete is None else row.complete / reference))
     missed = sum(row.is_reached is False for row in seen)
     return [*found, Result("goals_missed", f"{len(seen)} rows", float(missed) if seen else None)]
 
 
-def _row(claim: Claim, readings: Sequence[ReadingTaken]) -> Row:
+def _row(claim: Claim, readings: Sequence[ReadingTaken], rig: Rig) -> Row:
     groups = by_placement(readings, claim.select, claim.to_mm)
     rated = [(group, claim.quantity.statistics(group)) for group in groups]
-    value: Callable[[ErrorStatistics, float], float | None] = _sd if claim.measure == "sd" else _mean_error
-    found = [
-        (ours, group[0].reference_mm, statistics.expanded, true)
-        for group, statistics in rated
-        if (true := claim.quantity.true(group[0])) is not None
-        and (ours := value(statistics, true)) is not None
-    ]
-    ours, at_mm, expanded, true = max(found, default=(None, None, None, None), key=lambda one: one[0] or 0.0)
-    return Row(
+    found, lacking_mm = [], []
+    for group, statistics in rated:
+        ours, true = _value(claim, group, statistics), claim.quantity.true(group[0])
+        if ours is None or true is None:
+            lacking_mm.append(group[0].reference_mm)
+        else:
+            found.append((ours, group, statistics.expanded, abs(true)))
+    row = Row(
         claim.figure,
         claim.target,
         f"{claim.quantity.name} {claim.measure}",
         claim.quantity.unit if claim.measure == "sd" else "%",
         None if claim.to_mm == inf else claim.to_mm,
         claim.thesis,
-        ours,
+        None,
         claim.goal,
-        at_mm,
-        None if expanded is None or true is None else expanded / abs(true),
-        sum(statistics.missing for _, statistics in rated),
-        claim.limit,
+        readings=sum(statistics.n for _, statistics in rated),
+        missing=sum(statistics.missing for _, statistics in rated),
+        lacking_mm=tuple(lacking_mm),
+        cause=claim.cause,
     )
+    if not found:
+        return row
+    ours, group, expanded, true = max(found, key=lambda one: one[0])
+    size = None if claim.cause is None else claim.cause.size(group, rig)
+    return replace(
+        row,
+        ours=ours,
+        at_mm=group[0].reference_mm,
+        expanded=None if expanded is None else expanded / true,
+        cause_size=None if size is None else size / true,
+    )
+
+
+def _value(claim: Claim, group: Sequence[ReadingTaken], statistics: ErrorStatistics) -> float | None:
+    """Value of a claim at one placement; None if too few readings have the quantity."""
+    if claim.measure == "sd":
+        return statistics.sd
+    true = claim.quantity.true(group[0])
+    return None if true is None else _mean_error(statistics, true)
 
 
 def _missing_row(left_off: int, readings: Sequence[ReadingTaken]) -> Row:
@@ -168,11 +196,24 @@ def _missing_row(left_off: int, readings: Sequence[ReadingTaken]) -> Row:
     without = {place(g[0]): g for g in by_placement(readings, is_without(left_off), inf)}
     full = {place(g[0]): g for g in by_placement(readings, is_without(0), inf)}
     both = [key for key in without if key in full]
-    errors = [[_relative(group) for group in (without[key], full[key])] for key in both]
-    pairs = [(own, whole) for own, whole in errors if own is not None and whole is not None]
+    errors = [(key[0], _relative(without[key]), _relative(full[key])) for key in both]
+    pairs = [(own, whole) for _, own, whole in errors if own is not None and whole is not None]
     whole_error = fmean(whole for _, whole in pairs) if pairs else 0.0
     ours = fmean(own for own, _ in pairs) / whole_error if whole_error else None
-    return Row("", f"{left_off} off", "error / that of all", "", None, None, ours, RATIO_GOAL)
+    statistics = [CLOSEST_RANGE.statistics(without[key]) for key in both]
+    return Row(
+        "",
+        f"{left_off} off",
+        "error / that of all",
+        "",
+        None,
+        None,
+        ours,
+        RATIO_GOAL,
+        readings=sum(one.n for one in statistics),
+        missing=sum(one.missing for one in statistics),
+        lacking_mm=tuple(mm for mm, own, whole in errors if own is None or whole is None),
+    )
 
 
 def _relative(group: Sequence[ReadingTaken]) -> float | None:
@@ -181,7 +222,3 @@ def _relative(group: Sequence[ReadingTaken]) -> float | None:
 
 def _mean_error(statistics: ErrorStatistics, true: float) -> float | None:
     return None if statistics.mean_absolute is None else statistics.mean_absolute / abs(true)
-
-
-def _sd(statistics: ErrorStatistics, true: float) -> float | None:
-    return statistics.sd

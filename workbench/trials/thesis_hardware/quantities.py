@@ -84,8 +84,8 @@ RADIUS = Quantity(
 
 
 def is_mean(reading: ReadingTaken) -> bool:
-    """Whether the range is the mean of the lasers in front of a flat and square target."""
-    return reading.true is None
+    """Whether the range is the mean of the lasers in front of a measured flat target."""
+    return reading.true is None and reading.is_measured
 
 
 def is_without(left_off: int) -> Select:

@@ -41,7 +41,41 @@ def side_by_side(name: str, rows: Sequence[Row]) -> Table:
             Column(key="reached", name="met"),
         ),
         rows=tuple(_cells(row) for row in rows),
-        caption="error: mean absolute value of the readings at a range; off: lasers left off",
+        caption="error: mean absolute value of the readings at a range; met: at every range; off: lasers"
+        " left off",
+    )
+
+
+def readings_table(name: str, rows: Sequence[Row]) -> Table:
+    """Table of the readings of every row, and of U where its value is largest."""
+    columns = (
+        Column(key="figure", name="fig."),
+        Column(key="target", name="target"),
+        Column(key="quantity", name="quantity"),
+        Column(key="to_mm", name="to", unit="mm"),
+        Column(key="readings", name="n"),
+        Column(key="missing", name="missing"),
+        Column(key="at_mm", name="at", unit="mm", format=".0f"),
+        Column(key="expanded", name="U there", format=".2g"),
+    )
+    return Table(
+        name=f"{name}-readings",
+        title="Readings of each row",
+        columns=columns,
+        rows=tuple(
+            (
+                row.figure,
+                row.target,
+                _quantity(row),
+                row.to_mm,
+                row.readings,
+                row.missing,
+                row.at_mm,
+                _shown(row, row.expanded) if row.unit == "%" else None,
+            )
+            for row in rows
+        ),
+        caption="n, missing: with and without the quantity; U: k = 2, of the error, in its unit",
     )
 
 
@@ -79,16 +113,26 @@ def goal_table(name: str, rows: Sequence[Row]) -> list[Table]:
 
 
 def reason(row: Row) -> str:
-    """Reason why a goal is not reached, from the stated uncertainty there."""
+    """Reason why a goal is not reached, from the stated uncertainty there and the computed size of causes."""
     if row.ours is None:
         return "no reading has this quantity"
+    lacking = f"no value at {', '.join(f'{mm:.0f}' for mm in row.lacking_mm)} mm" if row.lacking_mm else ""
+    if row.goal is None or row.ours <= row.goal:
+        return lacking
+    return "; ".join(part for part in (lacking, _reason_of_error(row, row.ours, row.goal)) if part)
+
+
+def _reason_of_error(row: Row, ours: float, goal: float) -> str:
     if row.expanded is None:
-        return "fewer spots: their noise and speckle are averaged less"
-    if row.limit:
-        return row.limit
-    if row.ours > row.expanded:
-        return "error exceeds U: the target is not as stated, or the sensor has changed"
-    return "within U: noise and speckle of the spots, calibration, and reference"
+        return "no U of a ratio: fewer spots average noise and speckle less"
+    is_within = ours <= row.expanded
+    excess = ours - (goal if is_within else row.expanded)
+    explains = row.cause_size is not None and row.cause_size >= excess
+    if row.cause is not None and explains and (is_within or not row.cause.is_in_u):
+        return f"{'within U: ' if is_within else ''}{row.cause.text}"
+    if is_within:
+        return "within U: noise and speckle of the spots, calibration, and reference"
+    return "error exceeds U: the target is not as stated, or the sensor has changed"
 
 
 def figures(name: str, readings: Sequence[ReadingTaken]) -> list[Chart]:

@@ -54,10 +54,10 @@ class ThesisComparisonStep(StepModel):
         from workbench.trials.limits import check_results
         from workbench.trials.results import finish_trial
         from workbench.trials.thesis_hardware.comparison import compare, comparison_results
-        from workbench.trials.thesis_hardware.report import figures, goal_table, side_by_side
+        from workbench.trials.thesis_hardware.report import figures, goal_table, readings_table, side_by_side
 
-        rows = compare(context.readings)
-        tables = [side_by_side(name, rows), *goal_table(name, rows)]
+        rows = compare(context.readings, context.rig)
+        tables = [side_by_side(name, rows), readings_table(name, rows), *goal_table(name, rows)]
         finish_trial(context, name, tables, figures(name, context.readings))
         check_results(context, name, comparison_results(rows), self.limits)
         goals = [row.is_reached for row in rows if row.is_reached is not None]

@@ -35,7 +35,7 @@ def test_targets_that_are_not_measured_are_left_out(tmp_path: Path) -> None:
     path = write_verification(tmp_path, FIRST + timedelta(days=9), [[0.001], [0.001]])
     journal = path / "journal.jsonl"
     text = journal.read_text()
-    rough = text.replace('"standoff_mm":200.0', '"standoff_mm":2.0', 1)  # u = 0.3 mm of 2 mm
+    rough = text.replace('"standoff_mm":200.0', '"standoff_mm":0.3', 1)  # u = 0.3 mm of 0.3 mm
     journal.write_text(rough)
     found = verifications(tmp_path, indexed_sessions(tmp_path))[-1]
     assert [check.range_mm for check in found.checks] == [400.0]

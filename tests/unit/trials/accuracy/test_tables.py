@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tests.support.accuracy_runs import STANDOFFS_MM, accuracy_run
+import pytest
+
+from tests.support.accuracy_runs import COMPLETE, STANDOFFS_MM, accuracy_run, incomplete_run
 from tests.support.rangers import IDS, thesis_ranger
 from tests.support.rigs import thesis_rig
 from tests.support.simulated_trials import SimulatedBench
@@ -27,14 +29,24 @@ def test_every_statistic_is_a_column_with_its_unit() -> None:
 
 
 def test_the_verdict_has_one_row_for_each_range_and_fits_80_columns() -> None:
-    table = verdict_table("p.1", RANGES, verdict_of(RANGES, LIMITS), LIMITS)
+    table = verdict_table("p.1", RANGES, verdict_of(RANGES, LIMITS, COMPLETE), LIMITS, COMPLETE)
     rows = table.records()
     assert [row["range"] for row in rows] == [CLOSEST, MEAN, *IDS]
     assert [row["decision"] for row in rows] == ["-", "pass", *["-"] * 4]
     assert len(blocks(text_columns(table), 80)) == 1
     without = AccuracyLimits()
-    free = verdict_table("p.1", RANGES, verdict_of(RANGES, without), without)
+    free = verdict_table("p.1", RANGES, verdict_of(RANGES, without, COMPLETE), without, COMPLETE)
     assert "decision" not in {column.key for column in free.columns}
+
+
+def test_a_laser_without_any_spot_is_a_row_of_the_verdict() -> None:
+    bench = SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1)
+    ranges, done = incomplete_run(bench, count=2, dead=["L3"])
+    limits = AccuracyLimits.model_validate({"laser_relative_error": {"in": [-0.5, 0.5]}})
+    rows = verdict_table("p.1", ranges, verdict_of(ranges, limits, done), limits, done).records()
+    (dead,) = [row for row in rows if row["range"] == "L3"]
+    assert (dead["readings"], dead["missing"], dead["error_mm"]) == (0, 2 * len(STANDOFFS_MM), None)
+    assert dead["decision"] == "fail"
 
 
 def test_details_are_left_to_the_files() -> None:
@@ -46,5 +58,9 @@ def test_details_are_left_to_the_files() -> None:
     assert [row["range"] for row in linear] == [CLOSEST, MEAN, *IDS]
     notes = [row["note"] for row in budget if row["range"] == MEAN]
     assert notes == [""] * len(STANDOFFS_MM) + ["all standoffs", "repeats"]
+    first = RANGES[0].uncertainty[0]
+    assert (bias[0]["u_mm"], bias[0]["expanded_mm"]) == pytest.approx((first.u, first.k * first.u))
     of_sources = [row for row in budget if row["note"] == ""]
     assert all(isinstance(row[key], float) for row in of_sources for key in SOURCES)
+    assert {row["alarm"] for row in of_sources} == {None}
+    assert all(isinstance(row["alarm"], bool) for row in budget if row["note"])

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.accuracy_runs import accuracy_run
+from tests.support.accuracy_runs import COMPLETE, STANDOFFS_MM, accuracy_run, incomplete_run
 from tests.support.rangers import thesis_ranger
 from tests.support.rigs import thesis_rig
 from tests.support.simulated_trials import SimulatedBench
+from workbench.model.target import Placement
+from workbench.trials.accuracy.completeness import Completeness, LostRange
 from workbench.trials.accuracy.limits import AccuracyLimits
 from workbench.trials.accuracy.ranges import MEAN
-from workbench.trials.accuracy.verdict import error_results, results_of, verdict_of
+from workbench.trials.accuracy.verdict import error_results, range_decision, results_of, verdict_of
 
 RANGES = accuracy_run(SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1))
 
@@ -18,7 +20,7 @@ RANGES = accuracy_run(SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1))
 @pytest.mark.parametrize(("bound", "decision"), [(None, None), (0.5, "pass"), (0.003, "neither")])
 def test_the_decision_is_that_of_the_limits(bound: float | None, decision: str | None) -> None:
     stated = {} if bound is None else {"mean_relative_error": {"in": [-bound, bound]}}
-    assert verdict_of(RANGES, AccuracyLimits.model_validate(stated)).decision == decision
+    assert verdict_of(RANGES, AccuracyLimits.model_validate(stated), COMPLETE).decision == decision
 
 
 def test_a_sensor_that_has_changed_is_biased() -> None:
@@ -26,10 +28,10 @@ def test_a_sensor_that_has_changed_is_biased() -> None:
     limits = AccuracyLimits.model_validate(
         {"mean_relative_error": {"in": [-0.005, 0.005]}, "bias_p": {"in": [0.05, None]}}
     )
-    verdict = verdict_of(accuracy_run(changed), limits)
+    verdict = verdict_of(accuracy_run(changed), limits, COMPLETE)
     assert verdict.is_biased
     assert verdict.decision == "fail"
-    assert not verdict_of(RANGES, limits).is_biased
+    assert not verdict_of(RANGES, limits, COMPLETE).is_biased
 
 
 def test_each_placement_is_a_result_in_mm_and_relative() -> None:
@@ -46,5 +48,39 @@ def test_each_placement_is_a_result_in_mm_and_relative() -> None:
 
 def test_results_of_lasers_share_one_limit() -> None:
     limits = AccuracyLimits.model_validate({"laser_error_mm": {"in": [-1, 1]}})
-    lasers = [one for one in results_of(RANGES, limits) if one.quantity == "laser_error_mm"]
+    lasers = [one for one in results_of(RANGES, limits, COMPLETE) if one.quantity == "laser_error_mm"]
     assert len({one.of.split()[0] for one in lasers}) == 4
+
+
+def test_a_laser_without_any_spot_fails_the_limit_on_lasers() -> None:
+    bench = SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1)
+    ranges, done = incomplete_run(bench, dead=["L3"])
+    limits = AccuracyLimits.model_validate({"laser_relative_error": {"in": [-0.5, 0.5]}})
+    assert {one.name for one in done.lost} == {"L3"}
+    assert len(done.lost) == len(STANDOFFS_MM)
+    assert verdict_of(ranges, limits, done).decision == "fail"
+    assert "L3" in verdict_of(ranges, limits, done).text
+    assert [range_decision("L3", None, limits, done), range_decision(MEAN, ranges[1], limits, done)] == [
+        "fail",
+        None,
+    ]
+    lost = [one for one in results_of(ranges, limits, done) if one.value is None]
+    assert {one.quantity for one in lost} == {"laser_error_mm", "laser_relative_error"}
+    assert len(lost) == 2 * len(STANDOFFS_MM)
+
+
+def test_a_range_that_is_lost_at_one_standoff_fails() -> None:
+    done = Completeness(len(STANDOFFS_MM), lost=(LostRange("L2", 500.0, 5),))
+    limits = AccuracyLimits.model_validate({"laser_relative_error": {"in": [-0.5, 0.5]}})
+    (second,) = [one for one in RANGES if one.name == "L2"]
+    assert verdict_of(RANGES, limits, COMPLETE).decision == "pass"
+    assert verdict_of(RANGES, limits, done).decision == "fail"
+    assert range_decision("L2", second, limits, done) == "fail"
+
+
+def test_a_skipped_standoff_forbids_pass_but_not_fail() -> None:
+    done = Completeness(len(STANDOFFS_MM) - 1, (Placement(key="p.1/500mm", standoff_mm=500.0),))
+    for bounds, decision in (([-0.5, 0.5], "neither"), ([0.4, 0.5], "fail")):
+        limits = AccuracyLimits.model_validate({"mean_relative_error": {"in": bounds}})
+        assert verdict_of(RANGES, limits, done).decision == decision
+    assert "5 of 6" in verdict_of(RANGES, AccuracyLimits(), done).text

@@ -30,7 +30,20 @@ def test_coverage_counts_placements_not_readings() -> None:
     own = [errors(400.0, 0.1, 0.2, 0.3, 2.0), errors(800.0, 0.0)]
     found = missing_summary(ALL, own, own)
     assert found.coverage == pytest.approx((0.75 + 1.0) / 2)
-    assert (found.coverage_low, found.coverage_high) == clopper_pearson(1.75, 2)
+    assert found.coverage_low is not None
+    assert found.coverage_low < clopper_pearson(1.75, 2)[0]
+
+
+def test_placements_that_share_the_calibration_count_as_fewer() -> None:
+    """A stated 0.5 mm common to all, and 0.3 mm of each placement: variances 0.25 and 0.09 mm2."""
+    own = [errors(400.0 + n, 0.0) for n in range(10)]
+    found = missing_summary(ALL, own, own)
+    rho = 0.25 / 0.34
+    number = 100 / (10 + 90 * rho**2)
+    assert (found.coverage_low, found.coverage_high) == pytest.approx(clopper_pearson(number, number))
+    exact = [[one.model_copy(update={"sigma_mm": 0.0}) for one in of] for of in own]
+    independent = missing_summary(ALL, exact, exact)
+    assert (independent.coverage_low, independent.coverage_high) == clopper_pearson(10, 10)
 
 
 def test_without_any_range_there_is_no_error() -> None:

@@ -42,6 +42,13 @@ def test_every_reading_belongs_to_one_test() -> None:
         assert [key for key, one in READINGS.items() if select(one)] == [name]
 
 
+def test_a_flat_at_an_unmeasured_standoff_belongs_to_no_test() -> None:
+    """The first placement of a verification: the standoff is not measured, its uncertainty is its size."""
+    unmeasured = reading(None, range_mm=530.0, reference_sd_mm=500.0)
+    assert not is_mean(unmeasured)
+    assert is_mean(unmeasured.model_copy(update={"reference_sd_mm": 1.0}))
+
+
 def test_errors_are_measured_minus_true() -> None:
     assert MEAN_RANGE.errors([READINGS["mean"]]) == [1.0]
     assert CLOSEST_RANGE.errors([READINGS["mean"], READINGS["flat"]]) == [-1.0, 1.0]

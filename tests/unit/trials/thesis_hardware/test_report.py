@@ -8,8 +8,9 @@ import pytest
 
 from tests.support.four_lasers import reading
 from workbench.model.event import TrueValues
+from workbench.trials.thesis_hardware.causes import PARABOLA, TILT, Cause
 from workbench.trials.thesis_hardware.comparison import Row
-from workbench.trials.thesis_hardware.report import figures, goal_table, reason, side_by_side
+from workbench.trials.thesis_hardware.report import figures, goal_table, readings_table, reason, side_by_side
 
 ROW = Row("33", "flat", "mean range error", "%", 2000.0, 0.025, 0.004, 0.005, 400.0, 0.006)
 MISSED = replace(ROW, ours=0.0055)
@@ -35,12 +36,38 @@ def test_a_goal_that_is_not_reached_is_listed_with_its_reason() -> None:
 
 def test_reasons_differ_by_the_uncertainty_at_the_range() -> None:
     beyond = replace(MISSED, ours=0.007)
-    limited = replace(MISSED, limit="the target's squareness")
     missing = replace(MISSED, ours=None)
     ratio = replace(MISSED, expanded=None)
-    reasons = [reason(one) for one in (MISSED, beyond, limited, missing, ratio)]
+    lacking = replace(MISSED, ours=0.001, lacking_mm=(500.0, 700.0))
+    reasons = [reason(one) for one in (MISSED, beyond, missing, ratio, lacking)]
     assert len(set(reasons)) == 5
-    assert reasons[2] == "the target's squareness"
+    assert "500, 700 mm" in reasons[4]
+
+
+@pytest.mark.parametrize(
+    ("ours", "cause", "size", "named"),
+    [
+        (0.0055, TILT, 0.001, True),  # within U, and the goal would be reached without the cause
+        (0.0055, TILT, 0.0001, False),  # too small
+        (0.0055, TILT, None, False),  # of unknown size
+        (0.5, TILT, 1.0, False),  # beyond U, which includes the cause
+        (0.007, PARABOLA, 0.002, True),  # beyond U, which does not include the cause
+        (0.5, PARABOLA, 0.002, False),  # far beyond U
+    ],
+)
+def test_a_cause_is_named_only_where_its_size_explains_the_excess(
+    ours: float, cause: Cause, size: float | None, named: bool
+) -> None:
+    """The goal is 0.5 %, U 0.6 %."""
+    row = replace(MISSED, ours=ours, cause=cause, cause_size=size)
+    assert (cause.text in reason(row)) is named
+    assert named or reason(row) == reason(replace(MISSED, ours=ours))
+
+
+def test_the_table_has_the_number_of_readings_the_missing_ones_and_u() -> None:
+    (record,) = readings_table("t", [replace(ROW, readings=70, missing=5)]).records()
+    assert (record["readings"], record["missing"]) == (70, 5)
+    assert record["expanded"] == pytest.approx(0.6)
 
 
 def test_a_figure_has_mean_maximum_and_minimum_of_the_absolute_error() -> None:
