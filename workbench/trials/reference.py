@@ -1,7 +1,7 @@
 """True ranges of a flat target: ruler reading, scale of the ruler, and tilt of the target.
 
-The true range at the point (x, y) of a beam is standoff x (1 + scale) + m x + n y, with the slopes m and n of
-the target about the vertical and the horizontal axis.
+The true range at the point (x, y) of a beam is standoff x (1 + scale) + m x + n y. The slopes m and n are
+those of the target about the vertical and the horizontal axis.
 """
 
 from __future__ import annotations

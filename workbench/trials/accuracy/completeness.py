@@ -36,7 +36,7 @@ class Completeness:
 
     @property
     def text(self) -> str:
-        """What was not measured, in one line; empty if all was."""
+        """Standoffs and ranges that were not measured, in one line; empty if all were."""
         planned = self.visited + len(self.skipped)
         standoffs = [f"{self.visited} of {counted(planned, 'standoff')}"] if self.skipped else []
         names = dict.fromkeys(one.name for one in self.lost)

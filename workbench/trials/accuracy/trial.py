@@ -94,7 +94,7 @@ def agreements(
 
 
 def completeness(visited: Sequence[PlacementReadings], skipped: Sequence[Placement]) -> Completeness:
-    """What the trial was to measure and did not."""
+    """Planned ranges that the trial did not measure."""
     lost = [
         found
         for one in visited

@@ -26,7 +26,7 @@ class Verdict:
     probability: float
     """P value of the largest bias of any range, over all standoffs (Bonferroni)."""
     unmeasured: str = ""
-    """What was planned and not measured; empty if all was."""
+    """Planned ranges that were not measured; empty if all were."""
 
     @property
     def is_biased(self) -> bool:

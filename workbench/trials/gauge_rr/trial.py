@@ -11,7 +11,7 @@ from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.trials.gauge_rr.step import GaugeTrialStep
 from workbench.trials.gauge_rr.table import gauge_chart, gauge_table
-from workbench.trials.limits import Result, cell_number, check_results, require_readings
+from workbench.trials.limits import Result, cell_number, require_readings
 from workbench.trials.reading_frame import reading_frame, reading_rows
 from workbench.trials.readings import take_readings
 from workbench.trials.results import write_readings
@@ -47,7 +47,7 @@ def run_trial(context: Context, name: str, step: GaugeTrialStep) -> str:
     table = gauge_table(f"{name}-table", frame)
     run.finish([table], [gauge_chart(f"{name}-errors", frame)])
     require_readings(name, by_standoff.values())
-    check_results(context, name, gauge_results(table), step.limits)
+    run.check(gauge_results(table), step.limits)
     return f"{counted(frame['measured_mm'].count(), 'reading')} in {name}.csv, statistics in {name}-table.csv"
 
 

@@ -10,7 +10,7 @@ from workbench.model.event import ReadingTaken, TrialProgress
 from workbench.model.reading_chart import error_chart
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
-from workbench.trials.limits import Result, check_results, require_readings
+from workbench.trials.limits import Result, require_readings
 from workbench.trials.readings import take_readings
 from workbench.trials.reference import standoff_sd_mm
 from workbench.trials.trial_run import TrialRun
@@ -100,5 +100,5 @@ def _finish(run: TrialRun, step: VerifyTrialStep, checked: Sequence[Checked], ve
     if not verdict.valid:
         raise LimitFailedError(f"{name}: {text}")
     require_readings(name, [one.readings for one in checked])
-    check_results(run.context, name, verify_results(reference, checks), step.limits)
+    run.check(verify_results(reference, checks), step.limits)
     return text
