@@ -12,6 +12,7 @@ from rich.console import Console
 
 from workbench.cli.console import print_message
 from workbench.cli.report import Outputs, write_document
+from workbench.model.contents import printable
 from workbench.model.errors import BadInputError
 from workbench.model.laboratory import load_laboratory
 from workbench.report.document import Document
@@ -21,7 +22,6 @@ from workbench.report.history.page import SensorHistory, history_document
 from workbench.report.history.verifications import verifications
 from workbench.report.terminal_table import TerminalTable
 from workbench.session.caller import now, operator
-from workbench.session.files import check_output
 from workbench.session.index import IndexedSession, copies_text, indexed_sessions
 from workbench.session.sensor_log import SensorEntry, append_entry, read_entries
 
@@ -46,8 +46,7 @@ def show_history(request: HistoryRequest, as_json: bool) -> None:
         BadInputError: there is no such sensor, a file is damaged, or one cannot be written.
     """
     outputs = Outputs(request.html, request.pdf)
-    for path in outputs.files:
-        check_output(path)
+    outputs.check()
     every = indexed_sessions(request.sessions)
     serial = request.serial or only_serial(every, request.sessions)
     if request.note is not None:
@@ -124,9 +123,9 @@ def only_serial(every: Sequence[IndexedSession], folder: Path) -> str:
 
 def _print(document: Document) -> None:
     console = Console(markup=False, highlight=False)
-    console.print(document.verdict.text)
+    console.print(printable(document.verdict.text))
     for line in (*document.verdict.reasons, *(f"{fact.name}: {fact.value}" for fact in document.head)):
-        console.print(f"  {line}", soft_wrap=True)
+        console.print(f"  {printable(line)}", soft_wrap=True)
     for section in document.sections:
         for table in section.tables:
             console.print(TerminalTable(table))

@@ -81,10 +81,17 @@ REASON_PLACEHOLDER = "TEXT"
 
 
 def reason(given: str | None) -> str | None:
-    """Refuse a blank reason, and the placeholder of a printed command."""
+    """Refuse a blank reason, the placeholder of a printed command, and text that is not UTF-8."""
+    if given is not None and not given.isprintable() and _has_surrogates(given):
+        raise typer.BadParameter("expected text in UTF-8, got other bytes; set the terminal to UTF-8")
     if given is not None and given.strip() in {"", REASON_PLACEHOLDER}:
         raise typer.BadParameter(f"expected a reason in words, got {given.strip() or 'a blank'}")
     return given
+
+
+def _has_surrogates(text: str) -> bool:
+    """Whether the text contains bytes that are not UTF-8, as Python decodes arguments."""
+    return any("\ud800" <= character <= "\udfff" for character in text)
 
 
 AcceptChanges = Annotated[

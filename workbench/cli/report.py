@@ -29,6 +29,8 @@ from workbench.session.files import check_output, write_output
 from workbench.session.identity import session_identity
 from workbench.session.index import indexed_sessions
 
+HTML, PDF, XML = (".html", ".htm"), (".pdf",), (".xml",)
+"""Endings of the files of each kind."""
 DEFAULT_NAME = "certificate.html"
 """File in the session folder if no other output is asked for."""
 
@@ -49,6 +51,21 @@ class Outputs:
         """Files that are asked for."""
         return [path for path in (self.html, self.pdf, self.dcc) if path is not None]
 
+    def check(self) -> None:
+        """Check that the files can be written, and have the endings of their kinds.
+
+        A wrong ending may be that of a file of the record, which must not be replaced.
+
+        Raises:
+            BadInputError: a file has another ending, or cannot be written.
+        """
+        for path, endings in ((self.html, HTML), (self.pdf, PDF), (self.dcc, XML)):
+            if path is None:
+                continue
+            if path.suffix.lower() not in endings:
+                raise BadInputError(f"{path}: expected a name that ends with {endings[0]}")
+            check_output(path)
+
 
 def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool) -> None:
     """Write the certificate of a session.
@@ -57,8 +74,7 @@ def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool)
         BadInputError: there is no such session, it is damaged, or a file cannot be written.
     """
     folder = find_session(name, sessions).resolve()
-    for path in outputs.files:
-        check_output(path)
+    outputs.check()
     session = read_session(folder)
     laboratory = laboratory_of(folder.parent, no_input, _ask)
     if outputs.dcc is not None:
@@ -85,8 +101,7 @@ def compare_sessions(names: tuple[Path, Path], sessions: Path, outputs: Outputs)
 
     if outputs.dcc is not None:
         raise BadInputError("--dcc: expected one session; a comparison is no calibration certificate")
-    for path in outputs.files:
-        check_output(path)
+    outputs.check()
     a, b = (read_session(find_session(name, sessions)) for name in names)
     document = comparison_document(a, b)
     write_document(document, outputs)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from textwrap import wrap
 
+from workbench.model.contents import printable
 from workbench.model.table import Table
 
 
@@ -30,7 +31,7 @@ def text_columns(table: Table) -> tuple[TextColumn, ...]:
 
 def _text_column(table: Table, index: int) -> TextColumn:
     heading = table.columns[index].heading
-    cells = tuple(table.text(row, index) for row in range(len(table.rows)))
+    cells = tuple(printable(table.text(row, index)) for row in range(len(table.rows)))
     width = max(map(len, [*cells, *heading.split(), " "]))
     lines = tuple(wrap(heading, width, break_long_words=False, break_on_hyphens=False))
     return TextColumn(lines or ("",), cells, table.is_number(index))

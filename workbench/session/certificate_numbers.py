@@ -6,17 +6,14 @@ A certificate of unchanged content keeps its number. A change of the content (a 
 
 from __future__ import annotations
 
-import fcntl
-import os
 from pathlib import Path
 
-from workbench.model.contents import read_file
 from workbench.model.errors import BadInputError
 from workbench.model.problems import short
 from workbench.model.yamlfile import FileModel
+from workbench.session.appended import append_line, locked, read_lines
 
 REGISTER = "certificates.jsonl"
-LARGEST_BYTES = 2**26
 
 
 class AssignedNumber(FileModel):
@@ -50,15 +47,8 @@ def assign_number(
     """
     path = folder / REGISTER
     wanted = AssignedNumber(number="", session=session, content_sha256=content_sha256, assigned=assigned)
-    try:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX)  # two programs never assign one number
-            return _assign(handle, path, wanted, prefix)
-        finally:
-            os.close(handle)
-    except OSError as error:
-        raise BadInputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    with locked(path) as handle:  # two programs never assign one number
+        return _assign(handle, path, wanted, prefix)
 
 
 def _assign(handle: int, path: Path, wanted: AssignedNumber, prefix: str) -> AssignedNumber:
@@ -73,21 +63,13 @@ def _assign(handle: int, path: Path, wanted: AssignedNumber, prefix: str) -> Ass
         count += 1
     replaces = of_session[-1].number if of_session else ""
     entry = wanted.model_copy(update={"number": number, "replaces": replaces})
-    start = "" if _ends_a_line(path) else "\n"
-    os.write(handle, f"{start}{entry.model_dump_json()}\n".encode())
-    os.fsync(handle)
+    append_line(handle, path, entry.model_dump_json())
     return entry
 
 
-def _ends_a_line(path: Path) -> bool:
-    """Whether a new line can follow; an editor may have removed the last line's end."""
-    return path.read_bytes()[-1:] in {b"", b"\n"}
-
-
 def _read(path: Path) -> list[AssignedNumber]:
-    lines = read_file(path, "a register of certificates", LARGEST_BYTES).decode(errors="replace").splitlines()
     register = []
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_lines(path, "a register of certificates"), start=1):
         try:
             register.append(AssignedNumber.model_validate_json(line))
         except ValueError:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 from pathlib import Path
 from typing import Literal
 
-from workbench.model.contents import read_file
 from workbench.model.errors import BadInputError
 from workbench.model.problems import short
 from workbench.model.yamlfile import FileModel
+from workbench.session.appended import append_line, locked, read_lines
 
 SENSOR_LOG = "sensors.jsonl"
-LARGEST_BYTES = 2**26
 
 
 class SensorEntry(FileModel):
@@ -36,19 +33,12 @@ def append_entry(folder: Path, entry: SensorEntry) -> None:
     """Append one line; the file is created where there is none.
 
     Raises:
-        BadInputError: the file cannot be written.
+        BadInputError: the file is damaged, or cannot be written.
     """
     path = folder / SENSOR_LOG
-    try:
-        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX)
-            os.write(handle, (entry.model_dump_json() + "\n").encode())
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-    except OSError as error:
-        raise BadInputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    with locked(path) as handle:
+        _read(path)
+        append_line(handle, path, entry.model_dump_json())
 
 
 def read_entries(folder: Path, serial: str) -> list[SensorEntry]:
@@ -60,9 +50,12 @@ def read_entries(folder: Path, serial: str) -> list[SensorEntry]:
     path = folder / SENSOR_LOG
     if not path.exists():
         return []
-    lines = read_file(path, "a record of sensors", LARGEST_BYTES).decode(errors="replace").splitlines()
+    return [one for one in _read(path) if one.serial == serial]
+
+
+def _read(path: Path) -> list[SensorEntry]:
     entries = []
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_lines(path, "a record of sensors"), start=1):
         try:
             entries.append(SensorEntry.model_validate_json(line))
         except ValueError:
@@ -70,4 +63,4 @@ def read_entries(folder: Path, serial: str) -> list[SensorEntry]:
                 f"{path}:{number}: expected an entry of a sensor, got {short(line)}; restore the file from"
                 " a copy"
             ) from None
-    return [one for one in entries if one.serial == serial]
+    return entries

@@ -39,6 +39,20 @@ def test_notes_are_kept_and_escaped(workbench: Run, tmp_path: Path) -> None:
     assert again["serial"] == SERIAL
 
 
+def test_control_characters_of_a_note_do_not_reach_the_terminal(workbench: Run, tmp_path: Path) -> None:
+    copied(tmp_path)
+    done = workbench("history", "--sessions", tmp_path, "--rig", SERIAL, "--note", "a\x1b[31mred\x07")
+    assert done.code == 0
+    assert not {"\x1b", "\x07"} & set(done.out + done.err)
+
+
+def test_a_note_that_is_not_utf8_is_refused(workbench: Run, tmp_path: Path) -> None:
+    copied(tmp_path)
+    done = workbench("history", "--sessions", tmp_path, "--rig", SERIAL, "--note", "Pr\udcfcfung")
+    refused(done, 2)
+    assert not (tmp_path / "sensors.jsonl").exists()
+
+
 def test_the_sensor_must_be_known(workbench: Run, tmp_path: Path) -> None:
     refused(workbench("history", "--sessions", tmp_path), 2, "--rig")
     copied(tmp_path)

@@ -119,6 +119,34 @@ def test_an_edited_calibration_gets_no_certificate(workbench: Run, tmp_path: Pat
     assert not (tmp_path / REGISTER).exists()
 
 
+def test_a_changed_frame_gets_no_certificate(workbench: Run, tmp_path: Path) -> None:
+    session = copied(tmp_path, frames=True)
+    frame = next(session.glob("frames/reference.6/**/*-on.png"))
+    frame.write_bytes(frame.read_bytes() + b"changed")
+    refused(workbench("report", session), 2, frame.name)
+    assert not (tmp_path / REGISTER).exists()
+
+
+def test_the_certificate_counts_missing_frames(workbench: Run, tmp_path: Path) -> None:
+    session = copied(tmp_path, frames=True)
+    for frame in session.glob("frames/reference.6/500mm/00/*.png"):
+        frame.unlink()
+    done = json.loads(workbench("report", session, "--json").out)
+    (data,) = [one for one in done["sections"] if one["key"] == "data"]
+    frames = data["facts"]["Frames"]
+    assert frames.split()[0] == "2"
+
+
+@pytest.mark.parametrize("option", ["-o", "--pdf", "--dcc"])
+def test_a_file_of_the_record_is_not_replaced(workbench: Run, tmp_path: Path, option: str) -> None:
+    session = copied(tmp_path)
+    (tmp_path / "lab.yaml").write_text(LAB)
+    for name in (JOURNAL, "session.yaml", "calibration.yaml"):
+        before = (session / name).read_bytes()
+        refused(workbench("report", session, option, session / name), 2, name)
+        assert (session / name).read_bytes() == before
+
+
 def test_a_session_that_has_only_begun(workbench: Run, tmp_path: Path) -> None:
     session = copied(tmp_path)
     (session / JOURNAL).unlink()

@@ -34,3 +34,18 @@ def test_a_damaged_line_is_named(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=SENSOR_LOG):
         append_entry(tmp_path / "missing", entry("a", "first"))
+
+
+def test_nothing_is_appended_to_a_damaged_record(tmp_path: Path) -> None:
+    path = tmp_path / SENSOR_LOG
+    path.write_text("damaged\n")
+    with pytest.raises(BadInputError, match=f"{SENSOR_LOG}:1"):
+        append_entry(tmp_path, entry("a", "first"))
+    assert path.read_text() == "damaged\n"
+
+
+def test_a_note_may_have_any_separator_of_lines(tmp_path: Path) -> None:
+    written = [entry("a", "lens\u2028cleaned\x85twice"), entry("a", "again")]
+    for one in written:
+        append_entry(tmp_path, one)
+    assert read_entries(tmp_path, "a") == written

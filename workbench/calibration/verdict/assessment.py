@@ -222,13 +222,21 @@ def _alarm(one: CrossValidatedPlacement) -> str:
 def _hidden_drift_px(fit: CalibrationFit) -> float:
     """Drift that half of the sessions would not show, along the axes that the data constrain; 0 without any.
 
+    Infinite where the parts of the session are too short to show any.
+
     The test of K shifts shows one of them where its square, in standard deviations, has a chi-square of K
     degrees of freedom beyond the test's threshold.
     """
     sd_px = drift_test(fit).sd_px
     drift_sd_px = sd_px[: len(DRIFT)]
+    if fit.layout.parts > 1 and not np.isfinite(drift_sd_px).any():
+        return float("inf")  # the steps between the parts take up any drift
     noticed_sd = float(chi2_isf(SHOWN_P, len(sd_px))) ** 0.5
     return float(noticed_sd * drift_sd_px[np.isfinite(drift_sd_px)].max(initial=0.0))
+
+
+def _hidden_text(hidden_px: float) -> str:
+    return f"up to {hidden_px:.2g} px" if np.isfinite(hidden_px) else "any size"
 
 
 def _by_order(fit: CalibrationFit) -> str:
@@ -290,7 +298,7 @@ def _warnings(fit: CalibrationFit) -> list[str]:
     hidden = 0.0 if fits_drift(fit.rig) else _hidden_drift_px(fit)
     if hidden > LARGEST_HIDDEN_PX:
         warnings.append(
-            f"a drift of the image of up to {hidden:.2g} px over the session would not be noticed (expected"
+            f"a drift of the image of {_hidden_text(hidden)} over the session would not be noticed (expected"
             f" {LARGEST_HIDDEN_PX:g} px at most{_by_order(fit)}), because it follows the standoff. Do: visit"
             " the standoffs in shuffled order (order: shuffled), and return to two of them at the end"
             " (returns: 2)."

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 
-from workbench.model import event as ev
 from workbench.model.contents import file_sha256
 from workbench.model.table import Column, Table
 from workbench.report.certificate.session_record import SessionRecord, text_sha256
@@ -23,8 +22,11 @@ def reproduction_section(session: SessionRecord) -> Section:
         if session.calibration_path is not None:
             commands.insert(1, f"workbench compare {name}/{session.calibration_path.name} again.yaml")
     versions = ", ".join(f"{what} {version}" for what, version in session.manifest.versions.items())
+    frames, missing = len(session.frames), session.missing_frames
+    kept = f"{missing} of {frames} are missing: they cannot be evaluated again" if missing else f"{frames}"
     facts = (
         Fact("Session", session.folder.name),
+        Fact("Frames", f"{kept}, compared with the hashes of the journal" if frames > missing else kept),
         Fact("Command line", session.manifest.command or "not recorded by this version"),
         Fact("Versions at the measurement", versions),
         Fact("Reproduce with", "; ".join(commands)),
@@ -39,13 +41,12 @@ def reproduction_section(session: SessionRecord) -> Section:
 
 
 def _inputs(session: SessionRecord) -> list[tuple[str, str]]:
-    frames = sum(1 + (one.off is not None) for one in session.events(ev.CaptureTaken))
     rows = [
         (f"rig file {_name(session.manifest.rig.file)}", text_sha256(session.manifest.rig.text)),
         *((f"procedure {_name(one.file)}", text_sha256(one.text)) for one in session.manifest.procedures),
         (MANIFEST, session.manifest_sha256),
         (JOURNAL, session.journal_sha256 or "missing"),
-        (f"{frames} frames, list of their sha256", session.frames_sha256),
+        (f"{len(session.frames)} frames, list of their sha256", session.frames_sha256),
     ]
     captures = session.folder / CALIBRATION_TABLE
     if captures.exists():

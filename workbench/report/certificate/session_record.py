@@ -104,13 +104,37 @@ class SessionRecord:
         return file_sha256(self.folder / MANIFEST)
 
     @cached_property
+    def frames(self) -> tuple[ev.FrameRef, ...]:
+        """Frames in effect, in order of the captures; positions that a table stated have none."""
+        pairs = ((capture.on, capture.off) for capture in self.events(ev.CaptureTaken))
+        return tuple(frame for pair in pairs for frame in pair if frame is not None and frame.path)
+
+    @cached_property
     def frames_sha256(self) -> str:
         """Hash of the hashes of all frames in effect, in order of the captures."""
         digest = hashlib.sha256()
-        for capture in self.events(ev.CaptureTaken):
-            for frame in filter(None, (capture.on, capture.off)):
-                digest.update(f"{frame.path} {frame.sha256}\n".encode())
+        for frame in self.frames:
+            digest.update(f"{frame.path} {frame.sha256}\n".encode())
         return digest.hexdigest()
+
+    @cached_property
+    def missing_frames(self) -> int:
+        """Number of frames in effect that are not in the folder.
+
+        Raises:
+            BadInputError: a frame has changed since it was taken.
+        """
+        missing = 0
+        for frame in self.frames:
+            path = self.folder / frame.path
+            if not path.is_file():
+                missing += 1
+            elif file_sha256(path) != frame.sha256:
+                raise BadInputError(
+                    f"{path}: the frame has changed since it was taken (sha256 {frame.sha256[:12]}...);"
+                    " restore it from a copy"
+                )
+        return missing
 
 
 def read_session(folder: Path) -> SessionRecord:

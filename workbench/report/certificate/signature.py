@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 2**20
 """Largest file of a key or a certificate."""
+LEAST_RSA_BITS, LEAST_EC_BITS = 2048, 224
+"""Least lengths of keys (NIST SP 800-131A)."""
 EXTRA = "pip install 'laser-range-workbench[sign]'"
 
 
@@ -37,13 +39,21 @@ class Signer:
             BadInputError: signxml is not installed, a file is wrong, or they do not belong together.
         """
         try:
-            import signxml  # noqa: F401 - the extra `sign`
+            import signxml.exceptions  # the extra `sign`
+            from cryptography.exceptions import UnsupportedAlgorithm
         except ImportError:
             raise BadInputError(f"--sign: expected the package signxml; install it with {EXTRA}") from None
         key = read_file(key_path, "a private key (PEM)", MOST_BYTES)
         certificate = read_file(certificate_path, "an X.509 certificate (PEM)", MOST_BYTES)
         _check_pair(key_path, key, certificate_path, certificate)
-        return cls(key, certificate)
+        signer = cls(key, certificate)
+        try:
+            signer.sign(b"<trial/>")
+        except (ValueError, TypeError, UnsupportedAlgorithm, signxml.exceptions.InvalidInput) as error:
+            raise BadInputError(
+                f"{certificate_path}: expected key and certificate that can sign, RSA or EC: {error}"
+            ) from None
+        return signer
 
     def sign(self, xml: bytes) -> bytes:
         """The document with its signature as the last element."""
@@ -72,15 +82,18 @@ def _private_key(pem: bytes) -> RSAPrivateKey | EllipticCurvePrivateKey:
     key = load_pem_private_key(pem, password=None)
     if not isinstance(key, RSAPrivateKey | EllipticCurvePrivateKey):
         raise TypeError(f"got a {type(key).__name__}")
+    if key.key_size < (LEAST_RSA_BITS if isinstance(key, RSAPrivateKey) else LEAST_EC_BITS):
+        raise ValueError(f"got {key.key_size} bits, which are too few for a signature")
     return key
 
 
 def _check_pair(key_path: Path, key: bytes, certificate_path: Path, certificate: bytes) -> None:
+    from cryptography.exceptions import UnsupportedAlgorithm
     from cryptography.x509 import load_pem_x509_certificate
 
     try:
         own = _private_key(key).public_key()
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
         raise BadInputError(
             f"{key_path}: expected a private key in PEM without a password, RSA or EC: {error}"
         ) from None

@@ -64,6 +64,16 @@ def test_the_signature_is_the_last_element(tmp_path: Path) -> None:
     assert root.tag == "{https://ptb.de/dcc}digitalCalibrationCertificate"
 
 
+def test_a_short_key_and_a_certificate_that_cannot_be_embedded_are_named(tmp_path: Path) -> None:
+    short = rsa.generate_private_key(65537, 1024)  # noqa: S505  # it is to be refused
+    with pytest.raises(BadInputError, match="1024"):
+        Signer.load(*write_key(tmp_path, short))
+    key, cert = write_key(tmp_path, KEYS["ec"])
+    cert.write_bytes(b"Pr\xfcfung\n" + cert.read_bytes())
+    with pytest.raises(BadInputError, match=str(cert)):
+        Signer.load(key, cert)
+
+
 def test_wrong_files_are_named(tmp_path: Path) -> None:
     key, cert = write_key(tmp_path, KEYS["rsa"])
     (tmp_path / "other").mkdir()
