@@ -26,9 +26,11 @@ def note_if_not_in_force(path: Path, calibration: Calibration, sessions: Path) -
     serial = calibration.laser_ranger.provenance.serial
     if serial == UNKNOWN_SERIAL or not sessions.is_dir():
         return
+    from workbench.report.certificate.session_record import check_recorded
     from workbench.report.history.in_force import sensor_in_force
 
     try:
+        check_recorded(path)
         force = sensor_in_force(sessions, serial)
     except BadInputError as error:
         print_message(f"note: {error}")

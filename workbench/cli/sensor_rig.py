@@ -114,7 +114,8 @@ def paths(sensor: Sensor, folder: Path) -> tuple[Path, Path]:
 def _named(sensor: Sensor, name: str) -> Iterator[str]:
     yield "format: 1"
     yield f"rig: {json.dumps(name)}"
-    yield _noted('serial: "1"', "of this sensor; its calibration is refused for another")
+    serial = "1" if name == sensor.name else practice_name("1")
+    yield _noted(f'serial: "{serial}"', "of this sensor; its calibration is refused for another")
     yield _noted(f'laser_class: "{sensor.laser_class}"', "IEC 60825-1, of the most dangerous laser")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tests.support.command_line import Run, refused
 from tests.support.reference_session import REFERENCE, SERIAL, copied, edit_calibration, repeated
+from workbench.session.journal import JOURNAL
 
 
 def in_force(workbench: Run, sessions: Path) -> str:
@@ -57,3 +58,21 @@ def test_a_reason_and_an_existing_calibration_are_needed(workbench: Run, tmp_pat
     assert workbench("use", "a", "--rig", SERIAL).code == 2
     done = workbench("use", "a", "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
     refused(done, 2, "a")
+
+
+def test_a_calibration_from_before_a_repair_is_not_put_in_force(workbench: Run, tmp_path: Path) -> None:
+    """The repair begins the steps after the captures again; the old file still lies in the folder."""
+    session = copied(tmp_path)
+    last = json.loads((session / JOURNAL).read_text().splitlines()[-1])
+    said = {"operator": "operator", "command": "workbench repair", "created": "2026-11-30T10:00:00+0000"}
+    events = (
+        {"kind": "session_repaired", "leave_out": ["reference.3/150mm"], "reason": "test", **said},
+        {"kind": "session_resumed", "from_n": 97, **said},
+    )
+    with (session / JOURNAL).open("a") as file:
+        for n, event in enumerate(events, start=1):
+            record = {"n": last["n"] + n, "time_ns": last["time_ns"] + n, "event": event}
+            file.write(json.dumps(record) + "\n")
+    path = session / "calibration.yaml"
+    done = workbench("use", path, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
+    refused(done, 2, "calibration.yaml", "repaired")

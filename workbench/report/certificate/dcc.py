@@ -17,6 +17,7 @@ from workbench.model.laboratory import LABORATORY_FILE, Laboratory, Party, Span,
 from workbench.model.table import Cell, Table
 from workbench.report.certificate.assemble import STATEMENTS, Certificate
 from workbench.report.certificate.coverage import expanded_parameter
+from workbench.report.certificate.identity import VIRTUAL, device_text
 from workbench.report.certificate.method import DECISION_RULE
 from workbench.report.certificate.results import COVERAGE
 from workbench.report.certificate.session_record import SessionRecord, text_sha256
@@ -83,8 +84,8 @@ def required_parties(lab: Laboratory, session: SessionRecord) -> tuple[Party, Pa
     }
     if missing := [name for name, value in items.items() if not value]:
         raise BadInputError(
-            f"--dcc: a Digital Calibration Certificate requires in {LABORATORY_FILE}: {', '.join(missing)};"
-            " write them into the file beside the session"
+            f"--dcc: a Digital Calibration Certificate requires {', '.join(missing)}; write them into"
+            f" {session.folder.parent / LABORATORY_FILE}"
         )
     return lab.laboratory or Party(name="-"), lab.customer or Party(name="-")
 
@@ -122,6 +123,8 @@ def _items(parent: ET.Element, certificate: Certificate) -> None:
 def _statements(parent: ET.Element, certificate: Certificate) -> None:
     document = certificate.document
     texts = [document.verdict.text, *document.verdict.reasons, DECISION_RULE, COVERAGE, *STATEMENTS]
+    if device_text(certificate.sources.session.rig) == VIRTUAL:
+        texts.insert(0, f"Devices: {VIRTUAL}.")
     if document.replaces:
         texts.append(f"This certificate replaces certificate {document.replaces}.")
     for text in texts:

@@ -169,13 +169,22 @@ def check_recorded(path: Path) -> None:
     Files elsewhere, and files that the session did not write, pass.
 
     Raises:
-        BadInputError: the file has changed since, or the journal is damaged.
+        BadInputError: the file has changed since, a repair of the session has replaced its result, or the
+            journal is damaged.
     """
     path = path.resolve()
     if not (path.parent / MANIFEST).is_file() or not (path.parent / JOURNAL).exists():
         return
-    events = [record.event for record in effective(read_journal(path.parent))]
-    recorded_calibration(path.parent, [one for one in events if getattr(one, "path", None) == path.name])
+    records = list(read_journal(path.parent))
+    written, valid = (
+        [one.event for one in some if getattr(one.event, "path", None) == path.name]
+        for some in (records, effective(records))
+    )
+    if written and not valid:
+        raise BadInputError(
+            f"{path}: the session was repaired since, and has another result; see `workbench sessions`"
+        )
+    recorded_calibration(path.parent, valid)
 
 
 def unchanged(path: Path, sha256: str) -> Path:

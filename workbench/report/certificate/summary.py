@@ -59,7 +59,7 @@ def _largest(found: Sequence[RangeUncertainty]) -> KeyNumber:
     return KeyNumber(
         "Largest U",
         f"{two_digits(100 * relative)} %",
-        f"{_k_text(one)}, of the range, at {one.range_mm:g} mm",
+        f"{_k_text(one)}, mean of the lasers, at {one.range_mm:g} mm",
     )
 
 

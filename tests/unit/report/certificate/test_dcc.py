@@ -12,10 +12,15 @@ from tests.support.reference_session import LABORATORY, MARKUP, REFERENCE, certi
 from workbench.model.errors import BadInputError
 from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.dcc import certificate_xml
+from workbench.report.certificate.identity import VIRTUAL
 from workbench.report.certificate.session_record import read_session
 
 PRINTED = datetime(2026, 12, 1, tzinfo=UTC)
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
+
+
+def test_it_states_that_no_real_sensor_was_measured(tmp_path: Path) -> None:
+    assert VIRTUAL in certificate_xml(certificate(), PRINTED).decode()
 
 
 def test_another_reader_finds_identity_and_quantities(
