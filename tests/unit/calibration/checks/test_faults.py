@@ -23,7 +23,7 @@ from workbench.model.fit_event import Fault, Rejected
 from workbench.model.rig import Rig
 
 RIG = thesis_rig()
-SEEDS = (1, 2)
+SEEDS = (1, pytest.param(2, marks=pytest.mark.thorough))
 SOUND = 20
 
 
