@@ -9,8 +9,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pytest
 
+from tests.consumers.calibrations import missing
 from workbench.model.arrays import FloatArray, Image
 
 SOURCES = Path(__file__).parents[2] / "examples/c_ranger"
@@ -21,7 +21,7 @@ CHECKED = "-O1 -g -fsanitize=address,undefined -fno-sanitize-recover=all"
 def build(folder: Path, *options: str) -> Path:
     """The program, built in a copy of its sources."""
     if shutil.which("cc") is None or shutil.which("make") is None:
-        pytest.skip("the example in C needs a C compiler and make (Debian: see .ci/run)")
+        missing("C compiler, or no make")
     own = Path(shutil.copytree(SOURCES, folder / "c_ranger", ignore=shutil.ignore_patterns("ranger", "*.o")))
     flags = " ".join([CHECKED, *options])
     subprocess.run(["make", "-s", "-C", own, f"CFLAGS={flags}"], check=True)

@@ -11,18 +11,9 @@ import pytest
 
 import workbench as wb
 from tests.consumers.c_ranger import build, read_grey, run, spot_lines, write_pgm
+from tests.consumers.calibrations import RIGS, calibration_with
 from tests.support.reference_session import REFERENCE
-from tests.support.rigs import (
-    FISHEYE_STANDOFFS_MM,
-    PROVENANCE,
-    STANDOFFS_MM,
-    World,
-    fisheye_rig,
-    thesis_rig,
-)
-from workbench.calibration.estimation.fit import fit
-from workbench.calibration.verdict.export import calibrate, render
-from workbench.model.acceptance import Acceptance
+from workbench.calibration.verdict.export import render
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import load_calibration
 from workbench.sensor.calibrated import CalibratedSensor
@@ -48,18 +39,9 @@ def drawn_spots(sensor: CalibratedSensor, seed: int) -> tuple[list[str], FloatAr
     return lasers, exact + sd * rng.normal(size=(500, 2)), sd
 
 
-RIGS = {
-    "plumb_bob": (thesis_rig, STANDOFFS_MM),
-    "equidistant": (fisheye_rig, FISHEYE_STANDOFFS_MM),
-}
-"""Rig of each lens, and the standoffs of its calibration."""
-
-
 @pytest.mark.parametrize("lens", RIGS)
 def test_ranges_of_spots_are_those_of_the_workbench(lens: str, program: Path, tmp_path: Path) -> None:
-    rig, standoffs_mm = RIGS[lens]
-    world = World(rig(), 1)
-    calibration, _ = calibrate(fit(world.rig, world.observations(standoffs_mm)), Acceptance(), PROVENANCE)
+    calibration = calibration_with(lens)
     path = tmp_path / "calibration.yaml"
     path.write_text(render(calibration))
     sensor = CalibratedSensor(calibration)

@@ -3,32 +3,19 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.support.rigs import (
-    FISHEYE_STANDOFFS_MM,
-    PROVENANCE,
-    STANDOFFS_MM,
-    World,
-    fisheye_rig,
-    thesis_rig,
-)
-from workbench.calibration.estimation.fit import fit
-from workbench.calibration.verdict.export import calibrate, render
-from workbench.model.acceptance import Acceptance
+from tests.consumers.calibrations import RIGS, calibration_with, missing
+from workbench.calibration.verdict.export import render
 from workbench.model.calibration import Calibration
 
 HERE = Path(__file__).parent
-REQUIRED = "WORKBENCH_REQUIRE_CONSUMERS"
-"""Set to 1, a missing parser is a failure; otherwise its tests are skipped."""
 SYSTEM_PYTHON = Path("/usr/bin/python3")
 """Interpreter for which Debian packages ROS's parser."""
 READ_BY_ROS = """
@@ -37,15 +24,6 @@ name, info = camera_calibration_parsers.readCalibration(sys.argv[1])
 found = {"name": name, "width": info.width, "height": info.height, "model": info.distortion_model}
 print(json.dumps(found | {"D": list(info.D), "K": list(info.K), "P": list(info.P)}))
 """
-RIGS = {"plumb_bob": (thesis_rig, STANDOFFS_MM), "equidistant": (fisheye_rig, FISHEYE_STANDOFFS_MM)}
-"""Rig of each lens, and the standoffs of its calibration."""
-
-
-@cache
-def calibration_with(lens: str) -> Calibration:
-    rig, standoffs_mm = RIGS[lens]
-    world = World(rig(), 1)
-    return calibrate(fit(world.rig, world.observations(standoffs_mm)), Acceptance(), PROVENANCE)[0]
 
 
 @pytest.fixture(params=RIGS)
@@ -54,14 +32,6 @@ def stored(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Calibration,
     calibration, path = calibration_with(request.param), tmp_path / "calibration.yaml"
     path.write_text(render(calibration))
     return calibration, path
-
-
-def missing(what: str) -> None:
-    """Skip the test, or fail where the parser is required."""
-    message = f"no {what} (Debian: see .ci/run)"
-    if os.environ.get(REQUIRED) == "1":
-        pytest.fail(message)
-    pytest.skip(message)
 
 
 def test_the_parser_of_ros_reads_the_lens(stored: tuple[Calibration, Path]) -> None:

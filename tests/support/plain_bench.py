@@ -21,7 +21,7 @@ from workbench.model.rig import Rig
 
 @dataclass
 class PlainLasers:
-    """Lasers that are on inside `lit` until the lease ends, and off outside of it."""
+    """Lasers that are on inside `lit` until the lease ends."""
 
     ids: tuple[str, ...]
     interlock_closed: bool

@@ -21,7 +21,7 @@ from shutil import which
 import pytest
 
 from tests.conftest import REAL_TIME
-from tests.firmware.parts import KINDS, Kind, Running, build, hurried, hurry, is_there
+from tests.firmware.parts import KINDS, Change, Kind, Running, build, hurried, hurry, is_there
 from tests.support.lasers import serial_bank
 from workbench.devices.guarded_lasers import GuardedLaserBank
 from workbench.devices.guardian import answer, public_name
@@ -233,12 +233,19 @@ def test_a_hang_is_told_when_it_is_over(controller: Running, bank: GuardedLaserB
 def test_beats_hold_the_light_to_its_end_and_not_beyond(controller: Running, bank: GuardedLaserBank) -> None:
     """The controller is given short leases; renewing them leaves no gap."""
     already = len(controller.changes())
-    with suppress(LeaseEndedError), bank.lit(["L3"], for_s=1.2):  # the block outlasts it on purpose
-        on = controller.wait_for(4)
-        while controller.lines():
-            bank.beat()
-            time.sleep(0.01)
-        off = controller.wait_for(0)
+
+    def lit_to_the_end() -> Iterator[Change]:
+        with bank.lit(["L3"], for_s=1.2):
+            yield controller.wait_for(4)
+            while controller.lines():
+                bank.beat()
+                time.sleep(0.01)
+            yield controller.wait_for(0)
+
+    lit = lit_to_the_end()
+    on, off = next(lit), next(lit)
+    with pytest.raises(LeaseEndedError):
+        next(lit)
     assert len(controller.changes()) == already + 2
     lit_ms = (off.time_ns - on.time_ns) / 1e6
     print(f"lit for {lit_ms:.1f} of 1200 ms")

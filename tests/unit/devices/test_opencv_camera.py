@@ -200,7 +200,7 @@ def test_a_file_waits_for_its_reader(tmp_path: Path) -> None:
     assert found == pytest.approx([2 * number for number in range(1, count)], abs=3)
 
 
-def test_yuyv_becomes_grey_whatever_its_colour(tmp_path: Path) -> None:
+def test_yuyv_of_any_colour_becomes_grey(tmp_path: Path) -> None:
     """Frames as V4L2 delivers them, two bytes a pixel: luminance from 16 to 235, and half the chroma."""
     frames = []
     for luminance in (16, 126, 235):
