@@ -10,7 +10,7 @@
 
 enum seen {
     WIDTH = 1, HEIGHT = 2, LENS = 4, MATRIX = 8, DISTORTION = 16, OFFSET = 32, NOISE = 64, SPECKLE = 128,
-    VALIDITY = 256, FORMAT_SEEN = 512, ALL = 1023
+    VALIDITY = 256, FORMAT_SEEN = 512, VERDICT = 1024, ALL = 2047
 };
 
 struct reader {
@@ -19,6 +19,7 @@ struct reader {
     unsigned seen;
     unsigned laser_seen; /* of the present laser: 1 origin, 2 direction, 4 axis */
     real noise, speckle;
+    int is_refused, is_accepted_with_reason;
 };
 
 /* Numbers in brackets; their count, or -1. */
@@ -166,6 +167,11 @@ static const char *take(struct reader *r, int indent, int is_item, const char *k
         if (numbers(value, v, 2) != 2 || !(v[0] <= v[1]))
             return "validity.standoff_mm: expected [nearest, farthest]";
         c->nearest_mm = v[0], c->farthest_mm = v[1];
+    } else if (is_in(r, "laser_ranger", "fit") && indent == 4 && strcmp(key, "verdict") == 0) {
+        r->seen |= VERDICT;
+        r->is_refused = strcmp(value, "\"accepted\"") != 0;
+    } else if (is_in(r, "laser_ranger", "fit") && indent == 4 && strcmp(key, "accepted_because") == 0) {
+        r->is_accepted_with_reason = strlen(value) > 2; /* more than the quotes */
     } else if (is_in(r, "laser_ranger", "lasers") && (is_item || indent == 6))
         return laser(r, key, value, is_item);
     return NULL;
@@ -221,6 +227,8 @@ const char *calibration_read(FILE *file, struct ranger_calibration *c, int *line
         return "it is not a calibration of the workbench, or a part is missing";
     if (c->lasers == 0 || r.laser_seen != 7)
         return "lasers: expected axis, origin_mm and direction of each";
+    if (r.is_refused && !r.is_accepted_with_reason)
+        return "it was refused, and not accepted with a reason";
     c->spot_sd_px = (real)hypot(r.noise, r.speckle);
     return NULL;
 }

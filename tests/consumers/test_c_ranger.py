@@ -124,6 +124,7 @@ DAMAGES: dict[str, Callable[[str], str]] = {
     "a later format": lambda text: text.replace("format: 1", "format: 2", 1),
     "cut": lambda text: text[: text.index("camera_matrix:") + 40],
     "a long key": lambda text: "k" * 300 + ": 1\n" + text,
+    "refused": lambda text: text.replace('    verdict: "accepted"', '    verdict: "refused"', 1),
     "no line end": lambda text: text.replace("\n", " "),
 }
 """Name and damage of a calibration file."""
@@ -138,6 +139,16 @@ def test_a_damaged_calibration_is_refused(damage: str, program: Path, tmp_path: 
 
     assert (ended.returncode, ended.stdout) == (2, "")
     assert ended.stderr.startswith(f"error: {path}: ")
+
+
+def test_a_refused_calibration_that_was_accepted_with_a_reason_is_used(program: Path, tmp_path: Path) -> None:
+    text = DAMAGES["refused"](CALIBRATION.read_text())
+    path = tmp_path / "calibration.yaml"
+    path.write_text(text.replace('accepted_because: ""', 'accepted_because: "a trial"', 1))
+
+    ended = run(program, path, given="L1 100 30\n")
+
+    assert (ended.returncode, ended.stderr) == (0, "")
 
 
 FRAMES = {
