@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar, cast
@@ -14,11 +13,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from tests.support.fake_lasers import FakeLasers
 from tests.support.mjpeg import Picture, Stream
 from tests.support.yuyv import write_yuyv
 from workbench.devices.opencv_camera import BACKLOG, OpenCvBlock, OpenCvCamera
 from workbench.devices.placed_by_hand import PlacedByHand
-from workbench.devices.protocols import Bench, Frame, LaserState, StreamingCamera
+from workbench.devices.protocols import Bench, Frame, StreamingCamera
 from workbench.model.arrays import Image
 from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import CameraSpec, Rig, exactly
@@ -308,39 +308,14 @@ class Colours(Device):
 
     rate = 0.03
     """Red's share of full scale, for each unit of exposure."""
-    lit = False
+    lasers = FakeLasers()
 
     def read(self) -> tuple[bool, Picture]:
         time.sleep(0.001)
-        red = min(0.05 + Colours.rate * self.settings[cv2.CAP_PROP_EXPOSURE] * Colours.lit, 1.0)
+        red = min(0.05 + Colours.rate * self.settings[cv2.CAP_PROP_EXPOSURE] * Colours.lasers.is_lit, 1.0)
         shown = np.full((HEIGHT, WIDTH, 3), 12, np.uint8)
         shown[59:62, 99:102] = (15, 25, round(255 * red))
         return True, shown
-
-
-class Lasers:
-    """Shine on it."""
-
-    ids: tuple[str, ...] = ("L1",)
-    identity = "fake"
-
-    @contextmanager
-    def lit(self, ids: Sequence[str], for_s: float) -> Iterator[None]:
-        Colours.lit = True
-        yield
-        Colours.lit = False
-
-    def all_off(self) -> None:
-        Colours.lit = False
-
-    def beat(self) -> None:
-        pass
-
-    def state(self) -> LaserState:
-        return LaserState((), None)
-
-    def close(self) -> None:
-        pass
 
 
 @pytest.mark.parametrize("rate", [0.3, 0.01, 0.003])
@@ -351,7 +326,7 @@ def test_a_red_spot_on_a_camera_of_colours_is_not_clipped(
     monkeypatch.setattr(cv2, "VideoCapture", Colours)
     monkeypatch.setattr(Colours, "rate", rate)
     camera = camera_of("/dev/video0", exposure=16, exposure_limits=(8, 7000), latency_frames=1)
-    found = set_exposure(Bench(camera, Lasers(), PlacedByHand()), RIG, "k", lambda key: None)
+    found = set_exposure(Bench(camera, Colours.lasers, PlacedByHand()), RIG, "k", lambda key: None)
     camera.close()
     assert found is not None
     assert found.exposure == camera._for_spots
@@ -401,7 +376,7 @@ def test_an_exposure_that_is_another_the_next_time() -> None:
 
         def grab(self) -> Frame:
             picture = flat(12)
-            picture[60, 100] = min(12 + int(1.5 * self.asked[-1] * Colours.lit), 255)
+            picture[60, 100] = min(12 + int(1.5 * self.asked[-1] * Colours.lasers.is_lit), 255)
             return Frame(picture, 0)
 
         grab_ambient = grab
@@ -410,7 +385,7 @@ def test_an_exposure_that_is_another_the_next_time() -> None:
             pass
 
     camera = Forgetful()
-    bench = Bench(camera, Lasers(), PlacedByHand())
+    bench = Bench(camera, Colours.lasers, PlacedByHand())
     found = set_exposure(bench, RIG, "k", lambda key: None)
     assert found is not None
     assert camera.asked[-1] in camera.asked[:-1], "half of it confirmed it, then it was set again"

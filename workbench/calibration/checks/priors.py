@@ -78,7 +78,7 @@ def doubted_priors(fit: CalibrationFit) -> list[str]:
 
 
 def _is_drift(fit: CalibrationFit) -> BoolArray:
-    """(P,) whether each parameter is the drift of the image, or a step of it between two parts.
+    """(P,) whether each parameter is a drift of the image, or its step between two parts.
 
     They have a limit; their prior is no measurement.
     """

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
 
+from tests.support.fake_lasers import FakeLasers
 from tests.support.mjpeg import Picture, Stream
 from workbench.devices.opencv_camera import OpenCvBlock, OpenCvCamera
-from workbench.devices.protocols import Frame, LaserState
+from workbench.devices.protocols import Frame
 from workbench.model.rig import CameraSpec, Rig, exactly
 from workbench.procedure.capture.automatic import AutomaticControl, find_automatic_control
 
@@ -26,11 +24,8 @@ LATENCY = 6
 """Frames under way in the stream."""
 
 
-class Scene:
+class Scene(FakeLasers):
     """A wall with a red spot, seen by a camera whose gain follows the brightest pixel by `automatic`."""
-
-    ids: tuple[str, ...] = ("L1",)
-    identity = "fake"
 
     def __init__(
         self,
@@ -42,7 +37,7 @@ class Scene:
     ) -> None:
         self.automatic, self.flicker, self.fade = automatic, flicker, fade
         self.rng = np.random.default_rng(seed)
-        self.is_lit, self.gain, self.wall = False, 1.0, wall
+        self.gain, self.wall = 1.0, wall
 
     def picture(self) -> Picture:
         brightest = max(self.wall + 120.0 * self.is_lit, 20.0)
@@ -53,24 +48,6 @@ class Scene:
         if self.is_lit:
             image[57:63, 100:106, 2] += 120.0
         return np.clip(image * self.gain, 0, 255).astype(np.uint8)
-
-    @contextmanager
-    def lit(self, ids: Sequence[str], for_s: float) -> Iterator[None]:
-        self.is_lit = bool(ids)
-        yield
-        self.is_lit = False
-
-    def all_off(self) -> None:
-        self.is_lit = False
-
-    def beat(self) -> None:
-        pass
-
-    def state(self) -> LaserState:
-        return LaserState((), None)
-
-    def close(self) -> None:
-        pass
 
 
 class Direct:
