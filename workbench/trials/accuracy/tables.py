@@ -217,7 +217,7 @@ def _budget_rows(one: Agreement) -> list[dict[str, Cell]]:
 
 def _test_row(one: JointTest) -> dict[str, Cell]:
     return {
-        "range": one.range,
+        "range": one.name,
         "variance_ratio": one.ratio,
         "p": one.probability,
         "alarm": one.alarm,
