@@ -57,6 +57,7 @@ MANY = 10
 COVERAGE = (0.93, 0.97)
 EVEN = (-0.1, 0.1)
 STANDOFFS_MM = (140.0, 180.0, 250.0, 350.0, 500.0, 750.0, 1100.0, 1700.0, 2000.0, 2700.0, 3800.0)
+GAUGE_MM = (480.0, 490.0, 500.0, 510.0, 520.0)
 VERIFIED_MM = (200.0, 300.0, 500.0, 800.0, 1200.0, 2000.0)
 FEW_PLACEMENTS = "at 3 standoffs with 8 placements a test at 5 % finds about 77 %; the procedure has 10"
 NEAR_END = "the near end of a target that is not quite square is closer than its standoff"
@@ -181,6 +182,36 @@ def gauge(runs: int) -> Iterator[Figure]:
         inside["GRR"] += study.gauge.low <= hypot(0.2, 0.4) <= study.gauge.high
     for name, count in inside.items():
         yield Figure("gauge R&R", f"95 % interval of {name}", count / trials, COVERAGE, trials)
+    yield from _gauge_of_sensors(runs)
+
+
+def _gauge_of_sensors(runs: int) -> Iterator[Figure]:
+    """The same intervals of the shipped design: drawn sensors, a new placement for every trial."""
+    operator_mm = 0.4
+    many = [_mean_range(bench(0), 500.0, number) for number in range(50 * runs)]
+    equipment_mm = float(np.std(many, ddof=1))
+    true = {"EV": equipment_mm, "GRR": hypot(equipment_mm, operator_mm)}
+    found = []
+    for seed in range(runs):
+        one, random = bench(seed), np.random.default_rng([6, seed])
+        rows = [
+            {"part": part, "operator": name, "measured_mm": _mean_range(one, mm, trial) + offset_mm}
+            for name, offset_mm in enumerate(random.normal(0.0, operator_mm, 3).tolist())
+            for part, mm in enumerate(GAUGE_MM)
+            for trial in range(3)
+        ]
+        found.append(gauge_rr(pd.DataFrame(rows)))
+    for name, sd in true.items():
+        of = [one.equipment if name == "EV" else one.gauge for one in found]
+        inside = _mean(one.low <= sd <= one.high for one in of)
+        yield Figure("gauge R&R", f"95 % interval of {name}, drawn sensors", inside, COVERAGE, runs)
+
+
+def _mean_range(one: SimulatedBench, standoff_mm: float, number: int) -> float:
+    """Mean range of the lasers at a new placement."""
+    ((taken, _),) = one.readings("g", flat_placement("g", standoff_mm, number), 1)
+    assert taken.range_mm is not None
+    return taken.range_mm
 
 
 def incline(runs: int) -> Iterator[Figure]:
