@@ -14,6 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "benchmarks"
+CODE = ("workbench", "tests", "procedures", "rigs")
 FIRST_LINE = re.compile(r".+, \d{4}-\d\d-\d\d: `(?P<command>[^`]+)`, code (?P<code>\w+\+?)")
 
 
@@ -70,7 +71,7 @@ def code_version() -> str:
     """Commit of the working tree, with `+` if files have changed since; `unknown` outside a clone."""
     try:
         commit = _git("rev-parse", "--short", "HEAD")
-        return f"{commit}+" if _git("status", "--porcelain", "--untracked-files=no") else commit
+        return f"{commit}+" if _git("status", "--porcelain", "--untracked-files=no", "--", *CODE) else commit
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
 
