@@ -67,6 +67,7 @@ lint: $(INSTALLED)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/codespell
 	$(BIN)/python -m tests.prose
 
 # The type checker takes minutes of one core: it runs beside the tests, which have priority.

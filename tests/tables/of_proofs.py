@@ -42,7 +42,7 @@ class ProofFigure:
 
     @property
     def head(self) -> str:
-        """What figures have in common that differ in a place or a number."""
+        """Beginning of the quantity that figures share which differ in a place or a number alone."""
         return re.split(r", \d| at \d", self.quantity)[0]
 
 

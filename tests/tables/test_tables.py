@@ -28,7 +28,7 @@ def test_every_table_is_on_one_page() -> None:
 
 @pytest.mark.parametrize("name", sorted(TABLES))
 def test_a_table_is_what_its_command_makes(name: str) -> None:
-    """If it is stale: `make tables`."""
+    """Write a stale one by `make tables`."""
     assert blocks((ROOT / MARKED[name]).read_text())[name] == TABLES[name]()
 
 

@@ -40,7 +40,7 @@ Shown = dict[str, str]
 
 
 def shown_by(name: str) -> Shown:
-    """What a picture shows, as hashes and versions by name.
+    """Hashes and versions of what a picture shows, by name.
 
     Raises:
         LookupError: no command makes a picture of this name.

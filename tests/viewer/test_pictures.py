@@ -21,7 +21,7 @@ from tests.viewer.manifest import (
 
 @pytest.mark.parametrize("name", names())
 def test_a_picture_is_that_of_its_command_and_not_stale(name: str) -> None:
-    """If it fails: `make pictures`, for the certificate `make certificate`."""
+    """Make a stale one by `make pictures`, the certificate by `make certificate`."""
     recorded = json.loads(MANIFEST.read_text())[name]
     assert recorded["sha256"] == file_hash(path_of(name))
     assert recorded["shows"] == shown_by(name)
