@@ -14,7 +14,7 @@ import numpy as np
 
 from tests.proofs.calibrated_surfaces import DrawnSensors
 from tests.proofs.shape_scores import angle_held, drawn_coverage
-from tests.proofs.tables import keep
+from tests.support.stored_output import store
 from tests.support.surfaces import (
     F_PX,
     SD_PX,
@@ -196,7 +196,7 @@ def main() -> int:
         f"{DRAWN_SHAPES} shapes drawn from the prior:"
         f" {100 * drawn_coverage(DRAWN_SHAPES, SEED):.1f} % in the interval",
     ]
-    keep("shapes", "Shapes", lines)
+    store("shapes", "Shapes", "python -m tests.proofs.shapes", lines)
     return 0
 
 

@@ -8,7 +8,6 @@ of the specification. A miss is printed with its reason where one is known.
 from __future__ import annotations
 
 import argparse
-import datetime as dt
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -25,6 +24,7 @@ from tests.support.accuracy_runs import accuracy_run
 from tests.support.rangers import thesis_ranger
 from tests.support.rigs import thesis_rig
 from tests.support.simulated_trials import SimulatedBench
+from tests.support.stored_output import store
 from tests.support.trial_readings import drawn_readings
 from workbench.model.event import ReadingTaken
 from workbench.model.target import Placement
@@ -52,7 +52,6 @@ from workbench.trials.verify.statistics import check_placement
 from workbench.trials.verify.verdict import lasers_verdict, ranges_verdict
 
 ROOT = Path(__file__).parents[2]
-RESULTS = ROOT / "docs" / "benchmarks"
 MANY = 10
 """Factor of the runs of trials that take milliseconds."""
 COVERAGE = (0.93, 0.97)
@@ -339,20 +338,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=200, help="simulated runs of each trial")
     runs = parser.parse_args().runs
-    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
-    lines = [f"Trials, {today}: `python -m tests.proofs.trials --runs {runs}`"]
-    missed, unjustified = 0, 0
+    lines, missed, unjustified = [], 0, 0
     for proof in PROOFS:
         for figure in proof(runs):
             lines.append(figure.line())
             missed += figure.is_missed
             unjustified += figure.is_unjustified
-            print(lines[-1], flush=True)
+            print(lines[-1], file=sys.stderr, flush=True)
     summary = f"{missed} figures missed, {missed - unjustified} of them with a known reason"
     lines.append(summary if missed else "Every figure is reached.")
-    print(lines[-1])
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{today}-trials.txt").write_text("\n".join(lines) + "\n")
+    store("trials", "Trials", f"python -m tests.proofs.trials --runs {runs}", lines)
     return 1 if unjustified else 0
 
 

@@ -11,11 +11,12 @@ from pathlib import Path
 from rich.console import Console
 
 from workbench.cli.console import print_message
-from workbench.cli.report import Outputs, write_document
+from workbench.cli.report import Outputs
 from workbench.model.contents import printable
 from workbench.model.errors import BadInputError
 from workbench.model.laboratory import load_laboratory
 from workbench.report.document import Document
+from workbench.report.document_files import write_document
 from workbench.report.history.drift import distance_histories
 from workbench.report.history.in_force import dated_calibrations, in_force, newer_text
 from workbench.report.history.page import SensorHistory, history_document
@@ -53,7 +54,7 @@ def show_history(request: HistoryRequest, as_json: bool) -> None:
         entry = SensorEntry(serial=serial, kind="note", time=now(), operator=operator(), text=request.note)
         append_entry(request.sessions, entry)
     document = history_document(sensor_history(request.sessions, serial, every))
-    write_document(document, outputs)
+    write_document(document, outputs.html, outputs.pdf)
     if as_json:
         print(json.dumps({"serial": serial} | document.as_json()))
     else:
