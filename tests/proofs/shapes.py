@@ -22,6 +22,7 @@ from tests.support.surfaces import (
     X,
     cubic,
     cylinder,
+    fit_polynomial,
     flat,
     holds,
     incline,
@@ -31,7 +32,6 @@ from tests.support.surfaces import (
     share,
 )
 from workbench.ranging.points import interval_mm
-from workbench.ranging.polynomial import fit_polynomial
 from workbench.ranging.shape import Shape
 
 READINGS, SEED = 1000, 2001

@@ -13,7 +13,8 @@ from workbench.model.rig import ImageAxis
 from workbench.ranging.points import Points
 from workbench.ranging.shape import DEFAULT_PRIOR, Shape, fit_shape
 from workbench.ranging.shape_prior import ShapePrior
-from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
+from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.range_model import RangeEstimates
 
 NAMES: dict[ImageAxis, str] = {"u": "horizontal", "v": "vertical"}
 Weights = Literal["information", "pixels"]

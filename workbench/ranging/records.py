@@ -10,7 +10,7 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 from workbench.model.event import LaserRange
 from workbench.ranging.points import interval_mm
-from workbench.sensor.calibrated import RangeEstimates
+from workbench.sensor.range_model import RangeEstimates
 from workbench.spots import Failure, Spot
 
 FLAGGED = {
