@@ -26,7 +26,7 @@ class Report:
         >>> import workbench as wb
         >>> report = wb.open_session("data/session-0.1.0").report()
         >>> [section["key"] for section in report.data["sections"]][:3]
-        ['laboratory', 'sensor', 'standards']
+        ['laboratory', 'sensor', 'conditions']
     """
 
     certificate: Certificate
