@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from workbench.report.aim_table import aim_table
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_session_rig
 from workbench.session.state import effective
-from workbench.spots import Finding
+from workbench.spots import Finding, Spot
 from workbench.viewer.aim_view import AimView, aim_layout
 from workbench.viewer.calibration_view import record_calibration
 from workbench.viewer.comparison import Source, compare
@@ -42,12 +43,14 @@ def record_live_ranger(_: Recorded, out: Path) -> None:
     view = RangerView(stream, a_rig(), ranger)
     for nearer_mm in (0.0, 2.0, 4.0):
         seen = spots(ranger, {laser: range_mm - nearer_mm for laser, range_mm in RANGES_MM.items()})
-        finding = Finding(tuple(seen))
         on = drawn_frame([bright_spot(None, one.u_px, one.v_px, 120.0) for one in seen], 8.0)
-        view.take(
-            Shown(acquire(ranger, "s", lambda _, f=finding: f), on.astype(np.uint8), DARK, finding.spots)
-        )
+        reading = acquire(ranger, "s", partial(_found, tuple(seen)))
+        view.take(Shown(reading, on.astype(np.uint8), DARK, tuple(seen)))
     view.close()
+
+
+def _found(seen: tuple[Spot, ...], _: object) -> Finding:
+    return Finding(seen)
 
 
 def record_aim(_: Recorded, out: Path) -> None:

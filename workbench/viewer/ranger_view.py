@@ -12,10 +12,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from workbench.model.arrays import Image
+from workbench.model.event import LaserRange
 from workbench.model.rig import Rig
 from workbench.model.spot import Spot
 from workbench.ranging.lines import LineShape
-from workbench.ranging.ranger import LaserRange, Ranger, Reading
+from workbench.ranging.ranger import Ranger, Reading
 from workbench.ranging.shape import Shape
 from workbench.viewer import blueprint as layout
 from workbench.viewer import entities as at
