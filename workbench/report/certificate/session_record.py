@@ -15,7 +15,7 @@ from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
-from workbench.session.journal import JOURNAL, read_journal
+from workbench.session.journal import JOURNAL, last_chain, read_journal
 from workbench.session.manifest import MANIFEST, Manifest, load_manifest, load_session_rig
 from workbench.session.state import SessionStatus, effective, session_status
 
@@ -135,6 +135,11 @@ class SessionRecord:
                     " restore it from a copy"
                 )
         return missing
+    @cached_property
+    def journal_chain(self) -> str:
+        """Hash at the end of the last record; empty in sessions of versions that did not record it."""
+        return last_chain(self.folder) if self.all_records else ""
+
 
 
 def read_session(folder: Path) -> SessionRecord:
