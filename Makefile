@@ -9,7 +9,7 @@ INSTALLED := $(VENV)/.installed
 # The dependencies of the workbench alone, without those of its developers.
 RUNNABLE := $(VENV)/.runnable
 
-.PHONY: help demo test thorough quick wheel lint bench prove mutants crash fuzz lock clean schema pictures docs certificate
+.PHONY: help demo test thorough quick wheel lint bench prove mutants crash fuzz lock clean schema pictures tables docs certificate
 
 help:
 	@echo "make demo   calibrate the emulated rig, then measure its accuracy (about a minute)"
@@ -23,7 +23,8 @@ help:
 	@echo "make fuzz   100 000 mutated inputs at every door, and 500 commands (ten minutes at most)"
 	@echo "make wheel  build the wheel, install it with the run-time dependencies only, run a session (two minutes)"
 	@echo "make lint   only the linters and the type checker"
-	@echo "make pictures  the viewer's screens in docs/images, of a new run of the demo (two minutes)"
+	@echo "make pictures  the pictures in docs/images, of new runs of the demo (four minutes)"
+	@echo "make tables  the tables of the documentation, from the outputs in docs/benchmarks (ten seconds)"
 	@echo "make docs   the documentation site in build/website/site, with the figures of the notebooks (two minutes)"
 	@echo "make certificate  docs/certificate-demo.pdf and its picture, of a new run of the demo (a minute)"
 	@echo "make lock   update requirements.lock and requirements-run.lock from pyproject.toml"
@@ -66,6 +67,7 @@ lint: $(INSTALLED)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/codespell
 	$(BIN)/python -m tests.prose
 
 # The type checker takes minutes of one core: it runs beside the tests, which have priority.
@@ -95,7 +97,11 @@ lock:
 	$(LOCK) --extra build --constraint requirements.lock --output-file requirements-run.lock
 
 pictures: $(INSTALLED)
-	$(BIN)/python -m tests.viewer.pictures docs/images
+	$(BIN)/python -m tests.viewer.pictures
+	$(BIN)/python -m tests.viewer.certificate docs
+
+tables: $(INSTALLED)
+	$(BIN)/python -m tests.tables
 
 docs: $(INSTALLED)
 	$(BIN)/python -m tests.website

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from workbench.api import LimitFailedError as LimitFailedError
     from workbench.api import Ranger as Ranger
     from workbench.api import Reading as Reading
+    from workbench.api import Report as Report
     from workbench.api import Rig as Rig
     from workbench.api import Session as Session
     from workbench.api import ShapePrior as ShapePrior
@@ -44,6 +45,7 @@ __all__ = [
     "LimitFailedError",
     "Ranger",
     "Reading",
+    "Report",
     "Rig",
     "Session",
     "ShapePrior",

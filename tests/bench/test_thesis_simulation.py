@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.tables.blocks import blocks
 from tests.viewer.readback import Contents
 from workbench.model.event import TrialFinished
 from workbench.model.rig import load_rig
@@ -82,9 +82,8 @@ def simulation(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
 
 def test_the_table_in_the_documentation_is_what_comes_out(simulation: Simulation) -> None:
     """To the digits that the last bits of another processor may move."""
-    text = (ROOT / "docs/thesis-simulation.md").read_text()
-    lines = [line for line in text.splitlines() if re.match(r"\| [a-z0-9-]+ \| \w+ \d", line)]
-    table = [line.strip("| ").split(" | ") for line in lines]
+    text = blocks((ROOT / "docs/thesis-simulation.md").read_text())["simulation"]
+    table = [line.strip("| ").split(" | ") for line in text.splitlines()[2:]]
     assert len(table) == len(simulation.rows)
     for (scene, what, *shown), (_, row) in zip(table, simulation.rows.iterrows(), strict=True):
         assert (scene, what) == (row.scene, f"{row.quantity} {row.nearest_mm:.0f}-{row.farthest_mm:.0f}")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import os
 import platform
-from pathlib import Path
 
 # One core, as stated in the tables; read when the numerical libraries load.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -23,16 +21,14 @@ from tests.benchmarks import (
     speckle,
     speed,
 )
-
-RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
+from tests.support.stored_output import store
 
 
 def main() -> None:
     """Run, print, write."""
-    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
-    RESULTS.mkdir(parents=True, exist_ok=True)
     subjects = {
-        "spots": (speed.lines, detection.lines, accuracy.lines, speckle.lines),
+        "spots": (speed.lines, detection.lines, accuracy.lines),
+        "speckle": (speckle.lines,),
         "calibration": (calibration.lines,),
         "rows": (rows.lines,),
         "ranging": (ranging.lines,),
@@ -40,13 +36,10 @@ def main() -> None:
         "listing": (listing.lines,),
     }
     for subject, tables in subjects.items():
-        with (RESULTS / f"{today}-{subject}.txt").open("w") as file:
-            title = [f"{subject.capitalize()}, {today}, Python {platform.python_version()}"]
-            for part in (title, *(table() for table in tables)):
-                for line in part:
-                    print(line, flush=True)
-                    file.write(line + "\n")
-                file.write("\n")
+        lines = [f"Python {platform.python_version()}"]
+        for table in tables:
+            lines += ["", *table()]
+        store(subject, subject.capitalize(), "make bench", lines)
 
 
 if __name__ == "__main__":

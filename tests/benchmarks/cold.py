@@ -73,7 +73,7 @@ def lines() -> Iterator[str]:
         ratio, processor = ours_took.wall / script_took.wall, ours_took.processor / script_took.processor
         of = f"minimal script of numpy and scipy, {name}"
         yield f"{of:52}{script_took.wall:6.2f}{script_took.processor:11.2f}{ratio:7.2f}{processor:14.2f}"
-    yield f"target of the wall's ratio: at most 2; the two optima differ by {off:.1e} sd"
+    yield f"target of the wall's ratio, with one thread: at most 2; the two optima differ by {off:.1e} sd"
     yield f"the very first fit, which compiles: {first.wall:.2f}"
 
 

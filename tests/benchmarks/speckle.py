@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.benchmarks.render import Sensor, axis_share
+from tests.support.stored_output import store
 from workbench.model.arrays import FloatArray
 from workbench.spots import SpotFinder
 
@@ -134,9 +135,8 @@ def lines(seed: int = 1, placements: int = PLACEMENTS) -> Iterator[str]:
 
 
 def main() -> int:
-    """Print."""
-    for line in lines(int(sys.argv[1]) if len(sys.argv) > 1 else 1):
-        print(line, flush=True)
+    """Print and write."""
+    store("speckle", "Speckle", "python -m tests.benchmarks.speckle", ["", *lines()])
     return 0
 
 

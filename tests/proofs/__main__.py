@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import datetime as dt
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,12 +11,12 @@ import numpy as np
 
 from tests.proofs import report, shape_scores, study
 from tests.proofs.solve import Solve, at_once, one_by_one
+from tests.support.stored_output import store
 from workbench.model.rig import Prior, Rig, load_rig
 from workbench.procedure.engine.procedure_file import load_procedure
 from workbench.steps.capture_grid import CaptureGridStep
 
 ROOT = Path(__file__).parents[2]
-RESULTS = ROOT / "docs" / "benchmarks"
 BLOCK = 1000
 SEED = 2001
 READINGS = 4000
@@ -32,7 +31,6 @@ def main() -> int:
     parser.add_argument("--chosen", type=int, default=2, help="how many times 1000 one by one")
     asked = parser.parse_args()
     rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
-    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
     whole = study.joined(list(_blocks(rig, asked.thousands, at_once)))
     lines, misses = report.tables(rig, whole, "fitted by calibration.estimation.batch, the whole model")
     if asked.chosen:
@@ -45,10 +43,7 @@ def main() -> int:
     shapes, missed = shape_scores.scores(READINGS, SEED)
     lines, misses = [*lines, "", "Shapes, lasers of the thesis, calibration exact", *shapes], misses + missed
     command = f"python -m tests.proofs --thousands {asked.thousands} --chosen {asked.chosen}"
-    lines = [f"Proofs, {today}: `{command}`, seed {SEED}", *lines]
-    print("\n".join(lines))
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{today}-proofs.txt").write_text("\n".join(lines) + "\n")
+    store("proofs", "Proofs", command, [f"seed {SEED}", *lines])
     return 1 if misses else 0
 
 

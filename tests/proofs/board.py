@@ -6,7 +6,6 @@ minutes; the table goes to docs/benchmarks.
 
 from __future__ import annotations
 
-import datetime as dt
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 import yaml as pyyaml
 
+from tests.support.stored_output import store
 from workbench.calibration.data.spot_rows import observations_of_rows
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.verdict.assessment import determined_by
@@ -28,7 +28,6 @@ from workbench.procedure.engine.run import Invocation, run
 ROOT = Path(__file__).parents[2]
 RIG = ROOT / "rigs/thesis-emulated.yaml"
 PROCEDURE = ROOT / "procedures/calibrate-board.yaml"
-RESULTS = ROOT / "docs" / "benchmarks"
 SEEDS = (2001, 7, 42, 1, 2, 3)
 F_LIMIT = 0.001
 """Relative error of the focal length."""
@@ -125,17 +124,14 @@ def misses(studies: list[Study]) -> list[str]:
 
 def main() -> int:
     """Run, print, write; 1 if a figure is missed."""
-    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
     rig, procedure = load_rig(RIG), load_procedure(PROCEDURE)
     with tempfile.TemporaryDirectory() as name:
         studies = []
         for seed in SEEDS:
             studies.append(study(rig, procedure, seed, Path(name)))
             print(f"seed {seed} done", file=sys.stderr)
-    lines = [f"Printed board, {today}: `python -m tests.proofs.board`", "", *table(studies), *misses(studies)]
-    print("\n".join(lines))
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{today}-board.txt").write_text("\n".join(lines) + "\n")
+    lines = ["", *table(studies), *misses(studies)]
+    store("board", "Printed board", "python -m tests.proofs.board", lines)
     return 1 if misses(studies) else 0
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tests.benchmarks.ranging import RIG, Bench
-from tests.proofs.tables import keep
+from tests.support.stored_output import store
 from workbench.model.rig import load_rig
 from workbench.ranging.acquire import acquire
 
@@ -66,7 +66,7 @@ def main() -> int:
         "",
         *table(),
     ]
-    keep("crowded", "Crowded spots", lines)
+    store("crowded", "Crowded spots", "python -m tests.proofs.crowded", lines)
     return 0
 
 

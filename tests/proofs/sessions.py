@@ -23,7 +23,7 @@ from tests.crash.short import CALLER
 from tests.proofs import simulate
 from tests.proofs.score import NORMAL_95
 from tests.proofs.study import RANGES_MM
-from tests.proofs.tables import keep
+from tests.support.stored_output import store
 from tests.support.virtual_truth import parameter_values
 from workbench.calibration.verdict.assessment import PRIOR_UNMOVED
 from workbench.model.arrays import FloatArray
@@ -197,7 +197,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sessions", type=int, default=SESSIONS)
     lines = list(table(parser.parse_args().sessions))
-    keep("sessions", "Sessions from light to file", lines)
+    store("sessions", "Sessions from light to file", "python -m tests.proofs.sessions", lines)
     return int(any(line.startswith("MISSED") for line in lines))
 
 

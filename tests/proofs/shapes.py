@@ -14,7 +14,7 @@ import numpy as np
 
 from tests.proofs.calibrated_surfaces import DrawnSensors
 from tests.proofs.shape_scores import angle_held, drawn_coverage
-from tests.proofs.tables import keep
+from tests.support.stored_output import store
 from tests.support.surfaces import (
     F_PX,
     SD_PX,
@@ -22,6 +22,7 @@ from tests.support.surfaces import (
     X,
     cubic,
     cylinder,
+    fit_polynomial,
     flat,
     holds,
     incline,
@@ -31,7 +32,6 @@ from tests.support.surfaces import (
     share,
 )
 from workbench.ranging.points import interval_mm
-from workbench.ranging.polynomial import fit_polynomial
 from workbench.ranging.shape import Shape
 
 READINGS, SEED = 1000, 2001
@@ -196,7 +196,7 @@ def main() -> int:
         f"{DRAWN_SHAPES} shapes drawn from the prior:"
         f" {100 * drawn_coverage(DRAWN_SHAPES, SEED):.1f} % in the interval",
     ]
-    keep("shapes", "Shapes", lines)
+    store("shapes", "Shapes", "python -m tests.proofs.shapes", lines)
     return 0
 
 

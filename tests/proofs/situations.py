@@ -20,18 +20,17 @@ the cause as often as is asked: the row is marked `unseen`, its coverage stands.
 from __future__ import annotations
 
 import argparse
-import datetime as dt
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
 from multiprocessing import get_context
-from pathlib import Path
 
 import numpy as np
 
 from tests.support.rigs import PROVENANCE, STANDOFFS_MM, World, prior, thesis_rig
+from tests.support.stored_output import store
 from workbench.calibration.checks.priors import DOUBT_P
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.estimation.fit import CalibrationFit, fit_cells
@@ -47,7 +46,6 @@ from workbench.model.stats import norm_cdf, norm_ppf
 from workbench.procedure.engine.visiting_order import returned, shuffled
 from workbench.sensor.calibrated import CalibratedSensor
 
-RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 RANGES_MM = np.geomspace(120.0, 5000.0, 10)
 COVERAGE = (0.93, 0.97)
 NAMED = 0.95
@@ -384,12 +382,11 @@ def main() -> int:
         for row in pool.map(_row, indices, [asked.calibrations] * len(indices)):
             rows.append(row)
             print(list(lines([row]))[-1], file=sys.stderr, flush=True)
-    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
-    text = [f"Situations, {today}: {asked.calibrations} calibrations each", *lines(rows)]
-    print("\n".join(text))
-    if not asked.rows:
-        RESULTS.mkdir(parents=True, exist_ok=True)
-        (RESULTS / f"{today}-situations.txt").write_text("\n".join(text) + "\n")
+    if asked.rows:
+        print("\n".join(lines(rows)))
+    else:
+        command = f"python -m tests.proofs.situations --calibrations {asked.calibrations}"
+        store("situations", "Situations", command, list(lines(rows)))
     return 1 if any("MISSED" in row.verdict for row in rows) else 0
 
 

@@ -7,21 +7,19 @@ the rig's tolerances), and the same with one standoff 10 mm off.
 from __future__ import annotations
 
 import argparse
-import datetime as dt
 import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from tests.support.rigs import STANDOFFS_MM, World, thesis_rig
+from tests.support.stored_output import store
 from workbench.calibration.checks import cross_validation, residuals
 from workbench.calibration.checks.faults import find_faults
 from workbench.calibration.selection.outliers import fit_without_outliers
 
-RESULTS = Path(__file__).parents[2] / "docs" / "benchmarks"
 FIRST_SEED = 20_000
 MISTAKE_MM = 10.0
 
@@ -32,13 +30,10 @@ def main() -> None:
     parser.add_argument("--fits", type=int, default=2000)
     parser.add_argument("--mistakes", type=int, default=20, help="fits for each standoff that is off")
     arguments = parser.parse_args()
-    today = dt.datetime.now(tz=dt.UTC).date().isoformat()
-    lines = [f"Checks of a fit, {today}: python -m tests.proofs.validation --fits {arguments.fits}"]
-    for line in (*_sound(arguments.fits), *_mistaken(arguments.mistakes)):
-        lines.append(line)
-        print(line, flush=True)
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{today}-cross_validation.txt").write_text("\n".join(lines) + "\n")
+    lines = [*_sound(arguments.fits), *_mistaken(arguments.mistakes)]
+    store(
+        "validation", "Checks of a fit", f"python -m tests.proofs.validation --fits {arguments.fits}", lines
+    )
 
 
 def _sound(fits: int) -> Iterator[str]:

@@ -94,7 +94,12 @@ class SimulatedBench:
             seen = [n for n, i in enumerate(self.true.ids) if i not in without]
             ids = [self.true.ids[n] for n in seen]
             reading = self.ranger.read_known(scene, len(self.true.ids), ids, px[seen], sd[seen])
-            found.append((reading_taken(self.rig, name, placement, number, reading, closest), reading))
+            found.append(
+                (
+                    reading_taken(self.rig, self.ranger.sensor, name, placement, number, reading, closest),
+                    reading,
+                )
+            )
         return found
 
     def spot_readings(self, name: str, placement: Placement, count: int) -> list[ReadingTaken]:

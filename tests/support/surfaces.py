@@ -8,6 +8,7 @@ import numpy as np
 
 from workbench.model.arrays import FloatArray
 from workbench.ranging.points import Points
+from workbench.ranging.polynomial import PolynomialFit, fit_polynomials
 from workbench.ranging.shape import Shape, fit_shape
 from workbench.ranging.shape_prior import ShapePrior, prior_components
 
@@ -41,6 +42,11 @@ def cylinder(range_mm: float, axis_x_mm: float = 0.0, radius_mm: float = 89.0) -
 def seen(x: FloatArray, range_mm: FloatArray, sd_px: float = SD_PX) -> Points:
     """What spots of this deviation tell: r^2 / (f b) of it in range."""
     return Points(x, range_mm, np.diag((sd_px * range_mm**2 / (F_PX * np.abs(x))) ** 2))
+
+
+def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
+    """The maximum-likelihood polynomial of one degree."""
+    return fit_polynomials(points, degree + 1).of_degree(degree)
 
 
 def readings(

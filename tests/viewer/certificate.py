@@ -14,11 +14,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pypdfium2
 
-from tests.viewer.pictures import COMMAND, SMALL
+from tests.viewer.harness import write_png
+from tests.viewer.manifest import record
+from tests.viewer.pictures import COMMAND
 
 DPI = 90
 POINTS_PER_INCH = 72
@@ -37,7 +38,7 @@ def first_page(pdf: Path, png: Path) -> None:
     """Write the first page of a PDF file as a picture."""
     document = pypdfium2.PdfDocument(pdf)
     picture = document[0].render(scale=DPI / POINTS_PER_INCH).to_numpy()
-    cv2.imwrite(str(png), np.ascontiguousarray(picture), SMALL)
+    write_png(png, np.ascontiguousarray(picture))
     document.close()
 
 
@@ -57,6 +58,7 @@ def main(docs: Path) -> None:
         report = ("report", session.name, "--no-input", "--pdf", str(pdf))
         subprocess.run([workbench, *report], cwd=folder, check=True)
     first_page(pdf, docs / "images/certificate.png")
+    record("certificate.png", pdf.name)
 
 
 if __name__ == "__main__":

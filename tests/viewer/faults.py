@@ -1,25 +1,20 @@
-"""Calibration with four faults, for the viewer: `python -m tests.viewer.faults OUT [each]`.
+"""Calibration with four faults, for the viewer.
 
 A placement 9 mm off, a target turned by 6 deg, a laser whose spot is saturated, and a reflection beside a
-spot. OUT gets a picture of the screen that opens, and with `each` also of the screen at each fault.
+spot.
 """
 
 from __future__ import annotations
 
-import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
-import cv2
 import numpy as np
 
 from tests.crash.short import CALLER, ROOT
-from tests.viewer.harness import headless_viewer
-from tests.viewer.pictures import SMALL
 from workbench.devices.protocols import Frame
 from workbench.emulator.camera import EmulatedCamera, Exposure
 from workbench.model import event as ev
@@ -113,19 +108,3 @@ def capture_numbers(session: Path) -> dict[str, int]:
     return {
         name: 1 + next(n for n, key in enumerate(keys) if key.endswith(end)) for name, end in wanted.items()
     }
-
-
-def main(out: Path, each: bool) -> None:
-    """Make the session in a temporary folder, and take the pictures."""
-    with tempfile.TemporaryDirectory() as folder:
-        session = write_session(Path(folder))
-        with headless_viewer(Path(folder), "1600x900") as viewer:
-            viewer.open(session / "recording.rrd")
-            cv2.imwrite(str(out / "faults.png"), viewer.shot(), SMALL)
-            for name, capture in capture_numbers(session).items() if each else ():
-                viewer.go_to("capture", capture)
-                cv2.imwrite(str(out / f"faults-{name}.png"), viewer.shot(), SMALL)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]), "each" in sys.argv[2:])

@@ -8,6 +8,7 @@ from workbench.api.calibration_design import CalibrationDesign, design
 from workbench.api.charts import draw
 from workbench.api.priors import with_prior
 from workbench.api.ranger import Ranger
+from workbench.api.report import Report
 from workbench.api.session import Session, Trial, open_session, sessions
 from workbench.api.simulation import Simulation, simulate
 from workbench.model.errors import BadInputError, LimitFailedError, WorkbenchError
@@ -23,6 +24,7 @@ __all__ = [
     "LimitFailedError",
     "Ranger",
     "Reading",
+    "Report",
     "Rig",
     "Session",
     "ShapePrior",

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -30,6 +31,9 @@ from workbench.session.frames import read_image
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_manifest, load_session_rig
 from workbench.session.state import effective, session_statuses
+
+if TYPE_CHECKING:
+    from workbench.api.report import Report
 
 
 @dataclass(frozen=True)
@@ -200,6 +204,20 @@ class Session:
 
         height = whole_of("height_px", height_px)
         return notebook_viewer(self.folder, self.rig, self._records, height)
+
+    def report(self) -> Report:
+        """Certificate of the session, as `workbench report` writes it; see `Report.save`.
+
+        Nothing is written. The laboratory is that of `lab.yaml` beside the session; its missing items read
+        "not stated".
+
+        Raises:
+            BadInputError: a file of the session or `lab.yaml` is damaged, or the calibration or a frame has
+                changed since.
+        """
+        from workbench.api.report import report_of  # loads matplotlib
+
+        return report_of(self.folder)
 
     @cached_property
     def _records(self) -> list[Record]:

@@ -11,11 +11,12 @@ from pathlib import Path
 from rich.console import Console
 
 from workbench.cli.console import print_message
-from workbench.cli.report import Outputs, write_document
+from workbench.cli.report import Outputs
 from workbench.model.contents import printable
 from workbench.model.errors import BadInputError
 from workbench.model.laboratory import load_laboratory
 from workbench.report.document import Document
+from workbench.report.document_files import write_document
 from workbench.report.history.dates import future_text
 from workbench.report.history.drift import distance_histories
 from workbench.report.history.in_force import dated_calibrations, in_force, newer_text
@@ -58,7 +59,7 @@ def show_history(request: HistoryRequest, as_json: bool) -> None:
         )
         append_entry(request.sessions, entry)
     document = history_document(sensor_history(request.sessions, serial, every))
-    write_document(document, outputs)
+    write_document(document, outputs.html, outputs.pdf)
     if as_json:
         print(json.dumps({"serial": serial} | document.as_json()))
     else:

@@ -16,18 +16,13 @@ from workbench.cli.sessions import find_session
 from workbench.model.contents import printable
 from workbench.model.errors import AnswerNeededError, BadInputError
 from workbench.model.laboratory import Laboratory
-from workbench.model.rig import UNKNOWN_SERIAL
-from workbench.report.certificate.assemble import Certificate, Sources, certificate_of, fingerprint
+from workbench.report.certificate.assemble import Certificate, certificate_of
 from workbench.report.certificate.dcc import certificate_xml, required_parties
-from workbench.report.certificate.predecessor import Predecessor, load_predecessor
-from workbench.report.certificate.session_record import SessionRecord, read_session, unchanged
+from workbench.report.certificate.issue import numbered, sources_of
+from workbench.report.certificate.session_record import SessionRecord, read_session
 from workbench.report.certificate.signature import Signer
-from workbench.report.document import Document
-from workbench.session.caller import now
-from workbench.session.certificate_numbers import assign_number
+from workbench.report.document_files import write_document
 from workbench.session.files import check_output, write_output
-from workbench.session.identity import session_identity
-from workbench.session.index import indexed_sessions
 
 HTML, PDF, XML = (".html", ".htm"), (".pdf",), (".xml",)
 """Endings of the files of each kind."""
@@ -79,10 +74,10 @@ def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool)
     laboratory = laboratory_of(folder.parent, no_input, _ask)
     if outputs.dcc is not None:
         required_parties(laboratory, session)  # before a number is assigned
-    certificate = numbered(session, laboratory)
+    certificate = _issued(session, laboratory)
     if not outputs.files and not outputs.as_json:
         outputs = Outputs(html=folder / DEFAULT_NAME)
-    write_document(certificate.document, outputs)
+    write_document(certificate.document, outputs.html, outputs.pdf)
     if outputs.dcc is not None:
         xml = certificate_xml(certificate, datetime.now(UTC))
         write_output(outputs.dcc, xml if outputs.signer is None else outputs.signer.sign(xml))
@@ -104,68 +99,17 @@ def compare_sessions(names: tuple[Path, Path], sessions: Path, outputs: Outputs)
     outputs.check()
     a, b = (read_session(find_session(name, sessions)) for name in names)
     document = comparison_document(a, b)
-    write_document(document, outputs)
+    write_document(document, outputs.html, outputs.pdf)
     if outputs.as_json:
         print(json.dumps(document.as_json()))
     print_message("\n".join((document.verdict.text, *(f"note: {one}" for one in document.verdict.reasons))))
 
 
-def write_document(document: Document, outputs: Outputs) -> None:
-    """Write HTML and PDF of a document, as far as they are asked for.
-
-    Raises:
-        BadInputError: a file cannot be written, or the PDF needs a system library that is missing.
-    """
-    if outputs.html is None and outputs.pdf is None:
-        return
-    from workbench.report.document_html import document_html
-
-    page = document_html(document, f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC")
-    if outputs.html is not None:
-        write_output(outputs.html, page.encode())
-    if outputs.pdf is not None:
-        from workbench.report.document_pdf import document_pdf
-
-        write_output(outputs.pdf, document_pdf(page))
-
-
-def numbered(session: SessionRecord, laboratory: Laboratory) -> Certificate:
-    """The certificate with its number, which is assigned at the first call.
-
-    Raises:
-        BadInputError: a calibration is damaged, or the register of numbers cannot be written.
-    """
-    lab_folder = session.folder.parent
-    sources = Sources(session, laboratory, _predecessor(session))
-    certificate = certificate_of(sources)  # one that cannot be made gets no number
-    key = fingerprint(sources)
-    number = assign_number(lab_folder, session.folder.name, key, now(), laboratory.number_prefix)
-    return certificate.numbered(number)
-
-
-def _predecessor(session: SessionRecord) -> Predecessor | None:
-    """The last calibration of the same sensor in the folder, made before the session's own."""
-    if not session.is_own_calibration or session.rig.serial == UNKNOWN_SERIAL:
-        return None
-    own = session_identity(session.folder)
-    before = [
-        one
-        for one in indexed_sessions(session.folder.parent)
-        if one.serial == session.rig.serial
-        and one.calibration
-        and one.verdict in {"accepted", "exception"}
-        and (not own or one.identity != own)
-        and (one.began, one.name) < (session.manifest.created, session.folder.name)
-    ]
-    if not before:
-        return None
-    last = max(before, key=lambda one: (one.began, one.name))
-    try:
-        path = unchanged(last.status.session_dir / last.calibration, last.calibration_sha256)
-        return load_predecessor(path)
-    except BadInputError as error:
-        print_message(f"note: the calibration before is not used: {error}")
-        return None
+def _issued(session: SessionRecord, laboratory: Laboratory) -> Certificate:
+    sources, note = sources_of(session, laboratory)
+    if note:
+        print_message(f"note: {note}")
+    return numbered(certificate_of(sources))  # one that cannot be made gets no number
 
 
 def _ask(question: str) -> str:

@@ -25,7 +25,7 @@ def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
         name: name of the chart.
         readings: readings in the order in which they were taken.
     """
-    points = [(reading, *one) for reading in readings for one in _ranges(reading)]
+    points = [(reading, *one) for reading in readings for one in _errors(reading)]
     names = [*dict.fromkeys(name for _, name, _, _ in points if name != SENSOR), SENSOR]
     label = "standoff" if all(reading.true is None for reading in readings) else "true range"
     return Chart(
@@ -39,27 +39,26 @@ def error_chart(name: str, readings: Sequence[ReadingTaken]) -> Chart:
     )
 
 
-def _ranges(reading: ReadingTaken) -> list[tuple[str, float, float]]:
-    """Name, range and stated standard uncertainty (mm) of every laser and of the sensor itself."""
-    lasers = reading.lasers if reading.true is None else ()
-    ranges = [(one.laser_id, one.range_mm, one.sigma_mm) for one in lasers]
-    if reading.range_mm is not None and reading.sigma_mm is not None:
-        ranges.append((SENSOR, reading.range_mm, reading.sigma_mm))
-    return ranges
+def _errors(reading: ReadingTaken) -> list[tuple[str, float, float]]:
+    """Name, error and stated standard uncertainty (mm) of every laser and of the sensor itself."""
+    sigmas_mm = {one.laser_id: one.sigma_mm for one in reading.lasers}
+    errors = [(name, error_mm, sigmas_mm[name]) for name, error_mm in reading.laser_errors_mm.items()]
+    if reading.error_mm is not None and reading.sigma_mm is not None:
+        errors.append((SENSOR, reading.error_mm, reading.sigma_mm))
+    return errors
 
 
-def _series(name: str, ranges: Sequence[tuple[ReadingTaken, float, float]]) -> Series:
-    percents = [PERCENT / reading.reference_mm for reading, _, _ in ranges]
-    errors = [mm - reading.reference_mm for reading, mm, _ in ranges]
+def _series(name: str, errors: Sequence[tuple[ReadingTaken, float, float]]) -> Series:
+    percents = [PERCENT / reading.reference_mm for reading, _, _ in errors]
     expected_mm = [
         None if reading.reference_sd_mm is None else hypot(sd, reading.reference_sd_mm)
-        for reading, _, sd in ranges
+        for reading, _, sd in errors
     ]
     return Series(
         name=name,
-        x=tuple(reading.reference_mm for reading, _, _ in ranges),
-        y=tuple(percent * error for percent, error in zip(percents, errors, strict=True)),
-        sd=tuple(percent * sd for percent, (_, _, sd) in zip(percents, ranges, strict=True)),
+        x=tuple(reading.reference_mm for reading, _, _ in errors),
+        y=tuple(percent * mm for percent, (_, mm, _) in zip(percents, errors, strict=True)),
+        sd=tuple(percent * sd for percent, (_, _, sd) in zip(percents, errors, strict=True)),
         expected_sd=tuple(
             None if sd is None else percent * sd for percent, sd in zip(percents, expected_mm, strict=True)
         ),

@@ -101,6 +101,20 @@ class ReadingTaken(FileModel):
     notes: tuple[str, ...] = ()
     """Reasons of missing ranges, and remarks on uncertain ones."""
     lasers: tuple[LaserRange, ...]
+    lasers_true_mm: tuple[float, ...] = ()
+    """True range of each of `lasers` on a flat target, at the place of its spot; empty: no flat, or of an
+    earlier version."""
+
+    @property
+    def laser_errors_mm(self) -> dict[str, float]:
+        """Measured - true range of each laser on a flat target; empty on other targets.
+
+        Readings of earlier versions give the errors from the true value of `range_mm`.
+        """
+        if self.true is not None:
+            return {}
+        true_mm = self.lasers_true_mm or (self.reference_mm,) * len(self.lasers)
+        return {one.laser_id: one.range_mm - mm for one, mm in zip(self.lasers, true_mm, strict=True)}
 
     @property
     def reference_mm(self) -> float:

@@ -85,8 +85,8 @@ class _Control:
         return Seen.AMBIGUOUS if assignment.ambiguous else Seen.ASSIGNED
 
     def _alternative(self) -> Seen:
-        for laser_id in self._ambiguous:
-            spots = self._ranger.alone(laser_id, self._capture((laser_id,)).spots)
+        captures = [(laser_id, self._capture((laser_id,)).spots) for laser_id in self._ambiguous]
+        for laser_id, spots in zip(self._ambiguous, self._ranger.alone(captures), strict=True):
             if len(spots) == 1:
                 self._known.append((laser_id, spots[0]))
             else:

@@ -10,7 +10,8 @@ import numpy as np
 
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.stats import chi2_sf
-from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
+from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.range_model import RangeEstimates
 
 MOST_MISFIT_SD = 6.0
 """Largest distance of a spot from its laser's line; 1 in 5e8 lies farther by chance."""

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from math import inf, isnan, nan
 
 import numpy as np
 
 from workbench.calibration.data.averaging import outliers, scatter_chi2, weighted_mean
 from workbench.calibration.estimation.noise_scale import significant_scale
-from workbench.model.arrays import FloatArray
 from workbench.model.captures import ALL_LASERS, CaptureRow
 from workbench.model.errors import BadInputError
-from workbench.ranging.ranger import Ranger, Reading, spot_arrays
+from workbench.ranging.ranger import KnownSpots, Ranger, Reading, spot_arrays
 from workbench.session.capture_spots import find_row_spots
+
+BLOCK = 256
+"""Number of scenes ranged together; with eight lasers and a fisheye they take some 20 MB."""
+MeanSpot = tuple[Sequence[float], Sequence[float], Sequence[float]]
+"""u, v of a spot, and their deviations by noise and by speckle; NaN where not measured or not known."""
 
 
 def scenes(rows: Sequence[CaptureRow]) -> dict[str, list[CaptureRow]]:
@@ -52,58 +57,79 @@ def read_captures(ranger: Ranger, rows: Sequence[CaptureRow]) -> Iterator[Readin
     ]
     if unknown:
         raise BadInputError("\n".join(unknown))
-    for scene, members in scenes(rows).items():
+    for block in _blocks(scenes(rows)):
+        members = next(iter(block.values()))
         if members[0].laser_id == ALL_LASERS:
-            lines, lasers_on = ranger.searched(ranger.sensor.ids), len(ranger.sensor.ids)
-            finding = find_row_spots(members[0], ranger.size_px, lines, lasers_on, ranger.speckle_sd_px)
-            yield ranger.read_lit(scene, finding.spots)
+            yield _read_lit(ranger, *block, members[0])
         else:
-            yield _read_alone(ranger, scene, members)
+            yield from ranger.read_scenes([_known_spots(ranger, *scene) for scene in block.items()])
 
 
-def _read_alone(ranger: Ranger, scene: str, rows: Sequence[CaptureRow]) -> Reading:
-    """Reading of rows of one laser each; repeats are averaged in pixels, because range is convex in u."""
-    fired = list(dict.fromkeys(row.laser_id for row in rows))
-    means = {i: _mean_position(ranger, [row for row in rows if row.laser_id == i]) for i in fired}
+def _blocks(grouped: Mapping[str, list[CaptureRow]]) -> Iterator[dict[str, list[CaptureRow]]]:
+    """Consecutive scenes to range together, `BLOCK` at most; one with images is alone, as it takes long."""
+    block: dict[str, list[CaptureRow]] = {}
+    for scene, rows in grouped.items():
+        has_images = any(row.on is not None for row in rows)
+        if block and (has_images or len(block) == BLOCK):
+            yield block
+            block = {}
+        block[scene] = rows
+        if has_images:
+            yield block
+            block = {}
+    if block:
+        yield block
+
+
+def _read_lit(ranger: Ranger, scene: str, row: CaptureRow) -> Reading:
+    lines, lasers_on = ranger.searched(ranger.sensor.ids), len(ranger.sensor.ids)
+    finding = find_row_spots(row, ranger.size_px, lines, lasers_on, ranger.speckle_sd_px)
+    return ranger.read_lit(scene, finding.spots)
+
+
+def _known_spots(ranger: Ranger, scene: str, rows: Sequence[CaptureRow]) -> KnownSpots:
+    """Spots of rows of one laser each; repeats are averaged in pixels, because range is convex in u."""
+    by_laser: dict[str, list[CaptureRow]] = {}
+    for row in rows:
+        by_laser.setdefault(row.laser_id, []).append(row)
+    means = {i: _mean_spot(ranger, own) for i, own in by_laser.items()}
     seen = {i: mean for i, mean in means.items() if mean is not None}
-    position = np.array([mean[0] for mean in seen.values()]).reshape(-1, 2)
-    sd = np.array([mean[1] for mean in seen.values()]).reshape(-1, 2)
-    speckle_sd = np.array([mean[2] for mean in seen.values()]).reshape(-1, 2)
-    without_spot = [i for i in fired if i not in seen]
-    return ranger.read_known(
-        scene, len(fired), list(seen), position, sd, without_spot=without_spot, speckle_sd_px=speckle_sd
-    )
+    position, sd, speckle_sd = np.array([*seen.values()], float).reshape(-1, 3, 2).swapaxes(0, 1)
+    without_spot = [i for i in by_laser if i not in seen]
+    return KnownSpots(scene, len(by_laser), [*seen], position, sd, speckle_sd, without_spot=without_spot)
 
 
-def _mean_position(
-    ranger: Ranger, rows: Sequence[CaptureRow]
-) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """(2,) mean u, v, and their deviations by noise and by speckle; None when no row shows the laser's spot.
+def _mean_spot(ranger: Ranger, rows: Sequence[CaptureRow]) -> MeanSpot | None:
+    """Mean u, v, and their deviations by noise and by speckle; None when no row shows the laser's spot.
 
     As in the fit: weighted by the stated deviations, without outliers, and with the deviations scaled where
     the repeats scatter significantly more. Speckle is common to the repeats.
     """
-    found = [seen for row in rows if (seen := _position(ranger, row)) is not None]
+    found = [seen for row in rows if (seen := _spot(ranger, row)) is not None]
     if not found:
         return None
     spot_sd_px = ranger.calibration.laser_ranger.noise.spot_sd_px
     if len(found) == 1:  # thousands of scenes have no repeats
-        position, stated, speckle_sd = found[0]
-        sd = np.where(np.isfinite(stated), stated, spot_sd_px)
-        return position, np.where(np.isfinite(position), sd, np.inf), speckle_sd
-    position, stated, speckle_sd = np.moveaxis(np.array(found), 1, 0)
-    sd = np.where(np.isfinite(stated), stated, spot_sd_px)
-    kept = ~outliers(position, sd)
-    scale = float(significant_scale(*scatter_chi2(position[kept], sd[kept])))
-    return *weighted_mean(position[kept], scale * sd[kept]), np.sqrt((speckle_sd[kept] ** 2).mean(axis=0))
+        ((position, stated, speckle_sd),) = found
+        sds = [spot_sd_px if isnan(sd) else sd for sd in stated]
+        return position, [inf if isnan(p) else sd for p, sd in zip(position, sds, strict=True)], speckle_sd
+    position_px, stated_px, speckle_px = np.array(found, float).swapaxes(0, 1)
+    sd_px = np.where(np.isfinite(stated_px), stated_px, spot_sd_px)
+    kept = ~outliers(position_px, sd_px)
+    scale = float(significant_scale(*scatter_chi2(position_px[kept], sd_px[kept])))
+    mean, mean_sd = weighted_mean(position_px[kept], scale * sd_px[kept])
+    return mean.tolist(), mean_sd.tolist(), np.sqrt((speckle_px[kept] ** 2).mean(axis=0)).tolist()
 
 
-def _position(ranger: Ranger, row: CaptureRow) -> FloatArray | None:
-    """(3, 2) u, v, and their deviations by noise and by speckle, of a row's only spot; None otherwise."""
+def _spot(ranger: Ranger, row: CaptureRow) -> MeanSpot | None:
+    """u, v, and their deviations by noise and by speckle, of a row's only spot; None otherwise."""
     if row.on is None:
-        return np.array([(row.u_px, row.v_px), (row.u_sd_px, row.v_sd_px), (np.nan, np.nan)])
+        return (row.u_px, row.v_px), (row.u_sd_px, row.v_sd_px), (nan, nan)
     index = ranger.sensor.ids.index(row.laser_id)
     lines = ranger.scanlines[index : index + 1]
     found = find_row_spots(row, ranger.size_px, lines, 1, ranger.speckle_sd_px).spots
-    spots = ranger.alone(row.laser_id, found)
-    return np.stack(spot_arrays(spots))[:, 0] if len(spots) == 1 else None
+    (spots,) = ranger.alone([(row.laser_id, found)])
+    if len(spots) != 1:
+        return None
+    position, sd, speckle_sd = (part[0].tolist() for part in spot_arrays(spots))
+    return position, sd, speckle_sd

@@ -60,38 +60,19 @@ def fit_cylinder(points: Points) -> CylinderFit | None:
     Also None where a spot lies at grazing incidence, or the radius is uncertain by more than half. A circle
     has as many parameters as a parabola, and is reported only where it differs from one.
     """
-    from workbench.ranging.shape_kernels import circle  # loads the compiler
+    from workbench.ranging.shape_kernels import circle, circle_start  # loads the compiler
 
-    start = _start(points)
-    if start is None:
+    start = circle_start(points.x_mm, points.range_mm, LARGEST_MM)
+    if math.isnan(start[0]):
         return None
-    try:
-        found = circle(start, points.x_mm, points.range_mm, *points.covariances, STEPS, GRAZING, LARGEST_MM)
-    except np.linalg.LinAlgError:  # nearly a line: the three parameters are degenerate
-        return None
+    found = circle(
+        np.array(start), points.x_mm, points.range_mm, *points.covariances, STEPS, GRAZING, LARGEST_MM
+    )
     (x, z, radius), covariance, by_range, chi2, log_density = found
-    if not (math.isfinite(chi2) and (np.diag(covariance) > 0).all()):
+    if not (math.isfinite(chi2) and min(np.diag(covariance).tolist()) > 0):
         return None
     by_place = by_range * ((points.x_mm - x) / (points.range_mm - z))
     fit = CylinderFit(
         float(x), float(z), float(radius), covariance, by_range, by_place, chi2, len(points) - 3, log_density
     )
     return fit if 0 < fit.radius_sigma_mm < MOST_RELATIVE_SIGMA * radius else None
-
-
-def _start(points: Points) -> FloatArray | None:
-    """(3,) axis x, axis range, radius of the algebraic fit x^2 + r^2 = 2 a x + 2 b r + c, which is linear.
-
-    Coordinates are relative to the centroid, where c is the mean of the left side; None for spots on a line.
-    """
-    middle_x, middle_r = float(points.x_mm.mean()), float(points.range_mm.mean())
-    x, r = points.x_mm - middle_x, points.range_mm - middle_r
-    square = x * x + r * r
-    xx, xr, rr = float(x @ x), float(x @ r), float(r @ r)
-    of_x, of_r = 0.5 * float(x @ square), 0.5 * float(r @ square)
-    determinant = xx * rr - xr * xr
-    if not determinant > 1e-12 * xx * rr:
-        return None
-    a, b = (rr * of_x - xr * of_r) / determinant, (xx * of_r - xr * of_x) / determinant
-    radius = math.sqrt(float(square.mean()) + a * a + b * b)
-    return np.array([a + middle_x, b + middle_r, radius]) if b > 0 and radius < LARGEST_MM else None

@@ -9,16 +9,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.stats import norm_ppf
 from workbench.ranging.cylinder import CylinderFit
-from workbench.ranging.points import LEVEL, Closest, Points
-from workbench.ranging.polynomial import PolynomialFit
-from workbench.ranging.shape_prior import CUBIC, PriorComponents, ShapePrior, prior_components
+from workbench.ranging.points import LEVEL, Points
+from workbench.ranging.polynomial import PolynomialFits
+from workbench.ranging.shape_prior import CUBIC, ShapePrior, prior_components
 
 ShapeKind = Literal["flat", "incline", "round", "cylinder"]
 Candidate = tuple[ShapeKind, int]
@@ -27,6 +27,8 @@ TAIL_BELOW = 0.0175
 """Probability of a closest range below the interval; `1 - LEVEL - TAIL_BELOW` of one above it. A shape that
 noise hides puts the closest range before that of a flat, never behind it."""
 QUANTILES = np.array([TAIL_BELOW, 0.5, TAIL_BELOW + LEVEL])
+NO_CIRCLE = (0.0, 0.0, math.nan, 0.0, 0.0, 0.0), np.eye(3)
+"""Arguments of `posterior_kernels.shape_mixture` where there is no circle."""
 NODES = (1, 16, 48, 64)
 """Number of nodes for the amplitudes of degrees 0, 1, 2, and 3 or more."""
 
@@ -53,7 +55,7 @@ class ShapePosterior:
 def shape_posterior(
     points: Points,
     front_mm: tuple[float, float],
-    fits: Sequence[PolynomialFit | None],
+    fits: PolynomialFits,
     circle: CylinderFit | None,
     prior: ShapePrior,
     highest: int,
@@ -65,64 +67,39 @@ def shape_posterior(
     Args:
         points: the spots, at least one.
         front_mm: ends of the front, different.
-        fits: polynomials of degree 0 to len(fits) - 1, at most len(points) - 1; None where there is none.
+        fits: polynomials of at most len(points) degrees.
         circle: circle through the spots, where they determine one.
         prior: prior over shapes.
         highest: largest degree of a shape, at least 1; the spots need not determine it.
     """
-    from workbench.ranging.mixture_kernels import posterior  # loads the compiler
+    from workbench.ranging.posterior_kernels import shape_mixture  # loads the compiler
 
-    components = prior_components(prior, front_mm, highest)
-    nodes = _Nodes(
-        *posterior(
-            (points.x_mm - components.middle_mm) / components.half_mm,
-            *_likelihoods(points, components, fits),
-            components.degree,
-            components.log_mass if circle is None else components.log_mass + components.log_parabola,
-            components.mean_mm,
-            components.sd_mm,
-            *_nodes(components.mean_mm.shape[1]),
-            _floor_mm(points),
-        )
+    exists, by_shape, found = shape_mixture(
+        points.x_mm,
+        points.range_mm,
+        points.offset_mm,
+        fits.coefficients,
+        fits.depth_mm,
+        fits.weight,
+        fits.chi2,
+        fits.scale_mm,
+        *(NO_CIRCLE if circle is None else _of_circle(circle, front_mm)),
+        *prior_components(prior, front_mm, highest),
+        *_nodes(highest),
+        _floor_mm(points),
+        QUANTILES,
     )
-    if circle is not None:
-        near, evidence = circle.closest(front_mm), _circle_evidence(points, components, circle)
-        nodes = nodes.and_one(near, evidence if near.range_mm > _floor_mm(points) else -np.inf)
-    mass = nodes.mass()
-    if not (nodes.share.any(axis=1) & (mass > 0.0)).any():
+    if not exists:
         return None
-    return _summary(_probabilities(components, mass / mass.sum()), points, nodes.mixture(mass))
+    low, median, high, mean, sd = found.tolist()
+    return ShapePosterior(_probabilities(by_shape.tolist()), median, mean, sd, (low, high))
 
 
-class _Nodes(NamedTuple):
-    """Nodes of the closest range of C components, M each; see `mixture_kernels.posterior`."""
-
-    log_evidence: FloatArray
-    range_mm: FloatArray
-    share: FloatArray
-    sd_mm: FloatArray
-
-    def and_one(self, closest: Closest, log_evidence: float) -> _Nodes:
-        """The nodes, and a component with a single one."""
-        _, size = self.share.shape
-        return _Nodes(
-            np.append(self.log_evidence, log_evidence),
-            np.vstack([self.range_mm, np.full(size, closest.range_mm)]),
-            np.vstack([self.share, np.eye(1, size)]),
-            np.append(self.sd_mm, closest.sigma_mm),
-        )
-
-    def mass(self) -> FloatArray:
-        """(C,) evidence of the components, relative to the largest."""
-        best = float(self.log_evidence.max())
-        return np.exp(self.log_evidence - best) if math.isfinite(best) else np.zeros(len(self.log_evidence))
-
-    def mixture(self, mass: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(m,) ranges, deviations and weights of the nodes, by the mass (C,) of the components."""
-        weight = self.share * mass[:, None]
-        used = weight > 0.0
-        sd = np.broadcast_to(self.sd_mm[:, None], used.shape)[used]
-        return self.range_mm[used], sd, weight[used] / weight.sum()
+def _of_circle(circle: CylinderFit, front_mm: tuple[float, float]) -> tuple[tuple[float, ...], FloatArray]:
+    """Arguments `circle` and `circle_covariance` of `posterior_kernels.shape_mixture`."""
+    nearest = circle.closest(front_mm)
+    own = circle.axis_x_mm, circle.radius_mm, circle.chi2, circle.log_density
+    return (*own, nearest.range_mm, nearest.sigma_mm), circle.covariance
 
 
 def _floor_mm(points: Points) -> float:
@@ -130,74 +107,15 @@ def _floor_mm(points: Points) -> float:
     return max(0.0, -points.offset_mm)
 
 
-def _summary(
-    probabilities: Mapping[Candidate, float],
-    points: Points,
-    mixture: tuple[FloatArray, FloatArray, FloatArray],
-) -> ShapePosterior:
-    """Posterior from nodes (m,) of the closest range: range, deviation, and weight, 1 in total."""
-    from workbench.ranging.mixture_kernels import quantiles  # loads the compiler
-
-    range_mm, sd_mm, weight = mixture
-    depths = quantiles(range_mm + points.offset_mm, sd_mm, weight, QUANTILES)
-    low, median, high = (depths - points.offset_mm).tolist()
-    mean = float(weight @ range_mm)
-    variance = float(weight @ ((range_mm - mean) ** 2 + sd_mm**2))
-    return ShapePosterior(probabilities, median, mean, math.sqrt(variance), (low, high))
-
-
-def _likelihoods(
-    points: Points, components: PriorComponents, fits: Sequence[PolynomialFit | None]
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Arguments of `posterior`; degrees that the spots do not determine have the last fit's."""
-    size, n = components.mean_mm.shape[1] + 1, len(points)
-    estimate, depth = np.zeros((size, size)), np.ones((size, n))
-    weight, chi2 = np.zeros((size, n, n)), np.full(size, np.nan)
-    for degree in range(size):
-        fit = fits[min(degree, len(fits) - 1)]
-        if fit is None:
-            continue
-        shift = _shift(components.middle_mm, components.half_mm, fit.degree)
-        estimate[degree, : fit.degree + 1] = shift @ fit.per_mm()
-        depth[degree], weight[degree], chi2[degree] = fit.depth_mm, fit.weight, fit.chi2
-    return estimate, depth, weight, chi2
-
-
-def _circle_evidence(points: Points, components: PriorComponents, circle: CylinderFit) -> float:
-    """Log evidence of circles, by Laplace's method about the fit, in the units of `posterior`."""
-    density = components.circle_log_density(circle.axis_x_mm, circle.radius_mm)
-    _, log_determinant = np.linalg.slogdet(circle.covariance)
-    volume = math.log(2.0 * math.pi) + 0.5 * float(log_determinant)
-    # The polynomials' density is that of inverse depths: d(1 / z) = dz / z^2.
-    by_inverse_depth = 2.0 * float(np.log(points.range_mm + points.offset_mm).sum())
-    return density + volume + circle.log_density + by_inverse_depth - 0.5 * circle.chi2
-
-
-def _probabilities(components: PriorComponents, probability: FloatArray) -> dict[Candidate, float]:
-    """Probability of each candidate, simplest first.
-
-    Args:
-        components: C components of the prior.
-        probability: (C,) of them, or (C + 1,) where the last is that of circles.
-    """
-    by_degree = np.bincount(components.degree, probability[: len(components.degree)]).tolist()
+def _probabilities(by_shape: Sequence[float]) -> dict[Candidate, float]:
+    """Probability of each candidate, simplest first, from those of the degrees and, last, of circles."""
     kinds: tuple[ShapeKind, ...] = ("flat", "incline")
     found: dict[Candidate, float] = {}
-    for degree, of_degree in enumerate(by_degree):
-        found[kinds[degree] if degree < len(kinds) else "round", degree] = of_degree
+    for degree, probability in enumerate(by_shape[:-1]):
+        found[kinds[degree] if degree < len(kinds) else "round", degree] = probability
         if degree == len(kinds):
-            found["cylinder", degree] = float(probability[len(components.degree) :].sum())
+            found["cylinder", degree] = by_shape[-1]
     return found
-
-
-@lru_cache(maxsize=64)
-def _shift(middle_mm: float, half_mm: float, degree: int) -> FloatArray:
-    """(degree + 1, degree + 1) from coefficients of x^k to those of t^k, x = middle + half t."""
-    rows = [
-        [math.comb(k, j) * middle_mm ** (k - j) * half_mm**j if k >= j else 0.0 for k in range(degree + 1)]
-        for j in range(degree + 1)
-    ]
-    return np.array(rows)
 
 
 @lru_cache(maxsize=8)

@@ -30,10 +30,6 @@ class PolynomialFit:
     scale_mm: float
     chi2: float
     freedom: int
-    depth_mm: FloatArray
-    """(n,) fitted depths."""
-    weight: FloatArray
-    """(n, n) inverse covariance of the inverse depths, errors of the positions included."""
 
     @property
     def degree(self) -> int:
@@ -62,32 +58,76 @@ class PolynomialFit:
         if self.degree < 2:
             return []
         slope = self.coefficients[1:] * np.arange(1, self.degree + 1)
-        roots = np.roots(slope[::-1])
-        real = roots.real[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots.real))] * self.scale_mm
-        return [x for x in real.tolist() if front_mm[0] < x < front_mm[1]]
+        return [x for t in _real_roots(slope) if front_mm[0] < (x := t * self.scale_mm) < front_mm[1]]
 
 
-def fit_polynomial(points: Points, degree: int) -> PolynomialFit | None:
-    """Maximum-likelihood polynomial; None where it passes behind the pinhole or is not determined.
+@dataclass(frozen=True)
+class PolynomialFits:
+    """Fits of degrees 0 to D - 1 to the same n spots; arrays padded with zeros beyond each degree."""
+
+    coefficients: FloatArray
+    """(D, D)"""
+    covariance: FloatArray
+    """(D, D, D)"""
+    by_range: FloatArray
+    """(D, D, n)"""
+    by_place: FloatArray
+    """(D, D, n)"""
+    chi2: FloatArray
+    """(D,) NaN where the polynomial passes behind the pinhole or is not determined."""
+    depth_mm: FloatArray
+    """(D, n)"""
+    weight: FloatArray
+    """(D, n, n)"""
+    scale_mm: float
+
+    def __len__(self) -> int:
+        return len(self.chi2)
+
+    def of_degree(self, degree: int) -> PolynomialFit | None:
+        """The fit of one degree; None where there is none."""
+        chi2, size = float(self.chi2[degree]), degree + 1
+        if not math.isfinite(chi2):
+            return None
+        return PolynomialFit(
+            self.coefficients[degree, :size],
+            self.covariance[degree, :size, :size],
+            self.by_range[degree, :size],
+            self.by_place[degree, :size],
+            self.scale_mm,
+            chi2,
+            self.depth_mm.shape[1] - size,
+        )
+
+
+def fit_polynomials(points: Points, count: int) -> PolynomialFits:
+    """Maximum-likelihood polynomials of the degrees below `count`.
 
     Weights are the inverse of the full covariance. Residuals are those of inverse depth, whose deviation does
     not depend on the noise: weights by the measured ranges would favour spots that noise put too near. Errors
     of the positions enter with the slope of the polynomial.
     """
-    from workbench.ranging.shape_kernels import polynomial  # loads the compiler
+    from workbench.ranging.shape_kernels import polynomials  # loads the compiler
 
     scale = float(np.abs(points.x_mm).max()) or 1.0
-    measured = points.x_mm, degree, scale, points.range_mm, points.offset_mm
-    try:
-        coefficients, covariance, by_range, by_place, chi2, depth, weight = polynomial(
-            *measured, *points.covariances, STEPS
-        )
-    except np.linalg.LinAlgError:  # ranges so different that all but a few weights vanish
-        return None
-    if not math.isfinite(chi2):
-        return None
-    freedom = len(points) - degree - 1
-    return PolynomialFit(coefficients, covariance, by_range, by_place, scale, chi2, freedom, depth, weight)
+    measured = points.x_mm, count, scale, points.range_mm, points.offset_mm
+    return PolynomialFits(*polynomials(*measured, *points.covariances, STEPS), scale)
+
+
+def _real_roots(coefficients: FloatArray) -> list[float]:
+    """Real roots of a polynomial, from its coefficients in rising order."""
+    if len(coefficients) > 3:
+        roots = np.roots(coefficients[::-1])
+        real: list[float] = roots.real[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots.real))].tolist()
+        return real
+    c, b, a = (*coefficients.tolist(), 0.0)[:3]
+    if a == 0.0:
+        return [-c / b] if b != 0.0 else []
+    discriminant = b * b - 4.0 * a * c
+    if discriminant < 0.0:
+        return []
+    q = -0.5 * (b + math.copysign(math.sqrt(discriminant), b))  # without cancellation
+    return [q / a, c / q] if q != 0.0 else [0.0]
 
 
 def _powers(t: FloatArray, degree: int) -> FloatArray:

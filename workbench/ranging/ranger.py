@@ -20,7 +20,8 @@ from workbench.ranging.search_band import band
 from workbench.ranging.shape import DEFAULT_PRIOR
 from workbench.ranging.shape_prior import ShapePrior
 from workbench.ranging.validity_checks import failed_checks, outside_validity
-from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
+from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.range_model import RangeEstimates
 from workbench.spots import Scanline, Spot
 
 NOTHING_SEEN = "no spot was seen"
@@ -61,6 +62,27 @@ class Reading:
 
 
 @dataclass(frozen=True)
+class KnownSpots:
+    """Spots of one scene whose lasers are known, because each was on alone."""
+
+    scene: str
+    fired: int
+    """Number of lasers captured; with fewer ranges the status is `not_enough_points`."""
+    laser_ids: Sequence[str]
+    """n lasers."""
+    position_px: FloatArray
+    """(n, 2), NaN where a coordinate was not measured."""
+    sd_px: FloatArray
+    """(n, 2) 1 sigma by noise, NaN where not known."""
+    speckle_sd_px: FloatArray
+    """(n, 2) 1 sigma by speckle, NaN where not known."""
+    notes: Sequence[str] = ()
+    """Notes on the captures."""
+    without_spot: Sequence[str] = ()
+    """Lasers captured without a spot."""
+
+
+@dataclass(frozen=True)
 class Assignment:
     """Assignment of the spots of a frame with all lasers on."""
 
@@ -73,6 +95,27 @@ class Assignment:
     ambiguous: tuple[str, ...]
     """Lasers without an unambiguous assignment, with or without a spot; each is to be captured alone."""
     notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Spots of one scene and their ranges."""
+
+    laser_ids: Sequence[str]
+    position_px: FloatArray
+    ranges: RangeEstimates
+    failed: Sequence[str | None]
+    """Failed validity check of each; None where the range is valid."""
+
+    def valid(self, order: Sequence[str]) -> _Found:
+        """Those with a valid range, by the order of their lasers in the calibration."""
+        good = [n for n, check in enumerate(self.failed) if check is None]
+        good.sort(key=lambda n: order.index(self.laser_ids[n]))
+        if good == [*range(len(self.failed))]:
+            return self
+        index = np.array(good, np.intp)
+        ids = [self.laser_ids[n] for n in good]
+        return _Found(ids, self.position_px[index], self.ranges.only(index), [None] * len(good))
 
 
 @dataclass(frozen=True)
@@ -146,20 +189,32 @@ class Ranger:
         without_spot: Sequence[str] = (),
         speckle_sd_px: FloatArray | None = None,
     ) -> Reading:
-        """Range spots whose lasers are known, because each was on alone.
+        """Range the spots of one scene whose lasers are known; arguments as in `KnownSpots`.
 
-        Args:
-            scene: name of the scene.
-            fired: number of lasers captured; with fewer ranges the status is `not_enough_points`.
-            laser_ids: n lasers.
-            position_px: (n, 2), NaN where a coordinate was not measured.
-            sd_px: (n, 2) 1 sigma by noise, NaN where not known.
-            notes: notes on the captures.
-            without_spot: lasers captured without a spot.
-            speckle_sd_px: (n, 2) 1 sigma by speckle, NaN where not known; None: nowhere.
+        `speckle_sd_px` None: known nowhere.
         """
-        ranges = self.sensor.ranges(laser_ids, position_px, sd_px, speckle_sd_px)
-        return self._answer(scene, fired, laser_ids, position_px, ranges, notes, without_spot)
+        speckle = np.full((len(laser_ids), 2), np.nan) if speckle_sd_px is None else speckle_sd_px
+        spots = KnownSpots(scene, fired, laser_ids, position_px, sd_px, speckle, notes, without_spot)
+        (reading,) = self.read_scenes([spots])
+        return reading
+
+    def read_scenes(self, scenes: Sequence[KnownSpots]) -> list[Reading]:
+        """One reading for each scene; the spots of all scenes are ranged together, which saves time."""
+        if not scenes:
+            return []
+        ids = [i for scene in scenes for i in scene.laser_ids]
+        position, sd, speckle_sd = (
+            np.concatenate(parts)
+            for parts in zip(*((s.position_px, s.sd_px, s.speckle_sd_px) for s in scenes), strict=True)
+        )
+        ranges = self.sensor.ranges(ids, position, sd, speckle_sd)
+        failed = failed_checks(position, ranges, self.size_px)
+        readings, end = [], 0
+        for scene in scenes:
+            own = slice(end, end := end + len(scene.laser_ids))
+            found = _Found(scene.laser_ids, position[own], ranges.only(own), failed[own])
+            readings.append(self._answer(scene.scene, scene.fired, found, scene.notes, scene.without_spot))
+        return readings
 
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
         """Range the spots of a frame with all lasers on.
@@ -177,9 +232,9 @@ class Ranger:
         position, _, _ = spot_arrays(assigned)
         notes = (*assignment.notes, *flag_notes(ids, assigned))
         without_spot = [i for i in self.sensor.ids if i not in ids and i not in assignment.ambiguous]
-        reading = self._answer(
-            scene, len(self.sensor.ids), ids, position, assignment.ranges, notes, without_spot
-        )
+        failed = failed_checks(position, assignment.ranges, self.size_px)
+        found = _Found(ids, position, assignment.ranges, failed)
+        reading = self._answer(scene, len(self.sensor.ids), found, notes, without_spot)
         if assignment.ambiguous and reading.status == "no_points":
             return Reading(scene, "not_enough_points", notes=reading.notes)
         return reading
@@ -245,12 +300,17 @@ class Ranger:
             hidden += [(laser, int(n)) for n in np.flatnonzero(distance_px < near_px)]
         return hidden
 
-    def alone(self, laser_id: str, spots: Sequence[Spot]) -> list[Spot]:
-        """Spots on the line of a laser that was on alone; a single one is that of the laser."""
-        ranges = self.sensor.ranges([laser_id] * len(spots), *spot_arrays(spots))
+    def alone(self, captures: Sequence[tuple[str, Sequence[Spot]]]) -> list[list[Spot]]:
+        """Spots on the lines of lasers that were on alone; a single one is that of the laser.
+
+        Args:
+            captures: each laser with the spots of its capture.
+        """
+        ids = [laser_id for laser_id, spots in captures for _ in spots]
+        ranges = self.sensor.ranges(ids, *spot_arrays([spot for _, spots in captures for spot in spots]))
         possible = (ranges.range_mm > 0) & np.isfinite(ranges.range_mm)
-        on_line = np.flatnonzero((ranges.misfit_sd < MOST_MISFIT_SD) & possible)
-        return [spots[n] for n in on_line.tolist()]
+        on_line = iter(((ranges.misfit_sd < MOST_MISFIT_SD) & possible).tolist())
+        return [[spot for spot in spots if next(on_line)] for _, spots in captures]
 
     def _assignment_notes(
         self, pairs: LaserSpotPairs, spots: int, ambiguous: Sequence[ImageAxis]
@@ -267,27 +327,15 @@ class Ranger:
         return tuple(notes)
 
     def _answer(
-        self,
-        scene: str,
-        fired: int,
-        laser_ids: Sequence[str],
-        position_px: FloatArray,
-        ranges: RangeEstimates,
-        notes: Sequence[str],
-        without_spot: Sequence[str],
+        self, scene: str, fired: int, found: _Found, notes: Sequence[str], without_spot: Sequence[str]
     ) -> Reading:
-        failed = failed_checks(position_px, ranges, self.size_px)
-        all_notes = [
-            *notes,
-            *(f"{i}: {check}" for i, check in zip(laser_ids, failed, strict=True) if check is not None),
-        ]
-        good = [n for n, check in enumerate(failed) if check is None]
-        if not good:
+        named = zip(found.laser_ids, found.failed, strict=True)
+        all_notes = [*notes, *(f"{i}: {check}" for i, check in named if check is not None)]
+        valid = found.valid(self.sensor.ids)
+        if not valid.laser_ids:
             return Reading(scene, "no_points", notes=tuple(all_notes) or (NOTHING_SEEN,))
-        good.sort(key=lambda n: self.sensor.ids.index(laser_ids[n]))
-        ids, position = [laser_ids[n] for n in good], position_px[good]
-        ranges = ranges.only(np.array(good))
-        lasers = laser_ranges(ids, position, ranges, self.sensor.offset_mm)
+        ids, ranges = valid.laser_ids, valid.ranges
+        lasers = laser_ranges(ids, valid.position_px, ranges, self.sensor.offset_mm)
         status: Status = "done" if len(lasers) == fired else "not_enough_points"
         flat_mm, flat_sigma_mm, flat_spot_sd_mm = flat_range(ranges)
         lines = self._lines(ids, ranges)
@@ -312,9 +360,7 @@ class Ranger:
 
     def _mean_place(self, ids: Sequence[str], ranges: RangeEstimates) -> tuple[float, float]:
         weight = ranges.spot_sd_mm**-2
-        x, y = (
-            float(np.average(self.sensor.places(ids, axis, ranges)[0], weights=weight)) for axis in ("u", "v")
-        )
+        x, y = (self.sensor.positions_mm(ids, ranges.range_mm) @ weight / weight.sum()).tolist()
         return x, y
 
     def _no_spot_note(self, laser_id: str, range_mm: float) -> str:

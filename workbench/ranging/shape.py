@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -12,8 +12,8 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 from workbench.ranging.cylinder import CylinderFit, fit_cylinder
 from workbench.ranging.mixture import Candidate, ShapePosterior, shape_posterior
-from workbench.ranging.points import COVERAGE_FACTOR, Points, interval_mm, probability
-from workbench.ranging.polynomial import PolynomialFit, fit_polynomial
+from workbench.ranging.points import COVERAGE_FACTOR, Points, interval_mm, probabilities
+from workbench.ranging.polynomial import PolynomialFit, PolynomialFits, fit_polynomials
 from workbench.ranging.shape_prior import CUBIC, ShapePrior
 
 ShapeKind = Literal["flat", "incline", "round", "cylinder", "unknown"]
@@ -24,6 +24,8 @@ CLEAR_ODDS = 10.0
 """Ratio of probabilities from which a shape is reported instead of a simpler one."""
 EXCLUDING_ODDS = 300.0
 """Ratio of probabilities from which the interval of another shape need not include that of a flat."""
+CIRCLE = "cylinder"
+"""Name of the test of a circle."""
 DEFAULT_PRIOR = ShapePrior()
 
 
@@ -111,19 +113,19 @@ def fit_shape(
     if not front[1] > front[0]:
         return _unknown(points, None, _Angle(), ())
     fits, circle, tried = _fits(points)
-    angle = _angle(fits[1] if len(fits) > 1 else None)
+    angle = _angle(fits.of_degree(1) if len(fits) > 1 else None)
     seen, possible = _posteriors(points, front, (fits, circle), prior, lasers or len(points))
     if seen is None or possible is None:
         return _unknown(points, possible, angle, tried)
     kind, degree = _reported(seen)
-    fit = circle if kind == "cylinder" else fits[degree]
+    fit, name = (circle, CIRCLE) if kind == "cylinder" else (fits.of_degree(degree), _name(degree))
     if fit is None or (closest := fit.closest(front)).range_mm <= max(0.0, -points.offset_mm):
         return _unknown(points, possible, angle, tried)
     return Shape(
         kind=kind,
         closest_mm=seen.median_mm,
         closest_sigma_mm=possible.deviation_mm(seen.median_mm),
-        closest_interval_mm=_interval_mm(points, (seen, possible), kind, fits[0]),
+        closest_interval_mm=_interval_mm(points, (seen, possible), kind, fits.of_degree(0)),
         closest_x_mm=closest.x_mm,
         closest_by_range=closest.by_range,
         closest_by_place=closest.by_place,
@@ -134,34 +136,42 @@ def fit_shape(
         angle_sigma_rad=angle.sigma_rad,
         angle_interval_rad=angle.interval_rad,
         cylinder=circle,
-        probability=probability(fit.chi2, fit.freedom),
+        probability=next(test.probability for test in tried if test.name == name),
         tried=tried,
     )
 
 
-def _fits(points: Points) -> tuple[list[PolynomialFit | None], CylinderFit | None, tuple[ShapeTest, ...]]:
+def _fits(points: Points) -> tuple[PolynomialFits, CylinderFit | None, tuple[ShapeTest, ...]]:
     """Polynomials by degree, circle, and their tests; degrees above 3 where all others are rejected."""
     degrees = min(len(points), CUBIC + 1)
-    fits = [fit_polynomial(points, degree) for degree in range(degrees)]
+    fits = fit_polynomials(points, degrees)
     circle = fit_cylinder(points) if len(points) > 2 else None
-    if len(points) > degrees and all(test.is_rejected for test in _tests(fits, circle)):
-        fits += [fit_polynomial(points, degree) for degree in range(degrees, len(points))]
-    return fits, circle, tuple(_tests(fits, circle))
+    tests = _tests(fits, circle)
+    if len(points) > degrees and all(test.is_rejected for test in tests):
+        fits = fit_polynomials(points, len(points))
+        tests = _tests(fits, circle)
+    return fits, circle, tests
 
 
-def _tests(fits: Sequence[PolynomialFit | None], circle: CylinderFit | None) -> list[ShapeTest]:
-    found = [_test(f"degree {fit.degree}", fit) for fit in fits if fit is not None]
-    return found if circle is None else [*found, _test("cylinder", circle)]
+def _tests(fits: PolynomialFits, circle: CylinderFit | None) -> tuple[ShapeTest, ...]:
+    n = fits.depth_mm.shape[1]
+    tested = [(_name(degree), chi2, n - degree - 1) for degree, chi2 in enumerate(fits.chi2.tolist())]
+    if circle is not None:
+        tested.append((CIRCLE, circle.chi2, circle.freedom))
+    tested = [one for one in tested if math.isfinite(one[1])]
+    p_values = probabilities([chi2 for _, chi2, _ in tested], [freedom for _, _, freedom in tested])
+    return tuple(ShapeTest(*one, p_value) for one, p_value in zip(tested, p_values, strict=True))
 
 
-def _test(name: str, fit: PolynomialFit | CylinderFit) -> ShapeTest:
-    return ShapeTest(name, fit.chi2, fit.freedom, probability(fit.chi2, fit.freedom))
+def _name(degree: int) -> str:
+    """Name of the test of a polynomial."""
+    return f"degree {degree}"
 
 
 def _posteriors(
     points: Points,
     front: tuple[float, float],
-    fits: tuple[Sequence[PolynomialFit | None], CylinderFit | None],
+    fits: tuple[PolynomialFits, CylinderFit | None],
     prior: ShapePrior,
     lasers: int,
 ) -> tuple[ShapePosterior | None, ShapePosterior | None]:

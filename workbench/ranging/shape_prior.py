@@ -114,23 +114,6 @@ class PriorComponents(NamedTuple):
     circle_mass: FloatArray
     """(C,) probability of circles with the component's curvature and apex."""
 
-    def circle_log_density(self, axis_x_mm: float, radius_mm: float) -> float:
-        """Log prior density of a circle by axis position and radius, mm^-2: that of its parabola at the apex.
-
-        A circle of radius R about x has the curvature 1 / (2 R) and, in the middle of the front, the slope of
-        a parabola with its apex at x.
-        """
-        aside = (axis_x_mm - self.middle_mm) / self.half_mm
-        curvature = 0.5 * self.half_mm**2 / radius_mm
-        density = 0.0
-        for i in np.flatnonzero(self.circle_mass).tolist():
-            sd = self.sd_mm[i]
-            z = ((-2.0 * curvature * aside) / sd[0], (curvature - self.mean_mm[i, 1]) / sd[1])
-            peak = self.circle_mass[i] / (2.0 * math.pi * sd[0] * sd[1])
-            density += peak * math.exp(-0.5 * (z[0] ** 2 + z[1] ** 2))
-        jacobian = (curvature / radius_mm) * (2.0 * curvature / self.half_mm)
-        return math.log(density * jacobian) if density * jacobian > 0.0 else -math.inf
-
 
 @lru_cache(maxsize=64)
 def prior_components(

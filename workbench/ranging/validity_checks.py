@@ -11,7 +11,7 @@ from workbench.model.calibration import Validity
 from workbench.model.event import LaserRange
 from workbench.optics.image import in_picture, inside_px
 from workbench.ranging.assignment import MOST_MISFIT_SD
-from workbench.sensor.calibrated import RangeEstimates
+from workbench.sensor.range_model import RangeEstimates
 
 MOST_RELATIVE_SIGMA = 0.5
 """Largest relative uncertainty of a range; beyond it the spot lies too near its vanishing point."""

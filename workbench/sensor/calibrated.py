@@ -16,37 +16,11 @@ from workbench.optics.lens import LensModel
 from workbench.optics.lens_models import lens_model
 from workbench.optics.rays import RAY
 from workbench.sensor.curves import SpotCurves
+from workbench.sensor.range_model import RangeEstimates, RangeModel
 
-
-@dataclass(frozen=True)
-class RangeEstimates:
-    """Ranges of n spots from the reference plane, mm; not finite where a spot has no range."""
-
-    range_mm: FloatArray
-    """(n,)"""
-    spot_sd_mm: FloatArray
-    """(n,) 1 sigma from the spots alone, independent between spots."""
-    by_parameter: FloatArray
-    """(n, P) derivatives of the ranges by the parameters of the calibration, in the order of its names."""
-    covariance_mm2: FloatArray
-    """(n, n) of the ranges, by spots and calibration; ranges of one calibration share its error."""
-    misfit_sd: FloatArray
-    """(n,) distance of each spot from its laser's line, in standard deviations of spot and line together."""
-
-    @property
-    def sigma_mm(self) -> FloatArray:
-        """(n,) 1 sigma of each range."""
-        return np.sqrt(np.diag(self.covariance_mm2))
-
-    def only(self, index: IndexArray | BoolArray) -> RangeEstimates:
-        """Estimates of the spots `index`."""
-        return RangeEstimates(
-            self.range_mm[index],
-            self.spot_sd_mm[index],
-            self.by_parameter[index],
-            self.covariance_mm2[index][:, index],
-            self.misfit_sd[index],
-        )
+ALONG: dict[ImageAxis, tuple[str, str]] = {"u": ("x_mm", "tx"), "v": ("y_mm", "ty")}
+"""Names of origin and tangent of a ray in the direction in which its spots move along an image axis."""
+AXES = tuple(ALONG)
 
 
 @dataclass(frozen=True)
@@ -95,19 +69,59 @@ class CalibratedSensor:
         """(P, P) of the calibration's parameters."""
         return self.calibration.laser_ranger.parameters.covariance_array
 
+    @cached_property
+    def _lines(self) -> dict[ImageAxis, IndexArray]:
+        on = [laser.axis for laser in self.calibration.laser_ranger.lasers]
+        return {axis: np.array([n for n, own in enumerate(on) if own == axis], np.intp) for axis in ALONG}
+
+    @cached_property
+    def _beams(self) -> FloatArray:
+        """(2, 2, lasers) origins and tangents, each along x (axis u) and y (axis v)."""
+        return self._rays.T[
+            [[RAY.index(name) for name in names] for names in zip(*ALONG.values(), strict=True)]
+        ]
+
+    @cached_property
+    def _beam_columns(self) -> dict[ImageAxis, IndexArray]:
+        """(2, lasers) columns of these parameters."""
+        return {
+            axis: np.array([[self._columns[f"{i}.{name}"] for i in self.ids] for name in names], np.intp)
+            for axis, names in ALONG.items()
+        }
+
+    @cached_property
+    def _fronts_mm(self) -> dict[ImageAxis, tuple[float, float]]:
+        origins = {
+            axis: self._beams[0, AXES.index(axis), own].tolist()
+            for axis, own in self._lines.items()
+            if len(own)
+        }
+        return {axis: (min(own), max(own)) for axis, own in origins.items()}
+
+    @cached_property
+    def _index_of(self) -> dict[str, int]:
+        return {laser_id: n for n, laser_id in enumerate(self.ids)}
+
+    def _indices(self, laser_ids: Sequence[str]) -> IndexArray:
+        """(n,) indices of lasers in the order of `ids`."""
+        return np.array([self._index_of[i] for i in laser_ids], np.intp)
+
     def lasers_on(self, axis: ImageAxis) -> IndexArray:
         """Indices of the lasers whose spots move along an image axis."""
-        lasers = self.calibration.laser_ranger.lasers
-        return np.array([n for n, laser in enumerate(lasers) if laser.axis == axis], np.intp)
+        return self._lines[axis]
 
     def front_mm(self, axis: ImageAxis) -> tuple[float, float]:
         """From the first to the last laser of a line, mm along x or y."""
-        origins = self._rays[self.lasers_on(axis), RAY.index("x_mm" if axis == "u" else "y_mm")]
-        return float(origins.min()), float(origins.max())
+        return self._fronts_mm[axis]
 
     @cached_property
     def _curves(self) -> SpotCurves:
         return SpotCurves(self._model, self._lens, self._rays)
+
+    @cached_property
+    def _range_model(self) -> RangeModel:
+        offset = self._columns["offset_mm"]
+        return RangeModel(self._curves, self.offset_mm, self._own_columns, offset, self.covariance)
 
     @property
     def offset_mm(self) -> float:
@@ -143,8 +157,7 @@ class CalibratedSensor:
                 calibration.
             speckle_sd_px: (n, 2) 1 sigma by speckle; NaN or None: that of the calibration.
         """
-        laser = np.array([self.ids.index(i) for i in laser_ids], np.intp)
-        return self.ranges_of(laser, position_px, sd_px, speckle_sd_px)
+        return self.ranges_of(self._indices(laser_ids), position_px, sd_px, speckle_sd_px)
 
     def ranges_of(
         self,
@@ -154,20 +167,7 @@ class CalibratedSensor:
         speckle_sd_px: FloatArray | None = None,
     ) -> RangeEstimates:
         """`ranges` for lasers given by their indices (n,) in the order of `ids`."""
-        measured = np.isfinite(position_px)
-        inverse_sd = measured / self._total_sd(sd_px, speckle_sd_px)
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # no range, or infinite
-            found = self._curves.invert(laser, np.where(measured, position_px, 0.0), inverse_sd)
-            w = found.inverse_depth_per_mm
-            range_mm = np.where(w <= 0, np.inf, 1.0 / w) - self.offset_mm
-        gradient = self._by_parameter(laser, found.dz)
-        gradient[:, self._columns["offset_mm"]] = -1.0
-        covariance = gradient @ self.covariance @ gradient.T
-        covariance[np.diag_indices(len(laser))] += found.z_sd_of_spot_mm**2
-        line = self._by_parameter(laser, found.dacross)
-        line_variance = ((line @ self.covariance) * line).sum(axis=1)
-        misfit_sd = np.abs(found.across_sd) / np.sqrt(1 + line_variance)
-        return RangeEstimates(range_mm, found.z_sd_of_spot_mm, gradient, covariance, misfit_sd)
+        return self._range_model.ranges(laser, position_px, self._total_sd(sd_px, speckle_sd_px))
 
     def _total_sd(self, sd_px: FloatArray, speckle_sd_px: FloatArray | None) -> FloatArray:
         """(n, 2) 1 sigma by noise and speckle.
@@ -190,16 +190,20 @@ class CalibratedSensor:
             (n,) positions, mm; (n, P) derivatives by the parameters of the calibration; (n,) derivatives by
             the range (the tangents).
         """
-        names = ("x_mm", "tx") if axis == "u" else ("y_mm", "ty")
-        laser = [self.ids.index(i) for i in laser_ids]
-        origin, tangent = (self._rays[laser, RAY.index(name)] for name in names)
+        laser = self._indices(laser_ids)
+        origin, tangent = self._beams[:, AXES.index(axis), laser]
         depth = ranges.range_mm + self.offset_mm
         gradient = ranges.by_parameter * tangent[:, None]
         gradient[:, self._columns["offset_mm"]] = 0.0  # the reference plane does not affect the position
-        rows = np.arange(len(laser))
-        for name, slope in zip(names, (np.ones(len(laser)), depth), strict=True):
-            gradient[rows, [self._columns[f"{i}.{name}"] for i in laser_ids]] += slope
+        rows, (of_origin, of_tangent) = np.arange(len(laser)), self._beam_columns[axis][:, laser]
+        gradient[rows, of_origin] += 1.0
+        gradient[rows, of_tangent] += depth
         return origin + tangent * depth, gradient, tangent
+
+    def positions_mm(self, laser_ids: Sequence[str], range_mm: FloatArray) -> FloatArray:
+        """(2, n) positions of spots at ranges (n,) along x and y."""
+        origin, tangent = self._beams[:, :, self._indices(laser_ids)]
+        return np.asarray(origin + tangent * (range_mm + self.offset_mm))
 
     def relative_range_sd(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
         """(n,) relative 1 sigma of a single range, for spots with the noise in the calibration."""
@@ -238,9 +242,3 @@ class CalibratedSensor:
         """Index of the laser, n times, and the inverse depths of ranges (n,)."""
         index = np.full(len(range_mm), self.ids.index(laser_id), np.intp)
         return index, 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
-
-    def _by_parameter(self, laser: IndexArray, own: FloatArray) -> FloatArray:
-        """(n, P) derivatives from those by the lens and the laser's own ray (n, C); 0 by other rays."""
-        gradient = np.zeros((len(laser), len(self._columns)))
-        gradient[np.arange(len(laser))[:, None], self._own_columns[laser]] = own
-        return gradient

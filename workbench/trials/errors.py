@@ -8,6 +8,7 @@ from math import hypot
 
 import numpy as np
 
+from workbench.model.arrays import FloatArray
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.event import ReadingTaken
 from workbench.model.table import Cell, Column, Table
@@ -16,6 +17,29 @@ EXPANSION = 2.0
 """Coverage factor k of an expanded uncertainty U whose standard uncertainty is known."""
 EXPANSION_PROBABILITY = 0.9544997361036416
 """Coverage probability of k = 2 for a normal distribution."""
+
+
+@dataclass(frozen=True)
+class ErrorSpread:
+    """Mean and spread of n errors, at least one, in their unit."""
+
+    mean: float
+    largest: float
+    smallest: float
+    sd: float | None
+    """Standard deviation; None for a single error."""
+    mean_absolute: float
+
+    @classmethod
+    def of(cls, errors: FloatArray) -> ErrorSpread:
+        """Spread of (n,) errors."""
+        return cls(
+            float(errors.mean()),
+            float(errors.max()),
+            float(errors.min()),
+            float(errors.std(ddof=1)) if len(errors) > 1 else None,
+            float(np.abs(errors).mean()),
+        )
 
 
 @dataclass(frozen=True)
@@ -53,14 +77,15 @@ def error_statistics(
     if not len(found):
         return ErrorStatistics(0, missing)
     stated = np.array([sd for sd in stated_sd if sd is not None])
+    spread = ErrorSpread.of(found)
     return ErrorStatistics(
         len(found),
         missing,
-        float(found.mean()),
-        float(found.max()),
-        float(found.min()),
-        float(found.std(ddof=1)) if len(found) > 1 else None,
-        float(np.abs(found).mean()),
+        spread.mean,
+        spread.largest,
+        spread.smallest,
+        spread.sd,
+        spread.mean_absolute,
         EXPANSION * hypot(float(np.sqrt((stated**2).mean())), reference_sd),
     )
 

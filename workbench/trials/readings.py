@@ -103,7 +103,7 @@ def take_full_reading(
     left_off = () if closest is None else closest.left_off
     scene = f"{placement.key}/{_without(closest)}{number:02d}"
     reading = acquire(ranger, scene, _capture(context, ranger, placement, scene, number, left_off))
-    taken = reading_taken(context.rig, name, placement, number, reading, closest)
+    taken = reading_taken(context.rig, ranger.sensor, name, placement, number, reading, closest)
     context.emit(taken)
     context.readings.append(taken)
     return taken, reading
@@ -111,6 +111,7 @@ def take_full_reading(
 
 def reading_taken(
     rig: Rig,
+    sensor: CalibratedSensor,
     name: str,
     placement: Placement,
     number: int,
@@ -137,6 +138,7 @@ def reading_taken(
         shape=", ".join(line.shape.kind for line in reading.lines),
         notes=reading.notes,
         lasers=reading.lasers,
+        lasers_true_mm=reference.lasers_true_mm(sensor, reading.lasers),
     )
     return taken if closest is None else _closest_reading(taken, reading, closest)
 
@@ -157,6 +159,7 @@ def _closest_reading(taken: ReadingTaken, reading: Reading, closest: ClosestRang
             "sigma_mm": reading.sigma_mm,
             "spot_sd_mm": None,
             "flat_true_mm": None,
+            "lasers_true_mm": (),
             "placement_sd_mm": None,
             **_interval(reading),
             "true": closest.true,

@@ -9,15 +9,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
-from math import hypot, radians, sqrt, tan
+from math import hypot, isfinite, radians, sqrt, tan
 
 import numpy as np
 from scipy.special import ndtri
 
 from workbench.model.arrays import FloatArray
+from workbench.model.event import LaserRange
 from workbench.model.rig import BenchSpec, ImageAxis
 from workbench.model.target import Placement
 from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.range_model import RangeEstimates
 
 AXES: tuple[ImageAxis, ImageAxis] = ("u", "v")
 NODES = 31
@@ -126,6 +128,11 @@ class Reference:
         """1 sigma by the placement alone: reading of the ruler and own tilt."""
         return hypot(self.standoff_sd_mm, effect.own_sd_mm)
 
+    def lasers_true_mm(self, sensor: CalibratedSensor, lasers: Sequence[LaserRange]) -> tuple[float, ...]:
+        """Expected true range of each laser at its place on the target."""
+        places = laser_places(sensor, lasers).tolist()
+        return tuple(self.true_mm(self.at_point((x_mm, y_mm))) for x_mm, y_mm in places)
+
     def sd_mm(self, effect: TiltEffect) -> float:
         """1 sigma by all sources: placement, common tilt, and scale of the ruler."""
         return hypot(self.standoff_sd_mm, effect.sd_mm, self.scale_sd * self.standoff_mm)
@@ -162,6 +169,25 @@ def near_end(
     return TiltEffect(float(least.mean()), own_mm, (common_mm, 0.0))
 
 
+def laser_estimates(sensor: CalibratedSensor, lasers: Sequence[LaserRange]) -> RangeEstimates:
+    """Estimates of n lasers from their spots, with the noise in the calibration."""
+    position = np.array([[_number(one.u_px), _number(one.v_px)] for one in lasers]).reshape(-1, 2)
+    return sensor.ranges([one.laser_id for one in lasers], position, np.full_like(position, np.nan))
+
+
+def laser_places(sensor: CalibratedSensor, lasers: Sequence[LaserRange]) -> FloatArray:
+    """(n, 2) x and y of the spots of n lasers, mm."""
+    return places_of(sensor, lasers, laser_estimates(sensor, lasers))
+
+
+def places_of(
+    sensor: CalibratedSensor, lasers: Sequence[LaserRange], estimates: RangeEstimates
+) -> FloatArray:
+    """(n, 2) x and y of the spots of n lasers with these estimates, mm."""
+    ids = [one.laser_id for one in lasers]
+    return np.stack([sensor.places(ids, axis, estimates)[0] for axis in AXES], axis=1)
+
+
 def front_ends(sensor: CalibratedSensor) -> tuple[Point, ...]:
     """Ends (x, y) of the lines of lasers, mm."""
     ends: list[Point] = []
@@ -169,6 +195,10 @@ def front_ends(sensor: CalibratedSensor) -> tuple[Point, ...]:
         if len(sensor.lasers_on(axis)):
             ends += [(end, 0.0) if n == 0 else (0.0, end) for end in sensor.front_mm(axis)]
     return tuple(ends)
+
+
+def _number(px: float | None) -> float:
+    return np.nan if px is None or not isfinite(px) else px
 
 
 def _values(sd: float) -> FloatArray:

@@ -17,7 +17,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, LazyChunkStream, OptimizationProfile
 
-from workbench.viewer.rrd import open_rrd
+from workbench.viewer.rrd import open_rrd, release_unused
 from workbench.viewer.window import is_complete
 
 BLOCK_BYTES = 1 << 24
@@ -69,6 +69,7 @@ def _write(recording: Path, out: Path, layout: rrb.Blueprint) -> Counter[str]:
     """Write the copy; returns the rows that it must have."""
     reader = open_rrd(recording)
     (store,) = reader.recordings()
+    release_unused()
     copy = rr.RecordingStream(store.application_id, recording_id=store.recording_id, send_properties=False)
     copy.set_sinks(rr.FileSink(str(out)), default_blueprint=layout)
     counted: Counter[str] = Counter()

@@ -15,6 +15,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from workbench.viewer.entities import APPLICATION, CAPTURE, STANDOFF, STEP, WALL_CLOCK
+from workbench.viewer.rrd import release_unused
 from workbench.viewer.window import END, LOOPBACK
 
 FLUSH_SECONDS = 20.0
@@ -56,6 +57,7 @@ class Stream:
         self._size = 0
         self._stalled_since: float | None = None
         """Time of the first check at which the file had its present size."""
+        release_unused()
         self._recording = rr.RecordingStream(
             APPLICATION,
             recording_id=session,

@@ -104,9 +104,10 @@ def log_errors(stream: Stream, parent: str, reading: ReadingTaken, colors: Mappi
     """Log errors (measured - true, mm) of a reading and of its lasers, with their stated 1 sigma."""
     if reading.error_mm is not None:
         _log_error(stream, parent, SENSOR, reading.error_mm, reading.sigma_mm, at.WHITE)
-    for one in reading.lasers if reading.true is None else ():
-        color = colors.get(one.laser_id, at.WHITE)
-        _log_error(stream, parent, one.laser_id, one.range_mm - reading.standoff_mm, one.sigma_mm, color)
+    sigmas_mm = {one.laser_id: one.sigma_mm for one in reading.lasers}
+    for laser_id, error_mm in reading.laser_errors_mm.items():
+        color = colors.get(laser_id, at.WHITE)
+        _log_error(stream, parent, laser_id, error_mm, sigmas_mm[laser_id], color)
 
 
 def _log_error(

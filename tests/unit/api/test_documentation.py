@@ -58,7 +58,7 @@ def test_examples_of_the_page_run(page: Path) -> None:
     assert result.attempted > 10
 
 
-@pytest.mark.parametrize("name", ["calibration", "priors", "ranger", "session", "simulation"])
+@pytest.mark.parametrize("name", ["calibration", "priors", "ranger", "report", "session", "simulation"])
 def test_examples_of_the_docstrings_run(name: str) -> None:
     result = doctest.testmod(importlib.import_module(f"workbench.api.{name}"))
     assert result.failed == 0

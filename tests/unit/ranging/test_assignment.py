@@ -14,7 +14,7 @@ from tests.support.rigs import World, thesis_rig
 from workbench.model.arrays import FloatArray
 from workbench.ranging.assignment import LaserSpotPairs, assign, pair_up
 from workbench.ranging.ranger import Ranger
-from workbench.sensor.calibrated import RangeEstimates
+from workbench.sensor.range_model import RangeEstimates
 
 
 def dealt(ranger: Ranger, pixels: np.ndarray, sd_px: float = 0.05) -> tuple[str, ...] | None:

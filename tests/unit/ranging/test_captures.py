@@ -10,7 +10,7 @@ import pytest
 from tests.support.rangers import positions
 from workbench.model.captures import load_captures
 from workbench.model.errors import BadInputError
-from workbench.ranging.captures import read_captures, scenes
+from workbench.ranging.captures import BLOCK, _blocks, read_captures, scenes
 from workbench.ranging.ranger import Ranger
 
 
@@ -87,6 +87,17 @@ def test_no_row_is_lost_where_lasers_lit_together_and_alone_share_a_scene(tmp_pa
         "t (row 8)": [8],
         "s (row 5) (row 10)": [10],
     }
+
+
+def test_scenes_are_ranged_in_blocks_and_those_with_images_alone(tmp_path: Path) -> None:
+    path = tmp_path / "c.csv"
+    rows = [f"L1,,0,,100,240,s{n}" for n in range(BLOCK + 2)]
+    rows += ["L1,,0,a.png,,,t", "L1,,0,b.png,,,u", "L1,,0,,100,240,v", "L2,,0,,101,240,v"]
+    path.write_text("\n".join(["laser_id,standoff_mm,repeat,on,u_px,v_px,scene", *rows]) + "\n")
+    grouped = scenes(load_captures(path))
+    blocks = [[*block] for block in _blocks(grouped)]
+    assert [len(block) for block in blocks] == [BLOCK, 2, 1, 1, 1]
+    assert [name for block in blocks for name in block] == [*grouped]
 
 
 def test_a_laser_that_the_calibration_does_not_have(ranger: Ranger, tmp_path: Path) -> None:

@@ -15,9 +15,9 @@ from tests.support.surfaces import (
     seen,
 )
 from workbench.model.arrays import FloatArray
-from workbench.ranging import cylinder as cylinder_module
-from workbench.ranging.cylinder import fit_cylinder
+from workbench.ranging.cylinder import LARGEST_MM, fit_cylinder
 from workbench.ranging.points import Points
+from workbench.ranging.shape_kernels import circle_start
 
 SEEDS = (1, 2, 3)
 
@@ -106,8 +106,8 @@ def test_a_radius_that_is_hardly_known_is_not_told(sd_px: float) -> None:
 @pytest.mark.parametrize(("axis_mm", "x"), [(20.0, X), (-35.0, np.linspace(-70.0, 40.0, 7))])
 def test_the_first_guess_from_points_on_a_circle_is_that_circle(axis_mm: float, x: FloatArray) -> None:
     ranges = cylinder(300.0, axis_mm)(x)
-    assert cylinder_module._start(seen(x, ranges)) == pytest.approx((axis_mm, 389.0, 89.0))
-    assert cylinder_module._start(seen(x, 150.0 + 0.1 * x)) is None
+    assert circle_start(x, ranges, LARGEST_MM) == pytest.approx((axis_mm, 389.0, 89.0))
+    assert np.isnan(circle_start(x, 150.0 + 0.1 * x, LARGEST_MM)).all()
     fit = fit_cylinder(seen(x, ranges))
     assert fit is not None
     assert fit.freedom == len(x) - 3

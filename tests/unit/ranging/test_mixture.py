@@ -10,7 +10,7 @@ from workbench.model.arrays import FloatArray
 from workbench.ranging.cylinder import fit_cylinder
 from workbench.ranging.mixture import TAIL_BELOW, ShapePosterior, shape_posterior
 from workbench.ranging.points import LEVEL, Points
-from workbench.ranging.polynomial import fit_polynomial
+from workbench.ranging.polynomial import fit_polynomials
 from workbench.ranging.shape_prior import PriorComponents, ShapePrior, prior_components
 
 FRONT_MM = (-60.0, 60.0)
@@ -19,7 +19,7 @@ PARABOLAS = ShapePrior(circle=0.0)
 
 
 def posterior_of(points: Points, prior: ShapePrior = PARABOLAS, highest: int = 3) -> ShapePosterior:
-    fits = [fit_polynomial(points, degree) for degree in range(min(len(points), 4))]
+    fits = fit_polynomials(points, min(len(points), 4))
     circle = fit_cylinder(points) if prior.circle and len(points) > 2 else None
     found = shape_posterior(points, FRONT_MM, fits, circle, prior, highest)
     assert found is not None
@@ -63,7 +63,7 @@ def test_the_posterior_is_that_of_shapes_drawn_from_the_prior(surface: Surface) 
 
 def test_a_flat_that_is_certain_has_the_interval_of_the_flat_fit() -> None:
     points = seen(X, flat(150.0)(X))
-    found, fit = posterior_of(points), fit_polynomial(points, 0)
+    found, fit = posterior_of(points), fit_polynomials(points, 1).of_degree(0)
     assert fit is not None
     assert found.median_mm == pytest.approx(150.0, abs=1e-3)
     assert found.deviation_mm(150.0) == pytest.approx(fit.closest(FRONT_MM).sigma_mm, rel=0.05)
@@ -86,5 +86,5 @@ def test_a_circle_and_a_parabola_that_agree_with_the_spots_share_the_probability
 
 def test_shapes_behind_the_sensor_have_no_posterior() -> None:
     wall = seen(X, incline(100.0, 60.0)(X))
-    fits = [fit_polynomial(wall, degree) for degree in range(4)]
+    fits = fit_polynomials(wall, 4)
     assert shape_posterior(wall, (-1000.0, 60.0), fits, None, PARABOLAS, 3) is None

@@ -19,7 +19,7 @@ from workbench.ranging.mixture_kernels import (
     quantiles,
 )
 from workbench.ranging.points import interval_mm
-from workbench.ranging.polynomial import fit_polynomial
+from workbench.ranging.polynomial import fit_polynomials
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
@@ -103,14 +103,14 @@ def test_the_evidence_of_inclines_is_that_of_their_marginal_likelihood() -> None
     """Ratio to a flat: Gaussian ranges whose covariance has the prior of the slope in it."""
     ranges = incline(3000.0, 8.0)(X)
     points = seen(X, ranges)
-    fits = [fit for degree in (0, 1) if (fit := fit_polynomial(points, degree)) is not None]
+    fits = fit_polynomials(points, 2)
     sd_mm = 20.0
     evidence, _, _, _ = posterior(
         X / 60.0,
-        np.array([[fits[0].coefficients[0], 0.0], fits[1].coefficients]),
-        np.array([fit.depth_mm for fit in fits]),
-        np.array([fit.weight for fit in fits]),
-        np.array([fit.chi2 for fit in fits]),
+        fits.coefficients,
+        fits.depth_mm,
+        fits.weight,
+        fits.chi2,
         np.array([0, 1]),
         np.zeros(2),
         np.zeros((2, 1)),
@@ -132,18 +132,15 @@ def test_the_evidence_of_inclines_is_that_of_their_marginal_likelihood() -> None
 def closest_nodes(surface: FloatArray, floor: float) -> tuple[FloatArray, FloatArray]:
     """Evidence and weights of the nodes of a flat and of inclines."""
     points = seen(X, surface)
-    fits = [fit for degree in (0, 1) if (fit := fit_polynomial(points, degree)) is not None]
+    fits = fit_polynomials(points, 2)
     nodes = np.zeros((2, 3, 1))
     nodes[1, :, 0] = (-1.0, 0.0, 1.0)
-    estimate = np.zeros((2, 2))
-    for fit in fits:
-        estimate[fit.degree, : fit.degree + 1] = fit.coefficients
     evidence, _, share, _ = posterior(
         X / 60.0,
-        estimate,
-        np.array([fit.depth_mm for fit in fits]),
-        np.array([fit.weight for fit in fits]),
-        np.array([fit.chi2 for fit in fits]),
+        fits.coefficients,
+        fits.depth_mm,
+        fits.weight,
+        fits.chi2,
         np.array([0, 1]),
         np.zeros(2),
         np.zeros((2, 1)),

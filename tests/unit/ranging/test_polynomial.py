@@ -7,10 +7,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from tests.support.statistics import inverse_of_information
-from tests.support.surfaces import X, cubic, flat, incline, parabola, seen
+from tests.support.surfaces import X, cubic, fit_polynomial, flat, incline, parabola, seen
 from workbench.model.arrays import FloatArray
 from workbench.ranging.points import Points
-from workbench.ranging.polynomial import fit_polynomial
 
 SEEDS = (1, 2, 3)
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+
 import numpy as np
 import pytest
+from pydantic import BaseModel
 
 from tests.support.rangers import IDS, positions, spot_at, spots
-from workbench.ranging.ranger import Ranger
+from workbench.ranging.ranger import KnownSpots, Ranger
 
 
 def test_a_spot_on_no_laser_s_line_is_other_light(ranger: Ranger) -> None:
@@ -97,8 +101,69 @@ def test_lasers_of_one_line_are_searched_for_in_one_band_and_one_alone_on_its_ow
 
 def test_of_a_laser_fired_alone_only_spots_on_its_line_are_kept(ranger: Ranger) -> None:
     (own,) = spots(ranger, {"L1": 800.0})
-    assert ranger.alone("L1", [spot_at(own.u_px, own.v_px + 40.0), own]) == [own]
-    assert ranger.alone("L1", []) == []
+    assert ranger.alone([("L1", [spot_at(own.u_px, own.v_px + 40.0), own])]) == [[own]]
+    assert ranger.alone([("L1", [])]) == [[]]
+    assert ranger.alone([("L1", [own]), ("L2", []), ("L1", [spot_at(own.u_px, own.v_px + 40.0)])]) == [
+        [own],
+        [],
+        [],
+    ]
     # Beyond the image of the laser's point at infinity no target can lie.
     (u, v) = ranger.sensor.spot_px("L1", np.array([np.inf]))[0]
-    assert ranger.alone("L1", [spot_at(u + 5.0, v), own]) == [own]
+    assert ranger.alone([("L1", [spot_at(u + 5.0, v), own])]) == [[own]]
+
+
+def known_spots(ranger: Ranger, scenes: int, seed: int) -> list[KnownSpots]:
+    """Scenes of inclined and bent surfaces, some with missing spots, lost coordinates, or beyond infinity."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for n in range(scenes):
+        lasers = rng.permutation(IDS)[: rng.integers(1, 5)].tolist()
+        near, slope = 10.0 ** rng.uniform(2.2, 3.6), rng.normal(0.0, 0.5)
+        px = positions(ranger, {i: near * (1.0 + 0.1 * slope * rng.normal()) for i in lasers})
+        px += rng.normal(0.0, 0.06, px.shape)
+        if n % 7 == 0:
+            px[0, 0] += 4.0 * rng.normal()
+        if n % 5 == 0:
+            px[-1, 1] = np.nan
+        sd = np.where(rng.uniform(size=px.shape) < 0.2, np.nan, rng.uniform(0.02, 0.1, px.shape))
+        found.append(KnownSpots(f"s{n}", 4, lasers, px, sd, np.full(px.shape, np.nan)))
+    return found
+
+
+def values(thing: object) -> Iterator[object]:
+    """All numbers and texts of a reading, in order."""
+    if is_dataclass(thing) and not isinstance(thing, type):
+        thing = [getattr(thing, field.name) for field in fields(thing)]
+    elif isinstance(thing, BaseModel):
+        thing = list(thing.model_dump().values())
+    elif isinstance(thing, dict):
+        thing = [*thing, *thing.values()]
+    elif isinstance(thing, np.ndarray):
+        thing = thing.tolist()
+    if isinstance(thing, (list, tuple)):
+        for one in thing:
+            yield from values(one)
+    else:
+        yield thing
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_scenes_ranged_together_have_the_readings_of_each_alone(ranger: Ranger, seed: int) -> None:
+    """To 1e-12, although the spots are ranged in one iteration."""
+    scenes = known_spots(ranger, 60, seed)
+    together = ranger.read_scenes(scenes)
+    assert [reading.scene for reading in together] == [scene.scene for scene in scenes]
+    assert {reading.status for reading in together} >= {"done", "not_enough_points"}
+    for one, scene in zip(together, scenes, strict=True):
+        (alone,) = ranger.read_scenes([scene])
+        ours, others = [*values(one)], [*values(alone)]
+        assert [v for v in ours if not isinstance(v, float)] == [
+            v for v in others if not isinstance(v, float)
+        ]
+        numbers = [[v for v in some if isinstance(v, float)] for some in (ours, others)]
+        np.testing.assert_allclose(*numbers, rtol=1e-12, atol=1e-12)
+
+
+def test_no_scenes_have_no_readings(ranger: Ranger) -> None:
+    assert ranger.read_scenes([]) == []

@@ -12,7 +12,7 @@ from workbench.ranging.acquire import acquire
 from workbench.ranging.points import interval_mm
 from workbench.ranging.ranger import Ranger
 from workbench.ranging.records import FLAGGED, flag_notes, flat_range, laser_ranges
-from workbench.sensor.calibrated import RangeEstimates
+from workbench.sensor.range_model import RangeEstimates
 from workbench.spots import Failure, Finding
 
 
@@ -37,8 +37,7 @@ def estimates(range_mm: list[float], spot_sd_mm: list[float], common_sd_mm: floa
     """Ranges whose calibration errs by the same in all."""
     spot = np.array(spot_sd_mm)
     n = len(spot)
-    covariance = np.diag(spot**2) + common_sd_mm**2
-    return RangeEstimates(np.array(range_mm), spot, np.full((n, 1), common_sd_mm), covariance, np.zeros(n))
+    return RangeEstimates(np.array(range_mm), spot, np.full((n, 1), common_sd_mm), np.eye(1), np.zeros(n))
 
 
 def test_every_flag_of_every_spot_is_a_note_of_its_laser() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.surfaces import cylinder, parabola
 from workbench.model.arrays import FloatArray
-from workbench.ranging.shape_kernels import circle, polynomial
+from workbench.ranging.shape_kernels import circle, invert, polynomial, polynomials
 
 X = np.array([-60.0, -25.0, 10.0, 35.0, 60.0])
 OFFSET_MM = 20.0
@@ -27,6 +27,32 @@ def fitted(
     x: FloatArray, ranges: FloatArray, degree: int, seed: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float, FloatArray, FloatArray]:
     return polynomial(x, degree, 60.0, ranges, OFFSET_MM, *covariances(seed), 12)
+
+
+@pytest.mark.parametrize("size", [1, 2, 4, 6])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_inverse_and_determinant_are_those_of_numpy(size: int, seed: int) -> None:
+    matrix = np.random.default_rng(seed).normal(0.0, 1.0, (size, size))
+    out = np.empty((size, size))
+    assert invert(matrix.copy(), out) == pytest.approx(np.linalg.slogdet(matrix)[1], abs=1e-9)
+    np.testing.assert_allclose(out, np.linalg.inv(matrix), rtol=1e-9, atol=1e-9)
+
+
+def test_a_singular_matrix_has_no_inverse() -> None:
+    out = np.empty((2, 2))
+    assert math.isnan(invert(np.ones((2, 2)), out))
+    assert np.isnan(out).all()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_fits_of_all_degrees_are_those_of_each(seed: int) -> None:
+    ranges = parabola(500.0)(X) + np.random.default_rng(seed).normal(0.0, 0.3, 5)
+    together = polynomials(X, 4, 60.0, ranges, OFFSET_MM, *covariances(seed), 12)
+    for degree in range(4):
+        for stack, alone in zip(together, fitted(X, ranges, degree, seed), strict=True):
+            own = stack[(degree, *(slice(0, size) for size in np.shape(alone)))]
+            np.testing.assert_array_equal(own, alone)
+            assert np.count_nonzero(stack[degree]) == np.count_nonzero(own)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import dblquad
 
 from workbench.model.errors import BadInputError
 from workbench.ranging.shape_prior import ShapePrior, prior_components
@@ -65,19 +64,3 @@ def test_higher_degrees_have_the_size_of_the_cubic_one() -> None:
     components = prior_components(PRIOR, FRONT_MM, 5)
     highest = components.sd_mm[components.degree == 5]
     np.testing.assert_allclose(highest[:, 3:], np.repeat(highest[:, 2:3], 2, axis=1))
-
-
-@pytest.mark.parametrize("middle_mm", [0.0, 25.0])
-def test_the_density_of_circles_has_their_probability_in_total(middle_mm: float) -> None:
-    """Over radii and positions of the axis; curvatures below 0 (2 in 1000) have no circle."""
-    components = prior_components(PRIOR, (middle_mm - 60.0, middle_mm + 60.0))
-
-    def density(axis_mm: float, log_radius: float) -> float:
-        radius = np.exp(log_radius)
-        return float(np.exp(components.circle_log_density(axis_mm, radius)) * radius)
-
-    total, _ = dblquad(
-        density, np.log(2.0), np.log(20_000.0), middle_mm - 300.0, middle_mm + 300.0, epsabs=1e-4
-    )
-    assert total == pytest.approx(components.circle_mass.sum(), rel=0.01)
-    assert total == pytest.approx(PRIOR.circle * (1.0 - PRIOR.concave) * PRIOR.round, rel=0.01)

@@ -10,7 +10,8 @@ from workbench.model.calibration import Validity
 from workbench.model.event import LaserRange
 from workbench.ranging.ranger import Ranger
 from workbench.ranging.validity_checks import failed_checks, outside_validity
-from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
+from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.range_model import RangeEstimates
 
 
 @pytest.mark.parametrize(
@@ -99,15 +100,13 @@ def test_limits_of_what_gives_a_range(
     u_px: float, range_mm: float, sigma_mm: float, misfit_sd: float, good: bool
 ) -> None:
     sigma = np.full(1, sigma_mm)
-    ranges = RangeEstimates(
-        np.full(1, range_mm), sigma, np.zeros((1, 1)), np.diag(sigma**2), np.full(1, misfit_sd)
-    )
+    ranges = RangeEstimates(np.full(1, range_mm), sigma, np.zeros((1, 1)), np.eye(1), np.full(1, misfit_sd))
     (why,) = failed_checks(np.array([[u_px, 240.0]]), ranges, (640, 480))
     assert (why is None) == good
 
 
 def test_a_spot_of_one_coordinate_is_inside_by_that_one() -> None:
-    ranges = RangeEstimates(np.full(2, 500.0), np.ones(2), np.zeros((2, 1)), np.eye(2), np.zeros(2))
+    ranges = RangeEstimates(np.full(2, 500.0), np.ones(2), np.zeros((2, 1)), np.eye(1), np.zeros(2))
     why = failed_checks(np.array([[300.0, np.nan], [700.0, np.nan]]), ranges, (640, 480))
     assert why[0] is None
     assert why[1] is not None

@@ -18,7 +18,7 @@ from workbench.model.event import CaptureTaken, ReadingTaken
 from workbench.model.target import Placement
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.readings import reading_taken, session_ranger, take_readings
-from workbench.trials.reference import AXES
+from workbench.trials.reference import AXES, laser_places
 
 PLACEMENT = Placement(key="p.1/500mm", standoff_mm=500.0)
 
@@ -78,11 +78,16 @@ def test_the_true_range_has_the_scale_of_the_ruler_and_the_measured_tilt() -> No
         update={"ruler_scale": prior(0.003, 0.0005), "target_yaw_deg": 1.0, "target_tilt_sd_deg": 0.5}
     )
     rig = thesis_rig().model_copy(update={"bench": bench})
-    taken = reading_taken(rig, "p", placement, 0, reading)
+    taken = reading_taken(rig, ranger.sensor, "p", placement, 0, reading)
     arm_mm = mean_place_mm(ranger.calibration, taken)[0]
     assert 30.0 < arm_mm < 60.0
     assert taken.reference_mm == pytest.approx(1003.0 + tan(radians(1.0)) * arm_mm, abs=0.01)
     assert taken.error_mm == pytest.approx(-3.0 - tan(radians(1.0)) * arm_mm, abs=0.2)
+    places_mm = laser_places(ranger.sensor, taken.lasers)[:, 0]
+    assert taken.lasers_true_mm == pytest.approx(1003.0 + tan(radians(1.0)) * places_mm, abs=1e-6)
+    assert list(taken.laser_errors_mm) == list(IDS[2:])
+    errors_mm = list(taken.laser_errors_mm.values())
+    assert errors_mm == pytest.approx(-3.0 - tan(radians(1.0)) * places_mm, abs=1e-6)
     assert taken.placement_sd_mm is not None
     assert taken.reference_sd_mm is not None
     common_mm = (taken.reference_sd_mm**2 - taken.placement_sd_mm**2) ** 0.5

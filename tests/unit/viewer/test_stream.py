@@ -105,3 +105,18 @@ def test_a_served_recording_that_does_not_grow_has_failed(
 def test_a_file_that_cannot_be_written_is_named() -> None:
     with pytest.raises(OSError, match="/dev/full"):
         Stream(Path("/dev/full"), "part", blueprint(a_rig()))
+
+
+def test_a_closed_recording_leaves_no_busy_threads(tmp_path: Path) -> None:
+    """Rerun keeps two threads of each layout, which wake five times a second, and two of a recording."""
+
+    def threads(number: int) -> int:
+        for n in range(number):
+            stream = Stream(tmp_path / f"{number}-{n}.rrd", f"{number}-{n}", layout)
+            stream.log("a", rr.Scalars(1.0))
+            stream.close()
+        return len(list(Path("/proc/self/task").iterdir()))
+
+    layout = blueprint(a_rig())
+    before = threads(1)
+    assert threads(12) <= before + 2 * 13

@@ -36,7 +36,7 @@ STEADY_GAIN = 6.63
 """Gain over the steady drift above which a time constant is stated: chi-square of one degree, 1 %."""
 INTERVAL_GAIN = 3.84
 """Loss of gain at the ends of the 95 % interval."""
-BY_ORDER = "by the order of the captures, which have no time_s"
+BY_ORDER = "judged by the order of the captures, as they have no times (time_s)"
 """Remark on a drift whose time is an order."""
 DRIFTS_P = 0.003
 """P value below which a drift within the parts is taken for real, beside the steps between them."""

@@ -25,6 +25,7 @@ from workbench.model.rig import Rig
 from workbench.optics.image import in_picture
 from workbench.optics.rays import RAY
 from workbench.sensor.curves import SpotCurves
+from workbench.sensor.range_model import RangeModel
 
 
 @dataclass(frozen=True)
@@ -55,12 +56,26 @@ class SimulatedCalibrations:
         spot = _spots(self.rig, bench, range_mm, still)
         for sd_px in (noise.spot_sd_px, noise.speckle_sd_px):
             spot = spot + rng.normal(0.0, sd_px, spot.shape)
-        found = [_ranged(self, n, one) for n, one in enumerate(spot)]
-        measured, sd = (np.stack(part) for part in zip(*found, strict=True))
+        laser = np.tile(np.arange(layout.lasers), len(range_mm))
+        sd_px = np.hypot(noise.spot_sd_px, noise.speckle_sd_px) * self.fit.noise_scale
+        found = [
+            self._range_model(n).ranges(laser, one.reshape(-1, 2), np.full((len(laser), 2), sd_px[n]))
+            for n, one in enumerate(spot)
+        ]
+        measured = np.array([one.range_mm for one in found]).reshape(spot.shape[:3])
+        sd = np.array([one.sigma_mm for one in found]).reshape(spot.shape[:3])
         seen = self._seen(range_mm)
         return SimulatedRanges(
             np.where(seen, measured - range_mm[:, None], np.nan), np.where(seen, sd, np.nan)
         )
+
+    def _range_model(self, sensor: int) -> RangeModel:
+        """Inverse of the model by the calibration of one sensor, given by its index."""
+        layout = Layout(self.rig.camera.lens, len(self.rig.lasers))
+        values, covariance = self.fit.sensor[sensor], self.fit.sensor_covariance[sensor]
+        curves = SpotCurves(layout.model, values[layout.lens], values[layout.rays].reshape(-1, len(RAY)))
+        own = np.array([layout.own(n) for n in range(layout.lasers)])
+        return RangeModel(curves, float(values[layout.offset]), own, layout.offset, covariance)
 
     def _seen(self, range_mm: FloatArray) -> BoolArray:
         """(N, K, L) whether each sensor has the spot in its image."""
@@ -110,26 +125,3 @@ def _spots(rig: Rig, sensors: FloatArray, standoff_mm: FloatArray, error: FloatA
     )
     u, v = predict_cell(rig.camera.lens, inputs, standoff_mm[:, None])
     return np.stack(np.broadcast_arrays(u, v), axis=-1)
-
-
-def _ranged(
-    simulated: SimulatedCalibrations, index: int, spot_px: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Ranges and their 1 sigma, (K, L) each, of spots (K, L, 2) by one calibration."""
-    rig, fit = simulated.rig, simulated.fit
-    layout = Layout(rig.camera.lens, len(rig.lasers))
-    values, covariance = fit.sensor[index], fit.sensor_covariance[index]
-    curves = SpotCurves(layout.model, values[layout.lens], values[layout.rays].reshape(-1, len(RAY)))
-    laser = np.tile(np.arange(layout.lasers), len(spot_px))
-    sd_px = np.hypot(rig.noise.spot_sd_px, rig.noise.speckle_sd_px) * fit.noise_scale[index]
-    position = spot_px.reshape(-1, 2)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # no range, or infinite
-        found = curves.invert(laser, position, np.full(position.shape, 1.0 / sd_px))
-        depth = np.where(found.inverse_depth_per_mm <= 0, np.inf, 1.0 / found.inverse_depth_per_mm)
-    gradient = np.zeros((len(laser), len(values)))
-    own = np.array([layout.own(n) for n in range(layout.lasers)])[laser]
-    gradient[np.arange(len(laser))[:, None], own] = found.dz
-    gradient[:, layout.offset] = -1.0
-    variance = found.z_sd_of_spot_mm**2 + ((gradient @ covariance) * gradient).sum(axis=1)
-    shape = spot_px.shape[:2]
-    return (depth - values[layout.offset]).reshape(shape), np.sqrt(variance).reshape(shape)

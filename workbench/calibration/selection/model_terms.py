@@ -31,6 +31,7 @@ from workbench.model.rig import TARGET_TILT, Prior, Rig
 from workbench.model.stats import chi2_sf
 from workbench.optics.image import in_picture
 from workbench.optics.lens_models import lens_model
+from workbench.sensor.range_model import RangeModel
 
 STRONG = 1.0
 """log10 of a Bayes factor that is strong evidence (R. E. Kass and A. E. Raftery, JASA 90 (1995) 773)."""
@@ -176,17 +177,14 @@ def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
     laser = np.repeat(np.arange(len(fitted.rig.lasers)), GRID)
     range_mm = np.tile(grid, len(fitted.rig.lasers))
     layout = fitted.layout
-    w = 1.0 / (range_mm + fitted.values[layout.offset])
-    spots = fitted.curves.spots(laser, w)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # spots outside the image
-        found = fitted.curves.invert(laser, spots, np.full(spots.shape, 1.0 / spot_px))
-    gradient = np.zeros((len(laser), len(fitted.values)))
+    spots = fitted.curves.spots(laser, 1.0 / (range_mm + fitted.values[layout.offset]))
     own = np.array([layout.own(n) for n in range(layout.lasers)])
-    gradient[np.arange(len(laser))[:, None], own[laser]] = found.dz
-    gradient[:, layout.offset] = -1.0
+    offset = layout.offset
+    model = RangeModel(fitted.curves, float(fitted.values[offset]), own, offset, fitted.covariance)
+    found = model.ranges(laser, spots, np.full(spots.shape, spot_px))
     size = fitted.rig.camera.width_px, fitted.rig.camera.height_px
-    seen = in_picture(spots, size) & np.isfinite(found.z_sd_of_spot_mm)
-    return gradient[seen] / range_mm[seen, None], found.z_sd_of_spot_mm[seen] / range_mm[seen]
+    seen = in_picture(spots, size) & np.isfinite(found.spot_sd_mm)
+    return found.by_parameter[seen] / range_mm[seen, None], found.spot_sd_mm[seen] / range_mm[seen]
 
 
 def _called_for(fitted: CalibrationFit) -> list[TermSummary]:

@@ -12,7 +12,8 @@ from workbench.model.calibration import Calibration
 from workbench.model.chart import Axis, Band, Chart, Series
 from workbench.model.table import Column, Table
 from workbench.report.certificate.coverage import expanded_range
-from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
+from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.range_model import RangeEstimates
 from workbench.trials.errors import EXPANSION
 from workbench.trials.statistics.welch_satterthwaite import CombinedUncertainty
 

@@ -158,7 +158,7 @@ def _relative_error(reading: ev.ReadingTaken) -> float | None:
         return None
     if not reading.is_measured:
         return None
-    return reading.error_mm / reading.standoff_mm
+    return reading.error_mm / reading.reference_mm
 
 
 def _expanded(reading: ev.ReadingTaken) -> float:
@@ -166,8 +166,8 @@ def _expanded(reading: ev.ReadingTaken) -> float:
     if reading.interval_mm is None or reading.range_mm is None:
         return float("nan")
     low_mm, high_mm = reading.interval_mm
-    below = reading.range_mm > reading.standoff_mm
-    return (reading.range_mm - low_mm if below else high_mm - reading.range_mm) / reading.standoff_mm
+    below = reading.range_mm > reading.reference_mm
+    return (reading.range_mm - low_mm if below else high_mm - reading.range_mm) / reading.reference_mm
 
 
 def _check(range_mm: float, values: FloatArray) -> DistanceCheck:

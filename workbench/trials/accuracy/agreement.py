@@ -1,6 +1,6 @@
 """Agreement of the mean errors of one range with their stated uncertainty, over all standoffs.
 
-The errors of one calibration, of the ruler's scale and of the tilt common to all placements are the same at
+The errors of one calibration, of the ruler's scale and of the tilt common to all placements affect
 every standoff. The mean errors are therefore tested together, with their full covariance.
 """
 
@@ -59,6 +59,7 @@ class PlacementErrors:
                 sqrt(float(np.mean([one.sensitivities.spot_sd_mm**2 for one in found]))),
                 float(np.mean([one.sensitivities.speckle_share for one in found])),
                 TiltEffect.mean([one.sensitivities.tilt for one in found]),
+                sqrt(float(np.mean([one.sensitivities.shape_sd_mm**2 for one in found]))),
             ),
         )
 
@@ -131,6 +132,11 @@ class Agreement:
         return np.array([one.reference.own_sd_mm(one.sensitivities.tilt) for one in self.placements])
 
     @cached_property
+    def shape_mm(self) -> FloatArray:
+        """(p,) 1 sigma by the choice between shapes, common to the readings of a placement."""
+        return np.array([one.sensitivities.shape_sd_mm for one in self.placements])
+
+    @cached_property
     def common_mm(self) -> FloatArray:
         """(p, 2) 1 sigma by the tilt common to all placements, signed."""
         return np.array([one.sensitivities.tilt.common_mm for one in self.placements])
@@ -141,7 +147,7 @@ class Agreement:
         return ErrorSources(
             standoffs_mm=self.true_mm,
             calibration=self.calibration,
-            placement_mm=np.hypot(self.placement_mm, self.speckle_mm),
+            placement_mm=np.sqrt(self.placement_mm**2 + self.speckle_mm**2 + self.shape_mm**2),
             placements=np.ones(len(self.placements)),
             repeatability_mm=self._repeatability_mm,
             readings=self.readings,
@@ -233,6 +239,7 @@ def budget_of(one: Agreement, index: int) -> ErrorBudget:
             "speckle_mm": float(one.speckle_mm[index]),
             "calibration_mm": sqrt(float(one.calibration[index, index])),
             "placement_mm": float(one.placement_mm[index]),
+            "shape_mm": float(one.shape_mm[index]),
             "common_tilt_mm": common_mm,
             "scale_mm": float(one.bench.scale_sd * one.true_mm[index]),
         },

@@ -16,7 +16,8 @@ BUDGET_ALARM = 0.05
 class JointTest:
     """Test of one range over all standoffs."""
 
-    range: str
+    name: str
+    """Name of the range."""
     note: str
     """`all standoffs`: mean errors against all sources; `repeats`: their scatter against the noise."""
     ratio: float

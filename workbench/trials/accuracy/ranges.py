@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import hypot, inf, isfinite
+from math import hypot, inf, sqrt
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from workbench.model.event import LaserRange, ReadingTaken
 from workbench.model.trial_event import COVERAGE_FACTOR
 from workbench.ranging.ranger import Reading
 from workbench.sensor.calibrated import CalibratedSensor
-from workbench.trials.reference import AXES, Reference, TiltEffect, front_ends
+from workbench.trials.reference import Reference, TiltEffect, front_ends, laser_estimates, places_of
 
 CLOSEST, MEAN = "closest", "mean"
 Interval = tuple[float, float | None]
@@ -36,6 +36,8 @@ class Sensitivities:
     """Share of speckle in the variance `spot_sd_mm`^2; the rest is noise, which differs between readings."""
     tilt: TiltEffect
     """Effect of the target's tilt on the true range."""
+    shape_sd_mm: float = 0.0
+    """1 sigma by the choice between shapes: a slight tilt may count as none, noise as a tilt."""
 
 
 @dataclass(frozen=True)
@@ -85,9 +87,8 @@ def _sensitivities(
     sensor: CalibratedSensor, reading: Reading, reference: Reference
 ) -> Mapping[str, Sensitivities]:
     ids = [one.laser_id for one in reading.lasers]
-    position = np.array([[_number(one.u_px), _number(one.v_px)] for one in reading.lasers])
-    ranges = sensor.ranges(ids, position, np.full_like(position, np.nan))
-    places = np.stack([sensor.places(ids, axis, ranges)[0] for axis in AXES], axis=1)
+    ranges = laser_estimates(sensor, reading.lasers)
+    places = places_of(sensor, reading.lasers, ranges)
     weight = ranges.spot_sd_mm**-2 / (ranges.spot_sd_mm**-2).sum()
     spot_sd_mm, share = _own_noise(sensor, reading, float((ranges.spot_sd_mm**-2).sum() ** -0.5))
     at_mean = reference.at_point(_point(weight @ places))
@@ -102,11 +103,14 @@ def _sensitivities(
         for n, i in enumerate(ids)
     }
     nearest = min(reading.lines, key=lambda line: line.shape.closest_mm)
+    by_parameter, spot_mm = nearest.closest_by_parameter, float(np.linalg.norm(nearest.closest_spot_sd_mm))
+    of_one_shape = float(by_parameter @ sensor.covariance @ by_parameter) + spot_mm**2
     closest = Sensitivities(
-        nearest.closest_by_parameter,
-        float(np.linalg.norm(nearest.closest_spot_sd_mm)),
+        by_parameter,
+        spot_mm,
         share,
         reference.at_near_end(front_ends(sensor)),
+        sqrt(max(nearest.shape.closest_sigma_mm**2 - of_one_shape, 0.0)),
     )
     return {CLOSEST: closest, MEAN: mean, **lasers}
 
@@ -144,7 +148,3 @@ def _symmetric(range_mm: float, sigma_mm: float) -> Interval:
 
 def _point(place_mm: FloatArray) -> tuple[float, float]:
     return float(place_mm[0]), float(place_mm[1])
-
-
-def _number(px: float | None) -> float:
-    return np.nan if px is None or not isfinite(px) else px

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.model.event import ReadingTaken
+from workbench.trials.errors import ErrorSpread
 
 
 @dataclass(frozen=True)
@@ -55,15 +56,15 @@ def accuracy_row(readings: Sequence[ReadingTaken]) -> AccuracyRow:
             missing=len(readings),
             reference_sd_mm=readings[0].reference_sd_mm,
         )
-    error = np.array([r.error_mm for r in readings if r.error_mm is not None])
+    spread = ErrorSpread.of(np.array([r.error_mm for r in readings if r.error_mm is not None]))
     return AccuracyRow(
         standoff_mm=standoff_mm,
         readings=len(ranges),
         missing=len(readings) - len(ranges),
-        mean_error_mm=float(error.mean()),
-        max_error_mm=float(error.max()),
-        min_error_mm=float(error.min()),
-        sd_mm=float(error.std(ddof=1)) if len(error) > 1 else None,
+        mean_error_mm=spread.mean,
+        max_error_mm=spread.largest,
+        min_error_mm=spread.smallest,
+        sd_mm=spread.sd,
         range_sd_mm=float(np.sqrt((stated**2).mean())),
         reference_sd_mm=readings[0].reference_sd_mm,
     )

@@ -49,7 +49,15 @@ BIAS = (
     Column(key="z", name="z", format="+.2f"),
     Column(key="en", name="E_n", format=".2f"),
 )
-SOURCES = ("noise_mm", "speckle_mm", "calibration_mm", "placement_mm", "common_tilt_mm", "scale_mm")
+SOURCES = (
+    "noise_mm",
+    "speckle_mm",
+    "calibration_mm",
+    "placement_mm",
+    "shape_mm",
+    "common_tilt_mm",
+    "scale_mm",
+)
 BUDGET = (
     Column(key="range", name="range"),
     Column(key="standoff_mm", name="true", unit="mm", format=".1f"),
@@ -113,7 +121,7 @@ def detail_tables(name: str, ranges: Sequence[Agreement]) -> list[Table]:
     budget = [
         row
         for one in ranges
-        for row in (*_budget_rows(one), *(_test_row(test) for test in tests if test.range == one.name))
+        for row in (*_budget_rows(one), *(_test_row(test) for test in tests if test.name == one.name))
     ]
     linear = [row for one in ranges for row in _linearity_row(one)]
     tables = [
@@ -209,7 +217,7 @@ def _budget_rows(one: Agreement) -> list[dict[str, Cell]]:
 
 def _test_row(one: JointTest) -> dict[str, Cell]:
     return {
-        "range": one.range,
+        "range": one.name,
         "variance_ratio": one.ratio,
         "p": one.probability,
         "alarm": one.alarm,

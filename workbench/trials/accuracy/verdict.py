@@ -27,6 +27,8 @@ class Verdict:
     """P value of the largest bias of any range, over all standoffs (Bonferroni)."""
     unmeasured: str = ""
     """Planned ranges that were not measured; empty if all were."""
+    has_exact_standoffs: bool = False
+    """Whether no uncertainty of a standoff is stated, neither at a placement nor in the rig file."""
 
     @property
     def is_biased(self) -> bool:
@@ -39,13 +41,15 @@ class Verdict:
         agreement = "errors exceed" if self.is_biased else "errors agree with"
         decided = "" if self.decision is None else f"{self.decision.upper()}: "
         incomplete = f"; {self.unmeasured}" if self.unmeasured else ""
-        return f"{decided}{agreement} the stated uncertainty (p = {self.probability:.2g}){incomplete}"
+        exact = "; standoffs count as exact: state bench.placement_sd_mm" if self.has_exact_standoffs else ""
+        return f"{decided}{agreement} the stated uncertainty (p = {self.probability:.2g}){incomplete}{exact}"
 
 
 def verdict_of(ranges: Sequence[Agreement], limits: AccuracyLimits, done: Completeness) -> Verdict:
     """Verdict on the ranges of one sensor, at least one."""
     results = [*results_of(ranges, limits, done), *skipped_results(done.skipped, limits)]
-    return Verdict(decision_on(results, limits), bias_probability(ranges), done.text)
+    exact = any(placed.reference.standoff_sd_mm == 0 for one in ranges for placed in one.placements)
+    return Verdict(decision_on(results, limits), bias_probability(ranges), done.text, exact)
 
 
 def bias_probability(ranges: Sequence[Agreement]) -> float:

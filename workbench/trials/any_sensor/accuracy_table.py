@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from workbench.model.table import Cell, Column, Table
+from workbench.trials.errors import ErrorSpread
 from workbench.trials.reading_frame import dependence, levels, table_of
 from workbench.trials.statistics.autocorrelation import Autocorrelation, standard_error
 from workbench.trials.statistics.estimate import mean_estimate
@@ -60,12 +61,12 @@ def _row(standoff_mm: float, readings: pd.DataFrame, repeats: Autocorrelation) -
     }
     if not len(error):
         return row | {"note": "no statistics: no reading has a range"}
-    mean = float(means.mean())
+    mean, spread = float(means.mean()), ErrorSpread.of(error)
     row |= {
         "mean_error_mm": mean,
-        "max_error_mm": float(error.max()),
-        "min_error_mm": float(error.min()),
-        "sd_mm": float(error.std(ddof=1)) if len(error) > 1 else None,
+        "max_error_mm": spread.largest,
+        "min_error_mm": spread.smallest,
+        "sd_mm": spread.sd,
         "mean_relative_error": mean / standoff_mm if standoff_mm else None,
     }
     if len(means) > 1:

@@ -18,8 +18,8 @@ RANGES = accuracy_run(SimulatedBench.draw(thesis_ranger(), thesis_rig(), 1))
 
 def test_all_tests_of_a_trial_share_one_probability_of_an_alarm() -> None:
     tests = joint_tests(RANGES)
-    assert [one.range for one in tests if one.note == "all standoffs"] == [CLOSEST, MEAN, *IDS]
-    assert [one.range for one in tests if one.note == "repeats"] == [MEAN, *IDS]
+    assert [one.name for one in tests if one.note == "all standoffs"] == [CLOSEST, MEAN, *IDS]
+    assert [one.name for one in tests if one.note == "repeats"] == [MEAN, *IDS]
     assert sum(one.level for one in tests) == pytest.approx(BUDGET_ALARM)
 
 
@@ -32,5 +32,5 @@ def test_an_alarm_is_a_probability_below_its_share() -> None:
 def test_noise_that_no_source_states_is_an_alarm_of_the_repeats() -> None:
     bench = SimulatedBench.draw(thesis_ranger(), thesis_rig(), 2)
     noisy = bench.with_unknown(noise_px=3 * bench.ranger.calibration.laser_ranger.noise.spot_sd_px)
-    found = {(one.range, one.note): one.alarm for one in joint_tests(accuracy_run(noisy))}
+    found = {(one.name, one.note): one.alarm for one in joint_tests(accuracy_run(noisy))}
     assert found[MEAN, "repeats"]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from math import radians, tan
+from math import hypot, radians, sqrt, tan
 
 import numpy as np
 import pytest
 
 from tests.support.rangers import IDS, X_MM, positions, thesis_ranger
 from tests.support.rigs import thesis_rig
+from workbench.model.event import ReadingTaken
 from workbench.model.rig import BenchSpec
 from workbench.model.target import Placement
 from workbench.ranging.ranger import Reading
@@ -25,11 +26,14 @@ def read(ranges_mm: dict[str, float]) -> Reading:
     return thesis_ranger().read_known("s", len(IDS), list(ranges_mm), px, np.full((len(px), 2), 0.03))
 
 
+def taken_at(standoff_mm: float, reading: Reading) -> ReadingTaken:
+    placement = Placement(key="t/1", standoff_mm=standoff_mm)
+    return reading_taken(thesis_rig(), thesis_ranger().sensor, "t", placement, 0, reading)
+
+
 def errors(ranges_mm: dict[str, float], reference: Reference) -> dict[str, float]:
     reading = read(ranges_mm)
-    taken = reading_taken(
-        thesis_rig(), "t", Placement(key="t/1", standoff_mm=reference.standoff_mm), 0, reading
-    )
+    taken = taken_at(reference.standoff_mm, reading)
     found = range_errors(thesis_ranger().sensor, reading, taken, reference)
     return {name: one.error_mm for name, one in found.items()}
 
@@ -57,7 +61,7 @@ def test_sensitivities_are_the_derivatives_of_the_ranges() -> None:
     """By the finite change of a range where one parameter of the calibration is changed."""
     sensor = thesis_ranger().sensor
     reading = read(dict.fromkeys(IDS, STANDOFF_MM))
-    taken = reading_taken(thesis_rig(), "t", Placement(key="t/1", standoff_mm=STANDOFF_MM), 0, reading)
+    taken = taken_at(STANDOFF_MM, reading)
     found = range_errors(sensor, reading, taken, Reference(STANDOFF_MM, 0.3))
     names = sensor.calibration.laser_ranger.parameters.names
     name, step = "L2.tx", 1e-6
@@ -68,7 +72,19 @@ def test_sensitivities_are_the_derivatives_of_the_ranges() -> None:
     assert found["L2"].sensitivities.by_parameter[names.index(name)] == pytest.approx(expected, rel=1e-3)
 
 
+def test_the_choice_between_shapes_completes_the_stated_uncertainty_of_the_closest_range() -> None:
+    sensor = thesis_ranger().sensor
+    reading = read({i: STANDOFF_MM + 0.5 * n for n, i in enumerate(IDS)})
+    found = range_errors(sensor, reading, taken_at(STANDOFF_MM, reading), Reference(STANDOFF_MM, 0.3))
+    closest = found[CLOSEST].sensitivities
+    assert closest.shape_sd_mm > 0
+    by_parameter = closest.by_parameter
+    variance = by_parameter @ sensor.covariance @ by_parameter + closest.spot_sd_mm**2
+    assert hypot(sqrt(variance), closest.shape_sd_mm) == pytest.approx(reading.sigma_mm, rel=0.05)
+    assert [found[name].sensitivities.shape_sd_mm for name in (MEAN, *IDS)] == [0.0] * 5
+
+
 def test_a_reading_without_a_range_has_no_error() -> None:
     reading = Reading("s", "no_points")
-    taken = reading_taken(thesis_rig(), "t", Placement(key="t/1", standoff_mm=STANDOFF_MM), 0, reading)
+    taken = taken_at(STANDOFF_MM, reading)
     assert range_errors(thesis_ranger().sensor, reading, taken, Reference(STANDOFF_MM, 0.3)) == {}

@@ -34,6 +34,16 @@ def test_a_sensor_that_has_changed_is_biased() -> None:
     assert not verdict_of(RANGES, limits, COMPLETE).is_biased
 
 
+@pytest.mark.parametrize(("placement_sd_mm", "exact"), [(0.0, True), (0.3, False)])
+def test_standoffs_without_an_uncertainty_are_named(placement_sd_mm: float, exact: bool) -> None:
+    rig = thesis_rig()
+    stated = rig.bench.model_copy(update={"placement_sd_mm": placement_sd_mm})
+    bench = SimulatedBench.draw(thesis_ranger(), rig.model_copy(update={"bench": stated}), 1)
+    verdict = verdict_of(accuracy_run(bench), AccuracyLimits.model_validate({}), COMPLETE)
+    assert verdict.has_exact_standoffs is exact
+    assert ("placement_sd_mm" in verdict.text) is exact
+
+
 def test_each_placement_is_a_result_in_mm_and_relative() -> None:
     (mean,) = [one for one in RANGES if one.name == MEAN]
     found = error_results(mean)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from workbench.model.arrays import FloatArray
+from tests.proofs.control_charts import CHARTS, DRIFT_SD, REPEATS, SENSORS, simulated
 from workbench.trials.statistics.control_chart import (
     FALSE_ALARM,
     FIRST_SESSIONS,
@@ -15,10 +15,6 @@ from workbench.trials.statistics.control_chart import (
     frozen_limits,
 )
 
-SENSORS, CHARTS, REPEATS = 600, 5, 5
-LONGEST = 1000
-"""Number of sessions after which a simulated run ends; it shortens the mean run length."""
-DRIFT_SD = 0.25
 FOUND_BEFORE = 3.0 / DRIFT_SD
 """Number of sessions in which the drift grows to 3 standard deviations."""
 
@@ -101,34 +97,12 @@ def test_too_few_or_equal_sessions_have_no_limits() -> None:
     assert control_chart(np.ones(30), np.full(30, np.nan), np.ones(30, int), 1) is None
 
 
-def drawn(random: np.random.Generator, sessions: int, drift_sd: float) -> tuple[FloatArray, FloatArray]:
-    """Values and scatters (charts, sessions) of a sensor; the first chart drifts after the first sessions."""
-    values = random.standard_normal((CHARTS, sessions))
-    values[0, FIRST_SESSIONS:] += drift_sd * np.arange(1, sessions - FIRST_SESSIONS + 1)
-    freedom = REPEATS - 1
-    return values, np.sqrt(random.chisquare(freedom, (CHARTS, sessions)) / freedom)
-
-
-def run_length(values: FloatArray, scatter: FloatArray) -> int:
-    """Number of sessions after the first k until the first alarm of any chart."""
-    ends = [len(values[0])]
-    for one, spread in zip(values, scatter, strict=True):
-        chart = control_chart(one, spread, np.full(len(one), REPEATS), CHARTS)
-        assert chart is not None
-        if chart.alarm is not None:
-            ends.append(chart.alarm.index + 1)
-    return min(ends) - FIRST_SESSIONS
-
-
 def test_false_alarms_are_rarer_than_one_in_370_sessions_and_drift_is_found_before_3_sd() -> None:
-    random = np.random.default_rng(2026)
-    sound = [run_length(*drawn(random, FIRST_SESSIONS + LONGEST, 0.0)) for _ in range(SENSORS)]
-    drifting = [run_length(*drawn(random, FIRST_SESSIONS + 60, DRIFT_SD)) for _ in range(SENSORS)]
-    alarms = sum(length < LONGEST for length in sound)
+    found, root = simulated(), np.sqrt(SENSORS)
     # Two standard deviations of a Poisson number of alarms.
-    assert alarms + 2 * np.sqrt(alarms) < sum(sound) / 370
-    assert np.mean(sound) - 2 * np.std(sound) / np.sqrt(SENSORS) > 370
-    assert np.mean(drifting) + 2 * np.std(drifting) / np.sqrt(SENSORS) < FOUND_BEFORE
+    assert found.false_alarms + 2 * np.sqrt(found.false_alarms) < sum(found.sound) / 370
+    assert np.mean(found.sound) - 2 * np.std(found.sound) / root > 370
+    assert np.mean(found.drifting) + 2 * np.std(found.drifting) / root < FOUND_BEFORE
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

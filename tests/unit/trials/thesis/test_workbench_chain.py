@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from tests.support.same_frames import SameFrames
 from workbench.model.rig import Rig, load_rig
-from workbench.spots import find_spots
-from workbench.spots.threshold_centroid import thesis_centres
-from workbench.trials.thesis import camera, thesis_chain
+from workbench.trials.thesis import camera
 from workbench.trials.thesis import scene as scenes
 from workbench.trials.thesis.schema import LineName
 from workbench.trials.thesis.workbench_chain import Chain
@@ -58,23 +57,14 @@ def test_on_the_same_frames_ours_is_nearer_than_the_thesiss(
     rig: Rig, seed: int, noisy: bool, gain: float
 ) -> None:
     """What is gained is not the better camera alone: root mean square errors of a flat, 400 to 2500 mm."""
-    line = scenes.line_of(rig, "horizontal")
-    ranger = Chain(line, noisy, (45.0, 5000.0)).ranger
-    rng = np.random.default_rng(seed)
+    frames = SameFrames(scenes.line_of(rig, "horizontal"), noisy, np.random.default_rng(seed))
     errors = []
     for range_mm in np.linspace(400, 2500, 40).tolist():
-        depths = np.full(4, range_mm)
-        spots = line.spots_px(depths) + noisy * line.speckle_sd_px * rng.standard_normal(4)
-        on, off = camera.expose(line, depths, spots, ALL, rng if noisy else None)
-        centres = np.sort(thesis_centres(on, off, scanlines=ranger.scanlines[:1], expected=4)[:, 0])
-        lasers = np.arange(4)
-        ranges = thesis_chain.ranges_mm(line, lasers, centres)
-        sigmas = thesis_chain.sigmas_mm(line, lasers, centres)
-        theirs = thesis_chain.shape_of(line, lasers, ranges, sigmas).closest_mm
-        ours = ranger.read_lit("a", find_spots(on, off, scanlines=ranger.scanlines, expected=4).spots).flat_mm
+        theirs, ours = frames.read(range_mm)
         assert theirs is not None
         assert ours is not None
-        errors.append((theirs / range_mm - 1, ours / range_mm - 1))
+        assert ours.flat_mm is not None
+        errors.append((theirs / range_mm - 1, ours.flat_mm / range_mm - 1))
     rms_theirs, rms_ours = np.sqrt(np.square(errors).mean(axis=0))
     assert rms_theirs > gain * rms_ours
 

@@ -1,0 +1,169 @@
+"""Tables of the documentation from stored outputs of proofs and benchmarks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from tests.support.stored_output import newest
+from tests.tables.markdown import markdown_table
+
+FIGURE = re.compile(
+    r"(?P<trial>.{14})(?P<quantity>.+?) +(?P<value>-?\d+\.\d{3})  (?P<expected>.+?)"
+    r" \((?P<runs>\d+)\)(?P<missed>  MISSED.*)?$"
+)
+"""A line of `tests.proofs.figure.Figure`."""
+SITUATION = re.compile(
+    r"(?P<name>.{46})\s*(?:\d+ )?\s*(?P<accepted>\d+%) +(?P<coverage>[\d.]+%)(?P<rest>( +([\d.]+%|-))*)"
+)
+SPECKLE_WIDTHS_PX = ("0.75", "1.50")
+SPEED_ROWS = {
+    "flat": "flat",
+    "incline": "incline",
+    "cylinder": "cylinder",
+    "flat at 3 m": "flat at 3 m, overlapping spots",
+    "flat, one not seen": "flat, one laser without a spot",
+    "worst": "ambiguous, then each laser alone (5 or 9 pairs)",
+}
+"""Scenes of the benchmark, and how the documentation calls them."""
+
+
+@dataclass(frozen=True)
+class ProofFigure:
+    """One figure of the proof of the trials."""
+
+    trial: str
+    quantity: str
+    value: float
+    expected: str
+    runs: str
+    is_missed: bool
+
+    @property
+    def head(self) -> str:
+        """Beginning of the quantity that figures share which differ in a place or a number alone."""
+        return re.split(r", \d| at \d", self.quantity)[0]
+
+
+def shapes(heading: str) -> str:
+    """A table of `tests.proofs.shapes`, which are in Markdown."""
+    return "\n".join(newest("shapes").section(heading))
+
+
+def speed() -> str:
+    """Times of a reading: `make bench`."""
+    rows = {}
+    for line in newest("ranging").lines:
+        if found := re.match(r" *(horizontal|both lines), (.+?)((?: +[\d.]+){6})  ", line):
+            _, p99, cpu, per_second, *_ = found[3].split()
+            rows[found[1], found[2]] = (cpu, p99, per_second)
+    heading = ("", "one line", "p99", "readings/s", "both lines", "p99", "readings/s")
+    return markdown_table(
+        heading,
+        [(name, *rows["horizontal", key], *rows["both lines", key]) for key, name in SPEED_ROWS.items()],
+    )
+
+
+def speckle() -> str:
+    """Centres in speckle, single spots: `python -m tests.benchmarks.speckle`."""
+    rows = []
+    for line in newest("speckle").lines:
+        cells = line.split()
+        if len(cells) == 11 and cells[0] == "1" and cells[1] in SPECKLE_WIDTHS_PX:
+            _, width, peak, rms, repeats, stated, shared, z_single, z_mean, inside, _ = cells
+            z = f"{float(z_single):.2f}, {float(z_mean):.2f}"
+            rows.append((f"{float(width):g}", peak, rms, repeats, stated, shared, z, inside))
+    heading = ("width px", "peak DN", "rms px", "repeats px", "stated px", "speckle px", "z", "within 95 %")
+    return markdown_table(heading, rows, numbers_from=0)
+
+
+def situations() -> str:
+    """Wrong rig files and data: `python -m tests.proofs.situations`."""
+    rows = []
+    for line in newest("situations").lines:
+        if found := SITUATION.match(line):
+            worst, named, _, best = _cells(found["rest"])
+            cells = (found["accepted"], found["coverage"], worst, named, best)
+            rows.append((found["name"].strip(), *(cell.replace("%", " %") for cell in cells)))
+    return markdown_table(("situation", "accepted", "coverage", "worst", "cause named", "best"), rows)
+
+
+def _cells(rest: str) -> Sequence[str]:
+    """Cells worst, named, silent, best; a row of few calibrations has the second alone."""
+    cells = rest.split()
+    return cells if len(cells) == 4 else ("-", cells[0], "-", "-")
+
+
+def validation() -> str:
+    """False alarms of the checks of a fit: `python -m tests.proofs.validation`."""
+    row = re.compile(r"  (.+?) +(\d+) +([\d.]+ \+- [\d.]+ %) +stated: (.+)$")
+    rows = [found.groups() for line in newest("validation").lines if (found := row.match(line))]
+    return markdown_table(("of 2000 sound fits", "fits", "share", "stated"), rows)
+
+
+def trials() -> str:
+    """Statistics of the trials, without the changes that a verification finds.
+
+    Figures that differ in a place or a number alone are one row.
+    """
+    rows: dict[tuple[str, ...], list[ProofFigure]] = {}
+    for one in proof_figures():
+        if not _is_about_a_change(one):
+            rows.setdefault((one.trial, one.head, one.expected, one.runs), []).append(one)
+    texts, previous = [], ""
+    for (trial, head, expected, runs), figures in rows.items():
+        quantity = figures[0].quantity if len(figures) == 1 else f"{head}, {len(figures)} cases"
+        texts.append((trial if trial != previous else "", quantity, _found(figures), expected, runs))
+        previous = trial
+    return markdown_table(("trial", "figure", "found", "expected", "runs"), texts, numbers_from=2)
+
+
+def verification() -> str:
+    """Changes of a sensor that a verification finds and names, per cent."""
+    found = {one.quantity: f"{100 * one.value:.0f}" for one in proof_figures() if _is_about_a_change(one)}
+    changes = [re.fullmatch("best test: (.+), own bench", quantity) for quantity in found]
+    rows = [
+        (
+            change,
+            *(
+                found[f"{what}: {change}, {bench}"]
+                for bench in ("own bench", "same bench")
+                for what in ("refused", "best test", "named where refused")
+            ),
+        )
+        for change in (match[1] for match in changes if match)
+    ]
+    heading = ("change since the calibration", "other bench: found", "best", "named")
+    return markdown_table((*heading, "same bench: found", "best", "named"), rows)
+
+
+def control_charts() -> str:
+    """Run lengths of `workbench history`."""
+    rows = [line.split(": ", 1) for line in newest("control_charts").lines if ": " in line]
+    return markdown_table(("sensor", "result"), rows, numbers_from=2)
+
+
+def proof_figures() -> Iterator[ProofFigure]:
+    """All figures of the newest proof of the trials."""
+    for line in newest("trials").lines:
+        if found := FIGURE.match(line):
+            yield ProofFigure(
+                found["trial"].strip(),
+                found["quantity"],
+                float(found["value"]),
+                found["expected"],
+                found["runs"],
+                bool(found["missed"]),
+            )
+
+
+def _is_about_a_change(one: ProofFigure) -> bool:
+    return one.trial == "verify" and ": " in one.quantity
+
+
+def _found(figures: Sequence[ProofFigure]) -> str:
+    """Smallest and largest value, as they are printed."""
+    values = sorted({one.value for one in figures})
+    text = " to ".join(f"{value:.3f}" for value in dict.fromkeys((values[0], values[-1])))
+    return f"{text}, missed" if any(one.is_missed for one in figures) else text
