@@ -12,7 +12,7 @@ from workbench.session.journal import read_journal
 
 def wait_for_capture(sessions: Path, step: str, process: subprocess.Popen[bytes]) -> Path:
     """The session's folder, as soon as the step has captured something and has not ended."""
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 300  # the first run compiles
     while time.monotonic() < deadline:
         assert process.poll() is None, "it ended before it was killed"
         for journal in sessions.glob("*/journal.jsonl"):

@@ -124,7 +124,7 @@ def _how_to_answer(prompt: Prompt) -> str:
     return (
         f"type {' or '.join(prompt.choices)}"
         if prompt.choices
-        else f"type yes{prompt.yes and f' ({prompt.yes})'}"
+        else f"type yes{' and the reason' if prompt.overrules else ''}{prompt.yes and f' ({prompt.yes})'}"
     )
 
 
@@ -151,4 +151,7 @@ def _answer(prompt: Prompt, typed: str) -> Answer:
     if prompt.choices:
         return Answer(value=typed)
     # Only `yes` confirms, not an accidental key.
+    word, _, reason = typed.partition(" ")
+    if prompt.overrules and word.rstrip(",:").lower() == "yes" and reason.strip():
+        return Answer(reason=reason.strip())
     return Answer(value=None if typed.lower() == "yes" else typed)

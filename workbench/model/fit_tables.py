@@ -64,14 +64,15 @@ def cross_validation_table(placements: Sequence[CrossValidatedPlacement]) -> Tab
             Column(key="sd_mm", name="stated u", unit="mm", format="sd"),
             Column(key="normalised_error", name="error / u", format="+.1f"),
             Column(key="alarm", name="alarm"),
-            Column(key="alarm_test", name="by"),
+            Column(key="alarm_test", name="found by"),
             *(Column(key=f"relative_error.{i}", name=i, unit="%", scale=100, format="+.2f") for i in ids),
         ),
         rows=tuple(_placement_row(one, ids) for one in placements),
         caption=(
-            "error: range - standoff, none beyond infinity; u: 1 sigma at the standoff; error / u: to first"
-            " order in pixels; %: relative error of each laser alone; !: contradicts the others, by its range"
-            " error (range) or by the distance of all its spots from their prediction (spots)"
+            "error: range - standoff, empty where the spots give no finite range; u: 1 sigma at the standoff;"
+            " error / u: to first order in pixels; %: relative error of each laser alone; !: the placement"
+            " contradicts the others, found by its range error (range) or by the distance of all its spots from"
+            " their predictions (spots)"
         ),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -58,28 +59,29 @@ def fit_line(
         indices: indices of the line's ranges.
         prior: prior over shapes.
     """
-    own = ranges.only(np.asarray(indices, np.intp))
+    own = ranges if len(indices) == len(ids) else ranges.only(np.asarray(indices, np.intp))
     place, by_parameter, tangent = sensor.places([ids[i] for i in indices], axis, own)
-    c, spot = sensor.covariance, own.spot_sd_mm**2
-    points = Points(
-        place,
-        own.range_mm,
-        own.covariance_mm2,
-        sensor.offset_mm,
-        by_parameter @ c @ by_parameter.T + np.diag(tangent**2 * spot),
-        own.by_parameter @ c @ by_parameter.T + np.diag(tangent * spot),
-    )
+    propagated, spot = by_parameter @ sensor.covariance, own.spot_sd_mm**2
+    of_places, cross = propagated @ by_parameter.T, own.by_parameter @ propagated.T
+    own_noise = np.diag_indices(len(spot))
+    of_places[own_noise] += tangent**2 * spot
+    cross[own_noise] += tangent * spot
+    points = Points(place, own.range_mm, own.covariance_mm2, sensor.offset_mm, of_places, cross)
     shape = fit_shape(points, sensor.front_mm(axis), prior, len(sensor.lasers_on(axis)))
     by_parameter = shape.closest_by_range @ own.by_parameter + shape.closest_by_place @ by_parameter
     spot_sd = (shape.closest_by_range + shape.closest_by_place * tangent) * own.spot_sd_mm
     return LineShape(axis, shape, tuple(indices), by_parameter, spot_sd)
 
 
-def _shape_variance(line: LineShape, covariance: FloatArray) -> float:
-    """Variance of the closest range beyond that by spots and calibration, given the reported shape, mm2."""
+def _known_variance(line: LineShape, covariance: FloatArray) -> float:
+    """Variance of the closest range by spots and calibration, given the reported shape, mm2."""
     by_calibration = line.closest_by_parameter @ covariance @ line.closest_by_parameter
-    by_spots = line.closest_spot_sd_mm @ line.closest_spot_sd_mm
-    return max(0.0, line.shape.closest_sigma_mm**2 - float(by_calibration + by_spots))
+    return float(by_calibration + line.closest_spot_sd_mm @ line.closest_spot_sd_mm)
+
+
+def _shape_variance(line: LineShape, covariance: FloatArray) -> float:
+    """Variance of the closest range beyond that by spots and calibration, mm2."""
+    return max(0.0, line.shape.closest_sigma_mm**2 - _known_variance(line, covariance))
 
 
 def mean_of_lines(
@@ -91,6 +93,9 @@ def mean_of_lines(
     lines share the error of the calibration, which averaging does not reduce; `covariance` (P, P) is that of
     its parameters. The rest of a line's sigma, by its shape, is its own.
     """
+    if len(lines) == 1:
+        known = _known_variance(lines[0], covariance)
+        return lines[0].shape.closest_mm, math.sqrt(max(known, lines[0].shape.closest_sigma_mm ** 2))
     by_information = [1.0 / line.shape.closest_sigma_mm**2 for line in lines]
     by_pixels = [float(size_px[0] if line.axis == "u" else size_px[1]) for line in lines]
     weight = np.array(by_information if weights == "information" else by_pixels)

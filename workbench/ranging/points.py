@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -43,7 +44,7 @@ class Points:
             raise ValueError(f"expected spots at different positions, got {self.x_mm}")
         if np.shape(self.range_mm) != (n,) or np.shape(self.covariance_mm2) != (n, n):
             raise ValueError(f"expected {n} ranges and their covariance for {n} positions")
-        if not (self.range_mm + self.offset_mm > 0).all():
+        if not min(self.range_mm.tolist()) + self.offset_mm > 0:
             raise ValueError(f"expected spots in front of the pinhole, got ranges {self.range_mm}")
 
     def __len__(self) -> int:
@@ -87,6 +88,7 @@ def interval_mm(range_mm: float, sigma_mm: float, offset_mm: float = 0.0) -> tup
     return depth / (1.0 + relative) - offset_mm, farthest - offset_mm
 
 
-def probability(chi2: float, freedom: int) -> float | None:
-    """P value of a chi2; None without degrees of freedom."""
-    return float(chi2_sf(chi2, freedom)) if freedom > 0 else None
+def probabilities(chi2: Sequence[float], freedom: Sequence[int]) -> list[float | None]:
+    """P values of n chi2; None without degrees of freedom."""
+    p_values = chi2_sf(np.array(chi2), np.array(freedom)).tolist()
+    return [p if free > 0 else None for p, free in zip(p_values, freedom, strict=True)]

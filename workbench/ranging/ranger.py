@@ -360,8 +360,7 @@ class Ranger:
 
     def _mean_place(self, ids: Sequence[str], ranges: RangeEstimates) -> tuple[float, float]:
         weight = ranges.spot_sd_mm**-2
-        weight /= weight.sum()
-        x, y = (float(self.sensor.positions_mm(ids, axis, ranges.range_mm) @ weight) for axis in ("u", "v"))
+        x, y = (self.sensor.positions_mm(ids, ranges.range_mm) @ weight / weight.sum()).tolist()
         return x, y
 
     def _no_spot_note(self, laser_id: str, range_mm: float) -> str:

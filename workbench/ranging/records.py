@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
-
-import numpy as np
+from math import isfinite, sqrt
 
 from workbench.model.arrays import FloatArray
 from workbench.model.event import LaserRange
@@ -62,7 +60,8 @@ def flat_range(ranges: RangeEstimates) -> tuple[float, float, float]:
     The calibration's error is nearly common to all lasers: weights by the full covariance would depend on
     small differences of its entries, for no measurable gain.
     """
-    information = 1.0 / ranges.spot_sd_mm**2
-    weight = information / information.sum()
-    sigma_mm = float(np.sqrt(weight @ ranges.covariance_mm2 @ weight))
-    return float(weight @ ranges.range_mm), sigma_mm, float(information.sum() ** -0.5)
+    information = ranges.spot_sd_mm**-2
+    total = float(information.sum())
+    weight = information / total
+    sigma_mm = sqrt(weight @ ranges.covariance_mm2 @ weight)
+    return float(weight @ ranges.range_mm), sigma_mm, 1.0 / sqrt(total)

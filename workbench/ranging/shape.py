@@ -12,7 +12,7 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 from workbench.ranging.cylinder import CylinderFit, fit_cylinder
 from workbench.ranging.mixture import Candidate, ShapePosterior, shape_posterior
-from workbench.ranging.points import COVERAGE_FACTOR, Points, interval_mm, probability
+from workbench.ranging.points import COVERAGE_FACTOR, Points, interval_mm, probabilities
 from workbench.ranging.polynomial import PolynomialFit, PolynomialFits, fit_polynomials
 from workbench.ranging.shape_prior import CUBIC, ShapePrior
 
@@ -24,6 +24,8 @@ CLEAR_ODDS = 10.0
 """Ratio of probabilities from which a shape is reported instead of a simpler one."""
 EXCLUDING_ODDS = 300.0
 """Ratio of probabilities from which the interval of another shape need not include that of a flat."""
+CIRCLE = "cylinder"
+"""Name of the test of a circle."""
 DEFAULT_PRIOR = ShapePrior()
 
 
@@ -116,7 +118,7 @@ def fit_shape(
     if seen is None or possible is None:
         return _unknown(points, possible, angle, tried)
     kind, degree = _reported(seen)
-    fit = circle if kind == "cylinder" else fits.of_degree(degree)
+    fit, name = (circle, CIRCLE) if kind == "cylinder" else (fits.of_degree(degree), _name(degree))
     if fit is None or (closest := fit.closest(front)).range_mm <= max(0.0, -points.offset_mm):
         return _unknown(points, possible, angle, tried)
     return Shape(
@@ -134,7 +136,7 @@ def fit_shape(
         angle_sigma_rad=angle.sigma_rad,
         angle_interval_rad=angle.interval_rad,
         cylinder=circle,
-        probability=probability(fit.chi2, fit.freedom),
+        probability=next(test.probability for test in tried if test.name == name),
         tried=tried,
     )
 
@@ -153,16 +155,17 @@ def _fits(points: Points) -> tuple[PolynomialFits, CylinderFit | None, tuple[Sha
 
 def _tests(fits: PolynomialFits, circle: CylinderFit | None) -> tuple[ShapeTest, ...]:
     n = fits.depth_mm.shape[1]
-    found = [
-        _test(f"degree {degree}", chi2, n - degree - 1)
-        for degree, chi2 in enumerate(fits.chi2.tolist())
-        if math.isfinite(chi2)
-    ]
-    return tuple(found) if circle is None else (*found, _test("cylinder", circle.chi2, circle.freedom))
+    tested = [(_name(degree), chi2, n - degree - 1) for degree, chi2 in enumerate(fits.chi2.tolist())]
+    if circle is not None:
+        tested.append((CIRCLE, circle.chi2, circle.freedom))
+    tested = [one for one in tested if math.isfinite(one[1])]
+    p_values = probabilities([chi2 for _, chi2, _ in tested], [freedom for _, _, freedom in tested])
+    return tuple(ShapeTest(*one, p_value) for one, p_value in zip(tested, p_values, strict=True))
 
 
-def _test(name: str, chi2: float, freedom: int) -> ShapeTest:
-    return ShapeTest(name, chi2, freedom, probability(chi2, freedom))
+def _name(degree: int) -> str:
+    """Name of the test of a polynomial."""
+    return f"degree {degree}"
 
 
 def _posteriors(

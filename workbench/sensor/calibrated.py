@@ -18,6 +18,10 @@ from workbench.optics.rays import RAY
 from workbench.sensor.curves import SpotCurves
 from workbench.sensor.range_model import RangeEstimates, RangeModel
 
+ALONG: dict[ImageAxis, tuple[str, str]] = {"u": ("x_mm", "tx"), "v": ("y_mm", "ty")}
+"""Names of origin and tangent of a ray in the direction in which its spots move along an image axis."""
+AXES = tuple(ALONG)
+
 
 @dataclass(frozen=True)
 class CalibratedSensor:
@@ -67,18 +71,40 @@ class CalibratedSensor:
 
     @cached_property
     def _lines(self) -> dict[ImageAxis, IndexArray]:
-        axes: tuple[ImageAxis, ...] = ("u", "v")
         on = [laser.axis for laser in self.calibration.laser_ranger.lasers]
-        return {axis: np.array([n for n, own in enumerate(on) if own == axis], np.intp) for axis in axes}
+        return {axis: np.array([n for n, own in enumerate(on) if own == axis], np.intp) for axis in ALONG}
+
+    @cached_property
+    def _beams(self) -> FloatArray:
+        """(2, 2, lasers) origins and tangents, each along x (axis u) and y (axis v)."""
+        return self._rays.T[
+            [[RAY.index(name) for name in names] for names in zip(*ALONG.values(), strict=True)]
+        ]
+
+    @cached_property
+    def _beam_columns(self) -> dict[ImageAxis, IndexArray]:
+        """(2, lasers) columns of these parameters."""
+        return {
+            axis: np.array([[self._columns[f"{i}.{name}"] for i in self.ids] for name in names], np.intp)
+            for axis, names in ALONG.items()
+        }
 
     @cached_property
     def _fronts_mm(self) -> dict[ImageAxis, tuple[float, float]]:
         origins = {
-            axis: self._rays[lasers, RAY.index(_along(axis)[0])].tolist()
-            for axis, lasers in self._lines.items()
-            if len(lasers)
+            axis: self._beams[0, AXES.index(axis), own].tolist()
+            for axis, own in self._lines.items()
+            if len(own)
         }
         return {axis: (min(own), max(own)) for axis, own in origins.items()}
+
+    @cached_property
+    def _index_of(self) -> dict[str, int]:
+        return {laser_id: n for n, laser_id in enumerate(self.ids)}
+
+    def _indices(self, laser_ids: Sequence[str]) -> IndexArray:
+        """(n,) indices of lasers in the order of `ids`."""
+        return np.array([self._index_of[i] for i in laser_ids], np.intp)
 
     def lasers_on(self, axis: ImageAxis) -> IndexArray:
         """Indices of the lasers whose spots move along an image axis."""
@@ -131,8 +157,7 @@ class CalibratedSensor:
                 calibration.
             speckle_sd_px: (n, 2) 1 sigma by speckle; NaN or None: that of the calibration.
         """
-        laser = np.array([self.ids.index(i) for i in laser_ids], np.intp)
-        return self.ranges_of(laser, position_px, sd_px, speckle_sd_px)
+        return self.ranges_of(self._indices(laser_ids), position_px, sd_px, speckle_sd_px)
 
     def ranges_of(
         self,
@@ -165,19 +190,19 @@ class CalibratedSensor:
             (n,) positions, mm; (n, P) derivatives by the parameters of the calibration; (n,) derivatives by
             the range (the tangents).
         """
-        names = _along(axis)
-        tangent = self._rays[[self.ids.index(i) for i in laser_ids], RAY.index(names[1])]
+        laser = self._indices(laser_ids)
+        origin, tangent = self._beams[:, AXES.index(axis), laser]
+        depth = ranges.range_mm + self.offset_mm
         gradient = ranges.by_parameter * tangent[:, None]
         gradient[:, self._columns["offset_mm"]] = 0.0  # the reference plane does not affect the position
-        rows, depth = np.arange(len(tangent)), ranges.range_mm + self.offset_mm
-        for name, slope in zip(names, (1.0, depth), strict=True):
-            gradient[rows, [self._columns[f"{i}.{name}"] for i in laser_ids]] += slope
-        return self.positions_mm(laser_ids, axis, ranges.range_mm), gradient, tangent
+        rows, (of_origin, of_tangent) = np.arange(len(laser)), self._beam_columns[axis][:, laser]
+        gradient[rows, of_origin] += 1.0
+        gradient[rows, of_tangent] += depth
+        return origin + tangent * depth, gradient, tangent
 
-    def positions_mm(self, laser_ids: Sequence[str], axis: ImageAxis, range_mm: FloatArray) -> FloatArray:
-        """(n,) positions of spots at ranges (n,) along x (axis u) or y (axis v)."""
-        laser = [self.ids.index(i) for i in laser_ids]
-        origin, tangent = (self._rays[laser, RAY.index(name)] for name in _along(axis))
+    def positions_mm(self, laser_ids: Sequence[str], range_mm: FloatArray) -> FloatArray:
+        """(2, n) positions of spots at ranges (n,) along x and y."""
+        origin, tangent = self._beams[:, :, self._indices(laser_ids)]
         return np.asarray(origin + tangent * (range_mm + self.offset_mm))
 
     def relative_range_sd(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
@@ -217,8 +242,3 @@ class CalibratedSensor:
         """Index of the laser, n times, and the inverse depths of ranges (n,)."""
         index = np.full(len(range_mm), self.ids.index(laser_id), np.intp)
         return index, 1.0 / (np.asarray(range_mm, float) + self.offset_mm)
-
-
-def _along(axis: ImageAxis) -> tuple[str, str]:
-    """Names of a ray's origin and tangent along x (axis u) or y (axis v)."""
-    return ("x_mm", "tx") if axis == "u" else ("y_mm", "ty")

@@ -88,7 +88,8 @@ class SpotCurves:
     def invert(self, laser: IndexArray, position_px: FloatArray, inverse_sd: FloatArray) -> InvertedSpots:
         """Maximum-likelihood inverse depths of n spots, by Gauss-Newton from the nearest start.
 
-        The loop is hot: it solves all spots of a reading together, one unknown each, in microseconds.
+        The loop is hot: it solves all spots of a reading together, one unknown each, in microseconds. A spot
+        that has converged stays, so that its depth does not depend on the other spots.
 
         Args:
             laser: (n,) index of each spot's laser.
@@ -96,19 +97,22 @@ class SpotCurves:
             inverse_sd: (n, 2) 1 / sigma; 0 for a coordinate that was not measured.
         """
         curve, s = self._position_and_slope[laser], self._start(laser, position_px, inverse_sd)
+        searching = np.ones(len(s), bool)
         for _ in range(ITERATIONS):
             seen = self._at(curve, s)
-            residual, slope = (seen[:, :2] - position_px) * inverse_sd, seen[:, 2:] * inverse_sd
-            information = _dot(slope, slope)
-            step = _dot(slope, residual) / information
-            s = self._by.within(s - step)
-            if not (np.abs(step) > CONVERGED).any():
+            slope = seen[:, 2:] * inverse_sd
+            step = _dot(slope, (seen[:, :2] - position_px) * inverse_sd) / _dot(slope, slope)
+            s = np.where(searching, self._by.within(s - step), s)
+            searching &= np.abs(step) > CONVERGED
+            if not searching.any():
                 break
-        # At convergence the residual is that across the line; derivatives are evaluated once, here.
-        own = self._at(self._derivatives[laser], s).reshape(len(s), 2, self._columns)
-        by = own * inverse_sd[:, :, None]
+        # Derivatives are evaluated once, here; the residual that is left is that across the line.
+        seen, own = self._at(curve, s), self._at(self._derivatives[laser], s)
+        residual, slope = (seen[:, :2] - position_px) * inverse_sd, seen[:, 2:] * inverse_sd
+        information = _dot(slope, slope)
+        by = own.reshape(len(s), 2, self._columns) * inverse_sd[:, :, None]
         lower, upper = self._unfolded[laser].T
-        found = (np.abs(step) <= CONVERGED) & (s > lower) & (s < upper)
+        found = ~searching & (s > lower) & (s < upper)
         unit = self._unit[laser]
         w = np.where(found, (self._by.argument(s) - self._at_infinity[laser]) * unit, np.nan)
         root = np.sqrt(information)

@@ -18,7 +18,8 @@ from workbench.model.arrays import FloatArray
 from workbench.model.event import LaserRange
 from workbench.model.rig import BenchSpec, ImageAxis
 from workbench.model.target import Placement
-from workbench.sensor.calibrated import CalibratedSensor, RangeEstimates
+from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.range_model import RangeEstimates
 
 AXES: tuple[ImageAxis, ImageAxis] = ("u", "v")
 NODES = 31

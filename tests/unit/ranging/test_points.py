@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from tests.support.statistics import spread
-from workbench.ranging.points import COVERAGE_FACTOR, Points, interval_mm, probability
+from workbench.ranging.points import COVERAGE_FACTOR, Points, interval_mm, probabilities
 
 
 @pytest.mark.parametrize("relative", [0.02, 0.1, 0.2])
@@ -80,5 +80,7 @@ def test_shapes_of_points_agree(x: list[float], ranges: list[float], n: int) -> 
 
 
 def test_a_fit_without_freedom_has_no_probability() -> None:
-    assert probability(0.0, 0) is None
-    assert probability(3.2, 2) == pytest.approx(stats.chi2.sf(3.2, 2))
+    none, some = probabilities([0.0, 3.2], [0, 2])
+    assert none is None
+    assert some == pytest.approx(stats.chi2.sf(3.2, 2))
+    assert probabilities([], []) == []

@@ -113,8 +113,8 @@ def _standoff_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
         name="standoff",
         placement=info.key,
         message=f"the captures at {info.standoff_mm:g} mm fit a standoff of {fitted:.4g} mm"
-        f"{_digit_error(info.standoff_mm, fitted)}; no other cause explains them. Do: correct the standoff in"
-        " the captures, or leave it out",
+        f"{_digit_error(info.standoff_mm, fitted)}; no other cause explains them. Do: measure it and"
+        " capture it again, or leave it out; in a captures file, correct standoff_mm",
     )
 
 

@@ -1,6 +1,6 @@
 """Agreement of the mean errors of one range with their stated uncertainty, over all standoffs.
 
-The errors of one calibration, of the ruler's scale and of the tilt common to all placements are the same at
+The errors of one calibration, of the ruler's scale and of the tilt common to all placements affect
 every standoff. The mean errors are therefore tested together, with their full covariance.
 """
 
