@@ -45,6 +45,14 @@ class Chain:
         if chain and self.sealed(record) != line:
             raise ChainBrokenError("its hash (chain) is that of other bytes")
         self._begun = self._begun or bool(chain)
+        self._extend(line)
+
+    def add_own(self, line: bytes) -> None:
+        """Continue after a line of `sealed`, which has been written and need not be checked."""
+        self._begun = True
+        self._extend(line)
+
+    def _extend(self, line: bytes) -> None:
         self._sum.update(line)
         self._sum.update(b"\n")
 

@@ -80,7 +80,7 @@ class Journal:
         except OSError as error:
             self._cut_back()
             raise StoppedError(f"{self._path}: the journal cannot be written: {error.strerror}") from error
-        self._chain.add(line)
+        self._chain.add_own(line)
         self._next += 1
         self._size += len(line) + 1
         return record

@@ -115,10 +115,10 @@ def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
 def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
     """Screen of the technician: what is captured now, and how the uncertainty decreases."""
     axis = f"{rig.lasers[0].axis}_px"
-    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (_log(), 4))
+    texts = _texts(live, (_log(), 4))
     brightness = rrb.Vertical(
-        _series(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
-        _series(at.AMBIENT, "Ambient light [DN]"),
+        _curves(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
+        _curves(at.AMBIENT, "Ambient light [DN]"),
         row_shares=[3, 2],
     )
     progress = rrb.Tabs(
@@ -129,7 +129,7 @@ def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
     )
     curves = rrb.Horizontal(
         brightness,
-        _series(f"{at.SPOTS}/{axis}", f"Spot position {axis[0]} [px]"),
+        _curves(f"{at.SPOTS}/{axis}", f"Spot position {axis[0]} [px]"),
         *([progress] if calibrates else []),
         rrb.StateTimelineView(origin=at.LANES, name="Steps"),
         column_shares=[3, 3, *([5] if calibrates else []), 4],
@@ -153,7 +153,6 @@ def _result(rig: Rig, live: bool) -> rrb.Container:
     axis = rig.lasers[0].axis
     texts = _texts(
         live,
-        (text_view(at.NOW, "Now"), 2),
         (text_view(at.FIT_VERDICT, "Verdict"), 6),
         (table_view(at.FIT_WORST, "Worst"), 6),
     )
@@ -171,7 +170,11 @@ def _result(rig: Rig, live: bool) -> rrb.Container:
 
 def _parameters() -> rrb.Container:
     charts = rrb.Vertical(*(picture_view(f"{at.FIT_PICTURE}/{axis}", f"Residuals {axis}") for axis in "uv"))
-    texts = rrb.Vertical(table_view(at.FIT_CHECKS, "Checks"), table_view(at.FIT_TABLE, "Parameters"))
+    texts = rrb.Tabs(
+        table_view(at.FIT_CHECKS, "Checks", titlebar=True),
+        table_view(at.FIT_TABLE, "Fitted parameters", titlebar=True),
+        active_tab=0,
+    )
     return rrb.Horizontal(charts, texts, column_shares=[1, 1], name="Calibration: details")
 
 
@@ -186,7 +189,7 @@ def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
             column_shares=[3, 2],
             name=trial.trial,
         )
-    texts = _texts(live, (text_view(at.NOW, "Now"), 2), (tables, 8))
+    texts = _texts(live, (tables, 8))
     charts = rrb.Horizontal(
         pictures[0] if len(pictures) == 1 else rrb.Tabs(*pictures, active_tab=0),
         _series(
@@ -226,8 +229,9 @@ def _texts(live: bool, *parts: tuple[rrb.View, int]) -> rrb.Container:
 
 
 def _seen(rig: Rig, texts: rrb.Container) -> rrb.Container:
-    """Upper half of a screen: the frame, the spots, texts."""
-    return rrb.Horizontal(frame_view(rig), crops_view(rig), texts, column_shares=[4, 5, 5])
+    """Upper half of a screen: the frame with the subject of its capture below, the spots, texts."""
+    frame = rrb.Vertical(frame_view(rig), text_view(at.NOW, "Now"), row_shares=[5, 1])
+    return rrb.Horizontal(frame, crops_view(rig), texts, column_shares=[4, 5, 5])
 
 
 def frame_view(rig: Rig, prefix: str = "", name: str = FRAME_VIEW) -> rrb.View:
@@ -249,15 +253,19 @@ def picture_view(origin: str, name: str, size_px: tuple[int, int] = SIZE_PX) -> 
     return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=_bounds(*size_px), background=DARK)
 
 
-def _series(
-    origin: str, name: str, y: tuple[float, float] | None = None, time: rrb.TimeAxis | None = None
-) -> rrb.View:
+def _series(origin: str, name: str, time: rrb.TimeAxis | None = None) -> rrb.View:
+    return rrb.TimeSeriesView(
+        origin=origin, name=name, axis_x=time, plot_legend=rrb.PlotLegend(corner="RightTop")
+    )
+
+
+def _curves(origin: str, name: str, y: tuple[float, float] | None = None) -> rrb.View:
+    """View of narrow curves without a legend, which would cover them: the spots above name the colours."""
     return rrb.TimeSeriesView(
         origin=origin,
         name=name,
         axis_y=None if y is None else rrb.ScalarAxis(range=y),
-        axis_x=time,
-        plot_legend=rrb.PlotLegend(corner="RightTop"),
+        plot_legend=rrb.PlotLegend(visible=False),
     )
 
 
@@ -266,9 +274,9 @@ def text_view(origin: str, name: str) -> rrb.View:
     return rrb.TextDocumentView(origin=origin, name=name, titlebar=False)
 
 
-def table_view(origin: str, name: str) -> rrb.View:
+def table_view(origin: str, name: str, *, titlebar: bool = False) -> rrb.View:
     """View of tables in plain text."""
-    return rrb.TextDocumentView(origin=origin, name=name, titlebar=False, format_options=TEXT)
+    return rrb.TextDocumentView(origin=origin, name=name, titlebar=titlebar, format_options=TEXT)
 
 
 def _bounds(width: float, height: float) -> rrb.VisualBounds2D:

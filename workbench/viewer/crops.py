@@ -18,6 +18,7 @@ import rerun as rr
 from scipy.special import ndtr
 
 from workbench.model.arrays import FloatArray, Image
+from workbench.model.number_text import counted
 from workbench.model.spot import Failure, Spot
 from workbench.viewer import entities as at
 from workbench.viewer.frame import RERUN_PIXEL_CENTRE
@@ -53,15 +54,23 @@ class Crop:
     """Column of the frame of the square's first column."""
     top_px: int
     spot: Spot | None
-    """None: no spot; the square shows where it was expected."""
+    """None: no spot, or several that may be the laser's; the square then shows the brightest of these, or
+    where the spot was expected."""
     others: tuple[Spot, ...] = ()
     """The other spots of the capture, which may lie in the square."""
+    candidates: tuple[Spot, ...] = ()
+    """Spots that may each be the laser's, the brightest first, where only this laser was on."""
 
     # Cached, because a crop stays in the picture while the other lasers are captured.
     @cached_property
     def squares(self) -> tuple[Image, Image]:
         """The square of the signal, and that of the residual (grey where the profile fits)."""
         return drawn(self)
+
+    @property
+    def has_defect(self) -> bool:
+        """Whether the spot is saturated, or one of several."""
+        return bool(self.candidates) or (self.spot is not None and Failure.SATURATED in self.spot.flags)
 
     @cached_property
     def cross(self) -> FloatArray:
@@ -104,7 +113,8 @@ class Crops:
         Args:
             on: frame with the lasers on, (height, width).
             off: frame with the lasers off.
-            spots: spots with their lasers; others are ignored.
+            spots: spots of the capture, with their lasers. Those without one may be the laser's where only
+                one laser was on.
             expected: (2,) expected position, px, of the spot of each laser that was on.
         """
         self.earlier = set(self.latest)
@@ -127,10 +137,12 @@ class Crops:
             if laser not in by_laser and laser not in expected:
                 continue
             spot = by_laser.get(laser)
-            centre = expected[laser] if spot is None else np.array([spot.u_px, spot.v_px])
+            candidates = _by_brightness(spots) if spot is None and len(expected) == 1 else ()
+            shown = next(iter(candidates), spot)
+            centre = expected[laser] if shown is None else np.array([shown.u_px, shown.v_px])
             if np.isfinite(centre).all():
                 others = tuple(one for one in spots if one is not spot)
-                self.latest[laser] = _crop(on, off, centre, spot, others)
+                self.latest[laser] = _crop(on, off, centre, spot, others, candidates)
                 self.earlier.discard(laser)
 
     def _log(self) -> None:
@@ -141,10 +153,10 @@ class Crops:
         for n, laser in enumerate(lasers):
             column, row = cell_corner(n, len(lasers))
             crop = self.latest.get(laser)
-            places.append((column + SIDE_PX + GAP_PX / 2, row - LABEL_PX / 2))
+            places.append((column + SIDE_PX + GAP_PX / 2, row - LABEL_PX))  # the viewer draws below a point
             labels.append(label(laser, crop, laser in self.earlier))
-            saturated = crop is not None and crop.spot is not None and Failure.SATURATED in crop.spot.flags
-            label_colors.append(at.RED if saturated else self.colors[laser])
+            has_defect = crop is not None and crop.has_defect
+            label_colors.append(at.RED if has_defect else self.colors[laser])
         self._log_outlines(at.CROPS_CENTRES, lambda crop: crop.cross)
         self._log_outlines(at.CROPS_ELLIPSES, lambda crop: crop.ellipses)
         self.stream.log(
@@ -173,6 +185,8 @@ def label(laser: str, crop: Crop | None, is_earlier: bool) -> str:
     if crop is None:
         return laser
     earlier = " earlier" if is_earlier else ""
+    if crop.candidates:
+        return f"{laser}{earlier} {counted(len(crop.candidates), 'spot')}, not assigned"
     if crop.spot is None:
         return f"{laser}{earlier} no spot"
     flags = "".join(f", {flag}" for flag in sorted(crop.spot.flags))
@@ -216,12 +230,13 @@ def drawn(crop: Crop) -> tuple[Image, Image]:
     """The square of the signal, and that of the residual (grey where the profile fits)."""
     peak = max(float(crop.signal.max()), 1.0)
     shown = 255.0 * np.sqrt(np.clip(crop.signal / peak, 0.0, 1.0))
-    if crop.spot is None or not np.isfinite(crop.spot.flux_dn):
+    spot = next(iter(crop.candidates), crop.spot)
+    if spot is None or not np.isfinite(spot.flux_dn):
         return shown.astype(np.uint8), np.full((SIDE_PX, SIDE_PX), MIDDLE, np.uint8)
-    known = [spot for spot in (crop.spot, *crop.others) if np.isfinite(spot.flux_dn)]
-    fitted = [profile(spot, crop.left_px, crop.top_px) for spot in known]
+    known = [one for one in dict.fromkeys((spot, *crop.others)) if np.isfinite(one.flux_dn)]
+    fitted = [profile(one, crop.left_px, crop.top_px) for one in known]
     residual = crop.signal - np.sum(fitted, axis=0)
-    scaled = MIDDLE + RESIDUAL_GAIN * MIDDLE * residual / max(crop.spot.peak_dn, 1.0)
+    scaled = MIDDLE + RESIDUAL_GAIN * MIDDLE * residual / max(spot.peak_dn, 1.0)
     return shown.astype(np.uint8), np.clip(scaled, 0, 255).astype(np.uint8)
 
 
@@ -253,8 +268,19 @@ def ellipses(spot: Spot) -> list[FloatArray]:
     return [np.array([spot.u_px, spot.v_px]) + sd * axes * circle for sd in ELLIPSES_SD]
 
 
+def _by_brightness(spots: Sequence[Spot]) -> tuple[Spot, ...]:
+    """Spots of no laser, the brightest first."""
+    found = [spot for spot in spots if spot.laser_id is None]
+    return tuple(sorted(found, key=lambda spot: -spot.peak_dn if np.isfinite(spot.peak_dn) else 0.0))
+
+
 def _crop(
-    on: Image, off: Image | None, centre: FloatArray, spot: Spot | None, others: tuple[Spot, ...]
+    on: Image,
+    off: Image | None,
+    centre: FloatArray,
+    spot: Spot | None,
+    others: tuple[Spot, ...],
+    candidates: tuple[Spot, ...],
 ) -> Crop:
     left, top = (round(float(c)) - SIDE_PX // 2 for c in centre)
     square = np.zeros((SIDE_PX, SIDE_PX))
@@ -268,4 +294,4 @@ def _crop(
         inside -= off[rows, columns]
     if inside.size:
         square[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left] = inside
-    return Crop(square, left, top, spot, others)
+    return Crop(square, left, top, spot, others, candidates)

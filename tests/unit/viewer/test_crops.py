@@ -204,6 +204,30 @@ def test_a_laser_without_a_spot_shows_the_place_where_it_was_expected(tmp_path: 
     assert contents.values("/crops/centres", STRIPS) == [(1, [])]
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_reflection_beside_the_spot_of_the_only_laser_is_in_its_square(tmp_path: Path, seed: int) -> None:
+    """Far from where the spot was expected."""
+    du, dv = np.random.default_rng(seed).integers(6, 15, 2).tolist()
+    pair = [bright_spot(None, 200.0 + du, 100.0 + dv, 20_000.0), bright_spot(None, 200.0, 100.0, 30_000.0)]
+    on, off = drawn_frame(pair, 900.0, (240, 320)), drawn_frame([], 900.0, (240, 320))
+    contents = taken(tmp_path, on, off, *pair, L2=np.array([80.0, 40.0]))
+    shown, residual = squares(picture(contents), "L2")
+    assert shown[HALF, HALF] == 255
+    assert shown[HALF + dv, HALF + du] == pytest.approx(255 * np.sqrt(2 / 3), abs=2)
+    assert set(np.unique(residual)) <= {MIDDLE - 1, MIDDLE}
+    assert labels(contents)["L2"] == "L2 2 spots, not assigned"
+    ((_, colors),) = contents.values("/crops/labels", "Points2D:colors")
+    assert colors[LASERS.index("L2")] == packed(RED)
+    assert contents.values("/crops/centres", STRIPS) == [(1, [])]
+
+
+def test_spots_of_no_laser_are_not_those_of_one_of_several(tmp_path: Path) -> None:
+    on = np.full((480, 640), 9, np.uint8)
+    where = np.array([200.0, 100.0])
+    found = labels(taken(tmp_path, on, None, a_spot(None, 50.0), L1=where, L2=where + 50.0))
+    assert (found["L1"], found["L2"]) == ("L1 no spot", "L2 no spot")
+
+
 def test_a_place_expected_far_outside_the_frame_is_black(tmp_path: Path) -> None:
     on = np.full((480, 640), 9, np.uint8)
     shown, _ = squares(picture(taken(tmp_path, on, None, L2=np.array([-900.0, 5000.0]))), "L2")
