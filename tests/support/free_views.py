@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
 from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import PlacementInfo
 from workbench.corners.board import BoardCorners
+from workbench.model.arrays import FloatArray
 from workbench.model.known_board import Chessboard
 from workbench.model.rig import BenchSpec, CameraSpec, Prior, Rig
 
@@ -32,24 +35,35 @@ RIG = Rig(
 TRUTH = {"f_px": 540.0, "cx_px": 331.0, "cy_px": 228.0, "k1": -0.25, "k2": 0.08, "p1": 0.001, "p2": -0.0005}
 
 
-def view(name: str, rng: np.random.Generator, sd_px: float, stated_px: float | None = None) -> BoardView:
-    """A view with a tilt of up to some 35 degrees that shows the whole board."""
+Project = Callable[[FloatArray], FloatArray]
+"""Pixels (n, 2) of points (n, 3) in the camera's frame, mm."""
+
+
+def project(points_mm: FloatArray) -> FloatArray:
+    """Pixels by OpenCV's lens with TRUTH."""
     k = np.array([[TRUTH["f_px"], 0, TRUTH["cx_px"]], [0, TRUTH["f_px"], TRUTH["cy_px"]], [0, 0, 1]])
     lens = np.array([TRUTH[name] for name in ("k1", "k2", "p1", "p2")])
-    points = np.column_stack([BOARD.corners_mm, np.zeros(len(BOARD.corners_mm))])
-    while True:
-        turn = rng.uniform(-0.6, 0.6, 3)
-        shift = rng.uniform([-80.0, -60.0, 300.0], [80.0, 60.0, 600.0])
-        seen = cv2.projectPoints(points, turn, shift, k, lens)[0].reshape(-1, 2)
-        if (seen > 8).all() and (seen < [631, 471]).all():
-            break
-    noisy = seen + rng.normal(0.0, sd_px, seen.shape)
-    sd = np.full(seen.shape, sd_px if stated_px is None else stated_px)
-    info = PlacementInfo(name, float("nan"), float("nan"), 0.0, name)
-    return BoardView(info, BoardCorners(np.arange(len(seen)), noisy, sd, 0))
+    return np.asarray(cv2.projectPoints(points_mm, np.zeros(3), np.zeros(3), k, lens)[0], float).reshape(
+        -1, 2
+    )
 
 
-def views(count: int, seed: int, sd_px: float = 0.1, stated_px: float | None = None) -> list[BoardView]:
-    """Views `V1`, `V2`, ... of one camera."""
+def views(
+    count: int, seed: int, sd_px: float = 0.1, stated_px: float | None = None, by: Project = project
+) -> list[BoardView]:
+    """Views `V1`, `V2`, ... with tilts of up to some 35 degrees, each of the whole board."""
     rng = np.random.default_rng(seed)
-    return [view(f"V{n}", rng, sd_px, stated_px) for n in range(1, count + 1)]
+    printed = np.column_stack([BOARD.corners_mm, np.zeros(len(BOARD.corners_mm))])
+    found: list[BoardView] = []
+    while len(found) < count:
+        turn = cv2.Rodrigues(rng.uniform(-0.6, 0.6, 3))[0]
+        shift = rng.uniform([-80.0, -60.0, 300.0], [80.0, 60.0, 600.0])
+        seen = by(printed @ turn.T + shift)
+        if not ((seen > 8).all() and (seen < [631, 471]).all()):
+            continue
+        name = f"V{len(found) + 1}"
+        noisy = seen + rng.normal(0.0, sd_px, seen.shape)
+        sd = np.full(seen.shape, sd_px if stated_px is None else stated_px)
+        info = PlacementInfo(name, float("nan"), float("nan"), 0.0, name)
+        found.append(BoardView(info, BoardCorners(np.arange(len(seen)), noisy, sd, 0)))
+    return found

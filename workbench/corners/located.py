@@ -28,7 +28,7 @@ class LocatedCorners:
     clear_mm: float
     """Distance from these edges to the next print beside them, such as a marker."""
     found: str
-    """What the detector found, for messages."""
+    """Finding of the detector, for messages."""
 
 
 def local_scale(

@@ -61,7 +61,7 @@ def for_image(found: Intrinsics, size_px: tuple[int, int]) -> Intrinsics:
     """Intrinsics for images of another size, if these are binned by a whole number.
 
     Raises:
-        BadInputError: the image may be cropped, by an amount that the file does not tell.
+        BadInputError: the image may be cropped, by an amount that the file does not state.
     """
     width, height = size_px
     if found.size_px is None:

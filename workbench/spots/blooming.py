@@ -60,7 +60,7 @@ def with_blooming(spot: Spot, on: Image, clip_dn: float) -> Spot:
 
 
 def _run(clipped: BoolArray, near: int) -> tuple[int, int]:
-    """Start and stop of the run of clipped pixels at an index or within two of it; 0, 0 without one."""
+    """Start and stop of the run of clipped pixels at or near an index; 0, 0 without one."""
     around = (near, near - 1, near + 1, near - 2, near + 2)
     there = [n for n in around if 0 <= n < len(clipped) and clipped[n]]
     if not there:

@@ -97,7 +97,7 @@ class PlacementInfo:
 
     @property
     def is_free(self) -> bool:
-        """Whether no standoff is stated: the pose of the board is whatever its corners show."""
+        """Whether no standoff is stated: the corners alone determine the pose of the board."""
         return isnan(self.standoff_mm)
 
     @property

@@ -323,8 +323,8 @@ def _with_pose_prior(parameter: Parameter, poses: Mapping[str, Mapping[str, Prio
 def _pose_priors(rig: Rig, view: BoardView) -> dict[str, Prior]:
     """Wide priors of a board's pose about its starting value, by the names of the placement's parameters.
 
-    Slopes, position and rotation; for a board held anywhere also its depth, in the place of the error of a
-    stated standoff.
+    Slopes, position and rotation; for a board held anywhere also its depth, instead of the error of a stated
+    standoff.
     """
     pose = guess_pose(rig, view)
     priors = {

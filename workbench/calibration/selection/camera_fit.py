@@ -41,7 +41,7 @@ def with_scatter_of_views(rig: Rig, boards: Sequence[BoardView]) -> list[BoardVi
     """Views with the deviations that the views of a board held anywhere call for by themselves.
 
     Photographs compressed by a camera scatter more than their pixels show. Spots must not be taken for wrong
-    because of it: a fit of both has one noise scale.
+    for that: a fit of both has one noise scale.
     """
     free = [view for view in boards if view.placement.is_free]
     if not free:
