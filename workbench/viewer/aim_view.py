@@ -97,8 +97,8 @@ def aim_layout(rig: Rig) -> rrb.Blueprint:
         end=rrb.TimeRangeBoundary.cursor_relative(seq=0),
     )
     curves = rrb.Vertical(
-        rrb.TimeSeriesView(origin=WIDTH, name="Width of each spot [px]", time_ranges=last),
-        rrb.TimeSeriesView(origin=PEAK, name="Peak of each spot [DN]", time_ranges=last),
+        layout.curves_view(WIDTH, "Width of each spot [px]", shown=last),
+        layout.curves_view(PEAK, "Peak of each spot [DN]", shown=last),
     )
     lower = rrb.Horizontal(layout.table_view(TABLE, "Table"), curves, column_shares=[3, 2])
     return rrb.Blueprint(

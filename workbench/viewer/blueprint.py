@@ -102,7 +102,7 @@ def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
     texts = rrb.Horizontal(
         rrb.Vertical(text_view(f"{below}{at.NOW}", "Now"), text_view(f"{below}{at.FIT_VERDICT}", "Verdict")),
         table_view(f"{below}{at.FIT_WORST}", "Worst"),
-        column_shares=[2, 3],
+        column_shares=[5, 11],
     )
     return rrb.Vertical(
         rrb.Horizontal(frame_view(rig, below, f"{title}: frame"), crops_view(rig, below, "Spots")),
@@ -117,8 +117,8 @@ def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
     axis = f"{rig.lasers[0].axis}_px"
     texts = _texts(live, (_log(), 4))
     brightness = rrb.Vertical(
-        _curves(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
-        _curves(at.AMBIENT, "Ambient light [DN]"),
+        curves_view(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
+        curves_view(at.AMBIENT, "Ambient light [DN]"),
         row_shares=[3, 2],
     )
     progress = rrb.Tabs(
@@ -129,7 +129,7 @@ def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
     )
     curves = rrb.Horizontal(
         brightness,
-        _curves(f"{at.SPOTS}/{axis}", f"Spot position {axis[0]} [px]"),
+        curves_view(f"{at.SPOTS}/{axis}", f"Spot position {axis[0]} [px]"),
         *([progress] if calibrates else []),
         rrb.StateTimelineView(origin=at.LANES, name="Steps"),
         column_shares=[3, 3, *([5] if calibrates else []), 4],
@@ -195,10 +195,11 @@ def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
         _series(
             at.trial_errors(trial.trial),
             "Error [mm], u shaded; right click: go to the reading",
+            legend="LeftTop",  # errors are larger towards the right, at longer standoffs
         ),
         column_shares=[10, 5],
     )
-    return rrb.Vertical(_seen(rig, texts), charts, row_shares=[5, 4], name=trial.trial)
+    return rrb.Vertical(_seen(rig, texts, (3, 4, 6)), charts, row_shares=[5, 4], name=trial.trial)
 
 
 def _grid(pictures: Sequence[rrb.View]) -> rrb.Container:
@@ -228,10 +229,10 @@ def _texts(live: bool, *parts: tuple[rrb.View, int]) -> rrb.Container:
     return rrb.Vertical(*views, row_shares=list(shares))
 
 
-def _seen(rig: Rig, texts: rrb.Container) -> rrb.Container:
+def _seen(rig: Rig, texts: rrb.Container, shares: tuple[int, int, int] = (4, 5, 5)) -> rrb.Container:
     """Upper half of a screen: the frame with the subject of its capture below, the spots, texts."""
     frame = rrb.Vertical(frame_view(rig), text_view(at.NOW, "Now"), row_shares=[5, 1])
-    return rrb.Horizontal(frame, crops_view(rig), texts, column_shares=[4, 5, 5])
+    return rrb.Horizontal(frame, crops_view(rig), texts, column_shares=list(shares))
 
 
 def frame_view(rig: Rig, prefix: str = "", name: str = FRAME_VIEW) -> rrb.View:
@@ -253,19 +254,27 @@ def picture_view(origin: str, name: str, size_px: tuple[int, int] = SIZE_PX) -> 
     return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=_bounds(*size_px), background=DARK)
 
 
-def _series(origin: str, name: str, time: rrb.TimeAxis | None = None) -> rrb.View:
+def _series(
+    origin: str,
+    name: str,
+    time: rrb.TimeAxis | None = None,
+    legend: Literal["LeftTop", "RightTop"] = "RightTop",
+) -> rrb.View:
     return rrb.TimeSeriesView(
-        origin=origin, name=name, axis_x=time, plot_legend=rrb.PlotLegend(corner="RightTop")
+        origin=origin, name=name, axis_x=time, plot_legend=rrb.PlotLegend(corner=legend)
     )
 
 
-def _curves(origin: str, name: str, y: tuple[float, float] | None = None) -> rrb.View:
+def curves_view(
+    origin: str, name: str, y: tuple[float, float] | None = None, shown: rrb.VisibleTimeRange | None = None
+) -> rrb.View:
     """View of narrow curves without a legend, which would cover them: the spots above name the colours."""
     return rrb.TimeSeriesView(
         origin=origin,
         name=name,
         axis_y=None if y is None else rrb.ScalarAxis(range=y),
         plot_legend=rrb.PlotLegend(visible=False),
+        time_ranges=shown,
     )
 
 

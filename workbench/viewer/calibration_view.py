@@ -82,7 +82,7 @@ def _layout() -> rrb.Blueprint:
     )
     chart = layout.picture_view(PICTURE, "Uncertainty of ranges")
     return rrb.Blueprint(
-        rrb.Horizontal(chart, texts, column_shares=[3, 2]),
+        rrb.Horizontal(chart, texts, column_shares=[11, 9]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="hidden"),

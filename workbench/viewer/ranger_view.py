@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from workbench.model.arrays import Image
+from workbench.model.event import LaserRange
 from workbench.model.rig import Rig
 from workbench.model.spot import Spot
 from workbench.ranging.lines import LineShape
 from workbench.ranging.ranger import Ranger, Reading
+from workbench.ranging.shape import Shape
 from workbench.viewer import blueprint as layout
 from workbench.viewer import entities as at
 from workbench.viewer import frame
@@ -23,16 +27,25 @@ from workbench.viewer.stream import Moment, Stream
 ANSWER = "reading/answer"
 PLAN = "plan"
 HISTORY = "history/closest"
-NOT_RANGED = "history/not_ranged"
 SHOWN_READINGS = 60
 """Number of readings in the history."""
-PLAN_HEIGHT = 200.0
-"""Height of the plan view for the depth from the sensor to 1.25 times the closest range."""
-BEYOND = 1.25
+PLAN_HEIGHT = 120.0
+"""Height of the plan view in its units. One unit is 1 mm, true to scale, where the intervals fit."""
+MARGIN = 1.25
+"""Depth that is drawn over that of all intervals, where these do not fit."""
+LABEL_ROWS = (PLAN_HEIGHT / 2, PLAN_HEIGHT / 2 + 12.0)
+"""Heights of the labels, alternately: neighbours do not overlap."""
+PLAN_BOUNDS = rrb.VisualBounds2D(
+    x_range=(-110.0, 110.0), y_range=(-PLAN_HEIGHT / 2 - 2.0, LABEL_ROWS[1] + 14.0)
+)
 CONTOUR_POINTS = 41
+CAP_MM = 5.0
+"""Half length of the bars across the interval of the closest point."""
+LEAST_PROBABILITY = 0.005
+"""Smallest probability of a shape that is shown."""
 _LINE = rr.Radius.ui_points(1.5)
 _THICK = rr.Radius.ui_points(4.0)
-_DOT = rr.Radius.ui_points(5.0)
+_NO_DOT = rr.Radius.ui_points(0.0)
 
 
 @dataclass(frozen=True)
@@ -81,29 +94,34 @@ class RangerView:
 
     def _log_plan(self, reading: Reading) -> None:
         """Log the obstacle from above: spots with their intervals, contour, closest point."""
-        scale = plan_scale(reading)
+        depths = Depths.of(reading)
         sensor = self._ranger.sensor
-        bars, points, colors, labels = [], [], [], []
-        for one in reading.lasers:
+        bars, labels, colors, texts = [], [], [], []
+        for n, one in enumerate(reading.lasers):
             x = self._place_mm(one.laser_id, one.range_mm)
-            low = one.range_mm - 2 * one.sigma_mm if one.low_mm is None else one.low_mm
-            high = one.range_mm + 2 * one.sigma_mm if one.high_mm is None else one.high_mm
-            bars.append([(x, -scale * low), (x, -scale * high)])
-            points.append((x, -scale * one.range_mm))
+            near, far = depths.heights(interval_of(one))
+            bars.append([(x, near), (x, far)])
+            labels.append((x, LABEL_ROWS[n % len(LABEL_ROWS)]))
             colors.append(self._colors[one.laser_id])
-            labels.append(f"{one.laser_id} {one.range_mm:.0f}")
-        some = len(points) > 0
+            texts.append(f"{one.laser_id} {one.range_mm:.0f}")
+        some = len(bars) > 0
         self._stream.log(
             f"{PLAN}/spots",
-            rr.Points2D(points, colors=colors, labels=labels, radii=_DOT if some else None, show_labels=True),
+            rr.Points2D(
+                labels, colors=colors, labels=texts, radii=_NO_DOT if some else None, show_labels=True
+            ),
         )
         self._stream.log(
             f"{PLAN}/intervals", rr.LineStrips2D(bars, colors=colors, radii=_THICK if some else None)
         )
-        contours = [contour(line, sensor.front_mm(line.axis), scale) for line in reading.lines]
+        contours = [contour(line, sensor.front_mm(line.axis), depths) for line in reading.lines]
         known = [strip for strip in contours if len(strip)]
         self._stream.log(
             f"{PLAN}/contour", rr.LineStrips2D(known, colors=at.WHITE, radii=_LINE if known else None)
+        )
+        closest = closest_bar(reading, depths)
+        self._stream.log(
+            f"{PLAN}/closest", rr.LineStrips2D(closest, colors=at.WHITE, radii=_LINE if closest else None)
         )
 
     def _place_mm(self, laser_id: str, range_mm: float) -> float:
@@ -115,20 +133,62 @@ class RangerView:
         return ray.origin_mm[along] + ray.direction[along] * depth_mm
 
 
-def plan_scale(reading: Reading) -> float:
-    """Height of a millimetre of depth in the plan view."""
-    farthest = max((one.range_mm for one in reading.lasers), default=1000.0)
-    return PLAN_HEIGHT / (BEYOND * farthest)
+@dataclass(frozen=True)
+class Depths:
+    """Heights of ranges in the plan view; a farther point is higher."""
+
+    middle_mm: float
+    """Range at height 0."""
+    scale: float
+    """Height of 1 mm of range."""
+
+    @classmethod
+    def of(cls, reading: Reading) -> Depths:
+        """Depths with all intervals of a reading in view, at most true to scale."""
+        shapes = [line.shape for line in reading.lines]
+        intervals = [*map(interval_of, reading.lasers), *(shape.closest_interval_mm for shape in shapes)]
+        ends = [mm for interval in intervals for mm in interval if isfinite(mm)]
+        if not ends:
+            return cls(0.0, 1.0)
+        return cls(
+            (min(ends) + max(ends)) / 2, min(1.0, PLAN_HEIGHT / MARGIN / max(max(ends) - min(ends), 1.0))
+        )
+
+    def heights(self, ranges_mm: Iterable[float]) -> list[float]:
+        """Heights of ranges; those out of view are at its edge."""
+        half = PLAN_HEIGHT / 2
+        return [min(half, max(-half, self.scale * (self.middle_mm - mm))) for mm in ranges_mm]
 
 
-def contour(line: LineShape, front_mm: tuple[float, float], scale: float) -> list[tuple[float, float]]:
+def interval_of(one: LaserRange) -> tuple[float, float]:
+    """95 % interval of a laser's range, mm."""
+    low = one.range_mm - 2 * one.sigma_mm if one.low_mm is None else one.low_mm
+    high = one.range_mm + 2 * one.sigma_mm if one.high_mm is None else one.high_mm
+    return low, high
+
+
+def closest_bar(reading: Reading, depths: Depths) -> list[list[tuple[float, float]]]:
+    """Lines of the closest point in the plan view; none without a shape.
+
+    Its 95 % interval, with bars across both ends and the point.
+    """
+    if not reading.lines:
+        return []
+    shape = min((line.shape for line in reading.lines), key=lambda one: one.closest_mm)
+    x, (low, high) = shape.closest_x_mm, shape.closest_interval_mm
+    ends = depths.heights((low, shape.closest_mm, high))
+    bars = [[(x - CAP_MM, y), (x + CAP_MM, y)] for y in ends]
+    return [[(x, ends[0]), (x, ends[-1])], *bars]
+
+
+def contour(line: LineShape, front_mm: tuple[float, float], depths: Depths) -> list[tuple[float, float]]:
     """Points of the fitted polynomial across the front, in the plan view; none for an unknown shape."""
     coefficients = line.shape.coefficients
     if not coefficients:
         return []
     x = np.linspace(*front_mm, CONTOUR_POINTS)
     z = np.polynomial.polynomial.polyval(x, coefficients)
-    return [(float(a), float(-scale * b)) for a, b in zip(x, z, strict=True)]
+    return [*zip(x.tolist(), depths.heights(z.tolist()), strict=True)]
 
 
 def answer_text(reading: Reading) -> str:
@@ -142,16 +202,23 @@ def answer_text(reading: Reading) -> str:
     for line in reading.lines:
         angle = line.shape.angle_rad
         turned = "" if angle is None else f", angle {np.degrees(angle):+.1f} deg"
-        lines.append(f"**{line.shape.kind}**{turned}")
+        lines.append(f"**{line.shape.kind}**{turned}{_odds(line.shape)}")
     return "\n\n".join([*lines, *reading.notes])
+
+
+def _odds(shape: Shape) -> str:
+    """Posterior probability of each kind, the largest first; empty where there is none."""
+    ordered = sorted(shape.probabilities.items(), key=lambda one: -one[1])
+    shown = [f"{kind} {100 * p:.0f} %" for kind, p in ordered if p >= LEAST_PROBABILITY]
+    return f" ({', '.join(shown)})" if shown else ""
 
 
 def ranger_layout(rig: Rig) -> rrb.Blueprint:
     """Layout of the live ranger, one screen."""
     plan = rrb.Spatial2DView(
         origin=PLAN,
-        name="Plan: spots with their 95 % intervals, contour (mm; the sensor is below)",
-        visual_bounds=rrb.VisualBounds2D(x_range=(-110.0, 110.0), y_range=(-PLAN_HEIGHT - 10.0, 10.0)),
+        name="From above: 95 % intervals; white: closest point",
+        visual_bounds=PLAN_BOUNDS,
         background=layout.DARK,
     )
     left = rrb.Vertical(layout.text_view(ANSWER, "Answer"), plan, row_shares=[1, 2])

@@ -20,6 +20,8 @@ not reach. Zeros alone may be left by a power failure."""
 FOOTER = b"RRF2FOOT"
 """Mark at the end of a complete recording."""
 TAIL_BYTES = 64
+HEAD = b"RRF"
+"""First bytes of a recording of any release of Rerun."""
 
 
 def viewer_executable() -> Path:
@@ -131,3 +133,8 @@ def open_viewer(recording: Path) -> int:
 def _check(recording: Path) -> None:
     if not recording.is_file():
         raise BadInputError(f"{recording}: no such recording; expected a file that ends in .rrd")
+    with recording.open("rb") as file:
+        if file.read(len(HEAD)) != HEAD:
+            raise BadInputError(
+                f"{recording}: expected a recording of Rerun; make that of a session by --rebuild"
+            )

@@ -16,14 +16,18 @@ from workbench.ranging.ranger import Ranger, Reading
 from workbench.spots import Finding
 from workbench.viewer.ranger_view import (
     PLAN_HEIGHT,
+    Depths,
     RangerView,
     Shown,
     answer_text,
+    closest_bar,
     contour,
-    plan_scale,
+    interval_of,
     ranger_layout,
 )
 from workbench.viewer.stream import Stream
+
+INCLINE_MM = {"L1": 812.0, "L2": 806.0, "L3": 794.0, "L4": 788.0}
 
 
 @pytest.fixture(scope="module")
@@ -51,27 +55,57 @@ def test_the_answer_has_range_interval_and_shape(ranger: Ranger) -> None:
     assert reading.interval_mm is not None
     low, high = reading.interval_mm
     assert f"{low:.1f} to {high:.1f} mm" in second
-    assert reading.lines[0].shape.kind in text
+    shape = reading.lines[0].shape
+    assert shape.kind in text
+    most, probability = max(shape.probabilities.items(), key=lambda one: one[1])
+    assert f"{most} {100 * probability:.0f} %" in text
 
 
 def test_no_range_is_an_answer_with_its_status(ranger: Ranger) -> None:
     reading = acquire(ranger, "s", lambda _: Finding(()))
     assert "no_points" in answer_text(reading).splitlines()[0]
-    assert plan_scale(reading) > 0
+    assert Depths.of(reading).scale > 0
 
 
 @pytest.mark.parametrize("range_mm", [140.0, 800.0, 4000.0])
-def test_spots_and_contour_lie_in_the_plan_view_at_any_range(ranger: Ranger, range_mm: float) -> None:
+def test_intervals_and_contour_lie_in_the_plan_view_at_any_range(ranger: Ranger, range_mm: float) -> None:
     reading = reading_at(ranger, L1=range_mm, L2=range_mm, L3=range_mm, L4=range_mm)
-    scale = plan_scale(reading)
+    depths = Depths.of(reading)
+    assert 0 < depths.scale <= 1
     for one in reading.lasers:
-        assert 0 < scale * one.range_mm < PLAN_HEIGHT
+        near, far = depths.heights(interval_of(one))
+        assert PLAN_HEIGHT / 2 > near > far > -PLAN_HEIGHT / 2
+        assert near - far == pytest.approx(depths.scale * 4 * one.sigma_mm, rel=0.2)
     (line,) = reading.lines
-    points = np.array(contour(line, ranger.sensor.front_mm(line.axis), scale))
+    points = np.array(contour(line, ranger.sensor.front_mm(line.axis), depths))
     assert len(points) > 10
-    assert (points[:, 1] < 0).all()
-    assert (points[:, 1] > -PLAN_HEIGHT).all()
-    assert abs(points[:, 1].mean() + scale * range_mm) < 0.05 * PLAN_HEIGHT
+    assert (np.abs(points[:, 1]) < PLAN_HEIGHT / 2).all()
+
+
+def test_a_plan_of_a_narrow_depth_is_true_to_scale(ranger: Ranger) -> None:
+    """The slope of the drawn contour is that of the incline."""
+    reading = reading_at(ranger, **INCLINE_MM)
+    (line,) = reading.lines
+    (x0, y0), *_, (x1, y1) = contour(line, ranger.sensor.front_mm(line.axis), Depths.of(reading))
+    assert line.shape.angle_rad is not None
+    assert (y0 - y1) / (x1 - x0) == pytest.approx(np.tan(line.shape.angle_rad), rel=0.02)
+
+
+@pytest.mark.parametrize("ranges_mm", [{"L1": 800.0, "L2": 800.0, "L3": 800.0}, INCLINE_MM, {"L1": 4000.0}])
+def test_the_bar_of_the_closest_point_spans_its_interval(ranger: Ranger, ranges_mm: dict[str, float]) -> None:
+    reading = reading_at(ranger, **ranges_mm)
+    depths = Depths.of(reading)
+    ((x, first), (_, last)), *bars = closest_bar(reading, depths)
+    (shape,) = (line.shape for line in reading.lines)
+    assert x == shape.closest_x_mm
+    assert [first, last] == depths.heights(shape.closest_interval_mm)
+    heights = [start[1] for start, _ in bars]
+    assert heights == sorted(heights, reverse=True)
+    assert heights[1:2] == depths.heights([shape.closest_mm])
+
+
+def test_there_is_no_bar_without_a_range(ranger: Ranger) -> None:
+    assert closest_bar(acquire(ranger, "s", lambda _: Finding(())), Depths(0.0, 1.0)) == []
 
 
 def test_readings_are_drawn_from_their_frames(ranger: Ranger, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ def test_viewer_listens_on_loopback_only_and_reports_nothing(
     monkeypatch.setattr(subprocess, "run", run)
     monkeypatch.setenv("DISPLAY", ":0")
     recording = tmp_path / "recording.rrd"
-    recording.touch()
+    recording.write_bytes(b"RRF2")
     assert window.open_viewer(recording) == 3
     ((command, env),) = started
     assert Path(command[0]).name.startswith("rerun")
@@ -39,11 +40,21 @@ def test_missing_recording_is_named(tmp_path: Path) -> None:
         window.open_viewer(tmp_path / "none.rrd")
 
 
+@pytest.mark.parametrize("show", [window.open_viewer, lambda path: window.serve(path, lambda _: None)])
+@pytest.mark.parametrize("content", [b"", b"RR", b"\x89PNG and more", bytes(100)])
+def test_a_file_that_is_no_recording_is_refused(
+    tmp_path: Path, show: Callable[[Path], int], content: bytes
+) -> None:
+    (tmp_path / "recording.rrd").write_bytes(content)
+    with pytest.raises(BadInputError, match=r"recording\.rrd: expected a recording"):
+        show(tmp_path / "recording.rrd")
+
+
 def test_no_display_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
-    (tmp_path / "recording.rrd").touch()
+    (tmp_path / "recording.rrd").write_bytes(b"RRF2")
     with pytest.raises(BadInputError, match="display"):
         window.open_viewer(tmp_path / "recording.rrd")
 
