@@ -14,6 +14,7 @@ from workbench.session.state import effective
 
 ANSWERS = {
     "Name of the sensor?": ["three"],
+    "Serial number of the sensor?": ["LS-0042"],
     "Camera?": [""],
     "Size of its images": ["1280", "1280 x 720"],  # a wrong answer is asked again
     "Pixel pitch": ["3"],
@@ -67,6 +68,7 @@ def test_a_newcomer_calibrates_a_new_sensor_and_repairs_a_spoilt_placement(tmp_p
     real, practice = (load_rig(lab / f"rigs/{name}.yaml") for name in ("three", "three-practice"))
     for rig in (real, practice):
         assert [laser.x_mm.value for laser in rig.lasers] == [-60.0, 30.0, 60.0]
+        assert rig.serial.startswith("LS-0042")
         assert (rig.camera.width_px, rig.camera.height_px, rig.laser_class) == (1280, 720, "2")
     # The printed commands, with a spoilt placement as the practice rig file offers it.
     commands = [line for line in plain_lines(terminal.text) if line.startswith("workbench run ")]

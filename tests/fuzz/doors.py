@@ -20,11 +20,14 @@ from hypothesis.strategies import SearchStrategy
 
 from tests.fuzz.mutation import edited_documents, edited_texts, mutate_bytes
 from tests.fuzz.outcome import Outcome
+from tests.support.camera_files import KALIBR, MESSAGE, MRCAL, ROS
 from workbench.corners.board import find_board
 from workbench.model.board import Board
 from workbench.model.calibration import load_calibration
+from workbench.model.camera_source import read_intrinsics
 from workbench.model.captures import load_captures
 from workbench.model.errors import BadInputError, WorkbenchError
+from workbench.model.intrinsics import camera_values, for_image
 from workbench.model.prompt import Prompt, Quantity
 from workbench.model.rig import load_rig
 from workbench.procedure.engine.check import check_file
@@ -181,6 +184,15 @@ CAPTURES = (
 READINGS = (b"true_mm,measured_mm,session,repeat\n100,101.2,a,0\n100,100.8,a,1\n200,199.5,b,0\n200,,b,1\n",)
 
 
+CAMERAS = (
+    ROS.encode(),
+    MESSAGE.encode(),
+    MRCAL.encode(),
+    KALIBR.partition("cam1:")[0].encode(),
+    (ROOT / "data/opencv-chessboards/left_intrinsics.yml").read_bytes(),
+)
+
+
 def _png(kind: str, levels: int) -> bytes:
     values = np.random.default_rng(1).integers(0, levels, (12, 16))
     image = values.astype(np.uint8) if levels <= 256 else values.astype(np.uint16)
@@ -235,6 +247,11 @@ def _read_answers(path: Path) -> None:
     ScriptedOperator.load(path, PROMPTS, NoOperator("no terminal"))
 
 
+def _read_camera(path: Path) -> None:
+    found = read_intrinsics(path)
+    camera_values(for_image(found, found.size_px or (640, 480)))
+
+
 def _read_board(path: Path) -> None:
     find_board([read_image(path)], Board())
 
@@ -255,6 +272,7 @@ def doors() -> tuple[Door, ...]:
         Door("journal", JOURNAL, (b"".join(journal[:12]), b"".join(journal)), _read_session, 100),
         Door("captures", "captures.csv", CAPTURES, load_captures, 400),
         Door("readings", "readings.csv", READINGS, load_readings, 100),
+        Door("camera", "camera.yaml", CAMERAS, _read_camera, 20),
         Door("image", "image.png", images, read_image, 1000),
         Door("board image", "board.png", (_board(),), _read_board, 10),
     )

@@ -7,13 +7,13 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from workbench.model.contents import file_sha256
-from workbench.model.event import Record
+from workbench.model.event import FitFinished, Record, SessionFinished, SessionRepaired, SessionResumed
 from workbench.model.laboratory import Ambient, Laboratory, Party, Recalibration, Standard
 from workbench.report.certificate.assemble import Certificate, Sources, certificate_of
 from workbench.report.certificate.predecessor import Predecessor
 from workbench.report.certificate.session_record import SessionRecord, read_session
 from workbench.session.certificate_numbers import AssignedNumber
-from workbench.session.journal import JOURNAL
+from workbench.session.journal import JOURNAL, Journal
 from workbench.session.manifest import MANIFEST
 
 REFERENCE = Path(__file__).parents[2] / "data/sessions/20261130-085045-reference"
@@ -73,6 +73,21 @@ def repeated(folder: Path, name: str, days: int) -> Path:
     moved = record.model_copy(update={"time_ns": record.time_ns + days * DAY_NS})
     journal.write_text("".join((moved.model_dump_json() + "\n", *others)))
     return session
+
+
+def repair(session: Path, verdict: str) -> None:
+    """Repair the session: its placements are fitted again, with this verdict and without a calibration."""
+    caller = {"operator": "operator", "command": "workbench repair", "created": "2026-11-30T10:00:00+0000"}
+    journal, before = Journal.reopen(session)
+    last = [one for one in before if isinstance(one.event, FitFinished)][-1]
+    reasons = ("too few standoffs",) if verdict == "refused" else ()
+    fit = FitFinished.model_validate({**dict(last.event), "verdict": verdict, "reasons": reasons})
+    decision = {"leave_out": ("reference.3/150mm",), "reason": "test"}
+    with journal:
+        journal.append(SessionRepaired.model_validate(caller | decision))
+        journal.append(SessionResumed.model_validate(caller | {"from_n": last.n}))
+        journal.append(fit)
+        journal.append(SessionFinished(exit_code=3 if reasons else 0, message="; ".join(reasons)))
 
 
 def edit_calibration(session: Path) -> None:

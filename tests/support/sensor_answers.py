@@ -4,6 +4,7 @@ from __future__ import annotations
 
 GIVEN = {
     "name": "three",
+    "serial": "LS-0042/B",
     "camera": "/dev/video0",
     "size": "1280 x 720",
     "pitch": "3",

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from tests.support.same_frames import SameFrames
-from tests.support.stored_output import ROOT, newest
+from tests.support.stored_output import FOLDER, ROOT, newest
 from tests.tables.markdown import code_block, markdown_table
 from workbench.model.event import TrialFinished
 from workbench.model.number_text import two_digits
@@ -28,8 +28,8 @@ from workbench.trials.thesis.step import ThesisSimulationStep
 SIMULATION = ROOT / "data/sessions/20261130-115245-thesis-simulation"
 PROCEDURE = ROOT / "procedures/thesis-simulation.yaml"
 RIG = ROOT / "rigs/thesis-simulated.yaml"
-SEEDS = (2001, 7, 42)
-"""Seeds of the stored outputs of the hardware tests; the first is that of the rig file."""
+SEED_OF_RIG = 2001
+"""Seed of the bench in the rig file."""
 HARDWARE_ROW = re.compile(
     r"(?P<figure>.{5})  (?P<target>.{8})  (?P<quantity>.+?) +(?P<to>\d+|-) +(?P<thesis>[\d.]+|-)"
     r" +(?P<ours>[\d.]+|-) +(?P<ratio>[\d.]+|-) +(?P<goal>[\d.]+|-)(?: +(?P<met>yes|NO))?$"
@@ -69,21 +69,21 @@ class HardwareRow:
 
 def hardware() -> str:
     """The table as the terminal prints it."""
-    lines = newest(f"thesis-{SEEDS[0]}").lines
-    begin = next(n for n, line in enumerate(lines) if line.startswith("Thesis's hardware tests"))
-    return code_block("\n".join(lines[begin : lines.index("lasers left off") + 1]))
+    return code_block("\n".join(_hardware_lines(SEED_OF_RIG)))
 
 
 def headlines() -> str:
     """The README's rows."""
-    rows = {(row.target, row.quantity, row.to_mm): row for row in _hardware_rows(SEEDS[0])}
+    rows = {(row.target, row.quantity, row.to_mm): row for row in _hardware_rows(SEED_OF_RIG)}
     cells = [(*texts, rows[key].thesis, rows[key].ours) for key, texts in HEADLINES.items()]
     return markdown_table(("test", "up to (mm)", "thesis", "workbench"), cells)
 
 
 def seeds() -> str:
-    """All rows with a goal, for every seed."""
-    by_seed = [[row for row in _hardware_rows(seed) if row.goal != "-"] for seed in SEEDS]
+    """All rows with a goal, for every seed with a stored output; that of the rig file comes first."""
+    stored = {int(path.stem.rpartition("-")[2]) for path in FOLDER.glob("*-thesis-*.txt")}
+    numbers = [SEED_OF_RIG, *sorted(stored - {SEED_OF_RIG})]
+    by_seed = [[row for row in _hardware_rows(seed) if row.goal != "-"] for seed in numbers]
     rows = [
         (
             f"{one[0].target}, {one[0].quantity}",
@@ -93,7 +93,7 @@ def seeds() -> str:
         )
         for one in zip(*by_seed, strict=True)
     ]
-    return markdown_table(("quantity", "to (mm)", *(f"seed {seed}" for seed in SEEDS), "goal"), rows)
+    return markdown_table(("quantity", "to (mm)", *(f"seed {seed}" for seed in numbers), "goal"), rows)
 
 
 def simulation() -> str:
@@ -128,7 +128,7 @@ def many_distances() -> str:
     rows = []
     for scene in _scenes():
         claims = tuple(claim for claim in scene.claims if claim.stated)
-        if not claims or "vertical" in scene.lines:
+        if not claims or scene.lost or "vertical" in scene.lines:
             continue
         for row in claim_rows(_by_thesis_chain(scene.model_copy(update={"claims": claims}))):
             assert row.stated is not None
@@ -169,8 +169,15 @@ def _largest(frames: SameFrames, nearest_mm: int, farthest_mm: int) -> Iterator[
         yield f"{two_digits(100 * max(one))} %{missing}"
 
 
+def _hardware_lines(seed: int) -> list[str]:
+    """Lines of the table, with its title and caption."""
+    lines = [line.rstrip() for line in newest(f"thesis-{seed}").lines]
+    begin = next(n for n, line in enumerate(lines) if line.startswith("Thesis's hardware tests"))
+    return lines[begin : lines.index("lasers left off", begin) + 1]
+
+
 def _hardware_rows(seed: int) -> Iterator[HardwareRow]:
-    for line in newest(f"thesis-{seed}").lines:
+    for line in _hardware_lines(seed):
         if row := HARDWARE_ROW.match(line):
             yield HardwareRow(
                 row["target"].strip(),

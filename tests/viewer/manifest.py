@@ -119,14 +119,18 @@ def _chart(name: str) -> Chart:
 def _lines(part: Any) -> Iterator[str]:
     """Description of a container or a view, and of all parts below."""
     if isinstance(part, rrb.Container):
-        yield f"{type(part).__name__} {part.name} {part.column_shares} {part.row_shares}"
+        yield _joined(type(part).__name__, part.name, part.column_shares, part.row_shares)
         for below in part.contents:
             yield from _lines(below)
         return
-    yield f"{type(part).__name__} {part.name} {part.origin} {part.contents}"
+    yield _joined(type(part).__name__, part.name, part.origin, part.contents)
     for name, value in sorted(part.properties.items()):
         for batch in value.as_component_batches():
-            yield f"  {name} {batch.component_descriptor()} {batch.as_arrow_array().to_pylist()!r}"
+            yield _joined(name, batch.component_descriptor(), batch.as_arrow_array().to_pylist())
+
+
+def _joined(*values: object) -> str:
+    return " ".join(map(str, values))
 
 
 def _hash(*texts: str) -> str:

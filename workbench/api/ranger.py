@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from pathlib import Path
 
+from workbench.api.arguments import shape_prior_of, text_of
 from workbench.api.calibration import Calibration, calibration_of
 from workbench.model.arrays import Image
 from workbench.model.errors import BadInputError
@@ -34,14 +35,14 @@ class Ranger:
 
     Raises:
         BadInputError: the file is missing or wrong, or the calibration is refused and was not accepted with a
-            reason.
+            reason. The prior is none.
     """
 
     def __init__(
         self, calibration: Calibration | str | Path, shape_prior: ShapePrior = DEFAULT_PRIOR
     ) -> None:
         self.calibration = calibration_of("calibration", calibration)
-        self.shape_prior = shape_prior
+        self.shape_prior = shape_prior_of(shape_prior)
         if not self.calibration.file.laser_ranger.fit.usable:
             reasons = "; ".join(self.calibration.reasons)
             raise BadInputError(f"calibration: expected an accepted one, got one refused: {reasons}")
@@ -59,9 +60,10 @@ class Ranger:
             spots have no range.
 
         Raises:
-            BadInputError: a frame has another size or type than the calibration's.
+            BadInputError: a frame has another size or type than the calibration's, or the name is no text.
         """
-        return self._ranger.read_lit(scene, self._finder.find(on, off).spots)
+        name = text_of("scene", scene)
+        return self._ranger.read_lit(name, self._finder.find(on, off).spots)
 
     @cached_property
     def _ranger(self) -> SpotRanger:

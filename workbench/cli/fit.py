@@ -43,6 +43,7 @@ from workbench.model.rig import Rig, load_rig
 from workbench.report.rejected_lines import rejected_lines
 from workbench.report.terminal_table import TerminalTable
 from workbench.session.caller import now, operator
+from workbench.session.compression import compression_notes
 from workbench.session.files import check_output
 from workbench.session.manifest import MANIFEST, load_session_rig, workbench_version
 
@@ -90,13 +91,11 @@ def fit_source(request: Request) -> FittedSource:
     rig = fix_parameters(_rig(request), request.fixed)
     if request.source.suffix == ".rrd":
         return _fit_recording(rig, request)
-    captures = calibration_table(request.source)
-    content = read_captures_file(captures)
-    rows = parse_captures(captures, content)
-    check_images(captures, rows)
+    captures, content, rows = _captures(request)
     fitted = fit_calibration(rig, *_observations(rig, rows, captures, request))
     digest = hashlib.sha256(content).hexdigest()
-    calibration, assessment = calibrate(fitted, Acceptance(), _provenance(rig, request, digest))
+    provenance = _provenance(rig, request, digest)
+    calibration, assessment = calibrate(fitted, Acceptance(), provenance, compression_notes(rows))
     kept = [row for row in rows if row.standoff_mm not in request.without_mm]
     return FittedSource(kept, fitted, calibration, assessment)
 
@@ -132,6 +131,10 @@ def fit_captures(request: Request, as_json: bool, details: bool = False) -> None
     if request.recording is not None:
         check_output(request.recording)
     _check_distinct(request)
+    rig = fix_parameters(_rig(request), request.fixed)
+    if not rig.lasers:
+        _fit_camera(rig, request, as_json, details)
+        return
     found = fit_source(request)
     fitted, calibration, assessment = found.fitted, found.calibration, found.assessment
     refused = assessment.verdict == "refused" and request.accept is None
@@ -148,6 +151,35 @@ def fit_captures(request: Request, as_json: bool, details: bool = False) -> None
         _print_tables(fitted, assessment)
     if refused:
         raise VerdictShownError(f"the calibration is refused; {request.output} is not written")
+
+
+def _fit_camera(rig: Rig, request: Request, as_json: bool, details: bool) -> None:
+    """Fit and print the calibration of a camera alone, and write it if it is accepted."""
+    from workbench.calibration.selection.camera_fit import fit_camera
+    from workbench.calibration.verdict.camera import calibrate_camera
+    from workbench.cli.fit_camera import show_camera
+
+    captures, content, rows = _captures(request)
+    if request.recording is not None or request.without_mm:
+        raise BadInputError(
+            f"{request.rig}: --recording and --without-standoff expect a rig with lasers, got one without"
+        )
+    with errors_name_file(captures):
+        _, rejected, boards = observations_of_rows(rig, rows)
+    fitted = fit_camera(rig, boards, rejected)
+    provenance = _provenance(rig, request, hashlib.sha256(content).hexdigest())
+    show_camera(
+        fitted, calibrate_camera(fitted, provenance), request.output, request.accept, as_json, details
+    )
+
+
+def _captures(request: Request) -> tuple[Path, bytes, tuple[CaptureRow, ...]]:
+    """Captures file of a request, its content, and its rows, whose images exist."""
+    captures = calibration_table(request.source)
+    content = read_captures_file(captures)
+    rows = parse_captures(captures, content)
+    check_images(captures, rows)
+    return captures, content, rows
 
 
 def record_fit(found: FittedSource, name: str, out: Path) -> None:
@@ -176,7 +208,7 @@ def _check_distinct(request: Request) -> None:
 
 def _rig(request: Request) -> Rig:
     if request.rig is not None:
-        return load_rig(request.rig)
+        return load_rig(request.rig, camera_alone=True)
     source = request.source
     if not source.exists():
         raise BadInputError(f"{source}: no such file or folder; expected a captures file or a session folder")

@@ -17,6 +17,7 @@ from workbench.model.errors import BadInputError
 from workbench.model.laboratory import load_laboratory
 from workbench.report.document import Document
 from workbench.report.document_files import write_document
+from workbench.report.history.dates import future_text
 from workbench.report.history.drift import distance_histories
 from workbench.report.history.in_force import dated_calibrations, in_force, newer_text
 from workbench.report.history.page import SensorHistory, history_document
@@ -37,6 +38,8 @@ class HistoryRequest:
     pdf: Path | None
     note: str | None
     """Note to add; None: none."""
+    operator: str | None
+    """Author of the note; None: the account."""
     sessions: Path
 
 
@@ -51,7 +54,9 @@ def show_history(request: HistoryRequest, as_json: bool) -> None:
     every = indexed_sessions(request.sessions)
     serial = request.serial or only_serial(every, request.sessions)
     if request.note is not None:
-        entry = SensorEntry(serial=serial, kind="note", time=now(), operator=operator(), text=request.note)
+        entry = SensorEntry(
+            serial=serial, kind="note", time=now(), operator=operator(request.operator), text=request.note
+        )
         append_entry(request.sessions, entry)
     document = history_document(sensor_history(request.sessions, serial, every))
     write_document(document, outputs.html, outputs.pdf)
@@ -96,14 +101,14 @@ def sensor_history(folder: Path, serial: str, every: Sequence[IndexedSession]) -
         distance_histories(checked),
         entries,
         None if agreed is None else agreed.months,
-        tuple(filter(None, (newer_text(force, calibrations), *remarks, *_left_out(every, own)))),
+        tuple(filter(None, (newer_text(force, calibrations), *remarks, *_remarks_on(every, own)))),
     )
 
 
-def _left_out(every: Sequence[IndexedSession], own: Sequence[IndexedSession]) -> tuple[str, ...]:
-    """Remarks on copies of the sensor's sessions, and on damaged sessions of this or of an unknown sensor."""
+def _remarks_on(every: Sequence[IndexedSession], own: Sequence[IndexedSession]) -> tuple[str, ...]:
+    """Remarks on copies of the sensor's sessions, on dates, and on damaged sessions of this or no sensor."""
     damaged = [one for one in every if one.status.state == "damaged" and (one in own or not one.serial)]
-    return copies_text(own), *(f"not counted: {one.status.why}" for one in damaged)
+    return copies_text(own), future_text(own), *(f"not counted: {one.status.why}" for one in damaged)
 
 
 def only_serial(every: Sequence[IndexedSession], folder: Path) -> str:

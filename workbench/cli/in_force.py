@@ -35,6 +35,8 @@ def note_if_not_in_force(path: Path, calibration: Calibration, sessions: Path) -
     except BadInputError as error:
         print_message(f"note: {error}")
         return
+    if force is not None and force.remark:
+        print_message(f"note: {force.remark}")
     if force is not None and force.calibration.sha256 != file_sha256(path):
         print_message(
             f"note: {path} is not the calibration in force for {serial}: since {force.since} it is"

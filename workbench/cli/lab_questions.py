@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 from collections.abc import Callable
 from datetime import date
@@ -12,6 +13,7 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 
+from workbench.cli.console import print_message
 from workbench.model.laboratory import LABORATORY_FILE, Laboratory, load_laboratory
 from workbench.session.files import write_output
 
@@ -19,6 +21,7 @@ Ask = Callable[[str], str]
 QUESTIONS = (
     ("laboratory.name", "Name of the laboratory"),
     ("laboratory.address", "Its address"),
+    ("country", "Its country, two letters such as DE; --dcc needs it"),
     ("customer.name", "Name of the customer"),
     ("customer.address", "Address of the customer"),
     ("authorised_by", "Person who authorises certificates"),
@@ -31,8 +34,6 @@ QUESTIONS = (
     ("temperature.high", "Highest temperature of the room, deg C"),
     ("target_material", "Material of the target"),
 )
-DAYS = {"standard.calibrated"}
-NUMBERS = {"standard.uncertainty_mm", "temperature.low", "temperature.high"}
 HEADING = """\
 # What certificates state about the laboratory. docs/certificate.md lists further keys, such as several
 # standards, warm-up and the interval of recalibration. What is missing here is reported as not stated.
@@ -63,19 +64,55 @@ def laboratory_of(sessions: Path, no_input: bool, ask: Ask) -> Laboratory:
 
 
 def _answer(key: str, question: str, ask: Ask) -> str:
-    """Answer in the form of its item, or empty; asked for again until it has that form."""
+    """Answer in the form of its item, or empty; asked for again, with the reason, until it has that form."""
+    parse = FORMS.get(key, str)
     while True:
         typed = ask(f"{question} (Enter: not stated)").strip()
-        if not typed or (_is_day(typed) if key in DAYS else key not in NUMBERS or number(typed) is not None):
-            return typed
+        if not typed:
+            return ""
+        try:
+            parse(typed)
+        except ValueError as wrong:
+            print_message(str(wrong))
+        else:
+            return typed.upper() if key == "country" else typed
 
 
-def _is_day(typed: str) -> bool:
+def _country(typed: str) -> str:
+    if not re.fullmatch("[A-Za-z]{2}", typed):
+        raise ValueError(f"expected two letters (ISO 3166-1), such as DE or US, got {typed}")
+    return typed
+
+
+def _day(typed: str) -> date:
     try:
-        date.fromisoformat(typed)
+        return date.fromisoformat(typed)
     except ValueError:
-        return False
-    return True
+        raise ValueError(f"expected a day as year-month-day, such as 2026-11-30, got {typed}") from None
+
+
+def _finite(typed: str) -> float:
+    value = number(typed)
+    if value is None:
+        raise ValueError(f"expected a number without unit, such as 21.5, got {typed}")
+    return value
+
+
+def _positive(typed: str) -> float:
+    value = _finite(typed)
+    if value <= 0:
+        raise ValueError(f"expected a number above 0, got {typed}")
+    return value
+
+
+FORMS: dict[str, Callable[[str], object]] = {
+    "country": _country,
+    "standard.calibrated": _day,
+    "standard.uncertainty_mm": _positive,
+    "temperature.low": _finite,
+    "temperature.high": _finite,
+}
+"""Parsers of the answers that are no free text; they raise ValueError with the reason."""
 
 
 def _yaml(answers: dict[str, str]) -> str:
@@ -84,9 +121,7 @@ def _yaml(answers: dict[str, str]) -> str:
         if answers[f"{party}.name"]:
             named = {key: answers[f"{party}.{key}"] for key in ("name", "address")}
             content[party] = {key: value for key, value in named.items() if value}
-    for key in ("authorised_by", "target_material"):
-        if answers[key]:
-            content[key] = answers[key]
+    content |= {key: answers[key] for key in ("country", "authorised_by", "target_material") if answers[key]}
     if answers["standard.name"]:
         content["standards"] = [_standard(answers)]
     span = [number(answers[f"temperature.{end}"]) for end in ("low", "high")]

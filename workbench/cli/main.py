@@ -21,6 +21,7 @@ from workbench.cli.option_types import (
     FitVerdict,
     Json,
     NoInput,
+    OperatorName,
     Sessions,
     View,
     day,
@@ -92,11 +93,13 @@ def run(
     no_input: NoInput = False,
     view: View = None,
     details: Details = False,
+    operator: OperatorName = None,
 ) -> None:
     """Run procedures on a rig in one session."""
     from workbench.cli.run import Screen, run_procedures
 
-    run_procedures(procedures, rig, sessions, Screen(answers, no_input, view, details), calibration)
+    screen = Screen(answers, no_input, view, details, operator)
+    run_procedures(procedures, rig, sessions, screen, calibration)
 
 
 @app.command()
@@ -110,12 +113,13 @@ def resume(
     no_input: NoInput = False,
     view: View = None,
     details: Details = False,
+    operator: OperatorName = None,
 ) -> None:
     """Resume a session that ended early. Complete placements are not captured again."""
     from workbench.cli.run import Screen, resume_session
     from workbench.cli.sessions import find_session
 
-    screen = Screen(answers, no_input, view, details)
+    screen = Screen(answers, no_input, view, details, operator)
     resume_session(find_session(session, sessions), accept_changes, screen)
 
 

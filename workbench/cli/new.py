@@ -15,6 +15,36 @@ if TYPE_CHECKING:
 PARTS = ("procedures", "rigs")
 """Folders that a laboratory starts from."""
 
+PAGES = {
+    "build-a-sensor.md": "parts, wiring, alignment, first calibration, practice",
+    "procedures.md": "procedure files, prompts, limits; resuming and repairing a session",
+    "rig-format.md": "all keys of rig files",
+    "laser-controller.md": "the laser controller, and what turns the lasers off",
+    "board.md": "the printed board",
+    "trials.md": "trials and their statistics",
+    "viewer.md": "live view, replay, finding a bad standoff",
+    "certificate.md": "reports, certificates, `lab.yaml`, `workbench sessions`",
+    "history.md": "verifications, control charts, calibration in force",
+}
+"""Pages of the documentation that a technician needs, with their contents."""
+README = """\
+# Laboratory
+
+Written by `workbench new`. `workbench --help` lists the commands, `workbench COMMAND --help` their options.
+
+| folder | contents |
+|---|---|
+| `procedures/` | what is measured: edit them, then `workbench check` and `workbench plan` |
+| `rigs/` | sensors and benches; `rigs/firmware/` is the laser controller's |
+| `docs/` | pages of the documentation, below |
+| `sessions/` | made by the first `workbench run`, one folder for each |
+
+| page | contents |
+|---|---|
+{pages}
+
+Links from these pages to others, and pictures, are in the documentation of the project.
+"""
 CALIBRATE = "procedures/calibrate-flat.yaml"
 DEMO = f"workbench run {CALIBRATE} procedures/accuracy-flat.yaml --rig rigs/thesis-emulated.yaml"
 SEED = 1
@@ -23,7 +53,7 @@ NOT_COPIED = shutil.ignore_patterns("build", "__pycache__")
 
 
 def lay_out(folder: Path, ask: bool = False) -> str:
-    """Copy the procedures, rigs and firmware of this version into `folder`, and return the next commands.
+    """Copy procedures, rigs, firmware and pages of this version into `folder`; return the next commands.
 
     Args:
         folder: new or empty folder.
@@ -36,7 +66,8 @@ def lay_out(folder: Path, ask: bool = False) -> str:
     _check_empty(folder)
     if not ask:
         _copy(folder)
-        return "\n".join((f"{folder}: procedures and rigs written. Next:", _enter(folder), DEMO))
+        written = f"{folder}: procedures, rigs and documentation (README.md) written. Next:"
+        return "\n".join((written, _enter(folder), DEMO))
     from workbench.cli.dialogue import ask_all
     from workbench.cli.found_devices import found_cameras, found_ports
     from workbench.cli.sensor_questions import parse_yes, sensor_questions
@@ -53,7 +84,8 @@ def _write_sensor(folder: Path, sensor: Sensor, *, practise: bool) -> str:
 
     real, practice = paths(sensor, folder)
     _write(real, rig_text(sensor))
-    lines = [f"{real}: written. Its comments name the source of each number; correct what is known better."]
+    lines = [f"{folder / 'README.md'}: how to read the documentation in {folder / 'docs'}."]
+    lines += [f"{real}: written. Its comments name the source of each number; correct what is known better."]
     steps: list[tuple[str, str]] = [("", _enter(folder))]
     if practise:
         _write(practice, practice_text(sensor, SEED))
@@ -86,8 +118,13 @@ def _copy(folder: Path) -> None:
             shutil.copytree(
                 _templates() / part, folder / part, ignore=NOT_COPIED, copy_function=shutil.copyfile
             )
+        (folder / "docs").mkdir()
+        for page in PAGES:
+            shutil.copyfile(_templates() / "docs" / page, folder / "docs" / page)
     except OSError as error:
         raise BadInputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+    pages = "\n".join(f"| [{page}](docs/{page}) | {contents} |" for page, contents in PAGES.items())
+    _write(folder / "README.md", README.format(pages=pages))
 
 
 def _write(path: Path, text: str) -> None:
@@ -101,7 +138,7 @@ def _enter(folder: Path) -> str:
 
 
 def _templates() -> Path:
-    """Folder with `PARTS`: package data of an installed workbench, the repository of an editable one."""
+    """Folder with `PARTS` and `docs`: data of an installed workbench, the repository of an editable one."""
     package = Path(__file__).parents[1]
     installed = package / "templates"
     return installed if installed.is_dir() else package.parent

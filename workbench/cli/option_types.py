@@ -89,11 +89,29 @@ def reason(given: str | None) -> str | None:
     return given
 
 
+def person(given: str | None) -> str | None:
+    """Refuse a blank name, and text that is not UTF-8 or in several lines."""
+    if given is not None and not (given.strip() and given.isprintable()):
+        raise typer.BadParameter(
+            "expected the name of a person in one line, got a blank or control characters"
+        )
+    return None if given is None else given.strip()
+
+
 def _has_surrogates(text: str) -> bool:
     """Whether the text contains bytes that are not UTF-8, as Python decodes arguments."""
     return any("\ud800" <= character <= "\udfff" for character in text)
 
 
+OperatorName = Annotated[
+    str | None,
+    typer.Option(
+        "--operator",
+        metavar="NAME",
+        callback=person,
+        help="Person who does this, for the record and the certificate. Default: the account.",
+    ),
+]
 AcceptChanges = Annotated[
     str | None,
     typer.Option(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from workbench.cli.console import print_message
 from workbench.cli.in_force import note_if_not_in_force, sessions_of
 from workbench.cli.reading_json import plain
 from workbench.model.captures import check_images, errors_name_file, load_captures
@@ -16,6 +17,7 @@ from workbench.ranging.ranger import Ranger
 from workbench.report.readings import reading_list
 from workbench.sensor.usable import check_same_sensor, load_usable
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE
+from workbench.session.compression import compression_notes
 from workbench.session.manifest import MANIFEST, load_session_rig
 
 
@@ -34,6 +36,8 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
     rows = load_captures(table)
     check_images(table, rows)
     with errors_name_file(table):
+        for note in compression_notes(rows):
+            print_message(f"note: {note}")
         for reading in read_captures(ranger, rows):
             readings.append(reading)
             if as_json:

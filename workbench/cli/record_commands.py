@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from workbench.cli.option_types import Json, Sessions, reason
+from workbench.cli.option_types import Json, OperatorName, Sessions, reason
 
 Pdf = Annotated[Path | None, typer.Option(metavar="FILE", help="PDF file to write.")]
 Serial = Annotated[str | None, typer.Option("--rig", metavar="SERIAL", help="Serial number of the sensor.")]
@@ -76,13 +76,14 @@ def history(
         str | None,
         typer.Option(metavar="TEXT", callback=reason, help="Add a note to the record of a sensor (--rig)."),
     ] = None,
+    operator: OperatorName = None,
     sessions: Sessions = Path("sessions"),
     json: Json = False,
 ) -> None:
     """Show control charts of a sensor. Its calibrations, verifications and drift."""
     from workbench.cli.history import HistoryRequest, show_history
 
-    show_history(HistoryRequest(rig, html, pdf, note, sessions), json)
+    show_history(HistoryRequest(rig, html, pdf, note, operator, sessions), json)
 
 
 def use(
@@ -91,9 +92,10 @@ def use(
         str, typer.Option("--reason", metavar="TEXT", callback=reason, help="Reason, for the record.")
     ],
     rig: Annotated[str, typer.Option(metavar="SERIAL", help="Serial number of the sensor.")],
+    operator: OperatorName = None,
     sessions: Sessions = Path("sessions"),
 ) -> None:
     """Put a calibration in force for a sensor. Also an earlier one; prints the change in mm."""
-    from workbench.cli.use import put_in_force
+    from workbench.cli.use import Choice, put_in_force
 
-    put_in_force(calibration, rig, because, sessions)
+    put_in_force(calibration, rig, Choice(because, operator), sessions)

@@ -12,6 +12,7 @@ from workbench.cli.option_types import (
     AnswersFile,
     Details,
     NoInput,
+    OperatorName,
     Sessions,
     View,
     millimetres,
@@ -54,6 +55,7 @@ def repair(
     no_input: NoInput = False,
     view: View = None,
     details: Details = False,
+    operator: OperatorName = None,
 ) -> None:
     """Repair an ended session. Captures placements again, leaves them out, restores or adds them."""
     from workbench.cli.run import Screen, resume_session
@@ -69,4 +71,5 @@ def repair(
         accept=accept,
     )
     folder = find_session(session, sessions)
-    resume_session(folder, accept_changes, Screen(answers, no_input, view, details), decisions)
+    screen = Screen(answers, no_input, view, details, operator)
+    resume_session(folder, accept_changes, screen, decisions)

@@ -29,6 +29,7 @@ from workbench.model.errors import (
     RigNotReadyError,
     StoppedError,
 )
+from workbench.model.number_text import counted
 from workbench.procedure.engine.durations import learn_durations
 from workbench.procedure.engine.operator import ScriptedOperator
 from workbench.procedure.engine.plan import Plan
@@ -41,6 +42,7 @@ from workbench.session.caller import now, operator
 from workbench.session.journal import JOURNAL, read_journal
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.session.repairs import repairs_of
+from workbench.session.state import placement_captures
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
 from workbench.viewer.window import has_display, viewer_executable, watch
@@ -58,6 +60,8 @@ class Screen:
     """Whether to open the viewer; None: if there is a display."""
     details: bool = False
     """Whether to print the tables of fits, and all notes."""
+    operator: str | None = None
+    """Name of the person at the bench, for the record; None: the account."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,7 @@ def run_procedures(
         note_if_not_in_force(plan.calibration.file, plan.calibration.calibration, sessions)
     session_dir = plan.new_session(sessions)
     with _repairable(session_dir, plan, screen) as ui:
-        run(plan, session_dir, ui.consumers, _caller(), ui.stopping, ui.operator)
+        run(plan, session_dir, ui.consumers, _caller(screen), ui.stopping, ui.operator)
 
 
 def resume_session(
@@ -104,9 +108,29 @@ def resume_session(
     plan = plan_of(session_dir, now)
     records = list(read_journal(session_dir)) if (session_dir / JOURNAL).exists() else []
     kept = kept_placements(plan, records, repair)
+    if text := replay_text(records, kept):
+        print_message(text)
     added_mm = [*repairs_of(records).added_mm, *(() if repair is None else repair.add_mm)]
     with _repairable(session_dir, plan, screen, kept, added_mm) as ui:
-        resume(session_dir, ui.consumers, _caller(), ui.stopping, ui.operator, accept_changes, repair)
+        resume(session_dir, ui.consumers, _caller(screen), ui.stopping, ui.operator, accept_changes, repair)
+
+
+def replay_text(records: Sequence[ev.Record], kept: Collection[str]) -> str:
+    """Announcement that captures are read from disk, before their progress looks like new ones.
+
+    Args:
+        records: records of the session so far.
+        kept: keys of the placements that are not captured again.
+
+    Returns:
+        Text in one line; empty if there is nothing to read.
+    """
+    found = [one for key, one in placement_captures(records).items() if key in kept]
+    captures = sum(len(one.captures) for one in found)
+    if not captures:
+        return ""
+    of = f"{counted(captures, 'capture')} of {counted(len(found), 'placement')}"
+    return f"replaying {of} from disk: no laser is switched on for them"
 
 
 @contextmanager
@@ -191,5 +215,5 @@ def session_interface(
             raise
 
 
-def _caller() -> Invocation:
-    return Invocation(operator=operator(), command=command_line(), created=now())
+def _caller(screen: Screen) -> Invocation:
+    return Invocation(operator=operator(screen.operator), command=command_line(), created=now())

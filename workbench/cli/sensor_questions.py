@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import atan, degrees, hypot, isfinite, radians, tan
@@ -11,7 +12,7 @@ from typing import Literal
 from workbench.cli.dialogue import Question
 from workbench.cli.found_devices import FoundDevice
 from workbench.model.problems import THOUSANDS
-from workbench.model.rig import FEWEST_PX
+from workbench.model.rig import FEWEST_PX, UNKNOWN_SERIAL
 
 LASER_CLASSES = ("1", "1M", "2", "2M", "3R", "3B", "4")
 MEASURED_SD_MM = {"calliper": 0.2, "ruler": 0.5, "drawing": 0.3}
@@ -24,6 +25,7 @@ NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
 SIZE = re.compile(r"^(\d+)\s*(?:x|X|\*|×|by|\s)\s*(\d+)$")
 QUANTITY = re.compile(r"^([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*([A-Za-zµ°]*)$")
 BASELINE = re.compile(r"^([-+]?[\d.,]+)(?:mm)?(v?)$")
+LONGEST_SERIAL = 60
 YES, NO = "yes", "no"
 DIAGONAL = "diagonal"
 
@@ -65,6 +67,14 @@ def sensor_questions(
             "Letters, digits, _ . and -; the rig file gets this name.",
             lambda text, _: parse_name(text, taken),
             "my-sensor",
+        ),
+        Question(
+            "serial",
+            "Serial number of the sensor?",
+            "On its label. Calibrations, verifications and history are filed under it: no other sensor may"
+            " have the same. Without a label, take the default and write it on the sensor.",
+            lambda text, _: parse_serial(text),
+            default_serial(),
         ),
         Question(
             "camera",
@@ -146,6 +156,24 @@ def parse_name(text: str, taken: Sequence[str] = ()) -> str:
         raise ValueError(f"expected up to 60 letters, digits, _ . and -, got {text or 'nothing'}")
     if text in taken:
         raise ValueError(f"expected a new name, got {text}: the folder will contain an example of this name")
+    return text
+
+
+def default_serial() -> str:
+    """Serial number that no other folder's sensor has: the present time, to the second."""
+    return time.strftime("%Y%m%d-%H%M%S", time.localtime())
+
+
+def parse_serial(text: str) -> str:
+    """Serial number of a sensor.
+
+    Raises:
+        ValueError: it is blank, too long, or the word for an unknown one.
+    """
+    if not text or len(text) > LONGEST_SERIAL or text == UNKNOWN_SERIAL:
+        raise ValueError(
+            f"expected a serial number of up to {LONGEST_SERIAL} characters, got {text or 'nothing'}"
+        )
     return text
 
 

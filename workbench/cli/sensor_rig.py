@@ -40,6 +40,7 @@ class Sensor:
     """Sensor as the answers describe it."""
 
     name: str
+    serial: str
     camera: str
     width_px: int
     height_px: int
@@ -63,6 +64,7 @@ class Sensor:
         width, height = parse_size(given["size"])
         return cls(
             name=given["name"],
+            serial=given["serial"],
             camera=given["camera"],
             width_px=width,
             height_px=height,
@@ -114,8 +116,8 @@ def paths(sensor: Sensor, folder: Path) -> tuple[Path, Path]:
 def _named(sensor: Sensor, name: str) -> Iterator[str]:
     yield "format: 1"
     yield f"rig: {json.dumps(name)}"
-    serial = "1" if name == sensor.name else practice_name("1")
-    yield _noted(f'serial: "{serial}"', "of this sensor; its calibration is refused for another")
+    serial = sensor.serial if name == sensor.name else practice_name(sensor.serial)
+    yield _noted(f"serial: {json.dumps(serial)}", "of this sensor; its calibration is refused for another")
     yield _noted(f'laser_class: "{sensor.laser_class}"', "IEC 60825-1, of the most dangerous laser")
 
 

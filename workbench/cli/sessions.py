@@ -118,7 +118,7 @@ def _show(one: SessionStatus, console: Console) -> None:
     columns = [one.session_dir.name, one.rig, counted(one.captures, "capture"), one.state]
     console.print("  ".join(filter(None, columns)))
     accepted = one.calibration.startswith("accepted")
-    lines = [one.calibration if accepted else "", "" if one.state == "finished" else _why(one)]
+    lines = [one.calibration if accepted else "", *one.trials, "" if one.state == "finished" else _why(one)]
     for line in filter(None, lines):
         console.print(Padding(Text(line), (0, 0, 0, 4)))
     if (command := next_command(one)) is not None:

@@ -16,7 +16,7 @@ def write_target(pdf: Path, rig: Path | None) -> str:
     Raises:
         BadInputError: the rig file is wrong, or the file cannot be written.
     """
-    board = Board() if rig is None else load_rig(rig).board
+    board = Board() if rig is None else load_rig(rig, camera_alone=True).banded_board
     write_output(pdf, board_page(board))
     width, height = board.page_mm
     page = f"{pdf}: {width:g} x {height:g} mm"

@@ -214,7 +214,10 @@ def _live(quality: Quality) -> str:
 
 
 def _summary(spots: dict[str, list[Sequence[Spot]]]) -> str:
-    """Summary of a placement: worst quality over the lasers; for all lasers together the number of spots."""
+    """Summary of a placement: worst quality over the lasers, and the lasers without a spot.
+
+    For all lasers together the number of spots.
+    """
     if "all" in spots:
         each = spots["all"]
         return f"{counted(len(each), 'reading')}, at least {counted(min(map(len, each)), 'spot')}"
@@ -222,6 +225,8 @@ def _summary(spots: dict[str, list[Sequence[Spot]]]) -> str:
     snr = [q.snr for q in found.values() if q.snr is not None]
     scatter = [q.scatter_px for q in found.values() if q.scatter_px is not None]
     parts = [f"{len(snr)}/{len(found)} lasers"]
+    if missing := [name for name, q in found.items() if q.snr is None]:
+        parts.append(f"NOT SEEN: {', '.join(missing)}")
     if snr:
         parts.append(f"snr {min(snr):.0f}")
     if scatter:

@@ -121,11 +121,10 @@ def _how_to_answer(prompt: Prompt) -> str:
     if (quantity := prompt.quantity) is not None:
         usual = "" if quantity.usual is None else f"Enter: {quantity.usual:g} {quantity.unit}; or "
         return f"{usual}type the number in {quantity.unit}, {quantity.low:g} to {quantity.high:g}"
-    return (
-        f"type {' or '.join(prompt.choices)}"
-        if prompt.choices
-        else f"type yes{prompt.yes and f' ({prompt.yes})'}"
-    )
+    if prompt.choices:
+        return f"type {' or '.join(prompt.choices)}"
+    yes = "yes, or yes and a reason" if prompt.overrules else "yes"
+    return f"type {yes}{prompt.yes and f' ({prompt.yes})'}"
 
 
 def _or(prompt: Prompt) -> str:
@@ -151,4 +150,7 @@ def _answer(prompt: Prompt, typed: str) -> Answer:
     if prompt.choices:
         return Answer(value=typed)
     # Only `yes` confirms, not an accidental key.
+    word, _, reason = typed.partition(" ")
+    if prompt.overrules and word.rstrip(",:").lower() == "yes" and reason.strip():
+        return Answer(reason=reason.strip())
     return Answer(value=None if typed.lower() == "yes" else typed)

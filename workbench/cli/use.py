@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.cli.console import print_message
@@ -13,16 +14,25 @@ from workbench.report.certificate.session_record import check_recorded, read_ses
 from workbench.report.history.calibrations import range_changes
 from workbench.report.history.in_force import dated_calibrations, in_force, newer_text, sensor_in_force
 from workbench.session.caller import now, operator
-from workbench.session.index import indexed_sessions
+from workbench.session.index import indexed_sessions, read_indexed
 from workbench.session.sensor_log import SensorEntry, append_entry, read_entries
 
 
-def put_in_force(name: Path, serial: str, reason: str, sessions: Path) -> None:
+@dataclass(frozen=True)
+class Choice:
+    """Reason and person of the choice."""
+
+    reason: str
+    operator: str | None = None
+    """None: the account."""
+
+
+def put_in_force(name: Path, serial: str, choice: Choice, sessions: Path) -> None:
     """Record a calibration as the one in force, and print the change of ranges against the one before.
 
     Raises:
         BadInputError: there is no such calibration, it is of another sensor, or the record cannot be written.
-        LimitFailedError: the calibration is refused.
+        LimitFailedError: the calibration, or that of the session, is refused.
     """
     path = _file(name, sessions)
     calibration = load_calibration(path)
@@ -33,13 +43,13 @@ def put_in_force(name: Path, serial: str, reason: str, sessions: Path) -> None:
         serial=serial,
         kind="in_force",
         time=now(),
-        operator=operator(),
-        text=reason,
+        operator=operator(choice.operator),
+        text=choice.reason,
         path=str(path.resolve().relative_to(sessions.resolve()) if inside else path.resolve()),
         sha256=file_sha256(path),
     )
     append_entry(sessions, entry)
-    print_message(f"{serial}: {entry.path} is in force since {entry.time[:10]}: {reason}")
+    print_message(f"{serial}: {entry.path} is in force since {entry.time[:10]}: {entry.text}")
     if newer := _newer_text(sessions, serial):
         print_message(f"note: {newer}")
     if before is None:
@@ -70,14 +80,33 @@ def _newer_text(sessions: Path, serial: str) -> str:
 
 
 def _file(name: Path, sessions: Path) -> Path:
-    """Calibration file: as named, or that of a session."""
+    """Calibration file: as named, or that of a session.
+
+    Raises:
+        BadInputError: there is none, or it is not that of the session any more.
+        LimitFailedError: the last fit of the session is refused.
+    """
     if name.is_file():
-        check_recorded(name)
+        try:
+            check_recorded(name)
+        except BadInputError:
+            _check_session(name.parent)
+            raise
         return name
-    session = read_session(find_session(name, sessions))
-    if session.calibration_path is None:
+    folder = find_session(name, sessions)
+    _check_session(folder)
+    path = read_session(folder).calibration_path
+    if path is None:
         raise BadInputError(f"{name}: expected a calibration, the session has none")
-    return session.calibration_path
+    return path
+
+
+def _check_session(folder: Path) -> None:
+    """Raise if the last fit of a session is refused."""
+    if read_indexed(folder).verdict == "refused":
+        fit = read_session(folder).fit
+        reasons = "" if fit is None else "; ".join(fit.reasons)
+        raise LimitFailedError(f"{folder}: the calibration of this session is refused: {reasons}")
 
 
 def _check(path: Path, calibration: Calibration, serial: str) -> None:

@@ -123,7 +123,7 @@ class BenchScene:
 
     @cached_property
     def _print(self) -> Print:
-        return Print(self._rig.board, self._spec.surface.ink_albedo / self._spec.surface.albedo)
+        return Print(self._rig.banded_board, self._spec.surface.ink_albedo / self._spec.surface.albedo)
 
     def _put_board(self, target: BoardTarget, z_mm: float, error: PlacementError, key: str) -> BoardError:
         """Place the board on its plane, with the error of an operator."""

@@ -59,6 +59,8 @@ class ImageSensor:
         noise += mean
         for spot, of_reading in zip(spots, read, strict=True):
             _window(noise, spot)[:] = rng.poisson(_window(mean, spot)) + of_reading
+        if self._spec.blooming > 0:
+            _spill(noise, self._spec.full_well_e, self._spec.blooming, self._spec.blooming_up)
         return self._digitise(noise, gain)
 
     def metered_exposure(self, spots: Sequence[SpotImage], gain: float, peak: float) -> float:
@@ -73,6 +75,31 @@ class ImageSensor:
         np.rint(electrons, out=electrons)
         np.clip(electrons, 0, self._full_scale, out=electrons)
         return electrons.astype(np.uint8) if self._full_scale < 256 else electrons.astype(np.uint16)
+
+
+def _spill(electrons: Float32Array, full_well_e: float, share: float, up: float) -> None:
+    """Move charge beyond the full well along its column, into the next pixels that have room.
+
+    Args:
+        electrons: (height, width) charge, changed in place.
+        full_well_e: charge that a pixel holds.
+        share: share of the excess that spills; the rest is drained.
+        up: share of the spilled charge that runs to smaller rows.
+    """
+    excess = np.maximum(electrons - full_well_e, 0.0)
+    columns = np.flatnonzero(excess.any(axis=0))
+    np.minimum(electrons, full_well_e, out=electrons)
+    for part, rows in (
+        (up * share, range(len(electrons) - 1, -1, -1)),
+        ((1.0 - up) * share, range(len(electrons))),
+    ):
+        carried = np.zeros(len(columns), np.float32)
+        for row in rows:
+            carried += part * excess[row, columns]
+            room = full_well_e - electrons[row, columns]
+            taken = np.minimum(carried, room)
+            electrons[row, columns] += taken
+            carried -= taken
 
 
 def _window(image: Float32Array, spot: SpotImage) -> Float32Array:

@@ -59,6 +59,11 @@ class SensorSpec(FileModel):
     read_noise_e: Annotated[float, within(0, 1e6, "electrons")] = 225.0
     black_level: Annotated[float, Field(ge=0, lt=0.5)] = 0.03
     """Pedestal as a fraction of full scale; prevents clipping of dark noise at 0."""
+    blooming: Fraction = 0.0
+    """Share of the charge beyond the full well that spills along the column; the rest is drained. A CCD
+    without anti-blooming has 1, other sensors 0."""
+    blooming_up: Fraction = 0.5
+    """Share of the spilled charge that runs upwards, to smaller rows."""
     hot_pixels: Annotated[int, within(0, 1_000_000, "pixels")] = 20
     hot_pixel_e_per_s: Annotated[float, within(0, 1e12, "electrons a second")] = 3e5
     """Mean dark current of a hot pixel; the distribution is exponential."""

@@ -29,6 +29,7 @@ BOW = ("bow_x_mm", "bow_y_mm", "bow_xy_mm")
 class Board(FileModel):
     """Nominal dimensions of the printed board. The defaults fill an A4 page in landscape format."""
 
+    kind: Literal["banded"] = "banded"
     columns: Annotated[int, Field(ge=3, le=1000)] = 13
     rows: Annotated[int, Field(ge=2, le=1000)] = 4
     """Rows of squares in each of the two blocks."""

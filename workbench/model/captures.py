@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from pathlib import Path
 from typing import Annotated
 
@@ -80,7 +80,12 @@ class CaptureRow(FileModel):
 
     @property
     def placement_key(self) -> str:
-        """Name of the placement for a fit: as stated, else the scene, else the standoff."""
+        """Name of the placement for a fit: as stated, else the scene, else the standoff.
+
+        A view of a board at no stated standoff is a placement of its own, named by its image.
+        """
+        if self.laser_id == BOARD and isnan(self.standoff_mm) and self.on is not None:
+            return self.placement or self.scene or self.on.name
         return self.placement or self.scene or f"{self.standoff_mm:g} mm"
 
     @model_validator(mode="after")

@@ -99,6 +99,8 @@ class Answered(FileModel):
     """Key of the prompt: the step's name, a placement's key, or `safety`."""
     question: str
     answer: Answer
+    overrules: bool = False
+    """Whether the answer keeps results in spite of a failed check, which `question` describes."""
 
 
 class PlacementFinished(FileModel):

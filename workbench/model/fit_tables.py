@@ -71,8 +71,8 @@ def cross_validation_table(placements: Sequence[CrossValidatedPlacement]) -> Tab
         caption=(
             "error: range - standoff, empty where the spots give no finite range; u: 1 sigma at the standoff;"
             " error / u: to first order in pixels; %: relative error of each laser alone; !: the placement"
-            " contradicts the others, found by its range error (range) or by the distance of all its spots from"
-            " their predictions (spots)"
+            " contradicts the others, found by its range error (range) or by the distance of all its spots"
+            " from their predictions (spots)"
         ),
     )
 

@@ -45,6 +45,8 @@ class Prompt:
     """Whether the answer needs a person who sees the bench: on a real rig an answers file cannot give it."""
     may: Mapping[Action, str] = field(default_factory=dict)
     """Further actions besides `done` and `abort`, with a short description of their effect here."""
+    overrules: bool = False
+    """Whether a confirmation keeps results in spite of a failed check; the certificate then shows it."""
 
     def refuse(self, answer: Answer) -> str | None:
         """Reason why an answer is not valid; None for a valid one."""

@@ -12,8 +12,11 @@ from ruamel.yaml.scalarint import ScalarInt
 from workbench.model.board import Board
 from workbench.model.bounds import applies, prior_within, within
 from workbench.model.device_block import DeviceBlock
+from workbench.model.errors import BadInputError
+from workbench.model.included_camera import include_camera
+from workbench.model.known_board import AnyBoard
 from workbench.model.lens import COEFFICIENTS, LensName, lens_parameters
-from workbench.model.yamlfile import FileModel, load_yaml_model
+from workbench.model.yamlfile import Document, FileModel, load_yaml_model
 
 PositiveFloat = Annotated[float, Field(gt=0)]
 NonNegativeFloat = Annotated[float, Field(ge=0)]
@@ -269,6 +272,11 @@ class Rig(FileModel):
 
     kind_key = "rig"
 
+    @classmethod
+    def include_files(cls, document: Document) -> bool:
+        """Replace `camera.from`, a camera file of another program, by the priors that it gives."""
+        return include_camera(document)
+
     format: Literal[1]
     rig: str
     serial: Name = UNKNOWN_SERIAL
@@ -280,9 +288,10 @@ class Rig(FileModel):
     devices: DeviceSpec | None = None
     """Ignored if the driver opens a whole bench."""
     camera: CameraSpec
-    lasers: Annotated[tuple[LaserSpec, ...], Field(min_length=1)]
+    lasers: tuple[LaserSpec, ...] = ()
+    """Empty: a camera alone, to be fitted to views of a board."""
     bench: BenchSpec = BenchSpec()
-    board: Board = Board()
+    board: AnyBoard = Board()
     noise: NoiseSpec = NoiseSpec()
     emulator: dict[str, Any] | None = None
     """Settings of the emulated bench, which validates them."""
@@ -296,15 +305,40 @@ class Rig(FileModel):
         return lasers
 
     @property
+    def banded_board(self) -> Board:
+        """The workbench's own board, whose blank band takes the spots.
+
+        Raises:
+            BadInputError: the rig has another board.
+        """
+        if not isinstance(self.board, Board):
+            raise BadInputError(
+                f"rig {self.rig}: expected the workbench's own board (`workbench target` prints it), whose"
+                f" blank band takes the spots, got board.kind {self.board.kind}; views of a"
+                f" {self.board.kind} are for `workbench fit`"
+            )
+        return self.board
+
+    @property
     def laser_ids(self) -> tuple[str, ...]:
         """Ids in the order of the file."""
         return tuple(laser.id for laser in self.lasers)
 
 
-def load_rig(path: Path) -> Rig:
+def load_rig(path: Path, *, camera_alone: bool = False) -> Rig:
     """Read a rig file.
 
+    Args:
+        path: rig file.
+        camera_alone: whether a rig without lasers is accepted.
+
     Raises:
-        BadInputError: see `load_yaml_model`.
+        BadInputError: see `load_yaml_model`; or the rig has no lasers.
     """
-    return load_yaml_model(path, Rig)
+    rig = load_yaml_model(path, Rig)
+    if not rig.lasers and not camera_alone:
+        raise BadInputError(
+            f"{path}: lasers: expected at least one laser, got none; without lasers, `workbench fit` alone"
+            " uses the file, for the camera"
+        )
+    return rig

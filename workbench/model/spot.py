@@ -17,6 +17,7 @@ class Failure(StrEnum):
     TOO_MANY = "too_many"
     TOO_DIM = "too_dim"
     SATURATED = "saturated"
+    BLOOMING = "blooming"
     OFF_SCANLINE = "off_scanline"
     MERGED = "merged"
     AMBIENT_CHANGED = "ambient_changed"

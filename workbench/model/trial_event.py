@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import hypot, inf
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from workbench.model.chart import Chart
 from workbench.model.table import Table
@@ -171,6 +171,19 @@ class TrialProgress(FileModel):
     """Summary in one line."""
 
 
+class VerificationVerdict(NamedTuple):
+    """Verdict of a verification on the calibration that it used."""
+
+    valid: bool
+    reason: str
+
+    @property
+    def text(self) -> str:
+        """Verdict with its reason."""
+        word = "valid" if self.valid else "not valid"
+        return f"the calibration is {word}" + (f": {self.reason}" if self.reason else "")
+
+
 class TrialFinished(FileModel):
     """Results of a trial as data for any renderer."""
 
@@ -183,4 +196,13 @@ class TrialFinished(FileModel):
     @property
     def refuses_calibration(self) -> bool:
         """Whether the verdict of a verification is that the calibration is not valid."""
-        return any(row.get("valid") == NOT_VALID for table in self.tables for row in table.records())
+        return self.verification is not None and not self.verification.valid
+
+    @property
+    def verification(self) -> VerificationVerdict | None:
+        """Verdict of a verification, the last one if there are several; None for other trials."""
+        found = [row for table in self.tables for row in table.records() if "valid" in row]
+        if not found:
+            return None
+        is_valid = all(row["valid"] != NOT_VALID for row in found)
+        return VerificationVerdict(is_valid, str(found[-1].get("verdict") or ""))

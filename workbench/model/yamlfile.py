@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
@@ -45,6 +46,11 @@ class FileModel(BaseModel):
 
     # Validators are built at first use: a command uses few of the models that it imports.
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+
+    @classmethod
+    def include_files(cls, document: Document) -> bool:
+        """Replace what a document takes from other files; whether there was any. By default there is none."""
+        return False
 
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -138,6 +144,7 @@ def parse_yaml_model(text: str, path: Path, model: type[Model], context: object 
     """
     document = parse_document(text, path)
     _check_kind(path, document.data, model)
+    include_files(document, model)
     try:
         found = model.model_validate(document.data, context=context)
     except ValidationError:
@@ -145,6 +152,30 @@ def parse_yaml_model(text: str, path: Path, model: type[Model], context: object 
         raise
     refuse(path, document.doubled)
     return found
+
+
+def include_files(document: Document, model: type[BaseModel]) -> bool:
+    """Replace what a document takes from other files by their contents; whether there was any.
+
+    Raises:
+        BadInputError: such a file is missing or wrong.
+    """
+    return issubclass(model, FileModel) and isinstance(document.data, dict) and model.include_files(document)
+
+
+def standalone_text(path: Path, model: type[BaseModel]) -> str:
+    """Text of a YAML file that depends on no other file: verbatim, where it names none.
+
+    Raises:
+        BadInputError: the file, or one that it names, is missing or wrong.
+    """
+    text = _read(path)
+    document = parse_document(text, path)
+    if not include_files(document, model):
+        return text
+    stream = StringIO()
+    YAML().dump(document.data, stream)
+    return stream.getvalue()
 
 
 def parse_document(text: str, path: Path) -> Document:

@@ -26,6 +26,7 @@ from workbench.procedure.capture.exposure import set_exposure
 from workbench.procedure.capture.latency import LEASE_S, count_latency
 from workbench.procedure.engine.prompts import laser_class_prompt, placement_prompt, safety_prompt
 from workbench.spots import Failure, find_spots
+from workbench.spots.jpeg_blocks import has_jpeg_blocks
 
 STANDOFF_MM = 500.0
 """Standoff of the target during the check."""
@@ -99,6 +100,7 @@ def examine(rig: Rig, bench: Bench, operator: Operator) -> Iterator[CheckResult]
     yield from _controller(bench.lasers)
     bench.mark("doctor/camera")
     yield _tried("camera", partial(_camera, rig, bench.camera))
+    yield from _compression(bench.camera)
     yield from _with_emission(rig, bench, operator)
 
 
@@ -170,6 +172,20 @@ def _camera(rig: Rig, camera: Camera) -> str:
             f"every pixel has the value {image.max()}; remove the lens cap, or check the camera's driver"
         )
     return f"{expected[1]} x {expected[0]}, {image.dtype.itemsize * 8} bits, median {np.median(image):.0f}"
+
+
+def _compression(camera: Camera) -> Iterator[CheckResult]:
+    """Look for the blocks of JPEG in a frame."""
+    try:
+        compressed = has_jpeg_blocks(camera.grab().image)
+    except RigNotReadyError:
+        return  # the check of the camera names it
+    if compressed:
+        text = (
+            "the frames show the blocks of JPEG compression, which moves spots; choose an uncompressed"
+            " pixel_format (GREY, YUYV) in the rig file"
+        )
+        yield CheckResult("compression", True, text, kind="noted")
 
 
 def _exposure(rig: Rig, bench: Bench) -> Iterator[CheckResult]:

@@ -58,11 +58,11 @@ def read_captures(ranger: Ranger, rows: Sequence[CaptureRow]) -> Iterator[Readin
     if unknown:
         raise BadInputError("\n".join(unknown))
     for block in _blocks(scenes(rows)):
-        members = next(iter(block.values()))
+        scene, members = next(iter(block.items()))
         if members[0].laser_id == ALL_LASERS:
-            yield _read_lit(ranger, *block, members[0])
+            yield _read_lit(ranger, scene, members[0])
         else:
-            yield from ranger.read_scenes([_known_spots(ranger, *scene) for scene in block.items()])
+            yield from ranger.read_scenes([_known_spots(ranger, *one) for one in block.items()])
 
 
 def _blocks(grouped: Mapping[str, list[CaptureRow]]) -> Iterator[dict[str, list[CaptureRow]]]:

@@ -27,7 +27,8 @@ TAIL_BELOW = 0.0175
 """Probability of a closest range below the interval; `1 - LEVEL - TAIL_BELOW` of one above it. A shape that
 noise hides puts the closest range before that of a flat, never behind it."""
 QUANTILES = np.array([TAIL_BELOW, 0.5, TAIL_BELOW + LEVEL])
-NO_CIRCLE = (0.0, 0.0, math.nan, 0.0, 0.0, 0.0), np.eye(3)
+CircleArguments = tuple[tuple[float, float, float, float, float, float], FloatArray]
+NO_CIRCLE: CircleArguments = ((0.0, 0.0, math.nan, 0.0, 0.0, 0.0), np.eye(3))
 """Arguments of `posterior_kernels.shape_mixture` where there is no circle."""
 NODES = (1, 16, 48, 64)
 """Number of nodes for the amplitudes of degrees 0, 1, 2, and 3 or more."""
@@ -74,6 +75,8 @@ def shape_posterior(
     """
     from workbench.ranging.posterior_kernels import shape_mixture  # loads the compiler
 
+    of_prior, (nodes, counts) = prior_components(prior, front_mm, highest), _nodes(highest)
+    of_circle, circle_covariance = NO_CIRCLE if circle is None else _of_circle(circle, front_mm)
     exists, by_shape, found = shape_mixture(
         points.x_mm,
         points.range_mm,
@@ -83,9 +86,18 @@ def shape_posterior(
         fits.weight,
         fits.chi2,
         fits.scale_mm,
-        *(NO_CIRCLE if circle is None else _of_circle(circle, front_mm)),
-        *prior_components(prior, front_mm, highest),
-        *_nodes(highest),
+        of_circle,
+        circle_covariance,
+        of_prior.middle_mm,
+        of_prior.half_mm,
+        of_prior.degree,
+        of_prior.log_mass,
+        of_prior.mean_mm,
+        of_prior.sd_mm,
+        of_prior.log_parabola,
+        of_prior.circle_mass,
+        nodes,
+        counts,
         _floor_mm(points),
         QUANTILES,
     )
@@ -95,11 +107,11 @@ def shape_posterior(
     return ShapePosterior(_probabilities(by_shape.tolist()), median, mean, sd, (low, high))
 
 
-def _of_circle(circle: CylinderFit, front_mm: tuple[float, float]) -> tuple[tuple[float, ...], FloatArray]:
+def _of_circle(circle: CylinderFit, front_mm: tuple[float, float]) -> CircleArguments:
     """Arguments `circle` and `circle_covariance` of `posterior_kernels.shape_mixture`."""
     nearest = circle.closest(front_mm)
-    own = circle.axis_x_mm, circle.radius_mm, circle.chi2, circle.log_density
-    return (*own, nearest.range_mm, nearest.sigma_mm), circle.covariance
+    of_fit = circle.axis_x_mm, circle.radius_mm, circle.chi2, circle.log_density
+    return (*of_fit, nearest.range_mm, nearest.sigma_mm), circle.covariance
 
 
 def _floor_mm(points: Points) -> float:

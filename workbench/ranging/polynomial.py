@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from operator import mul
 
 import numpy as np
 
@@ -45,13 +46,13 @@ class PolynomialFit:
 
         Its position depends on the coefficients too, but at a minimum this has no first-order effect.
         """
-        places = np.array([*front_mm, *self._turns(front_mm)])
-        powers = _powers(places / self.scale_mm, self.degree)
-        ranges = powers @ self.coefficients
-        at = int(ranges.argmin())
-        sigma = math.sqrt(powers[at] @ self.covariance @ powers[at])
-        by = powers[at]
-        return Closest(float(ranges[at]), sigma, float(places[at]), by @ self.by_range, by @ self.by_place)
+        places = [*front_mm, *self._turns(front_mm)]
+        powers = [[(x / self.scale_mm) ** k for k in range(self.degree + 1)] for x in places]
+        ranges = [sum(map(mul, row, self.coefficients.tolist())) for row in powers]
+        at = ranges.index(min(ranges))
+        by = np.array(powers[at])
+        sigma = math.sqrt(by @ self.covariance @ by)
+        return Closest(ranges[at], sigma, places[at], by @ self.by_range, by @ self.by_place)
 
     def _turns(self, front_mm: tuple[float, float]) -> list[float]:
         """Positions inside the front where the slope is 0."""
@@ -128,8 +129,3 @@ def _real_roots(coefficients: FloatArray) -> list[float]:
         return []
     q = -0.5 * (b + math.copysign(math.sqrt(discriminant), b))  # without cancellation
     return [q / a, c / q] if q != 0.0 else [0.0]
-
-
-def _powers(t: FloatArray, degree: int) -> FloatArray:
-    """(n, degree + 1) t^0, t^1, ..."""
-    return np.asarray(t[:, None] ** np.arange(degree + 1))

@@ -13,6 +13,7 @@ from workbench.spots import Failure, Spot
 
 FLAGGED = {
     Failure.SATURATED: "is saturated: its range is less certain",
+    Failure.BLOOMING: "has spilled charge along its column: it may be anywhere in the streak",
     Failure.MERGED: "overlaps another: the errors of both ranges are correlated",
     Failure.AT_EDGE: "is cut by the edge of the image",
 }

@@ -121,15 +121,16 @@ def fit_shape(
     fit, name = (circle, CIRCLE) if kind == "cylinder" else (fits.of_degree(degree), _name(degree))
     if fit is None or (closest := fit.closest(front)).range_mm <= max(0.0, -points.offset_mm):
         return _unknown(points, possible, angle, tried)
+    by_kind = _by_kind(seen)
     return Shape(
         kind=kind,
         closest_mm=seen.median_mm,
         closest_sigma_mm=possible.deviation_mm(seen.median_mm),
-        closest_interval_mm=_interval_mm(points, (seen, possible), kind, fits.of_degree(0)),
+        closest_interval_mm=_interval_mm(points, (seen, possible), kind, by_kind, fits),
         closest_x_mm=closest.x_mm,
         closest_by_range=closest.by_range,
         closest_by_place=closest.by_place,
-        probabilities=_by_kind(seen),
+        probabilities=by_kind,
         degree=None if isinstance(fit, CylinderFit) else degree,
         coefficients=() if isinstance(fit, CylinderFit) else fit.per_mm(),
         angle_rad=angle.angle_rad,
@@ -195,17 +196,19 @@ def _interval_mm(
     points: Points,
     posteriors: tuple[ShapePosterior, ShapePosterior],
     kind: ShapeKind,
-    flat: PolynomialFit | None,
+    by_kind: Mapping[ShapeKind, float],
+    fits: PolynomialFits,
 ) -> tuple[float, float]:
     """Interval over all shapes, see `Shape.closest_interval_mm`."""
     seen, possible = posteriors
     intervals = [possible.interval_mm]
     if possible is not seen:
         intervals.append(_nearest_interval_mm(points))
-    excluded = EXCLUDING_ODDS * seen.probabilities["flat", 0] < _by_kind(seen)[kind]
-    if flat is not None and kind != "flat" and not excluded:
-        at, sigma = float(flat.coefficients[0]), math.sqrt(flat.covariance[0, 0])
-        intervals.append(interval_mm(at, sigma, points.offset_mm))
+    if kind != "flat" and EXCLUDING_ODDS * by_kind["flat"] >= by_kind[kind]:
+        flat = fits.of_degree(0)
+        if flat is not None:
+            at, sigma = float(flat.coefficients[0]), math.sqrt(flat.covariance[0, 0])
+            intervals.append(interval_mm(at, sigma, points.offset_mm))
     return min(low for low, _ in intervals), max(high for _, high in intervals)
 
 
@@ -217,8 +220,10 @@ def _nearest_interval_mm(points: Points) -> tuple[float, float]:
 
 
 def _by_kind(posterior: ShapePosterior) -> dict[ShapeKind, float]:
-    found = posterior.probabilities.items()
-    return {kind: sum((p for (of, _), p in found if of == kind), 0.0) for kind in KINDS}
+    found = dict.fromkeys(KINDS, 0.0)
+    for (kind, _), probability in posterior.probabilities.items():
+        found[kind] += probability
+    return found
 
 
 def _angle(incline: PolynomialFit | None) -> _Angle:

@@ -11,9 +11,16 @@ import numpy as np
 
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.errors import BadInputError
+from workbench.model.problems import short
 
 CUBIC = 3
 """Degree of an irregular surface; the front of four lasers determines no higher one."""
+SHAPES = ("flat", "incline", "round", "irregular")
+PROBABILITIES = (*SHAPES, "concave", "circle", "steep")
+SIZES = ("relative_curvature_sd", "apex_sd", "steep_factor")
+SEVERAL_SIZES = ("slope_sds", "curvatures_per_mm", "irregular_sds")
+SMALLEST, LARGEST = 1e-12, 1e6
+"""Bounds of the sizes: their squares and quotients neither vanish nor overflow."""
 
 
 @dataclass(frozen=True)
@@ -52,18 +59,38 @@ class ShapePrior:
     steep_factor: float = 6.0
 
     def __post_init__(self) -> None:
-        """Check the probabilities of the shapes.
+        """Check types and bounds of the numbers, and the sum of the probabilities of the shapes.
 
         Raises:
-            BadInputError: one is negative, or they do not add up to 1.
+            BadInputError: a number is none or outside its bounds, or the probabilities do not add up to 1.
         """
-        shapes = {name: getattr(self, name) for name in ("flat", "incline", "round", "irregular")}
-        if min(shapes.values()) < 0 or not math.isclose(sum(shapes.values()), 1.0, abs_tol=1e-9):
+        for name in PROBABILITIES:
+            _check_number(name, getattr(self, name), 0.0, 1.0)
+        for name in SIZES:
+            _check_number(name, getattr(self, name), SMALLEST, LARGEST)
+        for name in SEVERAL_SIZES:
+            sizes = getattr(self, name)
+            if not isinstance(sizes, tuple) or not sizes:
+                raise BadInputError(f"ShapePrior: {name}: expected a tuple of numbers, got {short(sizes)}")
+            for size in sizes:
+                _check_number(name, size, SMALLEST, LARGEST)
+        if (count := len(self.irregular_sds)) != CUBIC:
+            raise BadInputError(f"ShapePrior: irregular_sds: expected {CUBIC} numbers, got {count}")
+        shapes = {name: getattr(self, name) for name in SHAPES}
+        if not math.isclose(sum(shapes.values()), 1.0, abs_tol=1e-9):
             got = ", ".join(f"{name}={value:g}" for name, value in shapes.items())
             raise BadInputError(
                 f"ShapePrior: expected probabilities from 0 that add up to 1, got {got} (sum"
                 f" {sum(shapes.values()):g}); state all four"
             )
+
+
+def _check_number(name: str, value: object, low: float, high: float) -> None:
+    """Raise if a value is no number from `low` to `high`."""
+    is_bool = isinstance(value, bool)
+    if isinstance(value, int | float | np.integer | np.floating) and not is_bool and low <= value <= high:
+        return
+    raise BadInputError(f"ShapePrior: {name}: expected a number from {low:g} to {high:g}, got {short(value)}")
 
 
 class PriorComponents(NamedTuple):

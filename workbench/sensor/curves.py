@@ -96,20 +96,23 @@ class SpotCurves:
             position_px: (n, 2) finite.
             inverse_sd: (n, 2) 1 / sigma; 0 for a coordinate that was not measured.
         """
-        curve, s = self._position_and_slope[laser], self._start(laser, position_px, inverse_sd)
+        s = self._start(laser, position_px, inverse_sd)
+        measured = position_px * inverse_sd
+        # In standard deviations: position and slope of the curve.
+        curve = self._position_and_slope[laser] * np.concatenate((inverse_sd, inverse_sd), axis=1)[:, None]
         searching = np.ones(len(s), bool)
         for _ in range(ITERATIONS):
             seen = self._at(curve, s)
-            slope = seen[:, 2:] * inverse_sd
-            step = _dot(slope, (seen[:, :2] - position_px) * inverse_sd) / _dot(slope, slope)
+            slope = seen[:, 2:]
+            step = np.vecdot(slope, seen[:, :2] - measured) / np.vecdot(slope, slope)
             s = np.where(searching, self._by.within(s - step), s)
             searching &= np.abs(step) > CONVERGED
             if not searching.any():
                 break
         # Derivatives are evaluated once, here; the residual that is left is that across the line.
         seen, own = self._at(curve, s), self._at(self._derivatives[laser], s)
-        residual, slope = (seen[:, :2] - position_px) * inverse_sd, seen[:, 2:] * inverse_sd
-        information = _dot(slope, slope)
+        residual, slope = seen[:, :2] - measured, seen[:, 2:]
+        information = np.vecdot(slope, slope)
         by = own.reshape(len(s), 2, self._columns) * inverse_sd[:, :, None]
         lower, upper = self._unfolded[laser].T
         found = ~searching & (s > lower) & (s < upper)
@@ -121,7 +124,7 @@ class SpotCurves:
         across = np.stack((-slope[:, 1], slope[:, 0]), axis=1) / root[:, None]
         return InvertedSpots(
             w,
-            _dot(across, residual),
+            np.vecdot(across, residual),
             dz_ds / root,
             (along[:, :, None] * by).sum(axis=1),
             (across[:, :, None] * by).sum(axis=1),
@@ -151,12 +154,6 @@ class SpotCurves:
         """(n, m) values of tables (n, terms, m), each at its own s (n,)."""
         values: FloatArray = np.matmul(self._by.basis(s)[:, None, :], table)[:, 0]
         return values
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """(n,) dot products of rows (n, 2)."""
-    products: FloatArray = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]
-    return products
 
 
 def _model(model: LensModel, lens: FloatArray, rays: FloatArray, inverse_depth: FloatArray) -> FloatArray:

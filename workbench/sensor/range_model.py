@@ -36,7 +36,7 @@ class RangeEstimates:
     @cached_property
     def sigma_mm(self) -> FloatArray:
         """(n,) 1 sigma of each range."""
-        return np.sqrt((self._propagated * self.by_parameter).sum(axis=1) + self.spot_sd_mm**2)
+        return np.asarray(np.sqrt((self._propagated * self.by_parameter).sum(axis=1) + self.spot_sd_mm**2))
 
     @cached_property
     def _propagated(self) -> FloatArray:

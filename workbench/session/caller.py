@@ -7,8 +7,10 @@ import os
 import time
 
 
-def operator() -> str:
-    """Name of the account; its number if it has no name."""
+def operator(named: str | None = None) -> str:
+    """Name of a person as named, else of the account; its number if it has no name."""
+    if named is not None:
+        return named
     try:
         return getpass.getuser()
     except (KeyError, OSError):

@@ -25,7 +25,7 @@ from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.session.state import SessionStatus, effective, session_status
 
 INDEX = ".sessions.sqlite3"
-FORMAT = 3
+FORMAT = 4
 """Number of the index's format; another one is made again."""
 MOST_NAMED = 3
 """Largest number of copies that a remark names."""
@@ -62,6 +62,8 @@ class IndexedSession:
     """Hash that copies of the session share; empty if it cannot be identified."""
     records: int = 0
     """Number of records of the journal, void ones included."""
+    first_record_ns: int = 0
+    """Time of the first record, ns since 1970 (UTC); 0 without records."""
     own_name: str = ""
     """Name of the folder in which the session began; empty if it is not known."""
     copies: tuple[str, ...] = ()
@@ -211,6 +213,7 @@ def read_indexed(folder: Path) -> IndexedSession:
         _with_results(IndexedSession(status, serial, began, "none"), records),
         identity=identity_of(folder, began, serial) if serial else "",
         records=len(records),
+        first_record_ns=records[0].time_ns if records else 0,
         own_name=first.session if isinstance(first, ev.SessionStarted) else "",
     )
 

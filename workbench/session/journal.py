@@ -14,6 +14,7 @@ from workbench.model.contents import printable_json, read_file
 from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.event import Event, Record, SpotsFound
 from workbench.model.problems import short
+from workbench.session.chain import Chain, ChainBrokenError, split
 
 JOURNAL = "journal.jsonl"
 LARGEST_BYTES = 2**30
@@ -23,7 +24,8 @@ LARGEST_BYTES = 2**30
 class Journal:
     """Writer of `journal.jsonl` in a session folder, one write per record.
 
-    The file is locked while it is open, so that two programs never write one session.
+    Each line carries the hash of the file up to there (`chain`). The file is locked while it is open, so that
+    two programs never write one session.
     """
 
     def __init__(self, session_dir: Path, flags: int = os.O_CREAT | os.O_EXCL) -> None:
@@ -31,6 +33,7 @@ class Journal:
         self._file = os.open(self._path, os.O_RDWR | os.O_APPEND | flags, 0o666)
         self._next = self._size = 0
         self._torn = False
+        self._chain = Chain()
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -48,7 +51,7 @@ class Journal:
         """
         journal = cls(session_dir, os.O_CREAT)
         try:
-            records = tuple(read_journal(session_dir))
+            records = tuple(_records(journal._path, journal._chain))
             content = journal._path.read_bytes()
             journal._size = content.rfind(b"\n") + 1
             os.ftruncate(journal._file, journal._size)
@@ -65,11 +68,11 @@ class Journal:
             StoppedError: the disk is full or cannot be written.
         """
         record = Record(n=self._next, time_ns=time.time_ns(), event=event)
-        line = (record.model_dump_json() + "\n").encode()
+        line = self._chain.sealed(record.model_dump_json().encode())
         if self._torn:
             raise StoppedError(f"{self._path}: the journal cannot be written after an earlier error")
         try:
-            if os.write(self._file, line) != len(line):
+            if os.write(self._file, line + b"\n") != len(line) + 1:
                 raise OSError(errno.ENOSPC, "no space left on device")
             # Spots are computed again from the frames, and would cost thousands of syncs.
             if not isinstance(event, SpotsFound):
@@ -77,8 +80,9 @@ class Journal:
         except OSError as error:
             self._cut_back()
             raise StoppedError(f"{self._path}: the journal cannot be written: {error.strerror}") from error
+        self._chain.add_own(line)
         self._next += 1
-        self._size += len(line)
+        self._size += len(line) + 1
         return record
 
     def _cut_back(self) -> None:
@@ -108,15 +112,33 @@ def read_journal(session_dir: Path) -> Iterator[Record]:
     A last line without newline, left by a power failure, is dropped.
 
     Raises:
-        BadInputError: there is no journal, or a line is damaged, missing, repeated or exchanged; names file
-            and line.
+        BadInputError: there is no journal, or a line is damaged, edited, missing, repeated or exchanged;
+            names file and line.
     """
-    path = session_dir / JOURNAL
-    content = read_file(path, "a session's journal", LARGEST_BYTES)
-    whole, _, _ = content.rpartition(b"\n")
-    for number, line in enumerate(whole.split(b"\n") if whole else [], start=1):
+    return _records(session_dir / JOURNAL, Chain())
+
+
+def last_chain(session_dir: Path) -> str:
+    """Hash at the end of the last complete line; empty without one, or of a version without hashes.
+
+    Raises:
+        BadInputError: there is no journal.
+    """
+    lines = _lines(session_dir / JOURNAL)
+    return split(lines[-1])[1] if lines else ""
+
+
+def _lines(path: Path) -> list[bytes]:
+    """Complete lines."""
+    whole, _, _ = read_file(path, "a session's journal", LARGEST_BYTES).rpartition(b"\n")
+    return whole.split(b"\n") if whole else []
+
+
+def _records(path: Path, chain: Chain) -> Iterator[Record]:
+    """Records in order, each checked and added to `chain`."""
+    for number, line in enumerate(_lines(path), start=1):
         try:
-            record = Record.model_validate_json(printable_json(line.decode("utf-8")))
+            record = Record.model_validate_json(printable_json(split(line)[0].decode("utf-8")))
         except ValueError:
             got = short(line.decode(errors="replace"))
             raise BadInputError(
@@ -127,6 +149,13 @@ def read_journal(session_dir: Path) -> Iterator[Record]:
                 f"{path}:{number}: expected record {number - 1}, got {record.n}: lines are missing, repeated"
                 " or exchanged; restore the journal from a copy"
             )
+        try:
+            chain.add(line)
+        except ChainBrokenError as broken:
+            raise BadInputError(
+                f"{path}:{number}: expected the line as it was written, got an edited one, or one after an"
+                f" edited one: {broken}; restore the journal from a copy"
+            ) from None
         yield record
 
 

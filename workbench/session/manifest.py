@@ -17,7 +17,7 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 from workbench.model.bounds import RECORDED
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Name, Rig
-from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model
+from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model, standalone_text
 from workbench.session.files import write_record
 
 MANIFEST = "session.yaml"
@@ -92,7 +92,7 @@ def create_session(
     except OSError as error:
         raise BadInputError(f"{folder}: the session folder cannot be created: {error.strerror}") from None
     caller = {"created": created, "operator": operator, "command": command}
-    entry = RigEntry(file=str(rig_path.resolve()), text=_read(rig_path), serial=rig.serial)
+    entry = RigEntry(file=str(rig_path.resolve()), text=standalone_text(rig_path, Rig), serial=rig.serial)
     procedures = [FileEntry(file=str(path.resolve()), text=_read(path)) for path in procedure_paths]
     _write(folder, caller, entry, procedures, calibration)
 

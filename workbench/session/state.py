@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -150,6 +150,8 @@ class SessionStatus:
     rig: str = ""
     calibration: str = ""
     """Outcome of the last fit in one line; empty without one."""
+    trials: tuple[str, ...] = ()
+    """Outcome of each finished trial in one line; of a verification its verdict."""
 
     @property
     def unfinished(self) -> bool:
@@ -187,6 +189,7 @@ def session_status(session_dir: Path) -> SessionStatus:
         captures=captures,
         rig=rig,
         calibration=_outcome_of_fit(events),
+        trials=tuple(_outcomes_of_trials(events)),
     )
     if is_running(session_dir):
         return status(state="running", why="running in another program")
@@ -196,6 +199,18 @@ def session_status(session_dir: Path) -> SessionStatus:
     if last.exit_code == AnswerNeededError.exit_code:
         why = f"for an answer to {why.removeprefix('prompt ').partition(' -- ')[0]}"
     return status(state=STATES.get(last.exit_code, "failed"), why=why)
+
+
+def _outcomes_of_trials(events: Sequence[ev.Event]) -> Iterator[str]:
+    """Outcome of each trial, by the name of its step."""
+    last = {event.trial: event for event in events if isinstance(event, ev.TrialFinished)}
+    steps = [event for event in events if isinstance(event, ev.StepFinished)]
+    outcomes = {f"{one.procedure}.{one.index}": one.outcome for one in steps}
+    for name, trial in last.items():
+        verdict = trial.verification
+        outcome = outcomes.get(name, "") if verdict is None else verdict.text
+        if outcome:
+            yield f"{name}: {outcome}"
 
 
 def _outcome_of_fit(events: Sequence[ev.Event]) -> str:

@@ -30,6 +30,11 @@ _TEXTS: Final[dict[Failure, str]] = {
         "certain. Cause: overexposure. Do: shorten the exposure or lower the gain until the peak stays below "
         "full scale."
     ),
+    Failure.BLOOMING: (
+        "The charge of clipped pixels has spilled along the columns of the sensor, so that the position "
+        "along them is uncertain by the length of the streak. Cause: overexposure of a sensor without "
+        "anti-blooming. Do: shorten the exposure until the peak stays below full scale."
+    ),
     Failure.OFF_SCANLINE: (
         "A spot lies outside the band where this rig's lasers can appear. Cause: a reflection, a lamp, or a "
         "calibration that no longer matches the rig. Do: cover shiny surfaces; if it persists, realign or "

@@ -8,6 +8,7 @@ import numpy as np
 
 from workbench.model.arrays import Image
 from workbench.model.spot import NO_FLAGS, Failure, Spot
+from workbench.spots.blooming import with_blooming
 from workbench.spots.deblending.blend import fit_blends, split_elongated, with_hidden_spots
 from workbench.spots.deblending.clusters import (
     CLEAR_SNR,
@@ -53,7 +54,8 @@ class Search:
         pair = Pair(on, off, clip_dn, stated_contrast2=self._contrast2)
         scenes = [measure_signal(pair, strip) for strip in self._strips]
         fits = self._search(scenes)
-        spots = self._in_order([t.spot for t in fits if self._on_a_line(t.spot)])
+        found = [t.spot for t in fits if self._on_a_line(t.spot)]
+        spots = self._in_order([with_blooming(spot, on, clip_dn) for spot in found])
         return Finding(tuple(spots), self._failures(pair, scenes, fits, spots))
 
     def _search(self, scenes: list[PairSignal]) -> list[FittedSpot]:

@@ -79,7 +79,7 @@ class CaptureBoardStep(StepModel):
             ]
             standoff_sd_mm = nan if placement.standoff_sd_mm is None else placement.standoff_sd_mm
             info = PlacementInfo(placement.key, placement.standoff_mm, standoff_sd_mm, 0.0, placement.key)
-            context.boards[placement.key] = see_board(frames, context.rig.board, info)
+            context.boards[placement.key] = see_board(frames, context.rig.banded_board, info)
             capture_lasers(context, placement, self.repeats)
 
         visit_placements(context, self.placements(name, context.rig), work)

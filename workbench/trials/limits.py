@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 from workbench.model.errors import LimitFailedError
 from workbench.model.event import LimitChecked, ReadingTaken
 from workbench.model.limit import Limit, Verdict
-from workbench.model.prompt import Prompt
 from workbench.model.table import Cell
 from workbench.model.target import Placement
 from workbench.model.yamlfile import FileModel
 from workbench.procedure.engine.context import Context
-from workbench.procedure.engine.limits import CONTINUE, stated_limits
+from workbench.procedure.engine.limits import result_limit_prompt, stated_limits
 from workbench.trials.errors import ErrorStatistics, range_statistics
 from workbench.trials.statistics.decision import Decision, decide
 
@@ -104,7 +103,7 @@ def check_results(context: Context, step: str, results: Sequence[Result], limits
             text = f"{name}: expected {limit.describe()}, got {_values(failed)}"
             if limit.on_fail == "stop":
                 raise LimitFailedError(f"{step}: {text}")
-            context.ask(Prompt(f"{step}/{name}", f"{text}. {CONTINUE}", otherwise="Abort with a reason."))
+            context.ask(result_limit_prompt(step, name, text))
             remarks.append(text)
     if not dict(stated_limits(limits)):
         return ""

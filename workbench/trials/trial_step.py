@@ -54,5 +54,6 @@ def outside_prompt(placement: Placement, found: str) -> Prompt:
         expect="1 of 20 readings lies outside without a cause. The target is the one of the prompt.",
         otherwise="Remove the cause, then `redo`. The reason is shown in the result.",
         yes="keep them",
+        overrules=True,
         may={"redo": f"{here} again", "skip": f"leave {here} out"},
     )

@@ -27,6 +27,13 @@ WRONG: tuple[Any, ...] = (
     nan,
     inf,
     10**400,
+    1e300,
+    "a" * 5000,
+    Path("b" * 300),
+    "\ud800",
+    np.array("k1"),
+    np.array(5),
+    np.array([None, "k1"]),
     1j,
     "",
     " ",
@@ -77,6 +84,10 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "with_prior(sd)": lambda x: wb.with_prior(RIG, "f_px", sd=x),
     "draw(chart)": wb.draw,
     "Ranger(calibration)": wb.Ranger,
+    "Ranger(shape_prior)": lambda x: wb.Ranger(LOADED, x),
+    "ShapePrior(flat)": lambda x: wb.ShapePrior(flat=x),
+    "ShapePrior(slope_sds)": lambda x: wb.ShapePrior(slope_sds=x),
+    "Ranger.range(scene)": lambda x: wb.Ranger(LOADED).range(np.zeros((480, 640), np.uint8), None, x),
     "Ranger.range(on)": wb.Ranger(LOADED).range,
     "Ranger.range(off)": lambda x: wb.Ranger(LOADED).range(np.zeros((480, 640), np.uint8), x),
     "Calibration.range_uncertainty(ranges_mm)": LOADED.range_uncertainty,
@@ -129,6 +140,7 @@ def test_names_are_one_string_or_several() -> None:
     assert names_of("fix", "k1") == ("k1",)
     assert names_of("fix", ["k1", "k2"]) == ("k1", "k2")
     assert names_of("fix", ()) == ()
+    assert names_of("fix", np.array(["k1", "k2"])) == ("k1", "k2")
     with pytest.raises(wb.BadInputError):
         names_of("fix", ["k1", 2])
 

@@ -339,3 +339,16 @@ def test_a_rejected_capture_of_a_recording_has_its_frame_instead_of_a_row() -> N
     of_frame, of_row = Rejected("frames/p/L1/00-on.png", "no spot"), Rejected("row 12", "no spot")
     assert _rejected_json(of_frame) == {"source": "frames/p/L1/00-on.png", "reason": "no spot"}
     assert _rejected_json(of_row) == {"row": 12, "reason": "no spot"}
+
+
+def test_a_public_table_of_a_laser_line_gives_its_author_s_numbers(workbench: Run, tmp_path: Path) -> None:
+    rows, rig = ROOT / "data/laser-line-rows.csv", ROOT / "rigs/laser-line.yaml"
+    outcome = workbench("fit", rows, "--rig", rig, "-o", tmp_path / "line.yaml", "--json")
+    # Whole-pixel rows give the farthest range, 2450 mm, to 14 %: the limits refuse it.
+    refused(outcome, 3, "relative standard deviation of ranges")
+    (derived,) = json.loads(outcome.out)["derived"]
+    # data/README.md: the plain fit of row = A + B / distance, and the author's fit of angles.
+    assert derived["f_b_px_mm"] == pytest.approx(6780, abs=20)
+    assert derived["f_b_sd"] == pytest.approx(80, rel=0.4)
+    assert derived["infinity_px"] == pytest.approx(118.44, abs=0.1)
+    assert abs(derived["f_b_px_mm"] - 22.5 / 0.0032974349) < 2 * derived["f_b_sd"]

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.reference_session import record
 from workbench.cli.lab_questions import QUESTIONS, laboratory_of
 from workbench.model.laboratory import Laboratory
+from workbench.report.certificate.dcc import required_parties
 
 ANSWERS = {
     "Name of the laboratory": "Lab: the <b>best</b>",
@@ -62,6 +64,44 @@ def test_wrong_days_and_numbers_are_asked_for_again(terminal: None, tmp_path: Pa
     lab = laboratory_of(tmp_path, False, ask)
     assert len(asked) == len(QUESTIONS) + 3
     assert (str(lab.standards[0].calibrated), lab.standards[0].expanded_uncertainty) == ("2026-05-04", 0.1)
+
+
+@pytest.mark.parametrize(
+    ("key", "wrong", "right"),
+    [
+        ("country", "Germany", "de"),
+        ("standard.calibrated", "4 May", "2026-05-04"),
+        ("standard.uncertainty_mm", "-0.1", "0.1"),
+        ("standard.uncertainty_mm", "0.1 mm", "0.1"),
+        ("temperature.low", "warm", "20"),
+    ],
+)
+def test_the_reason_is_printed_before_a_question_is_asked_again(
+    terminal: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str, wrong: str, right: str
+) -> None:
+    printed: list[str] = []
+    monkeypatch.setattr("workbench.cli.lab_questions.print_message", printed.append)
+    typed = [wrong, right]
+    question = dict(QUESTIONS)[key]
+
+    def ask(asked: str) -> str:
+        if not asked.startswith(question):
+            return "rule" if asked.startswith("Reference") else ""
+        assert len(printed) == 2 - len(typed)
+        return typed.pop(0)
+
+    laboratory_of(tmp_path, False, ask)
+    assert typed == []
+    (reason,) = printed
+    assert wrong in reason
+
+
+def test_the_items_of_a_digital_certificate_are_asked_for(terminal: None, tmp_path: Path) -> None:
+    names = ("Name of the laboratory", "Name of the customer", "Person who authorises certificates")
+    answers = dict.fromkeys(names, "x") | {dict(QUESTIONS)["country"]: "de"}
+    lab = laboratory_of(tmp_path, False, Person(answers))
+    assert lab.country == "DE"
+    required_parties(lab, record())
 
 
 def test_no_answers_leave_every_item_open(terminal: None, tmp_path: Path) -> None:

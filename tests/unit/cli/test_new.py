@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from tests.support.command_line import Run, refused
 from tests.support.terminal import at_terminal
+from workbench.cli.new import PAGES
 
 ROOT = Path(__file__).parents[3]
 
@@ -23,6 +26,22 @@ def test_new_folder_holds_the_procedures_rigs_and_firmware(workbench: Run, tmp_p
     assert (folder / "procedures/calibrate-flat.yaml").is_file()
     assert (folder / "rigs/thesis-emulated.yaml").is_file()
     assert (folder / "rigs/firmware/laser_controller.c").is_file()
+
+
+def test_new_folder_holds_the_pages_that_its_readme_names(workbench: Run, tmp_path: Path) -> None:
+    assert workbench("new", tmp_path).code == 0
+    pages = re.findall(r"\]\((docs/\S+\.md)\)", (tmp_path / "README.md").read_text())
+    assert "docs/procedures.md" in pages
+    assert sorted(pages) == sorted(f"docs/{path.name}" for path in (tmp_path / "docs").iterdir())
+    for page in pages:
+        assert (tmp_path / page).read_bytes() == (ROOT / page).read_bytes()
+
+
+def test_the_wheel_carries_the_pages_of_a_new_folder() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    carried = project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    for page in PAGES:
+        assert carried[f"docs/{page}"] == f"workbench/templates/docs/{page}"
 
 
 def test_next_commands_are_printed_and_name_files_of_the_folder(workbench: Run, tmp_path: Path) -> None:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.support.command_line import Run, refused
+from tests.support.reference_session import REFERENCE
+from workbench.cli.run import replay_text
+from workbench.report.certificate.identity import operators
+from workbench.report.certificate.session_record import read_session
+from workbench.session.state import placement_captures
 
 ROOT = Path(__file__).parents[3]
 WEBCAM_RIG = ROOT / "rigs/webcam-laser.yaml"
@@ -21,3 +28,31 @@ def test_one_procedure_twice(workbench: Run, tmp_path: Path) -> None:
     outcome = workbench("run", procedure, procedure, "--rig", WEBCAM_RIG, "--sessions", tmp_path)
     refused(outcome, 2, "procedure: ", "got calibrate-flat")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_operator_can_be_a_person(workbench: Run, tmp_path: Path) -> None:
+    procedure = tmp_path / "p.yaml"
+    procedure.write_text("format: 1\nprocedure: p\ntitle: T\nsteps:\n  - {step: message, text: Hello.}\n")
+    rig = ROOT / "rigs/thesis-emulated.yaml"
+    options = ("--sessions", tmp_path / "sessions", "--no-view", "--operator", "A. Person")
+    assert workbench("run", procedure, "--rig", rig, *options).code == 0
+    (session,) = (tmp_path / "sessions").glob("*-p")
+    assert operators(read_session(session)) == ["A. Person"]
+
+
+@pytest.mark.parametrize("name", ["", "  ", "two\nlines", "\udcfc"])
+def test_a_name_that_is_none_is_refused(workbench: Run, tmp_path: Path, name: str) -> None:
+    procedure = ROOT / "procedures/calibrate-flat.yaml"
+    outcome = workbench("run", procedure, "--rig", WEBCAM_RIG, "--operator", name, "--sessions", tmp_path)
+    refused(outcome, 2, "--operator")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_replay_counts_the_captures_that_are_kept() -> None:
+    records = read_session(REFERENCE).all_records
+    captures = placement_captures(records)
+    first, *_ = (key for key, one in captures.items() if one.captures)
+    assert replay_text(records, ()) == ""
+    (text,) = replay_text(records, [first]).splitlines()
+    assert f"{len(captures[first].captures)} capture" in text
+    assert "1 placement" in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from math import pi, tan
 
@@ -11,6 +12,7 @@ from tests.support.sensor_answers import GIVEN
 from workbench.cli.found_devices import FoundDevice
 from workbench.cli.sensor_questions import (
     Beam,
+    default_serial,
     nearest_mm,
     parse_baseline_sd,
     parse_baselines,
@@ -18,6 +20,7 @@ from workbench.cli.sensor_questions import (
     parse_lens,
     parse_name,
     parse_quantity,
+    parse_serial,
     parse_size,
     parse_yes,
     sensor_questions,
@@ -154,6 +157,21 @@ def test_devices_that_were_found_are_named_and_the_first_is_the_default() -> Non
     of = {one.key: one for one in sensor_questions(cameras, ports, [])}
     assert (of["camera"].default, of["port"].default) == ("/dev/video2", "/dev/ttyACM7")
     assert all(one.path in of["camera"].hint and one.name in of["camera"].hint for one in cameras)
+
+
+@pytest.mark.parametrize("wrong", ["", "unknown", "x" * 61])
+def test_a_serial_number_identifies_the_sensor(wrong: str) -> None:
+    with pytest.raises(ValueError, match="serial number"):
+        parse_serial(wrong)
+
+
+def test_the_default_serial_number_is_another_one_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = []
+    for when in (0, 1):
+        moment = time.gmtime(when)
+        monkeypatch.setattr(time, "localtime", lambda moment=moment: moment)
+        given.append(parse_serial(default_serial()))
+    assert given[0] != given[1]
 
 
 @pytest.mark.parametrize("key", ["camera", "port"])

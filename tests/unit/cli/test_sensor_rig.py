@@ -48,6 +48,11 @@ def test_names_that_yaml_would_read_as_numbers_stay_names() -> None:
     assert [rig.rig for rig in rigs(name="007")] == ["007", "007-practice"]
 
 
+@pytest.mark.parametrize("serial", ["7", 'LS 12/"34"', "007", "20261130-150255"])
+def test_the_serial_number_is_that_of_the_answers(serial: str) -> None:
+    assert [rig.serial for rig in rigs(serial=serial)] == [serial, f"{serial}-practice"]
+
+
 def test_devices_are_those_of_the_answers() -> None:
     real, practice = rigs(camera="rtsp://camera/1", port="/dev/serial/by-id/uno")
     assert real.devices is not None

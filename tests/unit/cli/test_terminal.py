@@ -73,6 +73,15 @@ def test_readings_and_spots_are_singular_or_plural(readings: int, spots: int) ->
     assert re.findall(r"\d+ \w+", text) == [counted(readings, "reading"), counted(spots, "spot")]
 
 
+def test_lasers_without_a_spot_are_named() -> None:
+    one = Spot(1.0, 2.0, 0.1, 0.1, 1e3, 1.5, 90.0)
+    text = _summary({"L1": [[one]], "L2": [[]], "L3": [[one, one]]})
+    assert "1/3 lasers" in text
+    assert "L2, L3" in text
+    assert "L1" not in text
+    assert "NOT SEEN" not in _summary({"L1": [[one]]})
+
+
 def test_what_is_wrong_is_shown_and_what_is_well_is_not() -> None:
     checked = ev.LimitChecked(
         step="p.1", of="a/L1", quantity="snr", value=7.0, limit="at least 9", verdict="fail"

@@ -19,6 +19,7 @@ from workbench.procedure.engine.operator import NoOperator
 NUMBER = Prompt("p", "Read it.", quantity=Quantity("mm", 450.0, 550.0, 500.0), may={"skip": "leave it out"})
 STANDOFF = Prompt("p", "Read it.", quantity=Quantity("mm", 1.0, 5000.0))
 CONFIRM = Prompt("safety", "Safe?")
+KEEP = Prompt("a/outside", "Keep them?", overrules=True)
 CHOICE = Prompt("card", "Which card?", choices=("grey", "white"))
 
 
@@ -51,6 +52,20 @@ def asked(typist: Typist, prompt: Prompt, *lines: str) -> Answer:
     typist.lines = list(lines)
     console = Console(file=typist.stream, width=80, markup=False)
     return TerminalOperator(console, typist.stopping, nullcontext).ask(prompt)
+
+
+@pytest.mark.parametrize(
+    ("typed", "reason"),
+    [("yes", None), ("yes, the wall is at 500", "the wall is at 500"), ("YES: seen before", "seen before")],
+)
+def test_a_failed_check_is_overruled_with_or_without_a_reason(
+    typist: Typist, typed: str, reason: str | None
+) -> None:
+    assert asked(typist, KEEP, "yesterday", typed) == Answer(reason=reason)
+
+
+def test_other_confirmations_have_no_reason(typist: Typist) -> None:
+    assert asked(typist, CONFIRM, "yes, of course", "yes") == Answer()
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from workbench.cli.main import TrialKind
 from workbench.trials.any_sensor.analysis import KINDS, analyse
 from workbench.trials.any_sensor.readings_file import load_readings
 
+ROOT = Path(__file__).parents[3]
 USED = ["true_mm", "measured_mm", "placement", "repeat", "session"]
 
 
@@ -98,3 +99,13 @@ def test_intervals_are_not_called_wider_where_none_is_printed(workbench: Run, tm
         outcome = workbench("trial", kind, path)
         assert "autocorrelated" in outcome.err
         assert ("widened" in " ".join(outcome.err.split())) == widened
+
+
+def test_a_public_table_of_an_ultrasonic_sensor_gives_its_author_s_numbers(workbench: Run) -> None:
+    path = ROOT / "data/hc-sr04-readings.csv"
+    accuracy = json.loads(workbench("trial", "accuracy", path, "--json").out)["rows"]
+    assert [row["mean_error_mm"] for row in accuracy] == [12.0, 10.0, 18.0, 21.0, 34.0]
+    (line,) = json.loads(workbench("trial", "linearity", path, "--json").out)["rows"]
+    # The author's line is of the true range by the measured one, rounded to three digits.
+    assert 1 / line["slope"] == pytest.approx(0.975, abs=0.002)
+    assert -line["intercept_mm"] / line["slope"] == pytest.approx(-6.86, abs=0.5)

@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from tests.support.command_line import Run, refused
-from tests.support.reference_session import REFERENCE, SERIAL, copied, edit_calibration, repeated
+from tests.support.reference_session import REFERENCE, SERIAL, copied, edit_calibration, repair, repeated
 from workbench.session.journal import JOURNAL
 
 
@@ -52,6 +52,16 @@ def test_a_refused_calibration_is_not_put_in_force(workbench: Run, tmp_path: Pat
     path = Path(shutil.copy(REFERENCE / "calibration.yaml", tmp_path))
     path.write_text(path.read_text().replace('verdict: "accepted"', 'verdict: "refused"'))
     refused(workbench("use", path, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path), 3, "refused")
+
+
+def test_a_refused_session_is_not_put_in_force(workbench: Run, tmp_path: Path) -> None:
+    """The calibration from before the repair still lies in the folder."""
+    session = copied(tmp_path)
+    repair(session, "refused")
+    for name in (session.name, session / "calibration.yaml"):
+        done = workbench("use", name, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
+        refused(done, 3, "too few standoffs")
+    assert not (tmp_path / "sensors.jsonl").exists()
 
 
 def test_a_reason_and_an_existing_calibration_are_needed(workbench: Run, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.support.drawn_boards import KnownBoard, draw, to_picture
 from workbench.corners.board import BoardCorners, find_board
 from workbench.corners.subpixel import FLOOR_SD_PX
 from workbench.emulator import open_bench
@@ -18,6 +19,7 @@ from workbench.emulator.board import BoardSurface
 from workbench.model.arrays import FloatArray
 from workbench.model.board import Board, sag_mm
 from workbench.model.errors import BadInputError
+from workbench.model.known_board import AprilGrid, CharucoBoard, Chessboard
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import BoardTarget, Placement
 
@@ -29,6 +31,14 @@ NOISELESS: dict[str, Any] = {
     "sensor": {"read_noise_e": 0.0, "hot_pixels": 0, "full_well_e": 1e9, "quantum_efficiency": 1.0},
     "ambient": {"level_e_per_s": 2e10, "flicker_depth": 0.0},
 }
+
+CHESSBOARD = Chessboard(kind="chessboard", corners=(9, 6), square_mm=25.0)
+CHARUCO = CharucoBoard(
+    kind="charuco", squares=(8, 6), square_mm=30.0, marker_mm=22.0, dictionary="DICT_5X5_50", first_marker=3
+)
+LEGACY = CHARUCO.model_copy(update={"legacy_pattern": True})
+APRILGRID = AprilGrid(kind="aprilgrid", tags=(5, 4), tag_mm=40.0, spacing=0.3)
+KNOWN = (CHESSBOARD, CHARUCO, LEGACY, APRILGRID)
 
 
 def rig_of(seed: int, **emulator: Any) -> Rig:
@@ -162,3 +172,49 @@ def test_a_hot_pixel_moves_no_corner(tmp_path: Path) -> None:
     moved = after.position_px[other] - before.position_px[one]
     # A pixel less of some 140: the corner moves by a part of its own deviation.
     assert np.abs(moved / before.sd_px[one]).max() < 1.0
+
+
+@pytest.mark.parametrize("view", [0, 1])
+@pytest.mark.parametrize("board", KNOWN, ids=lambda board: board.kind)
+def test_boards_of_others_are_found_where_they_are(board: KnownBoard, view: int) -> None:
+    found = find_board([draw(board, view, noise_dn=2.0, seed=seed) for seed in (1, 2)], board)
+    assert len(found.ids) > 0.9 * len(board.corners_mm)
+    true_px = cv2.perspectiveTransform(board.corners_mm[None], to_picture(board, view))[0]
+    z = (found.position_px - true_px[found.ids]) / found.sd_px
+    if isinstance(board, Chessboard):  # half a turn of it looks the same
+        turned = (found.position_px - true_px[::-1][found.ids]) / found.sd_px
+        z = min(z, turned, key=lambda one: float(np.abs(one).max()))
+    # As `test_errors_are_as_large_as_stated`; drawn in steps of a quarter pixel, which adds some.
+    assert np.mean(z**2) == pytest.approx(1.0, abs=0.3 + 4 * np.sqrt(2 / z.size))
+
+
+def test_a_view_that_shows_half_a_chessboard_is_refused() -> None:
+    picture = draw(CHESSBOARD, 0, noise_dn=2.0)
+    picture[:, :300] = 128
+    with pytest.raises(BadInputError, match="whole board"):
+        find_board([picture], CHESSBOARD)
+
+
+def test_half_an_aprilgrid_and_half_a_charuco_board_are_found() -> None:
+    for board in (CHARUCO, APRILGRID):
+        picture = draw(board, 0, noise_dn=2.0)
+        picture[:, :300] = 128
+        found = find_board([picture], board)
+        assert 0.3 < len(found.ids) / len(board.corners_mm) < 0.7
+
+
+def test_an_aprilgrid_numbered_from_the_top_row_is_found() -> None:
+    pictures = draw(APRILGRID, 0, 2.0), draw(APRILGRID, 0, 2.0, from_top=True)
+    below, above = (find_board([picture], APRILGRID) for picture in pictures)
+    assert len(below.ids) == len(above.ids)
+    order = np.argsort(below.ids), np.argsort(above.ids)
+    np.testing.assert_allclose(below.position_px[order[0]], above.position_px[order[1]], atol=0.2)
+
+
+def test_an_aprilgrid_upside_down_is_found() -> None:
+    turned = np.ascontiguousarray(draw(APRILGRID, 0, noise_dn=2.0)[::-1, ::-1], np.uint8)
+    upright, over = (find_board([picture], APRILGRID) for picture in (draw(APRILGRID, 0, 2.0), turned))
+    np.testing.assert_array_equal(np.sort(over.ids), np.sort(upright.ids))
+    by_id = dict(zip(over.ids.tolist(), over.position_px, strict=True))
+    for number, place in zip(upright.ids.tolist(), upright.position_px, strict=True):
+        assert by_id[number] == pytest.approx([639 - place[0], 479 - place[1]], abs=0.2)

@@ -104,3 +104,27 @@ def test_clutter_stands_still_and_has_edges() -> None:
     assert np.abs(np.diff(cluttered, axis=1)).max() > 0.1 * cluttered.mean()
     assert np.corrcoef(cluttered.ravel(), room(1, 0.5, frame=1).ravel())[0, 1] > 0.9
     assert np.corrcoef(cluttered.ravel(), room(2, 0.5).ravel())[0, 1] < 0.7
+
+
+@pytest.mark.parametrize("up", [0.0, 0.5, 1.0])
+def test_charge_beyond_the_full_well_spills_along_its_column(up: float) -> None:
+    quiet = {"read_noise_e": 0.0, "hot_pixels": 0, "black_level": 0.0, "full_well_e": 1000.0}
+    rig = ideal_rig(camera={"bits": 16}, sensor={**quiet, "blooming": 1.0, "blooming_up": up})
+    light = np.zeros((1, 3), np.float32)
+    light[0, 1] = 20_000.0
+    frame = sensor_of(rig).expose([SpotImage(top=75, left=99, rate=light)], 1.0, 1.0, 0.0, generator(3, "f"))
+    column = frame[:, 100] * (1000.0 / 65535)
+    assert column.sum() == pytest.approx(20_000, rel=0.03)  # Poisson noise of the light: 0.7 %
+    assert np.delete(frame, 100, axis=1).max() == 0
+    above, below = column[:75].sum(), column[76:].sum()
+    assert above / (above + below) == pytest.approx(up, abs=0.01)
+    full = np.flatnonzero(column > 999)
+    np.testing.assert_array_equal(full, np.arange(full[0], full[-1] + 1))
+
+
+def test_without_blooming_the_excess_is_drained() -> None:
+    quiet = {"read_noise_e": 0.0, "hot_pixels": 0, "black_level": 0.0, "full_well_e": 1000.0}
+    light = np.full((1, 1), 20_000.0, np.float32)
+    sensor = sensor_of(ideal_rig(camera={"bits": 16}, sensor=quiet))
+    frame = sensor.expose([SpotImage(top=75, left=100, rate=light)], 1.0, 1.0, 0.0, generator(3, "f"))
+    assert (frame > 0).sum() == 1

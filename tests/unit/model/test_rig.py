@@ -185,13 +185,37 @@ def test_an_image_does_not_drift_unless_stated() -> None:
     assert BenchSpec().drift_u_px == BenchSpec().drift_v_px == Prior(value=0.0, sd=0.0)
 
 
-def test_lasers_have_ids_that_differ_and_there_is_at_least_one() -> None:
+def test_lasers_have_ids_that_differ() -> None:
     data = thesis_rig().model_dump(exclude_unset=True)
     assert Rig.model_validate(data).laser_ids == ("L1", "L2", "L3", "L4")
-    for lasers in ([], [data["lasers"][0]] * 2):
-        with pytest.raises(ValidationError) as caught:
-            Rig.model_validate(data | {"lasers": lasers})
-        assert [error["loc"] for error in caught.value.errors()] == [("lasers",)]
+    with pytest.raises(ValidationError) as caught:
+        Rig.model_validate(data | {"lasers": [data["lasers"][0]] * 2})
+    assert [error["loc"] for error in caught.value.errors()] == [("lasers",)]
+
+
+def test_only_a_fit_of_the_camera_accepts_a_rig_without_lasers(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(RIG.partition("lasers:")[0].replace("COEFFICIENTS", "").rstrip() + "\n")
+    assert load_rig(path, camera_alone=True).lasers == ()
+    with pytest.raises(BadInputError, match="lasers"):
+        load_rig(path)
+
+
+def test_a_rig_has_one_of_the_known_boards(tmp_path: Path) -> None:
+    def boarded(*lines: str) -> Rig:
+        path = tmp_path / "rig.yaml"
+        path.write_text(RIG.replace("COEFFICIENTS", "") + "\n".join(lines) + "\n")
+        return load_rig(path)
+
+    assert boarded().banded_board.columns == 13
+    assert boarded("board: {columns: 11}").banded_board.columns == 11
+    chessboard = boarded("board: {kind: chessboard, corners: [9, 6], square_mm: 25}")
+    assert len(chessboard.board.corners_mm) == 54
+    with pytest.raises(BadInputError, match="chessboard"):
+        _ = chessboard.banded_board
+    for wrong in ("{kind: checkers}", "{kind: chessboard, corners: [3, 3], square_mm: 1}", "{rows: 1}"):
+        with pytest.raises(BadInputError, match="board"):
+            boarded(f"board: {wrong}")
 
 
 @pytest.mark.parametrize(("laser_class", "good"), [(2, True), ("3R", True), ("5", False), (True, False)])

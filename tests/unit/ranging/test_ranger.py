@@ -161,8 +161,8 @@ def test_scenes_ranged_together_have_the_readings_of_each_alone(ranger: Ranger, 
         assert [v for v in ours if not isinstance(v, float)] == [
             v for v in others if not isinstance(v, float)
         ]
-        numbers = [[v for v in some if isinstance(v, float)] for some in (ours, others)]
-        np.testing.assert_allclose(*numbers, rtol=1e-12, atol=1e-12)
+        numbers, expected = ([v for v in some if isinstance(v, float)] for some in (ours, others))
+        np.testing.assert_allclose(numbers, expected, rtol=1e-12, atol=1e-12)
 
 
 def test_no_scenes_have_no_readings(ranger: Ranger) -> None:

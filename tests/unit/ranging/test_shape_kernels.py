@@ -49,8 +49,8 @@ def test_fits_of_all_degrees_are_those_of_each(seed: int) -> None:
     ranges = parabola(500.0)(X) + np.random.default_rng(seed).normal(0.0, 0.3, 5)
     together = polynomials(X, 4, 60.0, ranges, OFFSET_MM, *covariances(seed), 12)
     for degree in range(4):
-        for stack, alone in zip(together, fitted(X, ranges, degree, seed), strict=True):
-            own = stack[(degree, *(slice(0, size) for size in np.shape(alone)))]
+        for stack, alone in zip(together, map(np.asarray, fitted(X, ranges, degree, seed)), strict=True):
+            own = stack[degree][tuple(slice(0, size) for size in alone.shape)]
             np.testing.assert_array_equal(own, alone)
             assert np.count_nonzero(stack[degree]) == np.count_nonzero(own)
 

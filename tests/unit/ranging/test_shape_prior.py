@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from math import inf, nan
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,8 +22,23 @@ def test_the_probabilities_of_four_lasers_sum_to_1() -> None:
 
 @pytest.mark.parametrize(("flat", "incline"), [(1.0, 1.0), (0.5, 0.12), (1.12, -0.56)])
 def test_probabilities_that_are_none_are_refused(flat: float, incline: float) -> None:
-    with pytest.raises(BadInputError, match="add up to 1"):
+    with pytest.raises(BadInputError, match="ShapePrior"):
         ShapePrior(flat=flat, incline=incline)
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(ShapePrior)])
+@pytest.mark.parametrize(
+    "wrong", [None, "x", True, -1.0, nan, inf, 1e300, 1j, (), ("x",), (1.0, nan), [1.0, 2.0, 3.0]]
+)
+def test_a_wrong_value_of_a_field_is_refused_by_its_name(name: str, wrong: Any) -> None:
+    with pytest.raises(BadInputError, match=name):
+        ShapePrior(**{name: wrong})
+
+
+def test_an_irregular_surface_has_three_sizes() -> None:
+    two: Any = (1.0, 1.0)
+    with pytest.raises(BadInputError, match="irregular_sds"):
+        replace(PRIOR, irregular_sds=two)
 
 
 @pytest.mark.parametrize(("highest", "degrees"), [(1, {0, 1}), (2, {0, 1, 2}), (3, {0, 1, 2, 3})])

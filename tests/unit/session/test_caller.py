@@ -24,5 +24,6 @@ def test_an_account_without_a_name_is_its_number(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(getpass, "getuser", lambda: "technician")
     assert operator() == "technician"
+    assert operator("A. Person") == "A. Person"
     monkeypatch.setattr(getpass, "getuser", nameless)
     assert operator() == str(os.getuid())

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from pathlib import Path
 
 import pytest
 
 from workbench.model.errors import BadInputError, StoppedError
-from workbench.model.event import SessionFinished, SessionStarted, StepStarted
-from workbench.session.journal import JOURNAL, Journal, is_running, read_journal
+from workbench.model.event import Record, SessionFinished, SessionStarted, StepStarted
+from workbench.session.journal import JOURNAL, Journal, is_running, last_chain, read_journal
 
 STARTED = SessionStarted(session="s", rig="r", procedures=("p",))
 STEP = StepStarted(procedure="p", index=1, step="fit", title="Fit", shots=0)
@@ -64,6 +66,52 @@ def test_a_time_out_of_range_is_named(tmp_path: Path, time_ns: int) -> None:
     path.write_text(path.read_text().replace(str(written.time_ns), str(time_ns)))
     with pytest.raises(BadInputError, match=r"journal\.jsonl:1: "):
         list(read_journal(tmp_path))
+
+
+@pytest.mark.parametrize("line", [0, 1, 2])
+def test_an_edited_number_is_refused_with_its_line(tmp_path: Path, line: int) -> None:
+    with Journal(tmp_path) as journal:
+        for event in (STEP, STEP, STEP):
+            journal.append(event)
+    path = tmp_path / JOURNAL
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[line] = lines[line].replace(b'"shots":0', b'"shots":1')
+    path.write_bytes(b"".join(lines))
+    for read in (read_journal, Journal.reopen):
+        with pytest.raises(BadInputError, match=rf"journal\.jsonl:{line + 1}: ") as caught:
+            list(read(tmp_path))
+        assert caught.value.exit_code == 2
+
+
+def test_a_reopened_journal_continues_the_hash_chain_also_of_an_older_version(tmp_path: Path) -> None:
+    path = tmp_path / JOURNAL
+    old = [Record(n=n, time_ns=n, event=event).model_dump_json() for n, event in enumerate((STARTED, STEP))]
+    path.write_text("".join(f"{line}\n" for line in old))
+    assert last_chain(tmp_path) == ""
+    for event in (STEP, STEP):
+        journal, _ = Journal.reopen(tmp_path)
+        with journal:
+            journal.append(event)
+    assert [record.event for record in read_journal(tmp_path)] == [STARTED, STEP, STEP, STEP]
+    content = path.read_bytes()
+    assert last_chain(tmp_path) == hashlib.sha256(content[: content.rindex(b',"chain"')]).hexdigest()
+    path.write_bytes(content.replace(b'"rig":"r"', b'"rig":"q"'))
+    with pytest.raises(BadInputError, match=r"journal\.jsonl:3: "):
+        list(read_journal(tmp_path))
+
+
+def test_a_write_that_failed_does_not_break_the_hash_chain(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = os.write
+    with Journal(tmp_path) as journal:
+        journal.append(STARTED)
+        with monkeypatch.context() as patch:
+            patch.setattr("workbench.session.journal.os.write", lambda file, data: write(file, data[:9]))
+            with pytest.raises(StoppedError):
+                journal.append(STEP)
+        journal.append(STEP)
+    assert [record.event for record in read_journal(tmp_path)] == [STARTED, STEP]
 
 
 def test_control_characters_of_a_foreign_journal_are_shown(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.model.prompt import Answer
+from workbench.model.table import Column, Table
 from workbench.model.target import Placement
 from workbench.session.journal import JOURNAL, Journal
 from workbench.session.state import effective, placement_captures, safe_part, session_status, session_statuses
@@ -102,6 +103,25 @@ def test_a_session_stands_where_its_exit_code_says(
     assert (status.state, status.unfinished) == (state, unfinished)
     assert (status.procedures, status.captures) == (("p",), 1)
     assert "\n" not in status.why
+
+
+def verified(valid: str) -> ev.TrialFinished:
+    """A verification with this cell in its verdict."""
+    columns = tuple(Column(key=key, name=key) for key in ("valid", "verdict"))
+    table = Table(name="p.1-verdict", title="Verdict", columns=columns, rows=((valid, "p = 0.3"),))
+    return ev.TrialFinished(trial="p.1", tables=(table,))
+
+
+def test_the_results_of_trials_are_part_of_the_status(tmp_path: Path) -> None:
+    finished = ev.StepFinished(procedure="p", index=2, outcome="bias 0.1 mm")
+    accuracy = ev.TrialFinished(trial="p.2")
+    status = session_status(write(tmp_path / "a", STARTED, verified("yes"), accuracy, finished))
+    verification, other = status.trials
+    assert other == "p.2: bias 0.1 mm"
+    assert verification.startswith("p.1: ")
+    refused = session_status(write(tmp_path / "b", STARTED, verified("NO")))
+    assert refused.trials != (verification,)
+    assert session_status(write(tmp_path / "c", STARTED)).trials == ()
 
 
 def test_a_session_that_waits_names_the_open_prompt(tmp_path: Path) -> None:

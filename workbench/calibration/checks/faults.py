@@ -113,8 +113,8 @@ def _standoff_fault(fit: CalibrationFit, h: Hypothesis) -> Fault:
         name="standoff",
         placement=info.key,
         message=f"the captures at {info.standoff_mm:g} mm fit a standoff of {fitted:.4g} mm"
-        f"{_digit_error(info.standoff_mm, fitted)}; no other cause explains them. Do: correct the standoff in"
-        " the captures, or leave it out",
+        f"{_digit_error(info.standoff_mm, fitted)}; no other cause explains them. Do: measure it and"
+        " capture it again, or leave it out; in a captures file, correct standoff_mm",
     )
 
 
@@ -229,7 +229,7 @@ def _all_far(fit: CalibrationFit) -> Iterator[Fault]:
     travels = [_travel(fit, laser) for laser in range(len(fit.rig.lasers))]
     known = [travel for travel in travels if travel is not None]
     if known and max(known) < LEAST_TRAVEL:
-        nearest = min(p.standoff_mm for p in fit.cells.placements)
+        nearest = min(s.standoff_mm for s in fit.used)
         yield Fault(
             name="all_far",
             message=f"all standoffs are far: from {nearest:g} mm to infinity no spot moves by more than"

@@ -170,6 +170,8 @@ def _wrong_standoffs(fit: CalibrationFit, state: Refit) -> Iterator[Hypothesis]:
     ]
     sound = not is_improbable(state)
     for index in np.argsort(strain)[::-1].tolist():
+        if fit.cells.placements[index].is_free:
+            continue
         on_board = fit.cells.placements[index].key in boards
         rows = rows_at(state.problem, index) & state.used
         others = state.used & ~rows

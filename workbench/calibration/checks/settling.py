@@ -25,8 +25,10 @@ import numpy as np
 
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.estimation.refit import optimum_of, problem_of
+from workbench.calibration.model.parameters import STEP
 from workbench.model.arrays import FloatArray
 from workbench.model.number_text import duration
+from workbench.model.stats import chi2_sf
 
 TIME_CONSTANTS = np.geomspace(0.02, 20.0, 121)
 """Grid, in durations of the session: below, one capture in fifty shifts; above, the drift is steady."""
@@ -36,6 +38,8 @@ INTERVAL_GAIN = 3.84
 """Loss of gain at the ends of the 95 % interval."""
 BY_ORDER = "judged by the order of the captures, as they have no times (time_s)"
 """Remark on a drift whose time is an order."""
+DRIFTS_P = 0.003
+"""P value below which a drift within the parts is taken for real, beside the steps between them."""
 LEAST_INFORMATION = 1e-6
 """Information on a drift, 1/px^2, below which its axis is not estimated."""
 
@@ -104,13 +108,8 @@ class DriftProfile:
         return float(score @ amplitude), np.asarray(amplitude, np.float64).reshape(-1, 2)
 
 
-def settling(fitted: CalibrationFit) -> Settling | None:
-    """Time constant of the drift that a fit has; None where the drift is steady, or hidden by the order."""
-    return settling_of(DriftProfile.of(fitted))
-
-
 def settling_of(profile: DriftProfile) -> Settling | None:
-    """`settling` by the linearised residuals of a fit."""
+    """Time constant of the drift that a fit has; None where the drift is steady, or hidden by the order."""
     gains = np.array([profile.gain(np.exp(-profile.time / tau))[0] for tau in TIME_CONSTANTS])
     best = int(np.argmax(gains))
     if gains[best] < profile.gain(profile.time)[0] + STEADY_GAIN:
@@ -121,9 +120,38 @@ def settling_of(profile: DriftProfile) -> Settling | None:
     return Settling(float(TIME_CONSTANTS[best]), (low, high), float(np.hypot(*amplitude_px.T).max()))
 
 
-def warm_up_advice(fitted: CalibrationFit) -> str:
-    """Advice in words for a fit with a drift: duration of the warm-up, or that the drift has not settled."""
-    found, duration_s = settling(fitted), fitted.cells.times.duration_s
+def drift_advice(fitted: CalibrationFit) -> str:
+    """Advice in words for a fit with a drift: on a step between parts of the session, or on the warm-up."""
+    profile = DriftProfile.of(fitted)
+    if fitted.layout.parts > 1 and not drifts_within_parts(profile):
+        return _step_advice(fitted)
+    return _warm_up_advice(fitted, settling_of(profile))
+
+
+def drifts_within_parts(profile: DriftProfile) -> bool:
+    """Whether the image drifts within the parts, steadily or settling, apart from the steps between them."""
+    shapes = [profile.time, *(np.exp(-profile.time / tau) for tau in TIME_CONSTANTS)]
+    gain = max(profile.gain(shape)[0] for shape in shapes)
+    return float(chi2_sf(gain, 2 * profile.parts.shape[1])) < DRIFTS_P
+
+
+def _step_advice(fitted: CalibrationFit) -> str:
+    """Advice on the most significant step of the image between two parts of the session."""
+    layout = fitted.layout
+    steps_px = fitted.values[layout.steps].reshape(-1, len(STEP))
+    sd_px = np.sqrt(np.diag(fitted.covariance)[layout.steps]).reshape(-1, len(STEP))
+    number = int(np.argmax((steps_px**2 / sd_px**2).sum(axis=1)))
+    u, v = steps_px[number].tolist()
+    return (
+        f"It is a step by {u:+.2g} px in u and {v:+.2g} px in v between parts {number + 1} and {number + 2}"
+        " of the session, and no drift within a part: at this interruption sensor, lens or camera was touched"
+        " or turned. Do: fix them, leave them alone until the last capture, or calibrate in one part"
+    )
+
+
+def _warm_up_advice(fitted: CalibrationFit, found: Settling | None) -> str:
+    """Duration of the warm-up, or that the drift has not settled."""
+    duration_s = fitted.cells.times.duration_s
     by_order = "" if isfinite(duration_s) else f" ({BY_ORDER})"
     if found is None:
         return (

@@ -13,6 +13,7 @@ from workbench.calibration.data.observations import MeanObservations, Observatio
 from workbench.model.board import Board
 from workbench.model.errors import BadInputError
 from workbench.model.fit_event import Rejected
+from workbench.model.known_board import AnyBoard
 from workbench.model.rig import Rig
 from workbench.optics.lens_models import lens_model
 from workbench.optics.undistort import undistort
@@ -35,6 +36,10 @@ class BoardView:
     placement: PlacementInfo
     corners: BoardCorners
 
+    def with_wider_sd(self, factor: float) -> BoardView:
+        """The view with the deviations of its corners multiplied."""
+        return replace(self, corners=replace(self.corners, sd_px=factor * self.corners.sd_px))
+
 
 @dataclass(frozen=True)
 class PoseGuess:
@@ -45,16 +50,21 @@ class PoseGuess:
     x_mm: float
     y_mm: float
     roll_rad: float
+    z0_mm: float
+    """Depth of the board's plane on the optical axis."""
+    distance_mm: float
+    """Depth of the board's centre: the scale of all lengths of the pose."""
 
 
-def see_board(frames: Sequence[Image], board: Board, placement: PlacementInfo) -> BoardView | Rejected:
+def see_board(frames: Sequence[Image], board: AnyBoard, placement: PlacementInfo) -> BoardView | Rejected:
     """Corners of the board in the frames of one placement, or the reason why they are not found."""
     from workbench.corners.board import find_board
 
     try:
         return BoardView(placement, find_board(frames, board))
     except BadInputError as error:
-        return Rejected(placement.source, f"board at {placement.standoff_mm:g} mm: {error}")
+        where = placement.key if placement.is_free else f"{placement.standoff_mm:g} mm"
+        return Rejected(placement.source, f"board at {where}: {error}")
 
 
 def on_band(view: BoardView, board: Board, observation: Observation) -> Observation | Rejected:
@@ -81,7 +91,7 @@ def on_band(view: BoardView, board: Board, observation: Observation) -> Observat
 
 
 def on_boards(
-    board: Board, seen: Mapping[str, BoardView | Rejected], found: Sequence[Observation | Rejected]
+    board: AnyBoard, seen: Mapping[str, BoardView | Rejected], found: Sequence[Observation | Rejected]
 ) -> list[Observation | Rejected]:
     """Reject observations whose spot lies beside the blank band of a board, or on a board not found.
 
@@ -94,13 +104,18 @@ def on_boards(
 
 
 def _on_board(
-    board: Board, seen: BoardView | Rejected | None, observation: Observation
+    board: AnyBoard, seen: BoardView | Rejected | None, observation: Observation
 ) -> Observation | Rejected:
     if seen is None:
         return observation
+    where = f"laser {observation.laser_id} at {observation.standoff_mm:g} mm"
+    if not isinstance(board, Board):
+        reason = (
+            f"{where}: a {board.kind} has no blank band for a spot; give its views placements of their own"
+        )
+        return Rejected(observation.source, reason)
     if isinstance(seen, BoardView):
         return on_band(seen, board, observation)
-    where = f"laser {observation.laser_id} at {observation.standoff_mm:g} mm"
     return Rejected(observation.source, f"{where}: the board at this placement was not found")
 
 
@@ -151,4 +166,5 @@ def guess_pose(rig: Rig, view: BoardView) -> PoseGuess:
     slope_x, slope_y = float(-axes[0, 2] / axes[2, 2]), float(-axes[1, 2] / axes[2, 2])
     across = np.array([1.0, 0.0, slope_x]) / np.hypot(1.0, slope_x)
     roll = atan2(float(axes[:, 0] @ np.cross(axes[:, 2], across)), float(axes[:, 0] @ across))
-    return PoseGuess(slope_x, slope_y, float(shift[0, 0]), float(shift[1, 0]), roll)
+    x, y, z = (float(one) for one in shift[:, 0])
+    return PoseGuess(slope_x, slope_y, x, y, roll, z - slope_x * x - slope_y * y, z)

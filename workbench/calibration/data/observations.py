@@ -83,6 +83,7 @@ class PlacementInfo:
 
     key: str
     standoff_mm: float
+    """NaN: a view of a board held anywhere."""
     standoff_sd_mm: float
     """NaN: not stated, the rig's is used."""
     yaw_deg: float
@@ -95,13 +96,21 @@ class PlacementInfo:
         return cls(s.placement, s.standoff_mm, s.standoff_sd_mm, s.yaw_deg, s.source)
 
     @property
-    def setting(self) -> tuple[float, float | None, float]:
+    def is_free(self) -> bool:
+        """Whether no standoff is stated: the corners alone determine the pose of the board."""
+        return isnan(self.standoff_mm)
+
+    @property
+    def setting(self) -> tuple[float | None, float | None, float]:
         """Standoff, its sd (None: not stated) and yaw: equal for all observations of a placement."""
-        return self.standoff_mm, None if isnan(self.standoff_sd_mm) else self.standoff_sd_mm, self.yaw_deg
+        standoff_mm = None if self.is_free else self.standoff_mm
+        return standoff_mm, None if isnan(self.standoff_sd_mm) else self.standoff_sd_mm, self.yaw_deg
 
     @property
     def describe(self) -> str:
         """Text for messages."""
+        if self.is_free:
+            return "no standoff"
         sd = "" if isnan(self.standoff_sd_mm) else f" +- {self.standoff_sd_mm:g}"
         return f"{self.standoff_mm:g}{sd} mm, {self.yaw_deg:g} deg"
 

@@ -136,8 +136,6 @@ def _see_board(rig: Rig, key: str, rows: Sequence[CaptureRow]) -> BoardView | Re
 
     first, size = rows[0], (rig.camera.width_px, rig.camera.height_px)
     source = f"row {first.row}"
-    if isnan(first.standoff_mm):
-        return Rejected(source, NO_STANDOFF)
     tilt = 0.0 if isnan(first.tilt_deg) else first.tilt_deg
     placement = PlacementInfo(key, first.standoff_mm, first.standoff_sd_mm, tilt, source)
     frames = [read_image(row.on, size) for row in rows if row.on is not None]

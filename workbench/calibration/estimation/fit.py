@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, radians, tan
@@ -10,7 +10,7 @@ from math import inf, radians, tan
 import numpy as np
 
 from workbench.calibration.checks.out_of_frame import name_out_of_frame
-from workbench.calibration.data.boards import BoardView, PoseGuess, guess_pose, with_placements
+from workbench.calibration.data.boards import BoardView, guess_pose, with_placements
 from workbench.calibration.data.observations import (
     MeanObservations,
     Observation,
@@ -192,7 +192,7 @@ def fit_cells(
     """
     table = table_of(rig, cells.placements, boards, layout_of(rig, cells, boards).parts)
     solution, scale = _solve(LeastSquaresProblem.of(rig, table, cells, boards))
-    errors = _placement_errors(table)
+    errors = _placement_errors(table, {p.key for p in cells.placements if p.is_free})
     scatter = placement_scatter(solution.y[errors], solution.covariance[np.ix_(errors, errors)])
     if scatter.scale > 1:
         table = table.with_wider_priors(errors, scatter.scale)
@@ -243,11 +243,19 @@ def _solve(problem: LeastSquaresProblem) -> tuple[Solution, float]:
     return solution, scale
 
 
-def _placement_errors(table: ParameterTable) -> IndexArray:
-    """(J,) indices of the placements' errors along the axis that are not held constant."""
-    name = PLACEMENT[0]
+def _placement_errors(table: ParameterTable, free: Set[str]) -> IndexArray:
+    """(J,) indices of the placements' errors along the axis that are not held constant.
+
+    Args:
+        table: parameters of the fit.
+        free: placements without a stated standoff, which can have no error.
+    """
+    parts = [(p, *p.name.rpartition(".")) for p in table.parameters]
     return np.flatnonzero(
-        [p.kind == "placement" and p.name.endswith(f".{name}") and p.prior.sd > 0 for p in table.parameters]
+        [
+            p.kind == "placement" and name == PLACEMENT[0] and p.prior.sd > 0 and key not in free
+            for p, key, _, name in parts
+        ]
     )
 
 
@@ -289,28 +297,47 @@ def table_of(
     if not boards:
         return ParameterTable((*sensor_parameters(rig), *flat, *step_parameters(parts)))
     printed = tuple(sensor_parameter(name, getattr(rig.bench, name)) for name in PRINT)
-    poses = {view.placement.key: guess_pose(rig, view) for view in boards}
+    poses = {view.placement.key: _pose_priors(rig, view) for view in boards}
     return ParameterTable(
         (
             *sensor_parameters(rig),
             *printed,
             *(_with_pose_prior(parameter, poses) for parameter in flat),
             *board_parameters(rig),
-            *(_pose_parameter(key, name, pose) for key, pose in poses.items() for name in POSE),
+            *(
+                Parameter(f"{key}.{name}", unit_of(name), priors[name], "placement")
+                for key, priors in poses.items()
+                for name in POSE
+            ),
             *step_parameters(parts),
         )
     )
 
 
-def _with_pose_prior(parameter: Parameter, poses: dict[str, PoseGuess]) -> Parameter:
-    """A placement's parameter; slopes of a board have a wide prior about the starting pose."""
+def _with_pose_prior(parameter: Parameter, poses: Mapping[str, Mapping[str, Prior]]) -> Parameter:
+    """A placement's parameter, with the prior of a board's pose if it has one."""
     key, _, name = parameter.name.rpartition(".")
-    return _pose_parameter(key, name, poses[key]) if key in poses and name in POSE_SD else parameter
+    return replace(parameter, prior=poses.get(key, {}).get(name, parameter.prior))
 
 
-def _pose_parameter(key: str, name: str, pose: PoseGuess) -> Parameter:
-    prior = Prior(value=getattr(pose, name.removeprefix("board_")), sd=POSE_SD[name])
-    return Parameter(f"{key}.{name}", unit_of(name), prior, "placement")
+def _pose_priors(rig: Rig, view: BoardView) -> dict[str, Prior]:
+    """Wide priors of a board's pose about its starting value, by the names of the placement's parameters.
+
+    Slopes, position and rotation; for a board held anywhere also its depth, instead of the error of a stated
+    standoff.
+    """
+    pose = guess_pose(rig, view)
+    priors = {
+        name: Prior(value=getattr(pose, name.removeprefix("board_")), sd=sd) for name, sd in POSE_SD.items()
+    }
+    if view.placement.is_free:
+        depth_mm = pose.z0_mm - rig.bench.offset_mm.value
+        priors |= {
+            PLACEMENT[0]: Prior(value=depth_mm, sd=pose.distance_mm),
+            "board_x_mm": Prior(value=pose.x_mm, sd=pose.distance_mm),
+            "board_y_mm": Prior(value=pose.y_mm, sd=pose.distance_mm),
+        }
+    return priors
 
 
 def _with_stated_prior(parameter: Parameter, placements: dict[str, PlacementInfo]) -> Parameter:
@@ -330,6 +357,8 @@ def _rms(cells: MeanObservations, residual_px: FloatArray) -> float:
     """Root mean square residual over the coordinates of all single observations, px."""
     predicted = cells.position_px - residual_px
     single = [positions(m) - p for m, p in zip(cells.members, predicted, strict=True)]
+    if not single:
+        return float("nan")
     return float(np.sqrt(np.nanmean(np.concatenate(single) ** 2)))
 
 

@@ -21,7 +21,6 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from workbench.model.arrays import FloatArray
 from workbench.model.stats import chi2_sf
@@ -117,6 +116,7 @@ def _log_likelihood(seen: _Seen, variance: FloatArray) -> float:
 
 def _variance(seen: _Seen, variance: FloatArray) -> float:
     """The variance that those of value 1 have most likely, at least 1."""
+    from scipy.optimize import minimize_scalar  # a tenth of the time of a fit to load; few fits need it
 
     def misfit(log_scale: float) -> float:
         return -_log_likelihood(seen, np.where(variance > 1, variance, np.exp(2.0 * log_scale)))

@@ -25,7 +25,7 @@ from workbench.calibration.model.prediction import (
     predict_spots,
 )
 from workbench.model.arrays import FloatArray
-from workbench.model.board import Board
+from workbench.model.known_board import AnyBoard
 from workbench.model.rig import Rig
 
 
@@ -84,7 +84,8 @@ class LeastSquaresProblem:
         data = _Data(
             mean=table.prior_mean,
             sd=table.prior_sd,
-            standoff_mm=np.array([p.standoff_mm for p in cells.placements]),
+            # A board held anywhere has its whole depth as its placement error.
+            standoff_mm=np.nan_to_num([p.standoff_mm for p in cells.placements]),
             spots=SpotData(cells.laser, cells.placement, cells.time, cells.parts),
             corners=_corner_data(cells, boards, rig.board),
             position_px=np.where(measured, position, 0.0),
@@ -133,7 +134,7 @@ def layout_of(rig: Rig, cells: MeanObservations, boards: Sequence[BoardView]) ->
     return Layout(rig.camera.lens, len(rig.lasers), len(cells.placements), len(boards), parts)
 
 
-def _corner_data(cells: MeanObservations, boards: Sequence[BoardView], board: Board) -> CornerData:
+def _corner_data(cells: MeanObservations, boards: Sequence[BoardView], board: AnyBoard) -> CornerData:
     order = [p.key for p in cells.placements]
     counts = [len(b.corners.ids) for b in boards]
     ids = np.concatenate([np.array([], np.intp), *(b.corners.ids for b in boards)])
@@ -191,7 +192,7 @@ def _data_residual(y: Array, data: _Data, layout: Layout) -> Array:
     """(2 M,) predicted - measured positions in standard deviations; 0 where not measured."""
     values = jnp.asarray(data.mean) + jnp.asarray(data.sd) * y
     standoff_mm = jnp.asarray(data.standoff_mm)
-    predicted = predict_spots(values, layout, data.spots, standoff_mm)
+    predicted = predict_spots(values, layout, data.spots, standoff_mm) if layout.lasers else jnp.zeros((0, 2))
     if layout.boards:
         corners = predict_corners(values, layout, data.corners, standoff_mm)
         predicted = jnp.concatenate([predicted, corners])

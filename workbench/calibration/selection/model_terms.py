@@ -18,29 +18,25 @@ import numpy as np
 
 from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Observation
-from workbench.calibration.estimation.fit import CalibrationFit, fit_cells, table_of
-from workbench.calibration.estimation.problem import LeastSquaresProblem
+from workbench.calibration.estimation.fit import CalibrationFit, fit_cells
 from workbench.calibration.model.parameters import DRIFT
+from workbench.calibration.selection.camera_fit import with_scatter_of_views
 from workbench.calibration.selection.drift import drift_is_shown, fit_with_drift, with_drift
+from workbench.calibration.selection.missing_terms import LEAST_INFORMATION, freed, missing_terms
 from workbench.calibration.selection.outliers import fit_without_outliers, without_outliers
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import TermSummary, TermVerdict
 from workbench.model.fit_event import Rejected
 from workbench.model.nested import TILTS
-from workbench.model.rig import TARGET_TILT, Prior, Rig
+from workbench.model.rig import TARGET_TILT, Rig
 from workbench.model.stats import chi2_sf
 from workbench.optics.image import in_picture
-from workbench.optics.lens_models import lens_model
 from workbench.sensor.range_model import RangeModel
 
 STRONG = 1.0
 """log10 of a Bayes factor that is strong evidence (R. E. Kass and A. E. Raftery, JASA 90 (1995) 773)."""
-CALLED_FOR_P = 0.001
-"""P value below which the data call for a term that the rig file holds constant."""
 GRID = 12
 """Standoffs at which the shift of ranges is evaluated."""
-LEAST_INFORMATION = 1e-6
-"""Information of the data, in units of the prior's, below which they do not constrain a direction."""
 
 
 class _Comparison(NamedTuple):
@@ -71,20 +67,21 @@ def fit_calibration(
         BadInputError: as `fit`.
         LimitFailedError: as `fit`.
     """
+    boards = with_scatter_of_views(rig, boards)
     # Tested before any rejection: spots that need a missing term look like outliers.
     whole = fit_with_drift(rig, observations, rejected, boards)
     rig = whole.rig
-    missing = _called_for(whole)
+    missing = missing_terms(whole)
     if missing:
-        freed = _freed(rig, [term.name for term in missing])
-        sound = fit_without_outliers(freed, observations, rejected, boards)
+        freer = freed(rig, [term.name for term in missing])
+        sound = fit_without_outliers(freer, observations, rejected, boards)
         fitted = fit_cells(rig, sound.cells, sound.rejected, boards)
     else:
         fitted = without_outliers(whole, rejected)
     if fitted is not whole and drift_is_shown(fitted):  # which outliers may have hidden
         fitted = fit_cells(with_drift(rig), fitted.cells, fitted.rejected, boards)
     if fitted is not whole:
-        missing = _called_for(fitted)
+        missing = missing_terms(fitted)
     terms = [_weigh(fitted, name) for name in _candidates(fitted)]
     return replace(fitted, terms=(*terms, *missing))
 
@@ -103,13 +100,6 @@ def _weigh(fitted: CalibrationFit, name: str) -> TermSummary:
         log10_bayes_factor=one.log10_bayes_factor,
         range_shift_sd=_range_shift_sd(fitted, one),
     )
-
-
-def _freed(rig: Rig, names: Sequence[str]) -> Rig:
-    """The rig with constant lens terms free, with the lens model's trial deviations as priors."""
-    known, trial_sd = rig.camera.lens_priors, lens_model(rig.camera.lens).trial_sd
-    priors = {name: Prior(value=known[name].value, sd=trial_sd[name]) for name in names}
-    return rig.model_copy(update={"camera": rig.camera.model_copy(update=priors)})
 
 
 def _candidates(fitted: CalibrationFit) -> list[str]:
@@ -185,42 +175,3 @@ def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
     size = fitted.rig.camera.width_px, fitted.rig.camera.height_px
     seen = in_picture(spots, size) & np.isfinite(found.spot_sd_mm)
     return found.by_parameter[seen] / range_mm[seen, None], found.spot_sd_mm[seen] / range_mm[seen]
-
-
-def _called_for(fitted: CalibrationFit) -> list[TermSummary]:
-    """Constant lens terms that the data call for, by a score test at the fit.
-
-    Let j be the derivatives of the residuals r by the term, J those by the free parameters, C their posterior
-    covariance. The information on the term is `j j - j^T J C J^T j`, the score `-j r`.
-    """
-    rig = fitted.rig
-    tried = [name for name in fitted.layout.model.trial_sd if rig.camera.lens_priors[name].sd == 0]
-    table = table_of(_freed(rig, tried), fitted.cells.placements, fitted.boards, fitted.layout.parts)
-    problem = LeastSquaresProblem.of(rig, table, fitted.cells, fitted.boards)
-    sd = table.prior_sd
-    y = np.divide(fitted.values - table.prior_mean, sd, out=np.zeros_like(sd), where=sd > 0)
-    residual, jacobian = problem.linearise(y, fitted.noise_scale)
-    free = fitted.table.prior_sd > 0
-    within = jacobian[:, free]
-    covariance = np.linalg.inv(within.T @ within + np.eye(free.sum()))
-    found = []
-    for name in tried:
-        column = jacobian[:, [p.name for p in table.parameters].index(name)]
-        along = within.T @ column
-        information = column @ column - along @ covariance @ along
-        if information <= LEAST_INFORMATION:
-            continue
-        score = -column @ residual
-        p_value = float(chi2_sf(score**2 / information, 1))
-        if p_value < CALLED_FOR_P:
-            log_factor = 0.5 * (score**2 / (1 + information) - log(1 + information))
-            found.append(
-                TermSummary(
-                    name=name,
-                    verdict="called for",
-                    p_value=p_value,
-                    log10_bayes_factor=float(log_factor / log(10)),
-                    range_shift_sd=None,
-                )
-            )
-    return found

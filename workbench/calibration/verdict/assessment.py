@@ -15,7 +15,7 @@ from workbench.calibration.checks.mistaken_data import undecided_unit
 from workbench.calibration.checks.priors import contradicted_priors, doubted_priors
 from workbench.calibration.checks.residuals import alarms as residual_alarms
 from workbench.calibration.checks.residuals import explain, residual_tests
-from workbench.calibration.checks.settling import BY_ORDER, warm_up_advice
+from workbench.calibration.checks.settling import BY_ORDER, drift_advice
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.model.parameters import DRIFT, fits_drift
 from workbench.calibration.selection.drift import SHOWN_P, drift_test
@@ -144,7 +144,7 @@ def _missed_limits(fit: CalibrationFit, limits: Acceptance, max_relative_range_s
     if not np.abs(fit.drift_px).max() <= limits.max_drift_px:
         reasons.append(
             f"the image drifted by {_drift_text(fit)}, expected at most"
-            f" {limits.max_drift_px:g} px. {warm_up_advice(fit)}, and capture again"
+            f" {limits.max_drift_px:g} px. {drift_advice(fit)}, and capture again"
         )
     if not fit.placement_scale <= limits.max_placement_scale:
         reasons.append(
@@ -306,7 +306,7 @@ def _warnings(fit: CalibrationFit) -> list[str]:
     if np.any(fit.drift_px):
         warnings.append(
             f"the image drifted by {_drift_text(fit)}; the fit allows for it, and the sd of the image centre"
-            f" includes half the drift. {warm_up_advice(fit)}."
+            f" includes half the drift. {drift_advice(fit)}."
         )
     if fit.noise_scale > 1:
         warnings.append(

@@ -10,7 +10,7 @@ from typing import Any
 from workbench.devices.registry import bench_problems, has_bench
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
-from workbench.model.yamlfile import Document, Mistake, kind_of, line_of, read_document
+from workbench.model.yamlfile import Document, Mistake, include_files, kind_of, line_of, read_document
 from workbench.procedure.engine.existing_calibration import GIVES
 from workbench.procedure.engine.procedure_file import Procedure
 from workbench.procedure.engine.registry import step_kinds
@@ -81,10 +81,13 @@ def _between_steps(document: Document, steps: list[Any]) -> Iterator[Mistake]:
 
 
 def _in_rig(document: Document) -> Iterator[Mistake]:
+    include_files(document, Rig)
     of_rig = document.mistakes(Rig)
     yield from of_rig
     if not has_bench(document.data.get("driver"), document.data.get("devices")):
         yield _Note(1, "no driver and no devices: the rig can be fitted but not run")
+    if not of_rig and not document.data.get("lasers"):
+        yield _Note(1, "no lasers: only its camera can be fitted, to views of its board")
     rig = None if of_rig else Rig.model_validate(document.data)
     of_bench = map(document.mistake, bench_problems(document.data, rig))
     yield from (one for one in of_bench if one not in of_rig)

@@ -18,7 +18,7 @@ from workbench.model.target import Placement
 from workbench.procedure.capture.automatic import find_automatic_control
 from workbench.procedure.capture.latency import count_latency
 from workbench.procedure.capture.pair import PairSource, spots_found
-from workbench.procedure.engine.prompts import SAFETY, safety_prompt
+from workbench.procedure.engine.prompts import safety_prompt
 from workbench.procedure.engine.replay import ReplayingJournal
 from workbench.procedure.engine.step import Step
 from workbench.spots import Finding, Scanline, find_spots
@@ -77,15 +77,20 @@ class Context:
             LaserOffNotConfirmedError: a beam stays on.
         """
         answer = self.recorder.answer(prompt.key, prompt.do) or self.ask_now(prompt)
-        self.emit(ev.Answered(key=prompt.key, question=prompt.do, answer=answer))
+        self.journal_answer(prompt, answer)
         return answer
+
+    def journal_answer(self, prompt: Prompt, answer: Answer) -> None:
+        """Journal an answer; a confirmation that overrules a failed check is marked."""
+        overrules = prompt.overrules and answer.action == "done"
+        self.emit(ev.Answered(key=prompt.key, question=prompt.do, answer=answer, overrules=overrules))
 
     def confirm_safety(self) -> None:
         """Have eyewear and beam path confirmed before the first emission, again after each resumption."""
         if not self.pairs.may_emit:
             prompt = safety_prompt(self.rig)
             answer = self.ask_now(prompt)
-            self.emit(ev.Answered(key=SAFETY, question=prompt.do, answer=answer))
+            self.journal_answer(prompt, answer)
             self.pairs.may_emit = True
 
     def capture(

@@ -36,7 +36,19 @@ def capture_limit_prompts(placements: Sequence[Placement], rig: Rig, limits: Cap
 
 def result_limit_prompts(step: str, limits: FileModel) -> list[Prompt]:
     """Possible prompts of limits on results of a fit or a trial with `on_fail: ask`."""
-    return [Prompt(f"{step}/{name}", CONTINUE) for name in _asking(limits)]
+    return [result_limit_prompt(step, name) for name in _asking(limits)]
+
+
+def result_limit_prompt(step: str, name: str, failed: str = "") -> Prompt:
+    """Question about a failed limit on a result of a fit or a trial.
+
+    Args:
+        step: name of the step.
+        name: name of the limit.
+        failed: description of the failure; empty: it is not known yet.
+    """
+    question = f"{failed}. {CONTINUE}" if failed else CONTINUE
+    return Prompt(f"{step}/{name}", question, otherwise="Abort with a reason.", overrules=True)
 
 
 def refuse_retry(limits: Limits) -> Limits:
@@ -102,7 +114,7 @@ def check_fit(context: Context, step: str, values: Mapping[str, float], limits: 
             continue
         if limit.on_fail == "stop":
             raise LimitFailedError(failed)
-        context.ask(Prompt(f"{step}/{name}", f"{failed}. {CONTINUE}", otherwise="Abort with a reason."))
+        context.ask(result_limit_prompt(step, name, failed))
         remarks.append(failed)
     return "; ".join(remarks) or "within the limits"
 

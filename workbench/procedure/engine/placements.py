@@ -178,4 +178,4 @@ def settle(context: Context, prompt: Prompt, failed: str, *, place_again: bool =
         raise RetakeError(f"{failed}: {answer.reason}", place_again=place_again)
     if answer.action == "skip":
         raise _SkipError(answer)
-    context.emit(ev.Answered(key=prompt.key, question=prompt.do, answer=answer))
+    context.journal_answer(prompt, answer)

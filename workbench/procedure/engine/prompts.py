@@ -18,6 +18,9 @@ SPECULAR = (
     " and keep eyes and shiny things out of the plane of the beams."
 )
 """Warning before a beam meets a curved surface, which spreads specular reflections in its plane."""
+MEASURE = "Place it as near as possible and enter the standoff that the ruler shows."
+MOVE = "Move it until they do; the number may stay as it is."
+"""Instructions for another sight, where the standoff is measured, and where it need not be."""
 MISREAD = 0.1
 """Largest relative difference of an entered standoff from the requested one; beyond it, it is refused."""
 
@@ -55,11 +58,12 @@ def placement_prompt(placement: Placement, before: Placement | None) -> Prompt:
     at, name = placement.standoff_mm, _target(placement)
     again = before is not None and (before.standoff_mm, before.target) == (at, placement.target)
     place = f"Take the {name} away and place it again" if again else f"Place the {name}"
+    measured = placement.is_measured
     return Prompt(
         key=placement.key,
-        do=f"{place} at {at:.6g} mm{_turn(placement)}.{_how(placement)}",
+        do=f"{place} at {'' if measured else 'about '}{at:.6g} mm{_turn(placement)}.{_how(placement)}",
         expect=_expected_sight(placement),
-        otherwise="Place it as near as possible and enter the standoff that the ruler shows.",
+        otherwise=MEASURE if measured else MOVE,
         quantity=Quantity("mm", (1 - MISREAD) * at, (1 + MISREAD) * at, at),
         at_bench=True,
         may=_instead(placement, before),
@@ -87,6 +91,7 @@ def captures_prompt(key: str, failed: str, placement: Placement, where: str = ""
         expect=where or "The spot is complete, lies on the target and has no reflection.",
         otherwise="Remove the cause, then `redo`.",
         yes="keep the captures of the other lasers" if where else "keep them",
+        overrules=True,
         may={"redo": f"{here} again", "skip": f"leave {here} out"},
     )
 
@@ -110,6 +115,7 @@ def standoff_prompt(placement: Placement, failed: str = "The standoff contradict
         expect=f"The ruler shows {here}, and the target is square to it.",
         otherwise="Type redo: the target is placed, and its standoff entered, again.",
         yes="keep them: the target stands as entered, another placement may be wrong",
+        overrules=True,
         at_bench=True,
         may={"redo": "measure again", "skip": f"leave {here} out"},
     )
@@ -177,8 +183,12 @@ def _nearer(target: FlatTarget) -> str:
 def _expected_sight(placement: Placement) -> str:
     if isinstance(placement.target, CylinderTarget):
         return "Every spot lies on the cylinder, and no beam is reflected towards a person or the camera."
+    if isinstance(placement.target, BoardTarget) and _turn(placement):
+        return "It is turned about as stated (the angle need not be measured), and every spot lies on it."
     if _turn(placement):
         return "It is turned as stated, and every spot lies on it."
+    if not placement.is_measured:
+        return "It faces the sensor, and every spot lies on it."
     return "Its face is square to the ruler, and every spot lies on it."
 
 

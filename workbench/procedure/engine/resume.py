@@ -14,7 +14,7 @@ from workbench.model import event as ev
 from workbench.model.errors import BadInputError
 from workbench.model.problems import short
 from workbench.model.rig import Rig
-from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model
+from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model, standalone_text
 from workbench.procedure.engine.existing_calibration import ExistingCalibration
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.procedure_file import Procedure
@@ -151,7 +151,7 @@ def _now(session_dir: Path, entry: Entry, model: type[FileModel]) -> tuple[Entry
         return entry, []
     where = first_change(before.model_dump(mode="json"), now.model_dump(mode="json"))
     change = f"{path} has changed since the session began, first at {where}"
-    return entry.model_copy(update={"text": path.read_text(encoding="utf-8")}), [change]
+    return entry.model_copy(update={"text": standalone_text(path, model)}), [change]
 
 
 def first_change(before: object, now: object, key: str = "") -> str:

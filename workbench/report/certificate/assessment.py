@@ -56,7 +56,7 @@ def _verdict(session: SessionRecord, calibration: Calibration | None, rows: Sequ
     fit, state = session.fit, session.status.state
     is_refused = fit is not None and fit.verdict == "refused"
     failed = [row for row in _with(rows, "fail") if not (is_refused and row[1] == "fit")]
-    reasons = (*_named(failed), *_trial_outcomes(session))
+    reasons = (*_named(failed), *_overruled(session), *_trial_outcomes(session))
     if fit is not None and _is_refused(session, calibration):
         return Verdict("bad", "Calibration refused", (*fit.reasons, *reasons))
     if _has_invalid_verification(session):
@@ -77,10 +77,15 @@ def _verdict(session: SessionRecord, calibration: Calibration | None, rows: Sequ
         return Verdict("open", "A result is marginal", (*_named(marginal), *reasons))
     if calibration is None:
         return Verdict("open", "No calibration in this session", reasons)
-    own = session.is_own_calibration
-    return Verdict(
-        "good", "Calibration accepted" if own else "Measured with an accepted calibration", reasons
-    )
+    return Verdict("good", _good_text(session), reasons)
+
+
+def _good_text(session: SessionRecord) -> str:
+    if session.is_own_calibration:
+        return "Calibration accepted"
+    if any(one.verification is not None for one in session.events(ev.TrialFinished)):
+        return "Verification: the calibration is valid"
+    return "Measured with an accepted calibration"
 
 
 def _is_refused(session: SessionRecord, calibration: Calibration | None) -> bool:
@@ -104,6 +109,14 @@ def _named(rows: Sequence[Row]) -> Iterator[str]:
         yield f"{counted(len(rows) - MOST_LIMITS, 'more limit')}: {rows[0][-1]}"
 
 
+def _overruled(session: SessionRecord) -> Iterator[str]:
+    for one in session.overruled[:MOST_LIMITS]:
+        reason = f" ({one.reason})" if one.reason else ""
+        yield f"{'overruled' if one.in_effect else 'overruled, results replaced since'}: {one.text}{reason}"
+    if (more := len(session.overruled) - MOST_LIMITS) > 0:
+        yield f"{counted(more, 'more warning')} overruled"
+
+
 def _trial_outcomes(session: SessionRecord) -> Iterator[str]:
     trials = {one.trial for one in session.events(ev.TrialFinished)}
     for step in session.events(ev.StepFinished):
@@ -112,8 +125,8 @@ def _trial_outcomes(session: SessionRecord) -> Iterator[str]:
 
 
 def _has_invalid_verification(session: SessionRecord) -> bool:
-    rows = (row for table in _verdict_tables(session) for row in table.records())
-    return any(row.get("valid") == "NO" for row in rows)
+    last = {one.trial: one for one in session.events(ev.TrialFinished)}
+    return any(one.refuses_calibration for one in last.values())
 
 
 def _has_biased_accuracy(session: SessionRecord) -> bool:

@@ -19,6 +19,7 @@ from workbench.report.certificate.assemble import STATEMENTS, Certificate
 from workbench.report.certificate.coverage import expanded_parameter
 from workbench.report.certificate.identity import VIRTUAL, device_text
 from workbench.report.certificate.method import DECISION_RULE
+from workbench.report.certificate.reproduction import record_text
 from workbench.report.certificate.results import COVERAGE
 from workbench.report.certificate.session_record import SessionRecord, text_sha256
 from workbench.report.document import NOT_STATED
@@ -127,6 +128,7 @@ def _statements(parent: ET.Element, certificate: Certificate) -> None:
         texts.insert(0, f"Devices: {VIRTUAL}.")
     if document.replaces:
         texts.append(f"This certificate replaces certificate {document.replaces}.")
+    texts.append(record_text(certificate.sources.session))
     for text in texts:
         _rich(_add(_add(parent, "statement"), "declaration"), text)
     assessment = certificate.assessment

@@ -15,22 +15,34 @@ from ruamel.yaml.error import YAMLError
 from workbench.calibration.model.parameters import DRIFT
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Calibration
-from workbench.model.event import LimitChecked
+from workbench.model.event import LimitChecked, TrialFinished
 from workbench.model.fit_event import FitFinished
 from workbench.model.table import Cell
 from workbench.report.certificate.session_record import SessionRecord
 
 Row = tuple[Cell, Cell, Cell, Cell, Cell, Cell]
 """Step, subject, quantity, value, limit, verdict."""
+VERIFIED = "errors as the calibration states them"
+"""Requirement that a verification tests."""
 
 
 def limit_rows(session: SessionRecord, calibration: Calibration | None) -> list[Row]:
-    """One row for each limit that was checked: those of the last fit, then those of the journal."""
+    """One row for each decision: limits of the last fit, those of the journal, verdicts of verifications."""
     checked = session.events(LimitChecked)
     return [
         *fit_limit_rows(session, calibration),
         *((one.step, one.of, one.quantity, one.value, one.limit, one.verdict) for one in checked),
+        *_verification_rows(session),
     ]
+
+
+def _verification_rows(session: SessionRecord) -> Iterator[Row]:
+    """Verdict of each verification, of its last run."""
+    last = {one.trial: one.verification for one in session.events(TrialFinished)}
+    for trial, found in last.items():
+        if found is not None:
+            verdict = "pass" if found.valid else "fail"
+            yield trial, "calibration", found.reason or "verification", None, VERIFIED, verdict
 
 
 def fit_limit_rows(session: SessionRecord, calibration: Calibration | None) -> list[Row]:

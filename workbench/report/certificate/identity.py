@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from workbench.model import event as ev
 from workbench.model.laboratory import Laboratory, Party, Span
 from workbench.model.number_text import duration
-from workbench.model.rig import UNKNOWN_SERIAL, Rig
+from workbench.model.rig import UNKNOWN_SERIAL, BenchSpec, Rig
 from workbench.model.table import Column, Table
 from workbench.report.certificate.session_record import SessionRecord
 from workbench.report.document import NOT_STATED, Fact, Section
 
 VIRTUAL = "virtual bench: no real sensor was measured"
+OVERRULED = "overruled"
+"""Answer that keeps results in spite of a failed check."""
 MOST_NAMED = 12
 """Largest number of lasers that are named one by one."""
 
@@ -62,8 +64,7 @@ def conditions_section(lab: Laboratory, session: SessionRecord) -> Section:
     outcomes = {f"{one.procedure}.{one.index}": one.outcome for one in session.events(ev.StepFinished)}
     tilt = (
         f"square to the optical axis within {bench.target_tilt_sd_deg:g} deg (1 sigma, all placements), with"
-        f" {bench.tilt_sd_deg:g} deg at each placement; measured yaw {bench.target_yaw_deg:g} deg, pitch"
-        f" {bench.target_pitch_deg:g} deg"
+        f" {bench.tilt_sd_deg:g} deg at each placement; {_measured_tilt(bench)}"
     )
     facts = (
         Fact("Temperature, lowest and highest", span_text(ambient.temperature_c, "deg C")),
@@ -82,12 +83,23 @@ def conditions_section(lab: Laboratory, session: SessionRecord) -> Section:
             Column(key="by", name="answered by"),
         ),
         rows=tuple(
-            (one.question, outcomes.get(one.key) or _answer_text(one), one.answer.by)
+            (one.question, _answer_text(one, outcomes.get(one.key)), one.answer.by)
             for one in session.events(ev.Answered)
             if one.key != "safety"
         ),
     )
     return Section("conditions", "Conditions", facts, tables=(table,) if table.rows else ())
+
+
+def _measured_tilt(bench: BenchSpec) -> str:
+    """Tilt of the rail, as far as the rig file states it."""
+    names = {"yaw": "target_yaw_deg", "pitch": "target_pitch_deg"}
+    texts = [
+        f"{what} {getattr(bench, name):g} deg"
+        for what, name in names.items()
+        if name in bench.model_fields_set
+    ]
+    return f"measured {', '.join(texts)}" if texts else "yaw and pitch of the rail were not measured"
 
 
 def standards_section(lab: Laboratory, rig: Rig) -> Section:
@@ -184,7 +196,11 @@ def _warm_up(session: SessionRecord) -> str:
     return ", ".join(found) or "no warm-up step"
 
 
-def _answer_text(one: ev.Answered) -> str:
+def _answer_text(one: ev.Answered, outcome: str | None) -> str:
+    """Outcome of the step that asked, unless the question was about a failed check; else the answer."""
+    if outcome and not one.overrules:
+        return outcome
     value = one.answer.value
-    text = f"{value:g}" if isinstance(value, float) else value or one.answer.action
+    done = OVERRULED if one.overrules else one.answer.action
+    text = f"{value:g}" if isinstance(value, float) else value or done
     return f"{text} ({one.answer.reason})" if one.answer.reason else text

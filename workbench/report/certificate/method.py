@@ -10,7 +10,7 @@ from workbench.model.calibration import Calibration
 from workbench.model.table import Cell, Column, Table
 from workbench.report.certificate.fit_limits import limit_rows
 from workbench.report.certificate.session_record import SessionRecord, text_sha256
-from workbench.report.document import Fact, Section
+from workbench.report.document import NOT_STATED, Fact, Section
 
 DECISION_RULE = (
     "Decision rule (ISO 14253-1): a result with an uncertainty passes if its whole 95 % interval lies"
@@ -18,6 +18,8 @@ DECISION_RULE = (
     " (marginal). Rms residual and other quantities without an uncertainty of their own are compared"
     " directly."
 )
+NOT_EVALUATED = "not evaluated: no calibration"
+"""Verdict on a limit whose quantity only a calibration states: a refused fit exports none."""
 NO_CLAIM = "The work follows the procedures named here. Conformity with no other standard is claimed."
 
 
@@ -37,7 +39,7 @@ def procedure_section(session: SessionRecord) -> Section:
     rows = dict[tuple[str, int], tuple[Cell, ...]]()
     for step in session.events(ev.StepStarted):
         at = step.procedure, step.index
-        rows[at] = (*at, step.title, step.shots or None, outcomes.get(at, "not finished"))
+        rows[at] = (*at, step.title, step.shots or None, outcomes.get(at, session.unfinished_text))
     steps = Table(
         name="steps",
         title="Steps",
@@ -67,23 +69,53 @@ def decision_section(session: SessionRecord, calibration: Calibration | None) ->
             Column(key="limit", name="limit"),
             Column(key="verdict", name="verdict"),
         ),
-        rows=tuple(limit_rows(session, calibration)),
+        rows=tuple((*row[:-1], row[-1] or NOT_EVALUATED) for row in limit_rows(session, calibration)),
     )
     fit = session.fit
     texts = [DECISION_RULE, *(f"Refused: {reason}." for reason in (fit.reasons if fit else ()))]
     if not table.rows:
-        texts.append("The procedures check no limit.")
+        texts.append("The procedures check no limit, and no calibration was verified.")
     return Section(
         "decisions", "Limits and decisions", texts=tuple(texts), tables=(table,) if table.rows else ()
     )
 
 
 def exception_section(session: SessionRecord) -> Section:
-    """Deviations: rejected and repeated captures, resumptions, repairs, missing readings, incidents."""
-    tables = (_rejected(session), _repeated(session), _missing(session), _incidents(session))
+    """Deviations: overruled warnings, rejected and repeated captures, repairs, missing readings."""
+    tables = (
+        _overruled(session),
+        _rejected(session),
+        _repeated(session),
+        _missing(session),
+        _incidents(session),
+    )
     shown = tuple(table for table in tables if table.rows)
     texts = () if shown else ("No capture was rejected or repeated; nothing deviated from the procedures.",)
     return Section("exceptions", "Deviations, rejected and repeated captures", texts=texts, tables=shown)
+
+
+def _overruled(session: SessionRecord) -> Table:
+    return _table(
+        "overruled",
+        "Warnings that the operator overruled",
+        (
+            Column(key="time", name="time (UTC)"),
+            Column(key="warning", name="warning"),
+            Column(key="reason", name="reason"),
+            Column(key="by", name="overruled by"),
+            Column(key="state", name="state"),
+        ),
+        (
+            (
+                f"{one.time:%Y-%m-%d %H:%M:%S}",
+                one.text,
+                one.reason or NOT_STATED,
+                one.by,
+                "in effect" if one.in_effect else "results replaced since",
+            )
+            for one in session.overruled
+        ),
+    )
 
 
 def _rejected(session: SessionRecord) -> Table:

@@ -40,12 +40,19 @@ def reproduction_section(session: SessionRecord) -> Section:
     return Section("data", "Data, versions and reproduction", facts, tables=(table,))
 
 
+def record_text(session: SessionRecord) -> str:
+    """Hashes of the record of the measurement in one sentence: a signed certificate fixes them."""
+    hashes = "; ".join(f"{what} {sha256}" for what, sha256 in _inputs(session))
+    return f"Record of the measurement, sha256: {hashes}."
+
+
 def _inputs(session: SessionRecord) -> list[tuple[str, str]]:
     rows = [
         (f"rig file {_name(session.manifest.rig.file)}", text_sha256(session.manifest.rig.text)),
         *((f"procedure {_name(one.file)}", text_sha256(one.text)) for one in session.manifest.procedures),
         (MANIFEST, session.manifest_sha256),
         (JOURNAL, session.journal_sha256 or "missing"),
+        *_last_record(session),
         (f"{len(session.frames)} frames, list of their sha256", session.frames_sha256),
     ]
     captures = session.folder / CALIBRATION_TABLE
@@ -54,6 +61,13 @@ def _inputs(session: SessionRecord) -> list[tuple[str, str]]:
     if session.calibration_path is not None and session.calibration_sha256:
         rows.append((session.calibration_path.name, session.calibration_sha256))
     return rows
+
+
+def _last_record(session: SessionRecord) -> list[tuple[str, str]]:
+    """Hash chain at the last record, which later records of a repair continue."""
+    if not session.journal_chain:
+        return []
+    return [(f"{JOURNAL} up to record {session.all_records[-1].n} (chain)", session.journal_chain)]
 
 
 def _name(path: str) -> str:

@@ -113,10 +113,8 @@ def trial_sections(session: SessionRecord) -> tuple[Section, ...]:
         own = [one for one in readings if one.trial == trial.trial]
         missing = sum(one.range_mm is None for one in own)
         facts = (
-            Fact(
-                "Outcome",
-                outcomes.get(trial.trial, "not finished: a limit failed, or the session was stopped"),
-            ),
+            Fact("Outcome", outcomes.get(trial.trial, session.unfinished_text)),
+            *((Fact("Verdict", found.text),) if (found := trial.verification) is not None else ()),
             Fact("Readings", f"{len(own)}, {missing} of them without a range"),
         )
         linear = any(table.name.endswith("-linearity") for table in trial.tables)

@@ -15,11 +15,25 @@ from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
-from workbench.session.journal import JOURNAL, read_journal
+from workbench.session.journal import JOURNAL, last_chain, read_journal
 from workbench.session.manifest import MANIFEST, Manifest, load_manifest, load_session_rig
 from workbench.session.state import SessionStatus, effective, session_status
 
 E = TypeVar("E")
+
+
+@dataclass(frozen=True)
+class OverruledWarning:
+    """A failed check whose results a person kept."""
+
+    time: datetime
+    text: str
+    """The question, with the failed check."""
+    reason: str
+    """Reason that the person stated; empty if none."""
+    by: str
+    in_effect: bool
+    """Whether the results that were kept still count: no repair or repetition has replaced them."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +61,23 @@ class SessionRecord:
         for record in self.all_records:
             if isinstance(record.event, kind):
                 yield utc(record.time_ns).strftime("%Y-%m-%d %H:%M:%S"), record.event
+
+    @cached_property
+    def overruled(self) -> tuple[OverruledWarning, ...]:
+        """Warnings that a person overruled, in order of time; a repair does not remove them."""
+        valid = {record.n for record in self.records}
+        found: dict[tuple[str, str], OverruledWarning] = {}
+        for record in self.all_records:
+            one = record.event
+            if not isinstance(one, ev.Answered) or not one.overrules:
+                continue
+            # A repair journals an answer that still holds once more: the first time counts.
+            before = found.get((one.key, one.question))
+            counts = record.n in valid or (before is not None and before.in_effect)
+            time = utc(record.time_ns) if before is None else before.time
+            reason = one.answer.reason or ""
+            found[one.key, one.question] = OverruledWarning(time, one.question, reason, one.answer.by, counts)
+        return tuple(found.values())
 
     @cached_property
     def fit(self) -> ev.FitFinished | None:
@@ -83,6 +114,12 @@ class SessionRecord:
         return bool(self.events(ev.CalibrationExported))
 
     @property
+    def unfinished_text(self) -> str:
+        """Cause why the last step has no outcome."""
+        word = "failed" if self.status.state == "failed" else "not finished"
+        return f"{word}: {self.status.why or self.status.state}"
+
+    @property
     def began(self) -> datetime | None:
         """Time of the first record, UTC."""
         return utc(self.all_records[0].time_ns) if self.all_records else None
@@ -97,6 +134,11 @@ class SessionRecord:
         """Hash of the journal."""
         path = self.folder / JOURNAL
         return file_sha256(path) if path.exists() else ""
+
+    @cached_property
+    def journal_chain(self) -> str:
+        """Hash at the end of the last record; empty in sessions of versions that did not record it."""
+        return last_chain(self.folder) if self.all_records else ""
 
     @cached_property
     def manifest_sha256(self) -> str:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from math import inf
 from pathlib import Path
 
 from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
-from workbench.report.certificate.session_record import unchanged
-from workbench.session.index import IndexedSession, indexed_sessions
+from workbench.report.certificate.session_record import check_recorded, unchanged
+from workbench.report.history.dates import EARLIEST, is_future, parsed_time, start_of, wrong_date
+from workbench.session.index import IndexedSession, indexed_sessions, read_indexed
 from workbench.session.sensor_log import SensorEntry, read_entries
 
 
@@ -36,13 +36,24 @@ class InForce:
     why: str
     by: str
     """Operator who put it in force; empty: the newest one is in force."""
+    remark: str = ""
+    """A later result of its session, which a repair has changed; empty if there is none."""
+    refused: bool = False
+    """Whether that result is a refusal."""
 
 
 def dated_calibrations(sessions: Sequence[IndexedSession]) -> tuple[list[DatedCalibration], list[str]]:
-    """Usable calibrations of the sessions, in order of time, and remarks on the files of others."""
+    """Usable calibrations of the sessions, in order of time, and remarks on those that are not.
+
+    A session whose start is no time or after its first record is not used. One that begins in the future
+    comes before the others, so that it is in force only if there is no other.
+    """
     found, remarks = [], []
-    for one in sorted(sessions, key=lambda each: (each.began, each.name)):
+    for one in sorted(sessions, key=_order):
         if not one.calibration or one.verdict not in {"accepted", "exception"}:
+            continue
+        if wrong := wrong_date(one):
+            remarks.append(f"not used: {wrong}")
             continue
         path = one.status.session_dir / one.calibration
         try:
@@ -50,6 +61,11 @@ def dated_calibrations(sessions: Sequence[IndexedSession]) -> tuple[list[DatedCa
         except BadInputError as error:
             remarks.append(str(error))
     return found, remarks
+
+
+def _order(one: IndexedSession) -> tuple[bool, datetime, str]:
+    start = start_of(one)
+    return not is_future(start), start, one.name
 
 
 def dated(path: Path, session: str, day: str) -> DatedCalibration:
@@ -97,7 +113,8 @@ def newer_text(force: InForce | None, calibrations: Sequence[DatedCalibration]) 
     if force is None:
         return ""
     ours = force.calibration
-    newer = [one for one in calibrations if one.sha256 != ours.sha256 and _made_s(one) > _made_s(ours)]
+    later = [one for one in calibrations if one.sha256 != ours.sha256 and _made(one) > _made(ours)]
+    newer = [one for one in later if is_future(_made(ours)) or not is_future(_made(one))]
     if not newer:
         return ""
     return (
@@ -106,12 +123,9 @@ def newer_text(force: InForce | None, calibrations: Sequence[DatedCalibration]) 
     )
 
 
-def _made_s(one: DatedCalibration) -> float:
-    """Time of making a calibration, s since 1970; negative infinity if the file states none."""
-    try:
-        return datetime.fromisoformat(one.calibration.laser_ranger.provenance.created).timestamp()
-    except ValueError:
-        return -inf
+def _made(one: DatedCalibration) -> datetime:
+    """Time of making a calibration; the earliest time there is if the file states none."""
+    return parsed_time(one.calibration.laser_ranger.provenance.created) or EARLIEST
 
 
 def _chosen(folder: Path, last: SensorEntry) -> InForce:
@@ -125,4 +139,16 @@ def _chosen(folder: Path, last: SensorEntry) -> InForce:
         )
     made = found.calibration.laser_ranger.provenance.created[:10]
     calibration = DatedCalibration(found.session, made, path, found.sha256, found.calibration)
-    return InForce(calibration, last.time[:10], last.text, last.operator)
+    remark, refused = _later_result(path)
+    return InForce(calibration, last.time[:10], last.text, last.operator, remark, refused)
+
+
+def _later_result(path: Path) -> tuple[str, bool]:
+    """Remark on the result with which a repair replaced a calibration, and whether it is a refusal."""
+    try:
+        check_recorded(path)
+    except BadInputError as error:
+        refused = read_indexed(path.parent).verdict == "refused"
+        result = "; its session is refused since" if refused else ""
+        return f"in force in spite of a later result{result}: {error}", refused
+    return "", False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date
 
@@ -14,7 +15,7 @@ from workbench.report.history.calibration_section import calibration_section
 from workbench.report.history.drift import DistanceHistory
 from workbench.report.history.in_force import DatedCalibration, InForce
 from workbench.report.history.verification_section import verification_section
-from workbench.report.history.verifications import Verification, unmonitored_mm
+from workbench.report.history.verifications import Verification, unmonitored_texts
 from workbench.session.sensor_log import SensorEntry
 from workbench.trials.statistics.control_chart import FIRST_SESSIONS
 
@@ -58,6 +59,8 @@ def verdict_of(history: SensorHistory) -> Verdict:
     reasons = [text for one in history.distances for text in (_drift_text(one), _excess_text(one)) if text]
     if _last_is_not_valid(history):
         reasons.append(f"the last verification, {history.verifications[-1].session}, ended with: not valid")
+    if history.in_force is not None and history.in_force.remark:
+        reasons.append(f"{history.in_force.calibration.session}: {history.in_force.remark}")
     reasons += _due_texts(history)
     reasons += [*_missing_texts(history), *history.remarks]
     return Verdict(*_tone_and_text(history), tuple(reasons))
@@ -70,6 +73,11 @@ def _tone_and_text(history: SensorHistory) -> tuple[Tone, str]:
         return "bad", "Errors beyond their stated uncertainty: calibrate again"
     if _last_is_not_valid(history):
         return "bad", "The last verification ended with: not valid; calibrate again"
+    if history.in_force is not None and history.in_force.refused:
+        return (
+            "bad",
+            "The calibration in force is of a session that was refused since; put another one in force",
+        )
     charts = [one for one in history.distances if one.chart is not None]
     tested = {name for one in charts for name in one.sessions[FIRST_SESSIONS:]}
     if tested:
@@ -95,12 +103,9 @@ def recalibrate_by(history: SensorHistory) -> tuple[date, str] | None:
     dates = []
     force = history.in_force
     if force is not None and history.agreed_months is not None:
-        try:
+        months = history.agreed_months
+        with suppress(ValueError):  # a calibration that another program wrote
             made = date.fromisoformat(force.calibration.day)
-        except ValueError:  # a calibration that another program wrote
-            made = None
-        if made is not None:
-            months = history.agreed_months
             dates.append((months_later(made, months), f"agreed interval of {months} months"))
     for one in history.distances:
         if one.drift is not None or (one.excess is not None and one.excess.alarm):
@@ -148,9 +153,7 @@ def _missing_texts(history: SensorHistory) -> list[str]:
         if lacking:
             where = counted(len(lacking), "session")
             texts.append(f"{one.range_mm:g} mm is monitored, but missing in {where}, last in {lacking[-1]}")
-    if other := unmonitored_mm(checked, [one.range_mm for one in history.distances]):
-        texts.append(f"not monitored: {', '.join(f'{mm:g}' for mm in other)} mm")
-    return texts
+    return texts + unmonitored_texts(checked, [one.range_mm for one in history.distances])
 
 
 def _key_numbers(history: SensorHistory) -> tuple[KeyNumber, ...]:

@@ -11,6 +11,8 @@ import numpy as np
 
 from workbench.model import event as ev
 from workbench.model.arrays import FloatArray
+from workbench.report.certificate.session_record import utc
+from workbench.report.history.dates import parsed_time
 from workbench.session.index import IndexedSession
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
@@ -78,6 +80,18 @@ def monitored_mm(checked: Sequence[Verification]) -> tuple[float, ...]:
 
     Later sessions do not change them: an alarm stays.
     """
+    common = common_mm(checked)
+    if len(common) <= DISTANCES:
+        return common
+    chosen: list[float] = []
+    for mm in np.geomspace(common[0], common[-1], DISTANCES).tolist():
+        free = [one for one in common if one not in chosen]
+        chosen.append(min(free, key=lambda one: abs(log(one / mm))))
+    return tuple(sorted(chosen))
+
+
+def common_mm(checked: Sequence[Verification]) -> tuple[float, ...]:
+    """Distances that most of the first k sessions share, in increasing order."""
     counts: dict[float, int] = {}
     for one in checked[:FIRST_SESSIONS]:
         known = {
@@ -86,14 +100,22 @@ def monitored_mm(checked: Sequence[Verification]) -> tuple[float, ...]:
         }
         counts |= {mm: counts.get(mm, 0) + 1 for mm in known}
     most = max(counts.values(), default=0)
-    common = sorted(mm for mm, count in counts.items() if count >= LEAST_SHARE * most)
-    if len(common) <= DISTANCES:
-        return tuple(common)
-    chosen: list[float] = []
-    for mm in np.geomspace(common[0], common[-1], DISTANCES).tolist():
-        free = [one for one in common if one not in chosen]
-        chosen.append(min(free, key=lambda one: abs(log(one / mm))))
-    return tuple(sorted(chosen))
+    return tuple(sorted(mm for mm, count in counts.items() if count >= LEAST_SHARE * most))
+
+
+def unmonitored_texts(checked: Sequence[Verification], monitored: Sequence[float]) -> list[str]:
+    """Distances of the sessions that are not monitored, one text for each reason."""
+    common = common_mm(checked)
+    found = unmonitored_mm(checked, monitored)
+    spare = [mm for mm in found if any(is_same_distance(mm, one) for one in common)]
+    rare = [mm for mm in found if mm not in spare]
+    reasons = (
+        (spare, f"at most {DISTANCES} distances are monitored, because each adds false alarms"),
+        (rare, f"too few of the first {FIRST_SESSIONS} sessions have it"),
+    )
+    return [
+        f"not monitored: {', '.join(f'{mm:g}' for mm in those)} mm ({why})" for those, why in reasons if those
+    ]
 
 
 def unmonitored_mm(checked: Sequence[Verification], monitored: Sequence[float]) -> tuple[float, ...]:
@@ -125,7 +147,9 @@ def _verification(session_dir: Path, indexed: IndexedSession) -> Verification | 
     if valid and not errors:
         return None
     checks = tuple(_check(mm, np.array(values)) for mm, values in sorted(errors.items()))
-    return Verification(indexed.name, indexed.began[:10], time_ns, calibration, checks, valid)
+    began = parsed_time(indexed.began)
+    day = indexed.began[:10] if began is not None else f"{utc(time_ns):%Y-%m-%d}"
+    return Verification(indexed.name, day, time_ns, calibration, checks, valid)
 
 
 def _relative_error(reading: ev.ReadingTaken) -> float | None:

@@ -65,11 +65,18 @@ def _fill_weights(
     out: FloatArray,
 ) -> None:
     """Fill the inverse of the variance that the model predicts; 0 for a pixel that is not used."""
+    lowest_clip = math.inf
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
             variance = floor + slope * max(signal[y, x], 0.0) + contrast2 * mean_square[y, x]
             out[y, x] = usable[y, x] / variance
+            lowest_clip = min(lowest_clip, clip[y, x])
+    if lowest_clip == math.inf:
+        return
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
             if clip[y, x] < math.inf:
+                variance = floor + slope * max(signal[y, x], 0.0) + contrast2 * mean_square[y, x]
                 margin = clip[y, x] - signal[y, x] - background
                 if not margin > _CLIP_MARGIN_SD * math.sqrt(variance):
                     out[y, x] = 0.0
@@ -114,21 +121,29 @@ def _evaluate(
 
     The mean square of the light on a pixel is the square of its mean, and a twelfth of that of its slope.
     """
-    flux = params[FLUX]
+    flux, background = params[FLUX], params[BACKGROUND]
+    height, width = signal.shape
     if params.size == 7:
         sheared_rows(params, rows)
-        signal[:] = flux * rows[1]
-        mean_square[:] = flux**2 * (rows[1] ** 2 + (rows[2] ** 2 + rows[3] ** 2) / 12.0)
-    else:
-        profile(params[U], params[LN_SU], along_u)
-        profile(params[V], params[LN_SV], along_v)
-        for y in range(signal.shape[0]):
-            height = flux * along_v[0, y]
-            height2 = flux**2 * (along_v[0, y] ** 2 + along_v[1, y] ** 2 / 12.0)
-            for x in range(signal.shape[1]):
-                signal[y, x] = height * along_u[0, x]
-                mean_square[y, x] = height2 * (along_u[0, x] ** 2 + along_u[1, x] ** 2 / 12.0)
-    residual[:] = data - signal - params[BACKGROUND]
+        for y in range(height):
+            for x in range(width):
+                share, by_u, by_v = rows[1, y, x], rows[2, y, x], rows[3, y, x]
+                signal[y, x] = flux * share
+                mean_square[y, x] = flux * flux * (share * share + (by_u * by_u + by_v * by_v) / 12.0)
+                residual[y, x] = data[y, x] - signal[y, x] - background
+        return
+    profile(params[U], params[LN_SU], along_u)
+    profile(params[V], params[LN_SV], along_v)
+    squares = np.empty(width)
+    for x in range(width):
+        squares[x] = along_u[0, x] * along_u[0, x] + along_u[1, x] * along_u[1, x] / 12.0
+    for y in range(height):
+        of_y = flux * along_v[0, y]
+        square = flux * flux * (along_v[0, y] * along_v[0, y] + along_v[1, y] * along_v[1, y] / 12.0)
+        for x in range(width):
+            signal[y, x] = of_y * along_u[0, x]
+            mean_square[y, x] = square * squares[x]
+            residual[y, x] = data[y, x] - signal[y, x] - background
 
 
 @compiled

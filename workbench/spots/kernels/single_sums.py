@@ -103,11 +103,24 @@ def dense_sums(
     rows: FloatArray, weight: FloatArray, residual: FloatArray, information: FloatArray, gradient: FloatArray
 ) -> None:
     """The same sums from full derivatives (k, height, width)."""
-    for i in range(rows.shape[0]):
-        weighted = rows[i] * weight
-        gradient[i] = (weighted * residual).sum()
-        for j in range(i + 1):
-            information[i, j] = information[j, i] = (weighted * rows[j]).sum()
+    k, height, width = rows.shape
+    information[:], gradient[:] = 0.0, 0.0
+    weighted = np.empty(width)
+    for y in range(height):
+        for i in range(k):
+            total = 0.0
+            for x in range(width):
+                weighted[x] = rows[i, y, x] * weight[y, x]
+                total += weighted[x] * residual[y, x]
+            gradient[i] += total
+            for j in range(i + 1):
+                total = 0.0
+                for x in range(width):
+                    total += weighted[x] * rows[j, y, x]
+                information[i, j] += total
+    for i in range(k):
+        for j in range(i):
+            information[j, i] = information[i, j]
 
 
 @compiled

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -9,7 +10,13 @@ import numpy as np
 import pytest
 
 from tests.support.rigs import World, thesis_rig
-from workbench.calibration.checks.settling import DriftProfile, Settling, settling_of, warm_up_advice
+from workbench.calibration.checks.settling import (
+    DriftProfile,
+    Settling,
+    drift_advice,
+    drifts_within_parts,
+    settling_of,
+)
 from workbench.calibration.estimation.fit import CalibrationFit, fit
 from workbench.calibration.selection.drift import with_drift
 from workbench.model.arrays import FloatArray
@@ -72,7 +79,7 @@ def test_a_shift_below_the_limit_needs_no_warm_up() -> None:
 
 
 def test_the_advice_of_a_session_follows_from_its_own_settling() -> None:
-    settles, still = warm_up_advice(fitted(1.0, 0.15)), warm_up_advice(fitted(0.0, 1.0))
+    settles, still = drift_advice(fitted(1.0, 0.15)), drift_advice(fitted(0.0, 1.0))
     assert "times the duration of this session" in settles
     assert settles != still
 
@@ -113,5 +120,40 @@ def test_a_steady_drift_of_each_part_has_no_time_constant() -> None:
 def test_the_advice_states_times_where_the_captures_have_them() -> None:
     whole = fitted(1.0, 0.15)
     by_time = replace(whole, cells=replace(whole.cells, times=replace(whole.cells.times, duration_s=4000.0)))
-    assert " min" in warm_up_advice(by_time)
-    assert " min" not in warm_up_advice(whole)
+    assert " min" in drift_advice(by_time)
+    assert " min" not in drift_advice(whole)
+
+
+def stepped(u_px: float, drift_px: float) -> CalibrationFit:
+    """Fit of a session whose image steps at an interruption after its first half, and drifts steadily."""
+    seen = World(RIG, 1).observations()
+    order = shuffled(tuple({s.standoff_mm for s in seen}))
+    seen = sorted(seen, key=lambda s: order.index(s.standoff_mm))
+    half, count = len(seen) // 2, len(seen)
+    moved = [
+        replace(
+            s,
+            u_px=s.u_px + u_px * (n >= half) + drift_px * n / count,
+            time_s=float(n),
+            part="1" if n >= half else "",
+        )
+        for n, s in enumerate(seen)
+    ]
+    return fit(with_drift(RIG), moved)
+
+
+@pytest.mark.parametrize("u_px", [0.8, -1.5])
+def test_a_pure_step_between_parts_is_named_instead_of_a_warm_up(u_px: float) -> None:
+    found = stepped(u_px, 0.0)
+    assert not drifts_within_parts(DriftProfile.of(found))
+    advice = drift_advice(found)
+    assert "parts 1 and 2" in advice
+    (stated,) = re.findall(r"step by ([-+][0-9.]+) px in u", advice)
+    assert float(stated) == pytest.approx(u_px, abs=0.15)
+    assert "warm" not in advice
+
+
+def test_a_drift_within_the_parts_keeps_the_advice_on_warming_up() -> None:
+    found = stepped(0.8, 3.0)
+    assert drifts_within_parts(DriftProfile.of(found))
+    assert "warm" in drift_advice(found)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tests.support.board_world import CORNER_SD_PX, BoardWorld
-from tests.support.rigs import PROVENANCE, World, board_rig, prior
+from tests.support.free_views import BOARD, views
+from tests.support.rigs import PROVENANCE, World, board_rig, prior, thesis_rig
 from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.data.boards import BoardView, on_boards
 from workbench.calibration.data.observations import Observation
@@ -198,3 +199,33 @@ def test_a_board_left_out_is_ranged_by_all_lasers_together_alone(seed: int) -> N
     for key in ("B0", "B1", "B2"):
         assert abs(folds[key].z) < 4
         assert folds[key].sd_mm < 0.02 * folds[key].standoff_mm
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_views_of_a_board_held_anywhere_give_the_lens_of_a_fit_of_spots(seed: int) -> None:
+    rig = thesis_rig().model_copy(update={"board": BOARD})
+    world = World(rig, seed)
+    # The corners scatter three times more than stated, as in photographs: the spots do not suffer.
+    seen = views(6, seed, sd_px=0.15, stated_px=0.05, by=world.pixels)
+    result = fit_calibration(rig, world.observations(), (), seen)
+    f, sd, share, by = of(result, "f_px")
+    assert abs(f - world.values["f_px"]) < 4 * sd
+    assert sd < 1.0
+    assert (share > 0.99, by) == (True, "data")
+    assert result.rejected == ()
+    calibration, assessment = calibrate(result, Acceptance(), PROVENANCE)
+    assert assessment.faults == ()
+    assert {one.placement for one in assessment.cross_validation}.isdisjoint({"V1", "V2"})
+    assert calibration.laser_ranger.fit.verdict == "accepted"
+
+    alone = fit_calibration(rig, world.observations())
+    assert of(alone, "f_px")[1] > sd
+    assert of(alone, "f_px")[2] < 0.5
+
+
+def test_a_spot_on_a_board_of_others_is_rejected() -> None:
+    (view,) = views(1, 1)
+    spot = Observation("row 2", "L1", "V1", 500.0, 0, 300.0, 200.0)
+    (rejected,) = on_boards(BOARD, {"V1": view}, [spot])
+    assert isinstance(rejected, Rejected)
+    assert "chessboard" in rejected.reason

@@ -13,7 +13,7 @@ from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.devices.protocols import Frame, StreamingCamera
 from workbench.model.errors import AnswerNeededError, RigNotReadyError, StoppedError
 from workbench.model.event import Answered, CaptureTaken, LatencyMeasured
-from workbench.model.prompt import Answer, Prompt
+from workbench.model.prompt import Action, Answer, Prompt
 from workbench.procedure.engine.step import flat_placement
 from workbench.session.frames import read_image
 
@@ -31,6 +31,18 @@ def test_an_answer_is_journalled_with_its_question(tmp_path: Path) -> None:
     with running(tmp_path, operator=Scripted({"p.1": [Answer(value="grey")]})) as session:
         assert session.context.ask(PROMPT).value == "grey"
         assert session.events == [Answered(key="p.1", question="Open the door.", answer=Answer(value="grey"))]
+
+
+@pytest.mark.parametrize(("overrules", "action"), [(True, "done"), (True, "redo"), (False, "done")])
+def test_only_a_confirmation_in_spite_of_a_failed_check_overrules_it(
+    tmp_path: Path, overrules: bool, action: Action
+) -> None:
+    prompt = replace(PROMPT, overrules=overrules, may={"redo": "again"})
+    with running(tmp_path, operator=Scripted({"p.1": [Answer(action=action, reason="x")]})) as session:
+        session.context.ask(prompt)
+        (answered,) = session.events
+        assert isinstance(answered, Answered)
+        assert answered.overrules == (overrules and action == "done")
 
 
 def test_an_abort_stops_the_session_with_its_reason(tmp_path: Path) -> None:

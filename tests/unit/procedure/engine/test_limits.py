@@ -62,7 +62,8 @@ def test_limits_that_ask_have_a_prompt_for_each_laser_and_placement() -> None:
     keys = [prompt.key for prompt in capture_limit_prompts(placements, two_laser_rig(), asking)]
     assert keys == [f"p.1/{mm}mm/{one}/snr" for mm in (500, 800) for one in ("L1", "L2")]
     fit = FitLimits.model_validate({"rms_px": {"in": [0, 1], "on_fail": "ask"}, "rejected": {"in": [0, 3]}})
-    assert [prompt.key for prompt in result_limit_prompts("p.3", fit)] == ["p.3/rms_px"]
+    (prompt,) = result_limit_prompts("p.3", fit)
+    assert (prompt.key, prompt.overrules) == ("p.3/rms_px", True)
 
 
 def test_a_limit_that_is_kept_is_journalled_with_its_value(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from workbench.procedure.engine.prompts import (
     placement_prompt,
     placement_prompts,
     safety_prompt,
+    standoff_prompt,
 )
 
 
@@ -133,3 +134,34 @@ def test_the_prompt_of_a_cylinder_warns_of_reflections_and_names_its_axis() -> N
     assert SPECULAR in prompt.do
     assert {"178", "20", "0.15"} <= set(prompt.do.split())
     assert SPECULAR not in placement_prompt(Placement(key="a", standoff_mm=400.0), None).do
+
+
+def test_a_confirmation_at_a_failed_check_overrules_it() -> None:
+    placement = Placement(key="a", standoff_mm=500.0)
+    for prompt in (
+        captures_prompt("a/L1/snr", "snr", placement),
+        standoff_prompt(placement),
+    ):
+        assert prompt.overrules
+    assert not placement_prompt(placement, None).overrules
+
+
+@pytest.mark.parametrize(
+    ("target", "sd_mm", "measured"),
+    [
+        (FlatTarget(), None, True),
+        (FlatTarget(), 0.5, True),
+        (FlatTarget(), 600.0, False),
+        (FlatTarget(yaw_deg=20.0), 600.0, False),
+        (BoardTarget(yaw_deg=20.0), 600.0, False),
+        (BoardTarget(), None, True),
+    ],
+)
+def test_only_a_measured_standoff_is_to_be_read_off_the_ruler(
+    target: FlatTarget | BoardTarget, sd_mm: float | None, measured: bool
+) -> None:
+    placement = Placement(key="a", standoff_mm=600.0, target=target, standoff_sd_mm=sd_mm)
+    prompt = placement_prompt(placement, None)
+    text = " ".join((prompt.do, prompt.expect, prompt.otherwise))
+    assert ("ruler" in text) == measured
+    assert ("need not be measured" in text) != measured

@@ -14,6 +14,7 @@ from workbench.model import event as ev
 from workbench.model.table import Column, Table
 from workbench.report.certificate.assessment import CERTIFICATE, REPORT, assess
 from workbench.report.certificate.dcc import certificate_xml
+from workbench.report.certificate.method import decision_section
 from workbench.report.certificate.session_record import SessionRecord, read_session
 from workbench.session.journal import JOURNAL
 
@@ -99,3 +100,22 @@ def test_a_session_that_was_cut_is_open(tmp_path: Path, last: int) -> None:
     lines = (session / JOURNAL).read_text().splitlines(keepends=True)
     (session / JOURNAL).write_text("".join(lines[:last]))
     assert assess(read_session(session), None).verdict.tone == "open"
+
+
+@pytest.mark.parametrize(("valid", "tone", "verdict"), [("yes", "good", "pass"), ("NO", "bad", "fail")])
+def test_a_verification_is_the_headline_and_a_decision(valid: str, tone: str, verdict: str) -> None:
+    """Of a session with an existing calibration and nothing but a verification."""
+    verified = with_table(("valid", "verdict"), (valid, "the ranges"))
+    kept = ev.SessionStarted | ev.TrialFinished | ev.SessionFinished
+    records = tuple(one for one in verified.all_records if isinstance(one.event, kept))
+    session = replace(verified, all_records=tuple(one for one in records if not _is_own_trial(one)))
+    calibration = record().calibration
+    found = assess(session, calibration)
+    assert (found.title, found.verdict.tone, found.conformity) == (REPORT, tone, verdict)
+    assert found.verdict.text.startswith("Verification")
+    (table,) = decision_section(session, calibration).tables
+    assert [row["verdict"] for row in table.records()] == [verdict]
+
+
+def _is_own_trial(one: ev.Record) -> bool:
+    return isinstance(one.event, ev.TrialFinished) and one.event.trial != "p.1"

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
+
 from tests.support.reference_session import LABORATORY, MARKUP, certificate, record
 from workbench.model.laboratory import Laboratory
+from workbench.model.rig import BenchSpec
 from workbench.report.certificate.identity import (
     VIRTUAL,
     conditions_section,
@@ -65,3 +70,16 @@ def test_a_virtual_bench_is_named_on_the_first_page() -> None:
     assert {fact.name: fact.value for fact in certificate().document.head}["Devices"] == VIRTUAL
     real = record().rig.model_copy(update={"driver": None})
     assert facts(sensor_section(real))["Devices"] == NOT_STATED
+
+
+@pytest.mark.parametrize(("stated", "measured"), [({}, False), ({"target_yaw_deg": 0.0}, True)])
+def test_a_tilt_is_stated_as_measured_only_if_the_rig_file_has_it(
+    stated: dict[str, float], measured: bool
+) -> None:
+    session = record()
+    bench = {
+        key: value for key, value in session.rig.bench if key not in {"target_yaw_deg", "target_pitch_deg"}
+    }
+    rig = session.rig.model_copy(update={"bench": BenchSpec.model_validate(bench | stated)})
+    tilt = facts(conditions_section(NOTHING, replace(session, rig=rig)))["Target tilt"]
+    assert ("measured yaw 0 deg" in tilt) == measured

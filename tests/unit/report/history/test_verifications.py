@@ -11,11 +11,13 @@ import pytest
 from tests.support.reference_session import SERIAL
 from tests.support.verified_sensor import FIRST, verified_sensor, write_verification
 from workbench.report.history.verifications import (
+    DISTANCES,
     DistanceCheck,
     Verification,
     is_same_distance,
     monitored_mm,
     unmonitored_mm,
+    unmonitored_texts,
     verifications,
 )
 from workbench.session.index import indexed_sessions
@@ -59,6 +61,18 @@ def test_the_first_sessions_choose_the_distances_each_session_once() -> None:
     assert unmonitored_mm([*first, session(300, 305, 1000)], (200, 500)) == (300, 1000)
     twice = [session(500, 510), *[session(200)] * 2]
     assert monitored_mm(twice) == (200,)
+
+
+def test_each_distance_that_is_not_monitored_has_its_reason() -> None:
+    usual = [session(200, 300, 500, 800, 1200, 2000)] * 10
+    (text,) = unmonitored_texts(usual, monitored_mm(usual))
+    assert "500 mm" in text
+    assert str(DISTANCES) in text
+    both = [*usual, session(200, 4000)]
+    spare, rare = unmonitored_texts(both, monitored_mm(both))
+    assert spare == text
+    assert "4000 mm" in rare
+    assert unmonitored_texts(usual, (200, 300, 500, 800, 1200, 2000)) == []
 
 
 def test_a_distance_within_five_percent_is_the_same() -> None:
