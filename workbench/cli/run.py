@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from rich.console import Console
 
@@ -34,7 +35,7 @@ from workbench.procedure.engine.durations import learn_durations
 from workbench.procedure.engine.operator import ScriptedOperator
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.progress import TimeLeft
-from workbench.procedure.engine.repair import Repair, kept_placements
+from workbench.procedure.engine.repair import Repair, kept_captures
 from workbench.procedure.engine.resume import files_now, plan_of, resume
 from workbench.procedure.engine.run import NO_OPERATOR, Invocation, run
 from workbench.report.figure_writer import FigureWriter
@@ -42,10 +43,12 @@ from workbench.session.caller import now, operator
 from workbench.session.journal import JOURNAL, read_journal
 from workbench.session.manifest import MANIFEST, load_manifest
 from workbench.session.repairs import repairs_of
-from workbench.session.state import placement_captures
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
 from workbench.viewer.window import has_display, viewer_executable, watch
+
+NONE_KEPT: Mapping[str, int] = MappingProxyType({})
+"""No placement is read from disk."""
 
 
 @dataclass(frozen=True)
@@ -107,30 +110,31 @@ def resume_session(
     now, _ = files_now(session_dir, load_manifest(session_dir))
     plan = plan_of(session_dir, now)
     records = list(read_journal(session_dir)) if (session_dir / JOURNAL).exists() else []
-    kept = kept_placements(plan, records, repair)
-    if text := replay_text(records, kept):
+    kept = kept_captures(plan, records, repair)
+    if text := replay_text(kept):
         print_message(text)
     added_mm = [*repairs_of(records).added_mm, *(() if repair is None else repair.add_mm)]
     with _repairable(session_dir, plan, screen, kept, added_mm) as ui:
         resume(session_dir, ui.consumers, _caller(screen), ui.stopping, ui.operator, accept_changes, repair)
 
 
-def replay_text(records: Sequence[ev.Record], kept: Collection[str]) -> str:
+def replay_text(kept: Mapping[str, int]) -> str:
     """Announcement that captures are read from disk, before their progress looks like new ones.
 
     Args:
-        records: records of the session so far.
-        kept: keys of the placements that are not captured again.
+        kept: numbers of captures of the placements that are not captured again, by key.
 
     Returns:
         Text in one line; empty if there is nothing to read.
     """
-    found = [one for key, one in placement_captures(records).items() if key in kept]
-    captures = sum(len(one.captures) for one in found)
+    captures = sum(kept.values())
     if not captures:
         return ""
-    of = f"{counted(captures, 'capture')} of {counted(len(found), 'placement')}"
-    return f"replaying {of} from disk: no laser is switched on for them"
+    of = f"{counted(captures, 'capture')} of {counted(len(kept), 'placement')}"
+    return (
+        f"replaying {of} from disk: no laser is switched on for them, and their spots are found again;"
+        " the time left is shown"
+    )
 
 
 @contextmanager
@@ -138,7 +142,7 @@ def _repairable(
     session_dir: Path,
     plan: Plan,
     screen: Screen,
-    kept: Collection[str] = (),
+    kept: Mapping[str, int] = NONE_KEPT,
     added_mm: Sequence[float] = (),
 ) -> Iterator[SessionInterface]:
     """`session_interface`, then the verdict; lets a person repair a refused calibration at once."""
@@ -172,7 +176,7 @@ def session_interface(
     session_dir: Path,
     plan: Plan,
     screen: Screen,
-    kept: Collection[str] = (),
+    kept: Mapping[str, int] = NONE_KEPT,
     added_mm: Sequence[float] = (),
 ) -> Iterator[SessionInterface]:
     """Terminal, recording, viewer, figures and operator for a session; adds to errors how to resume it.
@@ -181,7 +185,7 @@ def session_interface(
         session_dir: folder of the session.
         plan: rig and procedures.
         screen: options.
-        kept: keys of placements that are not captured again.
+        kept: numbers of captures of the placements that are not captured again, by key.
         added_mm: standoffs that repairs have added, for the prompts of an answers file.
     """
     watched = watch if screen.view or (screen.view is None and has_display()) else None

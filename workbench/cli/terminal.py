@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 
 from rich.console import Console
 from rich.padding import Padding
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.text import Text
 
+from workbench.cli.replay_progress import ReplayProgress
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.model.fit_tables import fit_tables
@@ -32,7 +33,7 @@ class Terminal:
         console: Console,
         forecast: TimeLeft,
         details: bool = False,
-        kept: Collection[str] = (),
+        kept: Mapping[str, int] = MappingProxyType({}),
     ) -> None:
         """Terminal without progress display.
 
@@ -40,9 +41,9 @@ class Terminal:
             console: terminal.
             forecast: estimate of the time left.
             details: whether to print the tables of a fit, its notes, and the captures that it rejects.
-            kept: keys of placements whose captures are kept, not taken again.
+            kept: numbers of captures of the placements that are not captured again, by key.
         """
-        self._kept = set(kept)
+        self._replay = ReplayProgress(kept)
         self._console, self._forecast, self._details = console, forecast, details
         self._progress = Progress(
             TextColumn("{task.description}"),
@@ -77,6 +78,7 @@ class Terminal:
     def __call__(self, record: ev.Record) -> None:
         """Show one record."""
         self._forecast.take(record)
+        self._replay.take(record)
         match record.event:
             case ev.CalibrationLoaded() as e:
                 self._console.print(Text(e.text))
@@ -99,15 +101,13 @@ class Terminal:
             case ev.SpotsFound() as e if e.key in self._captures:
                 self._show_capture(self._captures.pop(e.key), e)
             case ev.PlacementFinished() as e if self._spots:
-                kept = e.key in self._kept
+                kept = self._replay.keeps(e.key)
                 self._print(f"{self._placement} (kept)" if kept else self._placement)
-                if not kept:
-                    self._print(self.progress_text())
+                self._print(self._replay_text() if kept else self.progress_text())
             case ev.LimitChecked() as e if e.verdict != "pass":
                 value = "not measured" if e.value is None else f"{e.value:.3g}"
                 self._print(f"{e.verdict}: {e.of}: {e.quantity} {value}, limit {e.limit}", style="yellow")
             case ev.SetAside() as e:
-                self._kept.discard(e.key)
                 self._print(e.text, style="yellow")
             case ev.SessionResumed() as e:
                 self._print(
@@ -142,11 +142,19 @@ class Terminal:
         left = about(self._forecast.seconds_left)
         return f"placement {self._forecast.done} of {self._forecast.total} done, {left} left"
 
+    def _replay_text(self) -> str:
+        """Text such as `replayed 120 of 360 captures, about 1 min left`."""
+        seconds_left = self._replay.seconds_left
+        left = "" if not seconds_left else f", {about(seconds_left)} left"
+        return f"replayed {self._replay.done} of {counted(self._replay.total, 'capture')}{left}"
+
     def _show_capture(self, capture: ev.CaptureTaken, found: ev.SpotsFound) -> None:
         """Update the live line: quality of this laser at this placement, over its repeats so far."""
         self._spots[capture.laser_id].append(found.spots)
         self._placement = f"{capture.standoff_mm:g} mm: {_summary(self._spots)}"
-        if self._task is not None:
+        if self._task is not None and self._replay.keeps(capture.placement_key):
+            self._progress.update(self._task, description=f"     {self._replay_text()}")
+        elif self._task is not None:
             name = f"{capture.standoff_mm:g} mm {capture.laser_id}"
             seen = _live(quality_of(self._spots[capture.laser_id])) if capture.laser_id != "all" else ""
             self._progress.update(self._task, description=f"     {name} {seen}")

@@ -23,6 +23,8 @@ from workbench.procedure.engine.operator import NoOperator
 
 LOOK_S = 0.1
 """Interval at which stop requests are checked while waiting for input, s."""
+AWAY_S = 10.0
+"""Time without a prompt after which the next one is announced by the terminal's bell and a line, s."""
 ACTIONS = ("redo", "skip", "abort")
 
 
@@ -52,6 +54,7 @@ class TerminalOperator:
         quiet: Callable[[], AbstractContextManager[None]],
     ) -> None:
         self._console, self._stopping, self._quiet = console, stopping, quiet
+        self._answered_s = time.monotonic()
 
     def ask(self, prompt: Prompt) -> Answer:
         """Show a prompt and wait for a valid answer.
@@ -61,9 +64,13 @@ class TerminalOperator:
             AnswerNeededError: the terminal was closed, or end-of-file was typed (^D).
         """
         with self._quiet():
+            if time.monotonic() - self._answered_s > AWAY_S:
+                self._console.bell()
+                self._console.rule(Text("your answer is needed", style="bold reverse"))
             self._show(prompt)
             while True:
                 answer = self._read(prompt)
+                self._answered_s = time.monotonic()
                 if answer is None:
                     self._show(prompt)
                 elif (wrong := prompt.refuse(answer)) is None:

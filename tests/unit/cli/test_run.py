@@ -9,8 +9,11 @@ import pytest
 from tests.support.command_line import Run, refused
 from tests.support.reference_session import REFERENCE
 from workbench.cli.run import replay_text
+from workbench.procedure.engine.repair import Repair, kept_captures
+from workbench.procedure.engine.resume import files_now, plan_of
 from workbench.report.certificate.identity import operators
 from workbench.report.certificate.session_record import read_session
+from workbench.session.manifest import load_manifest
 from workbench.session.state import placement_captures
 
 ROOT = Path(__file__).parents[3]
@@ -50,9 +53,14 @@ def test_a_name_that_is_none_is_refused(workbench: Run, tmp_path: Path, name: st
 
 def test_a_replay_counts_the_captures_that_are_kept() -> None:
     records = read_session(REFERENCE).all_records
-    captures = placement_captures(records)
-    first, *_ = (key for key, one in captures.items() if one.captures)
-    assert replay_text(records, ()) == ""
-    (text,) = replay_text(records, [first]).splitlines()
-    assert f"{len(captures[first].captures)} capture" in text
+    now, _ = files_now(REFERENCE, load_manifest(REFERENCE))
+    plan = plan_of(REFERENCE, now)
+    found = {key: len(one.captures) for key, one in placement_captures(records).items() if one.complete}
+    first, second, *_ = found
+    assert kept_captures(plan, records, None) == found
+    kept = kept_captures(plan, records, Repair("because", recapture=(first,), leave_out=(second,)))
+    assert kept == {key: count for key, count in found.items() if key not in {first, second}}
+    assert replay_text({}) == ""
+    (text,) = replay_text({first: found[first]}).splitlines()
+    assert f"{found[first]} capture" in text
     assert "1 placement" in text

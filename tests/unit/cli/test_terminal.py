@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Mapping
 
 import pytest
 from rich.console import Console
@@ -26,9 +27,9 @@ def console() -> tuple[Console, io.StringIO]:
     return Console(file=stream, width=80, markup=False), stream
 
 
-def shown(*timed: tuple[float, ev.Event], kept: tuple[str, ...] = ()) -> list[str]:
+def shown(*timed: tuple[float, ev.Event], kept: Mapping[str, int] | None = None) -> list[str]:
     there, stream = console()
-    with Terminal(there, TimeLeft(STEPS, StepDurations()), kept=kept) as terminal:
+    with Terminal(there, TimeLeft(STEPS, StepDurations()), kept=kept or {}) as terminal:
         for record in records((0, STARTED), *timed):
             terminal(record)
     return stream.getvalue().splitlines()
@@ -58,12 +59,18 @@ def test_a_placement_is_summed_up_when_it_is_finished() -> None:
 def test_a_placement_that_is_kept_shows_no_progress_until_it_is_captured_again() -> None:
     end = ev.PlacementFinished(key="a")
     again = [(24.0, ev.SetAside(key="a", from_n=0, reason="moved")), *SESSION[1:4]]
-    once = [line for line in shown(*SESSION[:4], (23.0, end), kept=("a",)) if "lasers" in line]
-    twice = shown(*SESSION[:4], (23.0, end), *again, (25.0, end), kept=("a",))
+    once = [line for line in shown(*SESSION[:4], (23.0, end), kept={"a": 2}) if "lasers" in line]
+    twice = shown(*SESSION[:4], (23.0, end), *again, (25.0, end), kept={"a": 2})
     assert next(line for line in twice if "lasers" in line) == once[0]
     assert len([line for line in twice if line.strip().startswith("placement ")]) == 1
-    assert not [line for line in shown(*SESSION[:4], (23.0, end), kept=("a",)) if "placement 1" in line]
+    assert not [line for line in shown(*SESSION[:4], (23.0, end), kept={"a": 2}) if "placement 1" in line]
     assert "(kept)" in once[0]
+
+
+def test_a_replayed_placement_shows_the_captures_read_so_far() -> None:
+    lines = shown(*SESSION[:4], (23.0, ev.PlacementFinished(key="a")), kept={"a": 1, "b": 3})
+    (progress,) = [line for line in lines if line.strip().startswith("replayed ")]
+    assert [int(number) for number in re.findall(r"\d+", progress)[:2]] == [1, 4]
 
 
 @pytest.mark.parametrize(("readings", "spots"), [(1, 1), (1, 2), (3, 1), (2, 4)])

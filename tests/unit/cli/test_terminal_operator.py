@@ -64,6 +64,17 @@ def test_a_failed_check_is_overruled_with_or_without_a_reason(
     assert asked(typist, KEEP, "yesterday", typed) == Answer(reason=reason)
 
 
+@pytest.mark.parametrize(("away_s", "rings"), [(0.0, True), (1e9, False)])
+def test_a_prompt_after_a_while_without_one_rings(
+    typist: Typist, monkeypatch: pytest.MonkeyPatch, away_s: float, rings: bool
+) -> None:
+    monkeypatch.setattr("workbench.cli.terminal_operator.AWAY_S", away_s)
+    typist.lines = ["yes"]
+    console = Console(file=typist.stream, width=80, markup=False, force_terminal=True)
+    TerminalOperator(console, typist.stopping, nullcontext).ask(CONFIRM)
+    assert ("\a" in typist.stream.getvalue()) == rings
+
+
 def test_other_confirmations_have_no_reason(typist: Typist) -> None:
     assert asked(typist, CONFIRM, "yes, of course", "yes") == Answer()
 

@@ -118,22 +118,30 @@ def find_placement(name: str, keys: Sequence[str]) -> str:
     raise BadInputError(f"repair: no placement {name}; expected one of {', '.join(keys) or 'none'}")
 
 
-def kept_placements(plan: Plan, records: Sequence[ev.Record], repair: Repair | None) -> frozenset[str]:
-    """Keys of the complete placements that a resumption reads from disk, and does not capture again.
+def kept_captures(plan: Plan, records: Sequence[ev.Record], repair: Repair | None) -> dict[str, int]:
+    """Captures that a resumption reads from disk, and does not take again.
 
     Args:
         plan: rig and procedures of the session.
         records: records of the session so far.
         repair: decisions of the resumption.
 
+    Returns:
+        Number of captures by the key of their complete placement.
+
     Raises:
         BadInputError: the repair names no placement of the session.
     """
-    complete = {key for key, one in placement_captures(records).items() if one.complete}
     keys = placement_keys(plan, records)
-    again, back = ((), ()) if repair is None else (repair.recapture, repair.restore)
-    restored = {find_placement(name, keys) for name in back} & replaced_captures(records).keys()
-    return frozenset(complete - {find_placement(name, keys) for name in again} | restored)
+    decided = repair or Repair("")
+    again, out, back = (
+        {find_placement(name, keys) for name in names}
+        for names in (decided.recapture, decided.leave_out, decided.restore)
+    )
+    dropped = again | out | (repairs_of(records).left_out.keys() - back)
+    found = {key: one for key, one in placement_captures(records).items() if one.complete}
+    found |= {key: one for key, one in replaced_captures(records).items() if key in back}
+    return {key: len(one.captures) for key, one in found.items() if key not in dropped}
 
 
 def restored_frames(records: Sequence[ev.Record]) -> dict[str, list[ev.FrameRef]]:

@@ -8,6 +8,7 @@ with its inverse, which moves the spots.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,8 +23,12 @@ RETURN_AT = (2 / 3, 5 / 6)
 
 def shuffled(standoffs_mm: Sequence[float]) -> tuple[float, ...]:
     """The standoffs in a random order, always the same for the same standoffs."""
-    if len(standoffs_mm) < 3:
-        return tuple(standoffs_mm)
+    return tuple(standoffs_mm) if len(standoffs_mm) < 3 else _shuffled(tuple(standoffs_mm))
+
+
+@lru_cache
+def _shuffled(standoffs_mm: tuple[float, ...]) -> tuple[float, ...]:
+    """`shuffled`, once: every placement of a session needs the order, which takes a tenth of a second."""
     rng = np.random.default_rng(SEED)
     ordered = np.sort(np.asarray(standoffs_mm, float))
     time = np.arange(len(ordered), dtype=float)
