@@ -55,6 +55,8 @@ class Terminal:
         self._task: TaskID | None = None
         self._captures: dict[str, ev.CaptureTaken] = {}
         self._spots: dict[str, list[Sequence[Spot]]] = defaultdict(list)
+        self._overruled: dict[str, str] = {}
+        """Causes of the failed checks that a person overruled, by the key of the question."""
 
     def __enter__(self) -> Terminal:
         self._progress.start()
@@ -86,6 +88,7 @@ class Terminal:
                 self._length = e.steps
                 self._console.print(Text.assemble((e.title, "bold"), f" ({e.procedure}, {e.length})"))
             case ev.StepStarted() as e:
+                self._overruled.clear()
                 self._print(f"Step {e.index} of {self._length}: {e.title}", indent=2)
                 if e.shots:
                     self._task = self._progress.add_task("     capturing", total=e.shots)
@@ -108,6 +111,7 @@ class Terminal:
                 value = "not measured" if e.value is None else f"{e.value:.3g}"
                 self._print(f"{e.verdict}: {e.of}: {e.quantity} {value}, limit {e.limit}", style="yellow")
             case ev.SetAside() as e:
+                self._overruled = {k: v for k, v in self._overruled.items() if not k.startswith(f"{e.key}/")}
                 self._print(e.text, style="yellow")
             case ev.SessionResumed() as e:
                 self._print(
@@ -115,8 +119,12 @@ class Terminal:
                 )
             case ev.SessionRepaired() as e:
                 self._print(f"repair: {e.text}", 2)
+            case ev.Answered(overrules=True) as e:
+                self._overruled[e.key] = e.question.rpartition(". ")[0] or e.question
             case ev.StandoffAdvised() as e:
                 self._print(e.text)
+                for cause in self._overruled.values():
+                    self._print(f"kept against a check: {cause}", style="yellow")
             case ev.StepFinished() as e:
                 self._end_step(e.outcome)
             case ev.FitFinished() as e if self._details:

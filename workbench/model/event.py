@@ -229,6 +229,10 @@ class LatencyMeasured(FileModel):
     """Relative dimming of the spot after switching on, by automatic exposure or by the laser; None: none."""
 
 
+LEAST_GAIN = 0.02
+"""Least relative decrease of the range uncertainty for which a further standoff is proposed."""
+
+
 class StandoffAdvised(FileModel):
     """Uncertainty of ranges after the captures so far, and the most informative next standoff.
 
@@ -260,11 +264,20 @@ class StandoffAdvised(FileModel):
     def text(self) -> str:
         """Summary in one or two lines."""
         met = "met" if self.relative_range_sd <= self.limit else "not yet met"
+        following = (
+            f"best next standoff {self.next_standoff_mm:g} mm: {100 * self.then_relative_range_sd:.2g} %"
+            if self.next_helps
+            else f"no further standoff lowers it by {100 * LEAST_GAIN:g} % of its value"
+        )
         return (
             f"range uncertainty {100 * self.relative_range_sd:.2g} % (limit {100 * self.limit:g} %: {met});"
-            f" best next standoff {self.next_standoff_mm:g} mm: {100 * self.then_relative_range_sd:.2g} %"
-            f"{self._worst}"
+            f" {following}{self._worst}"
         )
+
+    @property
+    def next_helps(self) -> bool:
+        """Whether a placement at `next_standoff_mm` lowers the range uncertainty noticeably."""
+        return self.then_relative_range_sd < (1 - LEAST_GAIN) * self.relative_range_sd
 
     @property
     def _worst(self) -> str:

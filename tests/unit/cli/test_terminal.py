@@ -14,6 +14,7 @@ from workbench.cli.terminal import FaultTolerantConsumer, Terminal, _summary, ab
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.model.number_text import counted
+from workbench.model.prompt import Answer
 from workbench.model.spot import Spot
 from workbench.model.table import Column, Table
 from workbench.procedure.engine.durations import StepDurations
@@ -71,6 +72,19 @@ def test_a_replayed_placement_shows_the_captures_read_so_far() -> None:
     lines = shown(*SESSION[:4], (23.0, ev.PlacementFinished(key="a")), kept={"a": 1, "b": 3})
     (progress,) = [line for line in lines if line.strip().startswith("replayed ")]
     assert [int(number) for number in re.findall(r"\d+", progress)[:2]] == [1, 4]
+
+
+def test_an_overruled_check_is_repeated_with_the_advice_until_its_placement_is_set_aside() -> None:
+    advice = ev.StandoffAdvised(
+        placements=4, relative_range_sd=0.1, limit=0.05, next_standoff_mm=900.0, then_relative_range_sd=0.05
+    )
+    asked = ev.Answered(key="a/standoff", question="C1. Keep it?", answer=Answer(), overrules=True)
+    other = asked.model_copy(update={"question": "C2. Keep it?", "overrules": False})
+    lines = shown((1, asked), (2, other), (3, advice), (4, ev.SetAside(key="a", from_n=0, reason="x")))
+    assert len([line for line in lines if "C1" in line]) == 1
+    assert not [line for line in lines if "C2" in line or "Keep it?" in line]
+    later = shown((1, asked), (2, ev.SetAside(key="a", from_n=0, reason="x")), (3, advice))
+    assert not [line for line in later if "C1" in line]
 
 
 @pytest.mark.parametrize(("readings", "spots"), [(1, 1), (1, 2), (3, 1), (2, 4)])

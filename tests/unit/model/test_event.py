@@ -95,6 +95,13 @@ def test_advice_has_percents_and_the_worst_residual_where_there_is_one() -> None
         assert number in text.removeprefix(ADVICE.text)
 
 
+@pytest.mark.parametrize(("then", "helps"), [(0.0119, True), (0.0122, False), (0.0123, False)])
+def test_a_standoff_is_proposed_only_where_it_helps(then: float, helps: bool) -> None:
+    advice = ADVICE.model_copy(update={"then_relative_range_sd": then})
+    assert advice.next_helps == helps
+    assert ("1250 mm" in advice.text) == helps
+
+
 def test_one_step_is_not_several() -> None:
     lengths = [ev.ProcedureStarted(procedure="p", title="t", steps=n).length for n in (1, 2)]
     assert [length.split() for length in lengths] == [["1", "step"], ["2", "steps"]]
