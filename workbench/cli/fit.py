@@ -215,6 +215,7 @@ def _rig(request: Request) -> Rig:
     if source.suffix == ".rrd" and (source.parent / MANIFEST).is_file():
         return load_session_rig(source.parent, bounded=True)
     if not source.is_dir():
+        read_captures_file(source)  # a file of another kind is named as such
         raise BadInputError(f"{source}: a captures file needs --rig; only a session contains its rig file")
     return load_session_rig(source, bounded=True)
 

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 
 from workbench.cli.console import print_message
 from workbench.cli.sessions import find_session
+from workbench.model.contents import read_file
+from workbench.model.csvfile import LARGEST_BYTES
 from workbench.model.errors import BadInputError
+from workbench.model.file_kind import CALIBRATION, kind_of_content
 from workbench.session.journal import is_running, read_journal
 from workbench.session.manifest import load_session_rig
 from workbench.session.state import effective
@@ -22,6 +25,8 @@ if TYPE_CHECKING:  # loads Rerun
 RECORDING_FILE = "recording.rrd"
 MADE_FROM_FILES = {".rrd", ".yaml", ".yml", ".csv"}
 """Endings of files that are shown; anything else is a session."""
+VIEWABLE = "a session, a captures file (.csv, with --rig), a calibration (.yaml) or a recording (.rrd)"
+"""What can be shown, for messages."""
 MOST_SIDES = 2
 """Number of sessions that fit side by side on a screen."""
 
@@ -56,7 +61,9 @@ def view(request: Request) -> int:
             print_message(f"{recording} is made again; no display to show it")
             return 0
         if not has_display() and recording.parent == Path(folder):
-            raise BadInputError("no display to show it; use --web")
+            raise BadInputError(
+                f"{request.what[0]} can be viewed, but there is no display to show it; use --web"
+            )
         return open_viewer(recording)
 
 
@@ -78,6 +85,8 @@ def recording_of(request: Request, folder: Path) -> Path:
             return _of_calibration(first, folder)
         if first.suffix == ".csv":
             return _of_captures(first, request, folder)
+        if first.is_file():
+            _refuse_kind(first, ())
         return _of_session(find_session(first, request.sessions), folder, rebuild=request.rebuild)
     return _side_by_side(request, folder)
 
@@ -119,9 +128,20 @@ def _of_calibration(path: Path, folder: Path) -> Path:
     from workbench.model.calibration import load_calibration
     from workbench.viewer.calibration_view import record_calibration
 
+    _refuse_kind(path, (CALIBRATION,))
     _note_if_edited(path)
-
     return record_calibration(load_calibration(path), path.stem, folder / RECORDING_FILE)
+
+
+def _refuse_kind(path: Path, accepted: Sequence[str]) -> None:
+    """Refuse a file of a kind that cannot be shown; one of no known kind is left to its reader.
+
+    Raises:
+        BadInputError: it is refused.
+    """
+    kind = kind_of_content(read_file(path, VIEWABLE, LARGEST_BYTES))
+    if kind is not None and kind not in accepted:
+        raise BadInputError(f"{path}: expected {VIEWABLE}, got {kind}")
 
 
 def _note_if_edited(calibration: Path) -> None:

@@ -12,6 +12,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from workbench.model.csvfile import CsvRow, check_header, parse_csv, read_csv
 from workbench.model.errors import BadInputError
+from workbench.model.file_kind import kind_of_content
 from workbench.model.problems import problems
 from workbench.model.yamlfile import FileModel
 
@@ -114,9 +115,12 @@ def read_captures_file(path: Path) -> bytes:
     """Bytes of a captures file.
 
     Raises:
-        BadInputError: the file cannot be read.
+        BadInputError: the file cannot be read, or is of another kind.
     """
-    return read_csv(path, EXPECTED)
+    content = read_csv(path, EXPECTED)
+    if (kind := kind_of_content(content)) is not None:
+        raise BadInputError(f"{path}: expected {EXPECTED}, got {kind}")
+    return content
 
 
 def parse_captures(path: Path, content: bytes) -> tuple[CaptureRow, ...]:

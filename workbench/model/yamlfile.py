@@ -18,7 +18,12 @@ from workbench.model.contents import CONTROL, not_text, printable, read_file
 from workbench.model.errors import BadInputError
 from workbench.model.problems import Location, SchemaProblem, problems
 
-KINDS = {"procedure": "a procedure", "rig": "a rig", "laser_ranger": "a calibration"}
+KINDS = {
+    "procedure": "a procedure",
+    "rig": "a rig",
+    "laser_ranger": "a calibration",
+    "workbench_camera": "a calibration of a camera without lasers",
+}
 """Keys that identify the kind of a file, with the kind's name."""
 LARGEST_BYTES = 4 * 2**20
 """Largest YAML file; a calibration of 100 lasers takes 3 MiB."""

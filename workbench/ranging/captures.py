@@ -9,8 +9,9 @@ import numpy as np
 
 from workbench.calibration.data.averaging import outliers, scatter_chi2, weighted_mean
 from workbench.calibration.estimation.noise_scale import significant_scale
-from workbench.model.captures import ALL_LASERS, CaptureRow
+from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
 from workbench.model.errors import BadInputError
+from workbench.model.number_text import counted
 from workbench.ranging.ranger import KnownSpots, Ranger, Reading, spot_arrays
 from workbench.session.capture_spots import find_row_spots
 
@@ -49,20 +50,30 @@ def read_captures(ranger: Ranger, rows: Sequence[CaptureRow]) -> Iterator[Readin
         BadInputError: an image cannot be used, or a row names a laser that the calibration does not have.
     """
     lasers, known = (*ranger.sensor.ids, ALL_LASERS), ", ".join(ranger.sensor.ids)
-    unknown = [
-        f"row {row.row}, column laser_id: expected {ALL_LASERS} or one of the calibration's lasers ({known}),"
-        f" got {row.laser_id}"
-        for row in rows
-        if row.laser_id not in lasers
-    ]
+    unknown: dict[str, list[int]] = {}
+    for row in rows:
+        if row.laser_id not in lasers:
+            unknown.setdefault(row.laser_id, []).append(row.row)
     if unknown:
-        raise BadInputError("\n".join(unknown))
+        expected = f"expected {ALL_LASERS} or one of the calibration's lasers ({known})"
+        raise BadInputError(
+            "\n".join(
+                f"row {numbers[0]}{_more(numbers)}, column laser_id: {expected}, got {laser_id}"
+                + ("; a view of the printed board has no range" if laser_id == BOARD else "")
+                for laser_id, numbers in unknown.items()
+            )
+        )
     for block in _blocks(scenes(rows)):
         scene, members = next(iter(block.items()))
         if members[0].laser_id == ALL_LASERS:
             yield _read_lit(ranger, scene, members[0])
         else:
             yield from ranger.read_scenes([_known_spots(ranger, *one) for one in block.items()])
+
+
+def _more(numbers: Sequence[int]) -> str:
+    """Text of the rows after the first one."""
+    return f" and {counted(len(numbers) - 1, 'further row')}" if len(numbers) > 1 else ""
 
 
 def _blocks(grouped: Mapping[str, list[CaptureRow]]) -> Iterator[dict[str, list[CaptureRow]]]:

@@ -136,3 +136,9 @@ def test_without_a_display_a_rebuilt_recording_is_named_and_others_need_a_browse
     shown = workbench("view", WEBCAM, "--rig", WEBCAM_RIG)
     refused(shown, 2, "--web")
     assert ".rrd" not in shown.err, "a recording in a folder that is gone"
+
+
+@pytest.mark.parametrize("what", [WEBCAM_RIG, SESSION / "journal.jsonl", ROOT / "README.md"])
+def test_a_file_that_cannot_be_shown_is_refused(tmp_path: Path, what: Path) -> None:
+    with pytest.raises(BadInputError, match=what.name):
+        recording_of(asked(what), tmp_path)

@@ -140,7 +140,7 @@ def test_the_unit_of_an_exposure(tmp_path: Path) -> None:
             b"laser_id,standoff_mm,repeat\nL\xfc,1,0\n",
             "got text in another encoding .line 2.; save it as UTF-8",
         ),
-        (b"format: 1\nrig: r\n", "got YAML"),
+        (b"format: 1\nrig: r\n", "got a rig"),
         (b"%YAML 1.2\n---\nimage_width: 640\n", "got YAML"),
     ],
 )

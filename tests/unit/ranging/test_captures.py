@@ -104,3 +104,13 @@ def test_a_laser_that_the_calibration_does_not_have(ranger: Ranger, tmp_path: Pa
     path = captures(tmp_path, "L9,,0,1,2,s")
     with pytest.raises(BadInputError, match="row 2, column laser_id: expected all or one of"):
         list(read_captures(ranger, load_captures(path)))
+
+
+def test_rows_of_unknown_lasers_are_named_once_for_each_laser(ranger: Ranger, tmp_path: Path) -> None:
+    rows = (f"{laser},,{n},10.0,20.0,{laser}{n}" for n in range(3) for laser in ("L1", "L8", "L9"))
+    with pytest.raises(BadInputError) as refused:
+        list(read_captures(ranger, load_captures(captures(tmp_path, *rows))))
+    assert [line.split(", ")[0] for line in str(refused.value).splitlines()] == [
+        "row 3 and 2 further rows",
+        "row 4 and 2 further rows",
+    ]
