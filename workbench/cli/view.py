@@ -26,7 +26,7 @@ RECORDING_FILE = "recording.rrd"
 MADE_FROM_FILES = {".rrd", ".yaml", ".yml", ".csv"}
 """Endings of files that are shown; anything else is a session."""
 VIEWABLE = "a session, a captures file (.csv, with --rig), a calibration (.yaml) or a recording (.rrd)"
-"""What can be shown, for messages."""
+"""Kinds that can be shown, for messages."""
 MOST_SIDES = 2
 """Number of sessions that fit side by side on a screen."""
 
