@@ -44,9 +44,14 @@ static int range_spots(const struct ranger_calibration *c)
     char text[256], id[RANGER_ID_SIZE];
     for (int line = 1; fgets(text, sizeof text, stdin) != NULL; line++) {
         double u, v, su = (double)c->spot_sd_px, sv = su;
-        int count = sscanf(text, "%15s %lf %lf %lf %lf", id, &u, &v, &su, &sv), laser = laser_index(c, id);
-        if ((count != 3 && count != 5) || !(su > 0) || !(sv > 0) || laser < 0) {
+        int count = sscanf(text, "%15s %lf %lf %lf %lf", id, &u, &v, &su, &sv);
+        if ((count != 3 && count != 5) || !(su > 0) || !(sv > 0)) {
             fprintf(stderr, "error: standard input: line %d: expected `laser u v` or `laser u v sd_u sd_v`\n", line);
+            return BAD_INPUT;
+        }
+        int laser = laser_index(c, id);
+        if (laser < 0) {
+            fprintf(stderr, "error: standard input: line %d: %s is not a laser of this calibration\n", line, id);
             return BAD_INPUT;
         }
         const real uv[2] = {(real)u, (real)v};

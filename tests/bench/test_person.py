@@ -91,7 +91,7 @@ def test_control_c_at_a_prompt_pauses(terminal: Terminal, tmp_path: Path) -> Non
     terminal.wait_for("> ")
     os.write(terminal.master, b"\x03")
     assert terminal.end() == 5
-    assert "stopped by SIGINT" in terminal.text
+    assert "stopped by Ctrl-C" in terminal.text
     assert "workbench resume sessions/" in terminal.text
     last = events(tmp_path)[-1]
     assert isinstance(last, ev.SessionFinished)

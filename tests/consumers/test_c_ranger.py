@@ -188,3 +188,4 @@ def test_a_line_that_is_no_spot_is_refused(line: str, program: Path) -> None:
 
     assert ended.returncode == 2
     assert "line 1" in ended.stderr
+    assert ("L9" in ended.stderr) == line.startswith("L9")

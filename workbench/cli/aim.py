@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import select
-import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -19,7 +18,7 @@ from rich.live import Live
 
 from workbench.cli.console import print_message
 from workbench.cli.live_window import LiveWindow, watching
-from workbench.cli.stopping import StopAfterCapture
+from workbench.cli.stopping import BY_CTRL_C, StopAfterCapture
 from workbench.cli.terminal_operator import choose_operator
 from workbench.devices.registry import load_bench_rig, open_bench
 from workbench.model.errors import StoppedError
@@ -84,7 +83,7 @@ def aim_lasers(request: AimRequest) -> None:
         print_message("To change the standoff, type it in mm, then Enter. To end, type Ctrl-C.")
         with _window(aim) if request.view else nullcontext() as window, _output() as show:
             _aim_all(aim, request.standoff_mm, stopping, show, window)
-    if stopping.reason is not None and stopping.reason != f"stopped by {signal.SIGINT.name}":
+    if stopping.reason is not None and stopping.reason != BY_CTRL_C:
         raise StoppedError(stopping.reason)
 
 

@@ -30,6 +30,8 @@ class Question:
     """Parser of the answer, given the earlier ones; raises ValueError with the reason why it is wrong."""
     default: str = ""
     """Answer of Enter alone; empty: there is none."""
+    echo: Callable[[str], str] | None = None
+    """Text of a valid answer with its unit, which is shown where it differs from what was typed."""
 
 
 def is_interactive() -> bool:
@@ -78,6 +80,8 @@ def _answer(question: Question, given: Mapping[str, str]) -> str | None:
         except ValueError as wrong:
             _print(str(wrong), colour="yellow")
         else:
+            if question.echo is not None and (echo := question.echo(typed)) != typed:
+                _print(f"understood: {echo}", dim=True)
             return typed
 
 

@@ -13,7 +13,7 @@ from typing import NoReturn
 import typer
 
 from workbench.cli.console import print_message
-from workbench.cli.stopping import ignore_signals
+from workbench.cli.stopping import BY_CTRL_C, ignore_signals
 from workbench.cli.verdict import VerdictShownError
 from workbench.model.contents import printable
 from workbench.model.errors import LaserOffNotConfirmedError, StoppedError, WorkbenchError
@@ -65,7 +65,8 @@ def report(error: BaseException) -> int:
     if isinstance(error, VerdictShownError):
         return error.exit_code
     if isinstance(error, WorkbenchError):
-        print_message(f"error: {error}")
+        by_ctrl_c = isinstance(error, StoppedError) and str(error) == BY_CTRL_C
+        print_message("stopped by Ctrl-C" if by_ctrl_c else f"error: {error}")
         _print_notes([error])
         return error.exit_code
     if isinstance(error, OSError) and error.errno in WRITE_FAILURES | ACCESS_FAILURES:

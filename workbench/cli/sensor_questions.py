@@ -90,6 +90,7 @@ def sensor_questions(
             "Distance of two pixels in that image, from the data sheet of the image sensor. Twice as much"
             " where the camera joins pixels in pairs (binning).",
             lambda text, _: parse_quantity(text, "um", 0.5, 50),
+            echo=lambda text: f"{parse_quantity(text, 'um', 0.5, 50):g} um",
         ),
         Question(
             "lens",
@@ -108,6 +109,7 @@ def sensor_questions(
             "Wavelength of the lasers, in nm?",
             "On their label: 650 is red, 520 green.",
             lambda text, _: parse_quantity(text, "nm", 350, 1100),
+            echo=lambda text: f"{parse_quantity(text, 'nm', 350, 1100):g} nm",
         ),
         Question(
             "baselines",
@@ -122,6 +124,7 @@ def sensor_questions(
             "calliper (0.2 mm), drawing (0.3 mm), ruler (0.5 mm), or a standard uncertainty such as 0.1 mm.",
             lambda text, _: parse_baseline_sd(text),
             "calliper",
+            baseline_sd_text,
         ),
         Question(
             "laser_class",
@@ -286,6 +289,13 @@ def parse_baseline_sd(text: str) -> float:
     except ValueError as error:
         ways = ", ".join(MEASURED_SD_MM)
         raise ValueError(f"expected {ways}, or a standard uncertainty in mm: {error}") from None
+
+
+def baseline_sd_text(text: str) -> str:
+    """Valid answer for `parse_baseline_sd` with its unit: `calliper`, or `1 mm (1 sigma), as answered`."""
+    if (known := text.lower()) in MEASURED_SD_MM:
+        return known
+    return f"{parse_baseline_sd(text):g} mm (1 sigma), as answered"
 
 
 def parse_laser_class(text: str) -> str:

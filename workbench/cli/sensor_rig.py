@@ -12,6 +12,7 @@ from workbench.cli.sensor_questions import (
     F_RELATIVE_SD,
     Beam,
     Lens,
+    baseline_sd_text,
     nearest_mm,
     parse_baseline_sd,
     parse_baselines,
@@ -75,7 +76,7 @@ class Sensor:
             wavelength_nm=parse_quantity(given["wavelength"], "nm", 350, 1100),
             beams=tuple(beams),
             baseline_sd_mm=parse_baseline_sd(given["measured"]),
-            measured=given["measured"],
+            measured=baseline_sd_text(given["measured"]),
             laser_class=parse_laser_class(given["laser_class"]),
             port=given["port"],
             nearest_mm=min(nearest_mm(beam, given) for beam in beams),
@@ -115,9 +116,9 @@ def paths(sensor: Sensor, folder: Path) -> tuple[Path, Path]:
 
 def _named(sensor: Sensor, name: str) -> Iterator[str]:
     yield "format: 1"
-    yield f"rig: {json.dumps(name)}"
+    yield f"rig: {_quoted(name)}"
     serial = sensor.serial if name == sensor.name else practice_name(sensor.serial)
-    yield _noted(f"serial: {json.dumps(serial)}", "of this sensor; its calibration is refused for another")
+    yield _noted(f"serial: {_quoted(serial)}", "of this sensor; its calibration is refused for another")
     yield _noted(f'laser_class: "{sensor.laser_class}"', "IEC 60825-1, of the most dangerous laser")
 
 
@@ -127,7 +128,7 @@ def _devices(sensor: Sensor) -> Iterator[str]:
         "devices:",
         "  camera:",
         "    driver: opencv",
-        f"    source: {json.dumps(sensor.camera)}",
+        f"    source: {_quoted(sensor.camera)}",
         _noted("    # pixel_format: GREY", "v4l2-ctl --list-formats-ext lists what the camera has"),
         _noted("    exposure: 50", "V4L2: units of 100 us; turns automatic exposure off"),
         _noted("    exposure_limits: [1, 300]", "v4l2-ctl --list-ctrls prints those of the camera"),
@@ -135,7 +136,7 @@ def _devices(sensor: Sensor) -> Iterator[str]:
         _noted("    latency_frames: 3", "workbench doctor measures it"),
         "  lasers:",
         "    driver: serial",
-        f"    port: {json.dumps(sensor.port)}",
+        f"    port: {_quoted(sensor.port)}",
         "  target:",
         "    driver: by_hand",
         "",
@@ -222,6 +223,11 @@ def _emulator(sensor: Sensor, seed: int) -> Iterator[str]:
 def _noted(text: str, comment: str) -> str:
     """Line with a comment in the column of comments."""
     return f"{text:<{COMMENTS_AT}}# {comment}"
+
+
+def _quoted(text: str) -> str:
+    """Text in double quotes for YAML, readable in any script."""
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _prior(value: float, sd: float, decimals: int) -> str:

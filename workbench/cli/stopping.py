@@ -8,6 +8,8 @@ from types import FrameType
 from workbench.model.errors import StoppedError
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+BY_CTRL_C = f"stopped by {signal.SIGINT.name}"
+"""Reason of a stop by Ctrl-C."""
 
 
 def stop_at_once() -> None:

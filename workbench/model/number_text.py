@@ -27,6 +27,11 @@ def two_digits(sd: float) -> str:
     return f"{float(f'{sd:.2g}'):g}"
 
 
+def probability(p: float) -> str:
+    """Text of a p value: `p = 0.031`; close to 1, where its digits mean nothing, `p > 0.99`."""
+    return "p > 0.99" if p > 0.99 else f"p = {p:.2g}"
+
+
 def counted(number: int, thing: str) -> str:
     """Text of a number of things whose plural ends with s: `1 spot`, `2 spots`."""
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"

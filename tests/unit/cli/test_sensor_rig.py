@@ -48,7 +48,7 @@ def test_names_that_yaml_would_read_as_numbers_stay_names() -> None:
     assert [rig.rig for rig in rigs(name="007")] == ["007", "007-practice"]
 
 
-@pytest.mark.parametrize("serial", ["7", 'LS 12/"34"', "007", "20261130-150255"])
+@pytest.mark.parametrize("serial", ["7", "SN 17/ä", 'LS 12/"34"', "007", "20261130-150255"])
 def test_the_serial_number_is_that_of_the_answers(serial: str) -> None:
     assert [rig.serial for rig in rigs(serial=serial)] == [serial, f"{serial}-practice"]
 
@@ -90,3 +90,14 @@ def test_the_documented_example_is_the_sensor_of_its_answers() -> None:
     page = (ROOT / "docs/build-a-sensor.md").read_text()
     for key in ("size", "lens", "wavelength", "baselines", "measured", "laser_class", "port"):
         assert f"| `{GIVEN[key]}` |" in page, key
+
+
+def test_a_serial_number_is_readable_in_the_file() -> None:
+    assert "SN 17/ä" in rig_text(Sensor.of(GIVEN | {"serial": "SN 17/ä"}))
+
+
+@pytest.mark.parametrize(
+    ("measured", "comment"), [("1", "1 mm (1 sigma)"), ("0,5mm", "0.5 mm"), ("ruler", "ruler")]
+)
+def test_the_comment_of_a_baseline_has_the_unit(measured: str, comment: str) -> None:
+    assert f"measured: {comment}" in rig_text(Sensor.of(GIVEN | {"measured": measured}))

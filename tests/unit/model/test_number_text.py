@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from workbench.model.number_text import counted, duration, significant, two_digits, with_sd
+from workbench.model.number_text import counted, duration, probability, significant, two_digits, with_sd
 
 
 @pytest.mark.parametrize(
@@ -49,3 +49,12 @@ def test_durations_get_coarser(seconds: float, text: str) -> None:
 
 def test_one_thing_is_singular() -> None:
     assert [counted(number, "spot") for number in (0, 1, 2)] == ["0 spots", "1 spot", "2 spots"]
+
+
+def test_a_p_value_close_to_1_has_no_digits() -> None:
+    assert [probability(p) for p in (1.0, 0.9951, 0.99, 0.0312)] == [
+        "p > 0.99",
+        "p > 0.99",
+        "p = 0.99",
+        "p = 0.031",
+    ]

@@ -202,7 +202,7 @@ def test_a_signal_ends_it(
     from_the(4, stop, monkeypatch)
     ended = live("--standoff", 600, "--stats")
     assert (ended.code, len(ended.out)) == (5, readings)
-    assert f"stopped by {number.name}" in ended.err
+    assert f"stopped by {'Ctrl-C' if number == signal.SIGINT else number.name}" in ended.err
     assert f"{readings} readings in" in ended.err
     assert live.dark()
 

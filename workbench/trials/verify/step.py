@@ -52,7 +52,8 @@ class VerifyTrialStep(TrialStepModel):
     @property
     def title(self) -> str:
         """Numbers of standoffs and readings."""
-        where = f"Verify the calibration at {counted(len(self.standoffs_mm), 'standoff')}"
+        standoffs = counted(len(self.standoffs_mm), "standoff")
+        where = f"Verify the calibration at {standoffs} and one unmeasured placement"
         return f"{where}, {counted(self.readings, 'reading')} each"
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:

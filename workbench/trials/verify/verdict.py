@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from workbench.model.number_text import probability
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.verify.changes import FOCAL_LENGTH, REFOCUSED, Change, changes, named
 from workbench.trials.verify.laser_errors import laser_errors
@@ -51,7 +52,7 @@ def lasers_verdict(check: PlacementCheck) -> Verdict:
         return Verdict(True, "the lasers agree", "measure the target")
     return Verdict(
         False,
-        f"the lasers disagree on a flat target (p = {check.lasers_p:.2g})",
+        f"the lasers disagree on a flat target ({probability(check.lasers_p)})",
         "check that the target is flat and that no laser or lens is loose; then calibrate again",
     )
 
@@ -78,8 +79,8 @@ def ranges_verdict(
     found = changes(sensor, errors)
     p = _joint_p(found, errors.probability)
     if p >= ALARM:
-        return Verdict(True, f"the ranges agree (p = {p:.2g})", "keep the calibration")
-    text = f"the ranges disagree with the target (p = {p:.2g})"
+        return Verdict(True, f"the ranges agree ({probability(p)})", "keep the calibration")
+    text = f"the ranges disagree with the target ({probability(p)})"
     return explained(Verdict(False, text, MEASURE_AGAIN), found)
 
 
