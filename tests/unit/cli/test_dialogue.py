@@ -46,6 +46,16 @@ def test_back_returns_and_keeps_the_answer_as_default(monkeypatch: pytest.Monkey
     assert answers(monkeypatch, "1", "back", "5", "6") == {"a": "5", "b": "6"}
 
 
+def test_an_answer_is_repeated_with_its_unit_where_it_has_none(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    question = Question("c", "C?", "a length", lambda text, _: text, echo=lambda _: "1 mm")
+    for typed, repeated in (("1", 1), ("1 mm", 0)):
+        monkeypatch.setattr("sys.stdin", io.StringIO(f"{typed}\n"))
+        assert ask_all([question]) == {"c": typed}
+        assert capsys.readouterr().err.count("1 mm") == repeated
+
+
 def test_the_end_of_the_input_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(AnswerNeededError, match="B\\?"):
         answers(monkeypatch, "1")

@@ -86,7 +86,7 @@ def required_parties(lab: Laboratory, session: SessionRecord) -> tuple[Party, Pa
     if missing := [name for name, value in items.items() if not value]:
         raise BadInputError(
             f"--dcc: a Digital Calibration Certificate requires {', '.join(missing)}; write them into"
-            f" {session.folder.parent / LABORATORY_FILE}"
+            f" {session.folder.parent / LABORATORY_FILE} (layout: docs/certificate.md, section lab.yaml)"
         )
     return lab.laboratory or Party(name="-"), lab.customer or Party(name="-")
 
