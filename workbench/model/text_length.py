@@ -4,8 +4,8 @@ from __future__ import annotations
 
 LONGEST_NAME = 60
 """Largest number of characters of a person's name."""
-LONGEST_TEXT = 2000
-"""Largest number of characters of a reason, a note, or an item of the laboratory file: half a page."""
+LONGEST_TEXT = 10_000
+"""Largest number of characters of a reason, a note, or an item of the laboratory file: three pages."""
 
 
 def length_error(text: str, longest: int = LONGEST_TEXT) -> str:
