@@ -10,14 +10,13 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
 from workbench.model.rig import Name
-from workbench.model.text_length import LONGEST_TEXT
+from workbench.model.text_length import length_error
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 LABORATORY_FILE = "lab.yaml"
-Text = Annotated[Name, Field(max_length=LONGEST_TEXT)]
 Span = tuple[float, float]
 """Lowest and highest value."""
 
@@ -32,6 +31,13 @@ def _as_day(value: object) -> date:
         raise ValueError(f"expected a day, such as 2026-11-30, got {value!r}") from None
 
 
+def _not_too_long(text: str) -> str:
+    if wrong := length_error(text):
+        raise ValueError(wrong)
+    return text
+
+
+Text = Annotated[Name, AfterValidator(_not_too_long)]
 Day = Annotated[date, BeforeValidator(_as_day)]
 """A day, as 2026-11-30."""
 

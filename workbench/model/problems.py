@@ -33,7 +33,6 @@ EXPECTED = {
     "float_type": NUMBER,
     "finite_number": "a finite number",
     "string_type": "text, such as {text}",
-    "string_too_long": "at most {max_length} characters",
     "string_unicode": "text in UTF-8",
     "string_pattern_mismatch": "{spelled}",
     "bool_parsing": TRUTH,

@@ -29,7 +29,7 @@ LIBRARY = re.compile(
 
 ODD: tuple[Any, ...] = (
     None, True, False, -1e300, -91, -1, 0, 0.5, 1, 95, 1e300, 10**400, float("nan"), float("inf"),
-    "", " ", "ä/ö", "1 W", "2,5", "x" * 20_000, b"\xff", date(2026, 11, 23), {1, 2},
+    "", " ", "ä/ö", "1 W", "2,5", "x" * 300, b"\xff", date(2026, 11, 23), {1, 2},
     [], [None], ["a"], [1], [-1, -1], [[]], [1] * 30, {}, {"a": 1}, {1: {}}, {"step": "dance"}, {"step": 3},
     {"shape": "egg"}, [{"step": "fit", "limit": 1}], {"value": [], "sd": "x"}, [{"step": 3}],
 )  # fmt: skip
