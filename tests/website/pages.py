@@ -16,6 +16,8 @@ ROOT = Path(__file__).parents[2]
 COPIED = (
     "docs",
     "data/README.md",
+    "data/aprilgrid-photos/LICENSE",
+    "data/opencv-chessboards/LICENSE",
     "data/webcam-laser-rows.csv",
     "examples",
     "notebooks/README.md",

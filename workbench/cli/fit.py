@@ -174,10 +174,15 @@ def _fit_camera(rig: Rig, request: Request, as_json: bool, details: bool) -> Non
 
 
 def _captures(request: Request) -> tuple[Path, bytes, tuple[CaptureRow, ...]]:
-    """Captures file of a request, its content, and its rows, whose images exist."""
+    """Captures file of a request, its content, and its rows, whose images exist; of a session as recorded."""
     captures = calibration_table(request.source)
     content = read_captures_file(captures)
     rows = parse_captures(captures, content)
+    if (request.source / MANIFEST).is_file():
+        # Imported here: a fit of a captures file needs no events.
+        from workbench.session.capture_table_check import check_capture_table
+
+        check_capture_table(request.source, content.decode("utf-8-sig"))
     check_images(captures, rows)
     return captures, content, rows
 

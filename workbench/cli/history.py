@@ -20,7 +20,7 @@ from workbench.report.document_files import write_document
 from workbench.report.history.dates import future_text
 from workbench.report.history.drift import distance_histories
 from workbench.report.history.in_force import dated_calibrations, in_force, newer_text
-from workbench.report.history.page import SensorHistory, history_document
+from workbench.report.history.page import SensorHistory, history_document, of_one_calibration
 from workbench.report.history.verifications import verifications
 from workbench.report.terminal_table import TerminalTable
 from workbench.session.caller import now, operator
@@ -88,9 +88,7 @@ def sensor_history(folder: Path, serial: str, every: Sequence[IndexedSession]) -
         )
     calibrations, remarks = dated_calibrations(own)
     force = in_force(folder, calibrations, entries)
-    checked = verifications(folder, own)
-    if force is not None:
-        checked = tuple(one for one in checked if one.calibration == force.calibration.sha256)
+    checked = of_one_calibration(verifications(folder, own), force)
     laboratory = load_laboratory(folder)
     agreed = None if laboratory is None else laboratory.recalibration
     return SensorHistory(

@@ -7,6 +7,7 @@ from pathlib import Path
 from workbench.cli.console import print_message
 from workbench.model.calibration import Calibration
 from workbench.model.contents import file_sha256
+from workbench.model.dates import future_remark
 from workbench.model.errors import BadInputError
 from workbench.model.rig import UNKNOWN_SERIAL
 from workbench.session.manifest import MANIFEST
@@ -18,11 +19,15 @@ SESSIONS = Path("sessions")
 def note_if_not_in_force(path: Path, calibration: Calibration, sessions: Path) -> None:
     """Print one line if another calibration of the sensor is in force by a folder of sessions.
 
+    Another line is printed for a calibration that is dated in the future.
+
     Args:
         path: file of the calibration in use.
         calibration: its content.
         sessions: folder of sessions, which may be missing.
     """
+    if remark := future_remark(str(path), calibration.laser_ranger.provenance.created):
+        print_message(f"note: {remark}")
     serial = calibration.laser_ranger.provenance.serial
     if serial == UNKNOWN_SERIAL or not sessions.is_dir():
         return

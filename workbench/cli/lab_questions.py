@@ -15,6 +15,7 @@ from ruamel.yaml import YAML
 
 from workbench.cli.console import print_message
 from workbench.model.laboratory import LABORATORY_FILE, Laboratory, load_laboratory
+from workbench.model.text_length import length_error
 from workbench.session.files import write_output
 
 Ask = Callable[[str], str]
@@ -65,7 +66,7 @@ def laboratory_of(sessions: Path, no_input: bool, ask: Ask) -> Laboratory:
 
 def _answer(key: str, question: str, ask: Ask) -> str:
     """Answer in the form of its item, or empty; asked for again, with the reason, until it has that form."""
-    parse = FORMS.get(key, str)
+    parse = FORMS.get(key, _text)
     while True:
         typed = ask(f"{question} (Enter: not stated)").strip()
         if not typed:
@@ -76,6 +77,12 @@ def _answer(key: str, question: str, ask: Ask) -> str:
             print_message(str(wrong))
         else:
             return typed.upper() if key == "country" else typed
+
+
+def _text(typed: str) -> str:
+    if wrong := length_error(typed):
+        raise ValueError(wrong)
+    return typed
 
 
 def _country(typed: str) -> str:

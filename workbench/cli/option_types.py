@@ -11,6 +11,8 @@ from typing import Annotated
 
 import typer
 
+from workbench.model.text_length import LONGEST_NAME, length_error
+
 AnswersFile = Annotated[
     Path | None,
     typer.Option(help="Answers to prompts (YAML), except those that need a person at the bench."),
@@ -81,20 +83,24 @@ REASON_PLACEHOLDER = "TEXT"
 
 
 def reason(given: str | None) -> str | None:
-    """Refuse a blank reason, the placeholder of a printed command, and text that is not UTF-8."""
+    """Refuse a blank or overlong reason, the placeholder of a printed command, and text that is not UTF-8."""
     if given is not None and not given.isprintable() and _has_surrogates(given):
         raise typer.BadParameter("expected text in UTF-8, got other bytes; set the terminal to UTF-8")
     if given is not None and given.strip() in {"", REASON_PLACEHOLDER}:
         raise typer.BadParameter(f"expected a reason in words, got {given.strip() or 'a blank'}")
+    if given is not None and (wrong := length_error(given)):
+        raise typer.BadParameter(wrong)
     return given
 
 
 def person(given: str | None) -> str | None:
-    """Refuse a blank name, and text that is not UTF-8 or in several lines."""
+    """Refuse a blank or overlong name, and text that is not UTF-8 or in several lines."""
     if given is not None and not (given.strip() and given.isprintable()):
         raise typer.BadParameter(
             "expected the name of a person in one line, got a blank or control characters"
         )
+    if given is not None and (wrong := length_error(given.strip(), LONGEST_NAME)):
+        raise typer.BadParameter(wrong)
     return None if given is None else given.strip()
 
 

@@ -17,6 +17,7 @@ from workbench.model.contents import printable
 from workbench.model.errors import AnswerNeededError, BadInputError
 from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.assemble import Certificate, certificate_of
+from workbench.report.certificate.assessment import future_texts
 from workbench.report.certificate.dcc import certificate_xml, required_parties
 from workbench.report.certificate.issue import numbered, sources_of
 from workbench.report.certificate.session_record import SessionRecord, read_session
@@ -130,6 +131,9 @@ def _ask(question: str) -> str:
 def _print_summary(certificate: Certificate, outputs: Outputs) -> None:
     document = certificate.document
     print_message(f"{document.title} {document.number}: {document.verdict.text}")
+    session = certificate.sources.session
+    for remark in filter(None, (*future_texts(session, session.calibration), session.chain_remark)):
+        print_message(f"note: {remark}")
     for path in outputs.files:
         print_message(f"{path} written")
     open_items = [fact.name for fact in document.head if not fact.is_stated]

@@ -18,6 +18,7 @@ from workbench.cli.verdict import split_reason
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.number_text import counted
+from workbench.report.history.dates import future_text
 from workbench.session.index import IndexedSession, copies_text, indexed_sessions, read_indexed
 from workbench.session.journal import read_journal
 from workbench.session.manifest import MANIFEST
@@ -63,8 +64,8 @@ def list_sessions(sessions: Path, as_json: bool, selection: Selection = Selectio
     else:
         every = indexed_sessions(sessions)
     found = [one for one in every if selection.includes(one)]
-    if copies := copies_text(found):
-        print_message(f"note: {copies}")
+    for note in filter(None, (copies_text(found), future_text(found))):
+        print_message(f"note: {note}")
     if as_json:
         for each in found:
             print(json.dumps(_as_json(each)))

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.cli.console import print_message
+from workbench.cli.option_types import REASON_PLACEHOLDER
 from workbench.cli.sessions import find_session
 from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError, LimitFailedError
-from workbench.report.certificate.session_record import check_recorded, read_session
+from workbench.model.event import CalibrationLoaded
+from workbench.report.certificate.session_record import SessionRecord, check_recorded, read_session
 from workbench.report.history.calibrations import range_changes
 from workbench.report.history.in_force import dated_calibrations, in_force, newer_text, sensor_in_force
 from workbench.session.caller import now, operator
 from workbench.session.index import indexed_sessions, read_indexed
+from workbench.session.manifest import MANIFEST
 from workbench.session.sensor_log import SensorEntry, append_entry, read_entries
 
 
@@ -83,7 +87,7 @@ def _file(name: Path, sessions: Path) -> Path:
     """Calibration file: as named, or that of a session.
 
     Raises:
-        BadInputError: there is none, or it is not that of the session any more.
+        BadInputError: there is none, it is not that of the session any more, or it is the copy of another.
         LimitFailedError: the last fit of the session is refused.
     """
     if name.is_file():
@@ -92,13 +96,34 @@ def _file(name: Path, sessions: Path) -> Path:
         except BadInputError:
             _check_session(name.parent)
             raise
+        if (name.resolve().parent / MANIFEST).is_file():
+            _refuse_copy(read_session(name.resolve().parent), name.resolve().name, sessions)
         return name
     folder = find_session(name, sessions)
     _check_session(folder)
-    path = read_session(folder).calibration_path
+    session = read_session(folder)
+    path = session.calibration_path
     if path is None:
         raise BadInputError(f"{name}: expected a calibration, the session has none")
+    _refuse_copy(session, path.name, sessions)
     return path
+
+
+def _refuse_copy(session: SessionRecord, name: str, sessions: Path) -> None:
+    """Refuse the copy of an existing calibration that a session used: its session is another one.
+
+    Raises:
+        BadInputError: the file `name` of the session is such a copy.
+    """
+    used = [one for one in session.events(CalibrationLoaded) if one.path == name]
+    if not used or session.is_own_calibration:
+        return
+    options = ["--rig", session.rig.serial, "--reason", REASON_PLACEHOLDER, "--sessions", str(sessions)]
+    command = shlex.join(["workbench", "use", used[-1].file, *options])
+    raise BadInputError(
+        f"{session.folder}: expected a session that made a calibration, got one that used that of"
+        f" {used[-1].file}; put that one in force: {command}"
+    )
 
 
 def _check_session(folder: Path) -> None:

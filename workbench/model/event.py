@@ -8,10 +8,12 @@ trials, and about the records themselves are defined in modules of their own and
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import timedelta
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from workbench.model.dates import CHECK_CLOCK, CLOCK_TOLERANCE
 from workbench.model.exposure import Verdict as BrightnessVerdict
 from workbench.model.fit_event import CrossValidatedPlacement as CrossValidatedPlacement
 from workbench.model.fit_event import Fault as Fault
@@ -315,8 +317,15 @@ class CalibrationLoaded(FileModel):
     def text(self) -> str:
         """Summary in one line."""
         made = f"made {self.made}" if self.made else "of unknown date"
-        age = "age unknown" if self.age_days is None else f"{self.age_days:.1f} days old"
-        return f"calibration {self.file}, {made}, {age}"
+        return f"calibration {self.file}, {made}, {self._age_text}"
+
+    @property
+    def _age_text(self) -> str:
+        if self.age_days is None:
+            return "age unknown"
+        if timedelta(days=-self.age_days) > CLOCK_TOLERANCE:
+            return f"dated {-self.age_days:.1f} days in the future: {CHECK_CLOCK}"
+        return f"{max(self.age_days, 0.0):.1f} days old"
 
 
 class SessionFinished(FileModel):

@@ -10,9 +10,10 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
 from workbench.model.rig import Name
+from workbench.model.text_length import length_error
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 LABORATORY_FILE = "lab.yaml"
@@ -30,6 +31,13 @@ def _as_day(value: object) -> date:
         raise ValueError(f"expected a day, such as 2026-11-30, got {value!r}") from None
 
 
+def _not_too_long(text: str) -> str:
+    if wrong := length_error(text):
+        raise ValueError(wrong)
+    return text
+
+
+Text = Annotated[Name, AfterValidator(_not_too_long)]
 Day = Annotated[date, BeforeValidator(_as_day)]
 """A day, as 2026-11-30."""
 
@@ -37,23 +45,23 @@ Day = Annotated[date, BeforeValidator(_as_day)]
 class Party(FileModel):
     """A laboratory or a customer."""
 
-    name: Name
-    address: Name = ""
-    contact: Name = ""
+    name: Text
+    address: Text = ""
+    contact: Text = ""
 
 
 class Standard(FileModel):
     """An instrument, or a reference standard from which true values come."""
 
-    name: Name
-    serial: Name = ""
-    certificate: Name = ""
+    name: Text
+    serial: Text = ""
+    certificate: Text = ""
     """Number of its calibration certificate and the laboratory that issued it."""
     calibrated: Day | None = None
     due: Day | None = None
     """Day of its next calibration."""
     expanded_uncertainty: Annotated[float, Field(gt=0)] | None = None
-    unit: Name = ""
+    unit: Text = ""
     coverage_factor: Annotated[float, Field(gt=0)] = 2.0
 
 
@@ -75,7 +83,7 @@ class Recalibration(FileModel):
     """Interval of recalibration that was agreed with the customer."""
 
     months: Annotated[int, Field(ge=1, le=120)]
-    reason: Name
+    reason: Text
 
 
 class Laboratory(FileModel):
@@ -85,23 +93,23 @@ class Laboratory(FileModel):
     laboratory: Party | None = None
     country: Annotated[str, Field(pattern=r"^([A-Z]{2})?$")] = ""
     """Country of the laboratory, two letters of ISO 3166-1."""
-    place: Name = ""
+    place: Text = ""
     """Place of the work, if it is not the laboratory's address."""
     customer: Party | None = None
-    manufacturer: Name = ""
+    manufacturer: Text = ""
     """Manufacturer of the sensor."""
     received: Day | None = None
     """Day on which the sensor was received."""
-    authorised_by: Name = ""
+    authorised_by: Text = ""
     """Person who authorises the certificate."""
     number_prefix: Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{0,12}$")] = ""
     """Letters before the certificates' numbers."""
     standards: tuple[Standard, ...] = ()
     ambient: Ambient = Ambient()
     warm_up_min: Annotated[float, Field(ge=0)] | None = None
-    target_material: Name = ""
+    target_material: Text = ""
     recalibration: Recalibration | None = None
-    remarks: Name = ""
+    remarks: Text = ""
 
 
 def load_laboratory(folder: Path) -> Laboratory | None:

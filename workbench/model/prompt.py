@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from workbench.model.text_length import length_error
 from workbench.model.yamlfile import FileModel
 
 Action = Literal["done", "redo", "skip", "abort"]
@@ -50,6 +51,8 @@ class Prompt:
 
     def refuse(self, answer: Answer) -> str | None:
         """Reason why an answer is not valid; None for a valid one."""
+        if wrong := length_error(answer.reason or ""):
+            return f"reason: {wrong}"
         if answer.action != "done":
             if answer.action != "abort" and answer.action not in self.may:
                 return f"expected an answer, got {answer.action}, which is not possible here"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,6 +22,11 @@ TEMPLATE, STYLE = "document.html.j2", "document.css"
 WIDTH_CHARACTERS = 104
 """Width of a page in characters of a table; wider tables are split into blocks of columns."""
 HASH_KEY = "sha256"
+LONG_WORD = 60
+"""Number of letters of a word above which the cells of its column break words."""
+LONGEST_WORD = 300
+"""Largest number of letters of a word on the page: the time of a PDF grows with its square."""
+WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 MOST_ROWS = 600
 """Largest number of rows of a table on the page; `workbench export` writes all."""
 
@@ -34,7 +40,7 @@ class HtmlColumn:
     cells: tuple[str, ...]
     is_number: bool
     kind: str
-    """Class of its cells: `number`, `hash`, `alarm` or none."""
+    """Class of its cells: `number`, `hash`, `long` (words), `alarm` or none."""
 
 
 def document_html(document: Document, printed: str) -> str:
@@ -46,7 +52,11 @@ def document_html(document: Document, printed: str) -> str:
     """
     folder = Path(__file__).parent
     environment = Environment(
-        loader=FileSystemLoader(folder), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+        loader=FileSystemLoader(folder),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        finalize=_shortened,
     )
     environment.filters |= {
         "svg": partial(_svg, document),
@@ -89,11 +99,22 @@ def _without_empty_rows(block: list[HtmlColumn]) -> list[HtmlColumn]:
 
 def _html_column(table: Table, index: int, text: TextColumn) -> HtmlColumn:
     column = table.columns[index]
-    kind = "number" if text.is_number else "hash" if column.key == HASH_KEY else ""
+    kind = "number" if text.is_number else "hash" if column.key == HASH_KEY else _kind_of_words(text.cells)
     if any(cell == ALARM for cell in text.cells):
         kind = "alarm"
     name, unit = (column.name, column.unit) if column.name else (column.unit, "")
     return HtmlColumn(name, unit, text.cells, text.is_number, kind)
+
+
+def _kind_of_words(cells: Sequence[str]) -> str:
+    return "long" if any(len(word) > LONG_WORD for cell in cells for word in cell.split()) else ""
+
+
+def _shortened(value: object) -> object:
+    """A value of the page, with an ellipsis in place of the end of overlong words; markup as it is."""
+    if isinstance(value, Markup) or not isinstance(value, str):
+        return value
+    return WORD.sub(lambda word: f"{word[0][: LONGEST_WORD - 1]}\N{HORIZONTAL ELLIPSIS}", value)
 
 
 def _rows(columns: Sequence[HtmlColumn]) -> Iterator[list[tuple[HtmlColumn, str]]]:

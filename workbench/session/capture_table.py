@@ -30,7 +30,7 @@ def write_capture_table(path: Path, captures: Iterable[CaptureTaken]) -> str:
     """
     taken = list(captures)
     zero_ns = first_time_ns(taken)
-    rows = [_row(capture, zero_ns) for capture in taken]
+    rows = [table_row(capture, zero_ns) for capture in taken]
     stated = [n < len(NEEDED) or any(row[n] for row in rows) for n in range(len(COLUMNS))]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
@@ -45,7 +45,8 @@ def first_time_ns(captures: Iterable[CaptureTaken]) -> int:
     return min((capture.time_ns for capture in captures), default=0)
 
 
-def _row(capture: CaptureTaken, zero_ns: int) -> tuple[str, ...]:
+def table_row(capture: CaptureTaken, zero_ns: int) -> tuple[str, ...]:
+    """Cells of a capture in the order of `COLUMNS`; times count from `zero_ns`."""
     return (
         capture.laser_id,
         repr(capture.standoff_mm),

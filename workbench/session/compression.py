@@ -7,8 +7,6 @@ from pathlib import Path
 
 from workbench.model.captures import BOARD, CaptureRow
 from workbench.model.number_text import counted
-from workbench.session.frames import JPEG, read_image
-from workbench.spots.jpeg_blocks import has_jpeg_blocks
 
 REMEDY = (
     "JPEG moves spots, by more than their stated deviations. Do: record uncompressed frames (pixel_format"
@@ -23,14 +21,19 @@ def compression_notes(rows: Sequence[CaptureRow]) -> list[str]:
         BadInputError: that image cannot be read.
     """
     images = [row.on for row in rows if row.on is not None and row.laser_id != BOARD]
-    compressed = sum(map(_is_jpeg, dict.fromkeys(images)))
+    if not images:
+        return []
+    from workbench.session.frames import JPEG, read_image  # OpenCV takes time to load
+    from workbench.spots.jpeg_blocks import has_jpeg_blocks
+
+    compressed = sum(_begins_with(path, JPEG) for path in dict.fromkeys(images))
     if compressed:
         return [f"{counted(compressed, 'image')} of spots compressed by JPEG. {REMEDY}."]
-    if images and has_jpeg_blocks(read_image(images[0])):
+    if has_jpeg_blocks(read_image(images[0])):
         return [f"the images show the blocks of JPEG compression ({images[0].name}). {REMEDY}."]
     return []
 
 
-def _is_jpeg(path: Path) -> bool:
+def _begins_with(path: Path, content: bytes) -> bool:
     with path.open("rb") as file:
-        return file.read(len(JPEG)) == JPEG
+        return file.read(len(content)) == content

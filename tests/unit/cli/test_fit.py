@@ -11,13 +11,17 @@ import numpy as np
 import pytest
 
 from tests.support.command_line import Run, refused
+from tests.support.reference_session import copied
 from tests.support.rigs import World
 from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.fit import _rejected_json
 from workbench.model.calibration import load_calibration
+from workbench.model.event import SessionFinished
 from workbench.model.fit_event import Rejected
 from workbench.model.fit_tables import parameter_table
 from workbench.model.rig import load_rig
+from workbench.session.journal import Journal
+from workbench.session.manifest import load_manifest
 
 ROOT = Path(__file__).parents[3]
 WEBCAM = ROOT / "data/webcam-laser-rows.csv"
@@ -352,3 +356,24 @@ def test_a_public_table_of_a_laser_line_gives_its_author_s_numbers(workbench: Ru
     assert derived["f_b_sd"] == pytest.approx(80, rel=0.4)
     assert derived["infinity_px"] == pytest.approx(118.44, abs=0.1)
     assert abs(derived["f_b_px_mm"] - 22.5 / 0.0032974349) < 2 * derived["f_b_sd"]
+
+
+def test_a_session_is_fitted_as_recorded_only(workbench: Run, tmp_path: Path) -> None:
+    """An edited captures file, or a journal with an edited line, is refused; the file by itself is free."""
+    session, out = copied(tmp_path, frames=True), tmp_path / "c.yaml"
+    assert workbench("fit", session, "-o", out).code == 0
+    table = session / "captures.csv"
+    table.write_text(table.read_text().replace(",150.0,", ",150.5,"))
+    refused(workbench("fit", session, "-o", tmp_path / "a.yaml"), 2, "captures.csv: row 2", "standoff_mm")
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(load_manifest(session).rig.text)
+    assert workbench("fit", table, "--rig", rig, "-o", tmp_path / "b.yaml").code in {0, 3}
+    journal, _ = Journal.reopen(session)
+    with journal:
+        journal.append(SessionFinished(exit_code=0, message="first"))
+        journal.append(SessionFinished(exit_code=0, message="second"))
+    path = session / "journal.jsonl"
+    path.write_text(path.read_text().replace('"message":"first"', '"message":"other"'))
+    lines = path.read_text().count("\n")
+    refused(workbench("fit", session, "-o", tmp_path / "d.yaml"), 2, f"journal.jsonl:{lines - 1}")
+    assert not (tmp_path / "d.yaml").exists()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -68,3 +69,13 @@ def test_view_of_an_edited_calibration_has_a_remark(
     edit_calibration(session)
     recording_of(request, tmp_path / "out")
     assert "sha256" in capsys.readouterr().err
+
+
+def test_a_calibration_dated_in_the_future_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "c.yaml"
+    text = (REFERENCE / "calibration.yaml").read_text()
+    path.write_text(re.sub(r'created: "\d{4}', 'created: "2999', text))
+    (line,) = remark(path, tmp_path / "missing", capsys)
+    assert "2999" in line

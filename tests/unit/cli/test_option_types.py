@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.support.command_line import Run, refused
+from tests.support.reference_session import SERIAL, copied
+from workbench.model.text_length import LONGEST_NAME, LONGEST_TEXT
 
 ROOT = Path(__file__).parents[3]
 
@@ -35,3 +37,13 @@ def test_numbers_that_are_none(workbench: Run, line: str, says: str) -> None:
     outcome = workbench(*line.split())
     refused(outcome, 2, f"expected {says}")
     assert "Input should" not in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("options", "longest"), [("--note x --operator", LONGEST_NAME), ("--note", LONGEST_TEXT)]
+)
+def test_overlong_texts_are_refused(workbench: Run, tmp_path: Path, options: str, longest: int) -> None:
+    line = ["history", "--sessions", tmp_path, "--rig", SERIAL, *options.split()]
+    copied(tmp_path)
+    refused(workbench(*line, "x" * (longest + 1)), 2, str(longest))
+    assert workbench(*line, "x" * longest).code == 0

@@ -161,3 +161,12 @@ def test_sessions_are_selected_by_rig_day_and_verdict(workbench: Run, tmp_path: 
         assert [Path(one["session_dir"]).name for one in found] == names
     assert workbench("sessions", tmp_path, "--since", "yesterday").code == 2
     assert workbench("sessions", tmp_path, "--verdict", "good").code == 2
+
+
+def test_a_session_in_the_future_is_remarked_by_sessions_and_report(workbench: Run, tmp_path: Path) -> None:
+    session = copied(tmp_path)
+    arguments = (["sessions", tmp_path], ["report", session, "--no-input"])
+    assert ["2999" in workbench(*line).err for line in arguments] == [False, False]
+    manifest = session / "session.yaml"
+    manifest.write_text(manifest.read_text().replace("2026-11-30T08:50:45+0000", "2999-11-30T08:50:45+0000"))
+    assert ["2999" in workbench(*line).err for line in arguments] == [True, True]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tests.support.command_line import Run, refused
 from tests.support.reference_session import REFERENCE, SERIAL, copied, edit_calibration, repair, repeated
+from tests.support.verified_sensor import FIRST, write_verification
 from workbench.session.journal import JOURNAL
 
 
@@ -86,3 +87,14 @@ def test_a_calibration_from_before_a_repair_is_not_put_in_force(workbench: Run, 
     path = session / "calibration.yaml"
     done = workbench("use", path, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
     refused(done, 2, "calibration.yaml", "repaired")
+
+
+def test_the_copy_of_a_verification_is_not_put_in_force(workbench: Run, tmp_path: Path) -> None:
+    """The message names the calibration that the verification used."""
+    made = copied(tmp_path)
+    verification = write_verification(tmp_path, FIRST, [[0.001]] * 3)
+    copy = Path(shutil.copy(made / "calibration.yaml", verification))
+    for name in (verification.name, copy):
+        done = workbench("use", name, "--rig", SERIAL, "--reason", "x", "--sessions", tmp_path)
+        refused(done, 2, verification.name, "workbench use calibration.yaml", SERIAL)
+    assert not (tmp_path / "sensors.jsonl").exists()

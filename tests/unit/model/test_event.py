@@ -114,3 +114,17 @@ def test_a_placement_set_aside_is_left_out_or_captured_again() -> None:
     }
     assert texts[True] != texts[False]
     assert all(text.startswith("P3 ") and text.endswith("moved") for text in texts.values())
+
+
+def test_a_calibration_from_the_future_has_no_negative_age() -> None:
+    ages_days = (-1826.0, -0.5, 3.0)
+    loaded = [
+        ev.CalibrationLoaded(file="c", path="c", sha256="", made="2031-11-30", age_days=age_days)
+        for age_days in ages_days
+    ]
+    future, now, old = (one.text for one in loaded)
+    assert "future" in future
+    assert "1826" in future
+    assert "-" not in now.replace("2031-11-30", "")
+    assert "3.0 days old" in old
+    assert "future" not in now + old

@@ -9,6 +9,7 @@ import pytest
 
 from workbench.model.errors import BadInputError
 from workbench.model.laboratory import load_laboratory
+from workbench.model.text_length import LONGEST_TEXT
 
 FULL = """\
 format: 1
@@ -44,6 +45,7 @@ def test_items_are_read_with_their_types(tmp_path: Path) -> None:
         ("country: Germany", 2),
         ("received: yesterday", 2),
         ("unknown: 1", 2),
+        (f"authorised_by: {'x' * (LONGEST_TEXT + 1)}", 2),
         ("recalibration: {months: 0, reason: x}", 2),
     ],
 )

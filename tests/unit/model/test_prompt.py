@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from workbench.model.prompt import Action, Answer, Prompt, Quantity
+from workbench.model.text_length import LONGEST_TEXT
 
 NUMBER = Prompt("p", "Read it.", quantity=Quantity("mm", 450.0, 550.0, 500.0), may={"skip": "leave it out"})
 CONFIRM = Prompt("safety", "Safe?", at_bench=True)
@@ -33,3 +34,9 @@ def test_only_yes_confirms() -> None:
     assert CONFIRM.refuse(Answer()) is None
     assert CONFIRM.refuse(Answer(value="no")) is not None
     assert CONFIRM.refuse(Answer(value="")) is not None
+
+
+def test_an_overlong_reason_is_refused() -> None:
+    assert NUMBER.refuse(Answer(action="skip", reason="x" * LONGEST_TEXT)) is None
+    assert NUMBER.refuse(Answer(action="skip", reason="x" * (LONGEST_TEXT + 1))) is not None
+    assert CONFIRM.refuse(Answer(reason="x" * (LONGEST_TEXT + 1))) is not None

@@ -12,6 +12,8 @@ import pytest
 from tests.support.pango import need_pango
 from tests.support.reference_session import certificate
 from workbench.model.errors import BadInputError
+from workbench.model.table import Column, Table
+from workbench.report.document import Document, Fact, KeyNumber, Section, Verdict
 from workbench.report.document_html import document_html
 from workbench.report.document_pdf import document_pdf
 
@@ -101,3 +103,23 @@ def test_a_missing_system_library_is_named(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(sys, "meta_path", [Missing(), *sys.meta_path])
     with pytest.raises(BadInputError, match="libpango"):
         document_pdf("<p>text</p>")
+
+
+def test_an_overlong_word_neither_hangs_nor_leaves_the_page() -> None:
+    need_pango()
+    word = "m" * 3000
+    columns = (Column(key="a", name="a"), Column(key="b", name="b"))
+    table = Table(name="t", title="t", columns=columns, rows=((word, "b"), ("a", word)))
+    facts = (Fact("Operator", word),)
+    section = Section("s", "s", facts, (word,), (table,))
+    verdict = Verdict("good", "text", (word,))
+    numbers = (KeyNumber("name", "value", word),)
+    content = document_pdf(
+        document_html(Document("t", "1", "", facts, verdict, numbers, (section,), word), "now")
+    )
+    pages = pypdfium2.PdfDocument(content)
+    assert len(pages) < 5
+    for one in pages:
+        text = one.get_textpage()
+        for n in range(text.count_rects()):
+            assert text.get_rect(n)[2] <= one.get_width() - MARGIN_POINTS

@@ -8,6 +8,7 @@ from typing import Literal
 
 from workbench.model import event as ev
 from workbench.model.calibration import Calibration
+from workbench.model.dates import future_remark
 from workbench.model.number_text import counted
 from workbench.model.table import Table
 from workbench.report.certificate.fit_limits import Row, limit_rows
@@ -56,7 +57,8 @@ def _verdict(session: SessionRecord, calibration: Calibration | None, rows: Sequ
     fit, state = session.fit, session.status.state
     is_refused = fit is not None and fit.verdict == "refused"
     failed = [row for row in _with(rows, "fail") if not (is_refused and row[1] == "fit")]
-    reasons = (*_named(failed), *_overruled(session), *_trial_outcomes(session))
+    dates = future_texts(session, calibration)
+    reasons = (*_named(failed), *_overruled(session), *_trial_outcomes(session), *dates)
     if fit is not None and _is_refused(session, calibration):
         return Verdict("bad", "Calibration refused", (*fit.reasons, *reasons))
     if _has_invalid_verification(session):
@@ -115,6 +117,14 @@ def _overruled(session: SessionRecord) -> Iterator[str]:
         yield f"{'overruled' if one.in_effect else 'overruled, results replaced since'}: {one.text}{reason}"
     if (more := len(session.overruled) - MOST_LIMITS) > 0:
         yield f"{counted(more, 'more warning')} overruled"
+
+
+def future_texts(session: SessionRecord, calibration: Calibration | None) -> Iterator[str]:
+    """Remarks on dates of the session and its calibration that are after now."""
+    yield from filter(None, (future_remark(f"session {session.folder.name}", session.manifest.created),))
+    if calibration is not None:
+        made = calibration.laser_ranger.provenance.created
+        yield from filter(None, (future_remark("the calibration", made),))
 
 
 def _trial_outcomes(session: SessionRecord) -> Iterator[str]:

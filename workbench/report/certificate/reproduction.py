@@ -37,13 +37,18 @@ def reproduction_section(session: SessionRecord) -> Section:
         columns=(Column(key="what", name="file"), Column(key="sha256", name="sha256")),
         rows=tuple(_inputs(session)),
     )
-    return Section("data", "Data, versions and reproduction", facts, tables=(table,))
+    texts = tuple(f"{JOURNAL}: {remark}." for remark in (session.chain_remark,) if remark)
+    return Section("data", "Data, versions and reproduction", facts, texts, (table,))
 
 
 def record_text(session: SessionRecord) -> str:
-    """Hashes of the record of the measurement in one sentence: a signed certificate fixes them."""
+    """Hashes of the record of the measurement in one sentence: a signed certificate fixes them.
+
+    A journal without a hash chain is remarked.
+    """
     hashes = "; ".join(f"{what} {sha256}" for what, sha256 in _inputs(session))
-    return f"Record of the measurement, sha256: {hashes}."
+    remark = f" {JOURNAL}: {session.chain_remark}." if session.chain_remark else ""
+    return f"Record of the measurement, sha256: {hashes}.{remark}"
 
 
 def _inputs(session: SessionRecord) -> list[tuple[str, str]]:

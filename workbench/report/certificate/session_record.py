@@ -20,6 +20,7 @@ from workbench.session.manifest import MANIFEST, Manifest, load_manifest, load_s
 from workbench.session.state import SessionStatus, effective, session_status
 
 E = TypeVar("E")
+NO_CHAIN = "this record has no hash chain (it was written by an earlier version): an edit cannot be detected"
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,11 @@ class SessionRecord:
     def journal_chain(self) -> str:
         """Hash at the end of the last record; empty in sessions of versions that did not record it."""
         return last_chain(self.folder) if self.all_records else ""
+
+    @property
+    def chain_remark(self) -> str:
+        """Remark on a journal without a hash chain; empty with one, or without records."""
+        return NO_CHAIN if self.all_records and not self.journal_chain else ""
 
     @cached_property
     def manifest_sha256(self) -> str:

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 
+from workbench.model.dates import CHECK_CLOCK, CLOCK_TOLERANCE, is_future, parsed_time
 from workbench.model.number_text import counted
 from workbench.session.index import IndexedSession
 from workbench.session.manifest import MANIFEST
 
-TOLERANCE = timedelta(days=1)
-"""Largest difference by clocks and time zones."""
 EARLIEST = datetime.min.replace(tzinfo=UTC)
 REMEDY = "restore session.yaml from a copy"
-
-
-def parsed_time(text: str) -> datetime | None:
-    """Time of an ISO 8601 text, UTC where it has no zone; None if it is none."""
-    try:
-        time = datetime.fromisoformat(text)
-        return time.replace(tzinfo=UTC) if time.tzinfo is None else time.astimezone(UTC)
-    except (ValueError, OverflowError):
-        return None
 
 
 def wrong_date(one: IndexedSession) -> str:
@@ -31,7 +21,7 @@ def wrong_date(one: IndexedSession) -> str:
     if began is None:
         return f"{where}: expected the time of the start in ISO 8601, got {one.began!r}; {REMEDY}"
     first = datetime.fromtimestamp(one.first_record_ns / 1e9, tz=UTC)
-    if one.first_record_ns and began - first > TOLERANCE:
+    if one.first_record_ns and began - first > CLOCK_TOLERANCE:
         return f"{where}: the start, {one.began}, is after the first record, {first:%Y-%m-%d %H:%M}; {REMEDY}"
     return ""
 
@@ -41,16 +31,9 @@ def start_of(one: IndexedSession) -> datetime:
     return parsed_time(one.began) or EARLIEST
 
 
-def is_future(time: datetime) -> bool:
-    """Whether a time is after now: the clock that gave it, or that of this computer, is wrong."""
-    return time - datetime.now(UTC) > TOLERANCE
-
-
 def future_text(sessions: Iterable[IndexedSession]) -> str:
     """Remark on sessions that begin after now; empty without one."""
     names = [f"{one.name} ({one.began[:10]})" for one in sessions if is_future(start_of(one))]
     if not names:
         return ""
-    return (
-        f"{counted(len(names), 'session')} in the future, last {names[-1]}: check the clock of the computer"
-    )
+    return f"{counted(len(names), 'session')} in the future, last {names[-1]}: {CHECK_CLOCK}"

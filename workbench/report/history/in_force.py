@@ -9,9 +9,10 @@ from pathlib import Path
 
 from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.contents import file_sha256
+from workbench.model.dates import is_future, parsed_time
 from workbench.model.errors import BadInputError
 from workbench.report.certificate.session_record import check_recorded, unchanged
-from workbench.report.history.dates import EARLIEST, is_future, parsed_time, start_of, wrong_date
+from workbench.report.history.dates import EARLIEST, start_of, wrong_date
 from workbench.session.index import IndexedSession, indexed_sessions, read_indexed
 from workbench.session.sensor_log import SensorEntry, read_entries
 

@@ -28,22 +28,37 @@ class SensorHistory:
     calibrations: Sequence[DatedCalibration]
     in_force: InForce | None
     verifications: Sequence[Verification]
-    """Those with the calibration in force, in order of time."""
+    """Those of `of_one_calibration`, in order of time."""
     distances: Sequence[DistanceHistory]
     entries: Sequence[SensorEntry]
     agreed_months: int | None
     """Agreed interval of recalibration; None: none."""
     remarks: Sequence[str] = ()
 
+    @property
+    def verified(self) -> str:
+        """Calibration that the verifications used, in words."""
+        return "the calibration in force" if self.in_force else "the calibration of the last one"
+
+
+def of_one_calibration(checked: Sequence[Verification], force: InForce | None) -> tuple[Verification, ...]:
+    """Verifications with the calibration in force; if there is none, those with that of the last one."""
+    if not checked:
+        return ()
+    sha256 = checked[-1].calibration if force is None else force.calibration.sha256
+    return tuple(one for one in checked if one.calibration == sha256)
+
 
 def history_document(history: SensorHistory) -> Document:
     """The document."""
     force = history.in_force
     since = "none" if force is None else f"{force.calibration.session}, since {force.since}: {force.why}"
+    count = len(history.verifications)
     head = (
         Fact("Serial number", history.serial),
         Fact("Calibration in force", since),
-        Fact("Verifications with it", str(len(history.verifications))),
+        Fact("Verifications with it", str(count if force is not None else 0)),
+        *((Fact(f"Verifications with {history.verified}", str(count)),) if force is None else ()),
     )
     sections = (
         verification_section(history.verifications, history.distances),
@@ -84,9 +99,13 @@ def _tone_and_text(history: SensorHistory) -> tuple[Tone, str]:
         text = f"In control over {counted(len(tested), 'session')}"
         if any(one.excess for one in history.distances):
             return "open", f"{text}, but the last error exceeds U"
+        if history.in_force is None:
+            return "open", f"{text}, but no calibration is in force"
         return "good", text
     count = len(history.verifications)
-    text = f"No control limits yet: {count} of {FIRST_SESSIONS} verifications with the calibration in force"
+    if history.in_force is None and not count:
+        return "open", "No calibration is in force, and there is no verification"
+    text = f"No control limits yet: {count} of {FIRST_SESSIONS} verifications with {history.verified}"
     if charts:
         text = f"Control limits from {FIRST_SESSIONS} verifications; none after them yet"
     elif count >= FIRST_SESSIONS:
@@ -160,7 +179,7 @@ def _key_numbers(history: SensorHistory) -> tuple[KeyNumber, ...]:
     due = recalibrate_by(history)
     numbers = [
         KeyNumber("Calibrations", str(len(history.calibrations)), "accepted, in this folder"),
-        KeyNumber("Verifications", str(len(history.verifications)), "with the calibration in force"),
+        KeyNumber("Verifications", str(len(history.verifications)), f"with {history.verified}"),
         KeyNumber(
             "Recalibrate by", "-" if due is None else str(due[0]), "no rule" if due is None else due[1]
         ),

@@ -11,8 +11,8 @@ import numpy as np
 
 from workbench.model import event as ev
 from workbench.model.arrays import FloatArray
+from workbench.model.dates import parsed_time
 from workbench.report.certificate.session_record import utc
-from workbench.report.history.dates import parsed_time
 from workbench.session.index import IndexedSession
 from workbench.session.journal import read_journal
 from workbench.session.state import effective

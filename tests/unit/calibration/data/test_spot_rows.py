@@ -121,10 +121,11 @@ def test_all_frames_of_a_board_at_one_placement_are_one_view(monkeypatch: pytest
         row(5, "board", None, on=Path("4.png"), placement="b"),
     ]
     _, rejected, _ = observations_of_rows(thesis_rig(), rows)
-    assert [frames for frames, _ in seen] == [[1.0, 2.0], [3.0]]
-    assert [(p.key, p.standoff_mm, p.yaw_deg, p.source) for _, p in seen] == [
+    assert [frames for frames, _ in seen] == [[1.0, 2.0], [3.0], [4.0]]
+    assert [(p.key, p.standoff_mm, p.yaw_deg, p.source) for _, p in seen[:2]] == [
         ("a", 300.0, 10.0, "row 2"),
         ("400 mm", 400.0, 0.0, "row 4"),
     ]
+    assert np.isnan(seen[2][1].standoff_mm), "a board held anywhere"
     assert seen[0][1].standoff_sd_mm == 0.7
     assert [one.source for one in rejected] == ["row 2", "row 4", "row 5"]

@@ -12,7 +12,7 @@ from tests.support.reference_session import LABORATORY, certificate, copied, rec
 from tests.unit.report.certificate.test_dcc import NAMES, PRINTED
 from workbench.model import event as ev
 from workbench.model.table import Column, Table
-from workbench.report.certificate.assessment import CERTIFICATE, REPORT, assess
+from workbench.report.certificate.assessment import CERTIFICATE, REPORT, assess, future_texts
 from workbench.report.certificate.dcc import certificate_xml
 from workbench.report.certificate.method import decision_section
 from workbench.report.certificate.session_record import SessionRecord, read_session
@@ -119,3 +119,22 @@ def test_a_verification_is_the_headline_and_a_decision(valid: str, tone: str, ve
 
 def _is_own_trial(one: ev.Record) -> bool:
     return isinstance(one.event, ev.TrialFinished) and one.event.trial != "p.1"
+
+
+def test_dates_in_the_future_are_reasons_of_the_verdict(tmp_path: Path) -> None:
+    session = copied(tmp_path)
+    manifest = session / "session.yaml"
+    before = record(session)
+    assert list(future_texts(before, before.calibration)) == []
+    manifest.write_text(manifest.read_text().replace("2026-11-30T08:50:45+0000", "2999-11-30T08:50:45+0000"))
+    after = record(session)
+    (remark,) = future_texts(after, after.calibration)
+    assert session.name in remark
+    assert remark in assess(after, after.calibration).verdict.reasons
+    assert after.calibration is not None
+    made = after.calibration.laser_ranger.provenance.model_copy(
+        update={"created": "2999-01-01T00:00:00+0000"}
+    )
+    ranger = after.calibration.laser_ranger.model_copy(update={"provenance": made})
+    calibration = after.calibration.model_copy(update={"laser_ranger": ranger})
+    assert len(list(future_texts(after, calibration))) == 2

@@ -42,3 +42,18 @@ def test_command_and_versions_are_stated() -> None:
     facts = {fact.name: fact.value for fact in reproduction_section(record()).facts}
     assert facts["Command line"].startswith("workbench run reference.yaml")
     assert "numpy" in facts["Versions at the measurement"]
+
+
+def test_a_record_without_a_hash_chain_is_remarked(tmp_path: Path) -> None:
+    """Also in the signed file; the first hash of a later version covers the lines before it."""
+    session = copied(tmp_path)
+    found = read_session(session)
+    assert any(found.chain_remark in text for text in reproduction_section(found).texts)
+    assert found.chain_remark
+    xml = certificate_xml(certificate(session=found), datetime(2026, 12, 1, tzinfo=UTC))
+    assert found.chain_remark.encode() in xml
+    journal, before = Journal.reopen(session)
+    with journal:
+        journal.append(before[-1].event)
+    again = read_session(session)
+    assert (again.chain_remark, reproduction_section(again).texts) == ("", ())

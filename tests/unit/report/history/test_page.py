@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -14,8 +15,9 @@ from tests.support.verified_sensor import FIRST, MONTH, reading, verified_sensor
 from tests.unit.trials.verify.test_tables import REFERENCE, SENSOR
 from workbench.cli.history import sensor_history
 from workbench.model import event as ev
-from workbench.report.history.page import SensorHistory, history_document, recalibrate_by
+from workbench.report.history.page import SensorHistory, history_document, of_one_calibration, recalibrate_by
 from workbench.session.index import indexed_sessions
+from workbench.session.journal import JOURNAL
 from workbench.session.sensor_log import SensorEntry, append_entry
 from workbench.trials.verify.tables import verify_tables
 from workbench.trials.verify.verdict import Verdict
@@ -115,3 +117,26 @@ def test_charts_of_each_distance_and_notes_are_in_the_document(tmp_path: Path) -
     assert names == {f"{kind}_{mm}mm" for kind in ("xbar", "s", "cusum") for mm in (200, 400, 800)}
     assert sections["notes"].tables[0].records()[0]["text"] == entry.text
     json.dumps(found.as_json())
+
+
+@pytest.mark.parametrize("sessions", [0, 3, 24])
+def test_without_a_calibration_in_force_no_verification_counts_for_it(tmp_path: Path, sessions: int) -> None:
+    """The session of the calibration is damaged: verifications are compared with each other only."""
+    history(tmp_path, sessions)
+    journal = next(tmp_path.glob("*-reference")) / JOURNAL
+    lines = journal.read_text().splitlines(keepends=True)
+    journal.write_text("".join([*lines[:5], *lines[6:]]))
+    damaged = sensor_history(tmp_path, SERIAL, indexed_sessions(tmp_path))
+    document = history_document(damaged)
+    head = {fact.name: fact.value for fact in document.head}
+    assert (head["Calibration in force"], head["Verifications with it"]) == ("none", "0")
+    assert len(damaged.verifications) == sessions
+    assert document.verdict.tone == "open"
+    assert "in force" not in document.verdict.text or "no calibration" in document.verdict.text.lower()
+    assert any(JOURNAL in reason for reason in document.verdict.reasons)
+
+
+def test_verifications_of_one_calibration_are_compared(tmp_path: Path) -> None:
+    first, *others = history(tmp_path, 4).verifications
+    assert of_one_calibration((), None) == ()
+    assert len(of_one_calibration((replace(first, calibration="another"), *others), None)) == len(others)
