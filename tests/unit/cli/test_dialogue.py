@@ -49,6 +49,7 @@ def test_back_returns_and_keeps_the_answer_as_default(monkeypatch: pytest.Monkey
 def test_an_answer_is_repeated_with_its_unit_where_it_has_none(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     question = Question("c", "C?", "a length", lambda text, _: text, echo=lambda _: "1 mm")
     for typed, repeated in (("1", 1), ("1 mm", 0)):
         monkeypatch.setattr("sys.stdin", io.StringIO(f"{typed}\n"))
