@@ -107,7 +107,7 @@ def test_a_file_of_another_kind_is_refused_as_captures(workbench: Run, tmp_path:
     wrong.write_bytes(PNG)
     refused(workbench(*line), 2, f"{wrong}: ", "got a PNG image")
     wrong.write_bytes(cal.read_bytes())
-    refused(workbench(*line), 2, f"{wrong}: ", "got YAML")
+    refused(workbench(*line), 2, f"{wrong}: ", "got a calibration")
 
 
 @pytest.mark.parametrize(
