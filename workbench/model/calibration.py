@@ -205,10 +205,8 @@ class LaserRanger(FileModel):
     provenance: Provenance
 
 
-class Calibration(FileModel):
-    """A calibration file."""
-
-    kind_key = "laser_ranger"
+class CameraInfo(FileModel):
+    """Camera of a calibration file, with the keys of ROS's camera_info."""
 
     image_width: Annotated[int, Field(gt=0, le=MOST_PX)]
     image_height: Annotated[int, Field(gt=0, le=MOST_PX)]
@@ -218,6 +216,13 @@ class Calibration(FileModel):
     distortion_coefficients: Matrix
     rectification_matrix: Matrix
     projection_matrix: Matrix
+
+
+class Calibration(CameraInfo):
+    """A calibration file."""
+
+    kind_key = "laser_ranger"
+
     laser_ranger: LaserRanger
 
     @model_validator(mode="after")

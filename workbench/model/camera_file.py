@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from workbench.model.calibration import Matrix, Parameters, Provenance
-from workbench.model.lens import COEFFICIENTS, PINHOLE, LensName
-from workbench.model.rig import MOST_PX, NonNegativeFloat
+from workbench.model.calibration import CameraInfo, Parameters, Provenance
+from workbench.model.lens import COEFFICIENTS, PINHOLE
+from workbench.model.rig import NonNegativeFloat
 from workbench.model.yamlfile import FileModel
 
 
@@ -47,19 +47,11 @@ class CameraBlock(FileModel):
     provenance: Provenance
 
 
-class CameraCalibration(FileModel):
+class CameraCalibration(CameraInfo):
     """A camera calibration file."""
 
     kind_key = "workbench_camera"
 
-    image_width: Annotated[int, Field(gt=0, le=MOST_PX)]
-    image_height: Annotated[int, Field(gt=0, le=MOST_PX)]
-    camera_name: str
-    camera_matrix: Matrix
-    distortion_model: LensName
-    distortion_coefficients: Matrix
-    rectification_matrix: Matrix
-    projection_matrix: Matrix
     workbench_camera: CameraBlock
 
     @model_validator(mode="after")

@@ -5,9 +5,10 @@ from __future__ import annotations
 from workbench.calibration.checks.board_views import FEWEST_VIEWS, suspect_notes, view_residuals
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.verdict.assessment import determined_by
+from workbench.calibration.verdict.camera_info import camera_info, parameters
 from workbench.calibration.verdict.yaml_text import yaml_text
 from workbench.model.acceptance import Acceptance
-from workbench.model.calibration import Matrix, Parameters, Provenance
+from workbench.model.calibration import Provenance
 from workbench.model.camera_file import (
     CameraBlock,
     CameraCalibration,
@@ -22,25 +23,12 @@ LARGEST_F_SD = 0.01
 
 def calibrate_camera(fit: CalibrationFit, provenance: Provenance) -> CameraCalibration:
     """Make the calibration of a fit of a camera alone, with its verdict."""
-    camera, model = fit.rig.camera, fit.layout.model
-    lens = fit.layout.lens
-    values = dict(zip((p.name for p in fit.table.parameters[lens]), fit.values[lens].tolist(), strict=True))
-    f, cx, cy = values["f_px"], values["cx_px"], values["cy_px"]
     reasons = _reasons(fit)
     return CameraCalibration(
-        image_width=camera.width_px,
-        image_height=camera.height_px,
-        camera_name=fit.rig.rig,
-        camera_matrix=Matrix(rows=3, cols=3, data=(f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0)),
-        distortion_model=model.name,
-        distortion_coefficients=Matrix(
-            rows=1, cols=len(model.coefficients), data=tuple(values[name] for name in model.coefficients)
-        ),
-        rectification_matrix=Matrix(rows=3, cols=3, data=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)),
-        projection_matrix=Matrix(rows=3, cols=4, data=(f, 0.0, cx, 0.0, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0)),
+        **camera_info(fit).model_dump(),
         workbench_camera=CameraBlock(
             format=1,
-            parameters=_parameters(fit),
+            parameters=parameters(fit, fit.layout.lens),
             fit=CameraFitSummary(
                 rms_px=fit.corner_rms_px,
                 noise_scale=fit.noise_scale,
@@ -62,23 +50,6 @@ def calibrate_camera(fit: CalibrationFit, provenance: Provenance) -> CameraCalib
 def render_camera(calibration: CameraCalibration) -> str:
     """The YAML text."""
     return yaml_text(calibration.model_dump())
-
-
-def _parameters(fit: CalibrationFit) -> Parameters:
-    lens = fit.layout.lens
-    table = fit.table.parameters[lens]
-    covariance = fit.covariance[lens, lens]
-    symmetric = (covariance + covariance.T) / 2
-    return Parameters(
-        names=tuple(p.name for p in table),
-        units=tuple(p.unit for p in table),
-        values=tuple(fit.values[lens].tolist()),
-        sd=tuple(fit.sd[lens].tolist()),
-        prior_sd=tuple(p.prior.sd for p in table),
-        data_share=tuple(fit.data_share[lens].tolist()),
-        determined_by=determined_by(fit)[lens],
-        covariance=Matrix(rows=len(table), cols=len(table), data=tuple(symmetric.ravel().tolist())),
-    )
 
 
 def _reasons(fit: CalibrationFit) -> list[str]:

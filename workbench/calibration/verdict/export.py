@@ -11,7 +11,8 @@ import numpy as np
 from workbench.calibration.checks.cross_validation import leave_each_out
 from workbench.calibration.data.observations import positions, stated_sd, stated_speckle_sd
 from workbench.calibration.estimation.fit import CalibrationFit
-from workbench.calibration.verdict.assessment import Assessment, assess, determined_by
+from workbench.calibration.verdict.assessment import Assessment, assess
+from workbench.calibration.verdict.camera_info import camera_info, parameters
 from workbench.calibration.verdict.observability import RangeGradients, null_directions
 from workbench.calibration.verdict.yaml_text import yaml_text
 from workbench.model.acceptance import Acceptance
@@ -21,9 +22,7 @@ from workbench.model.calibration import (
     FitSummary,
     LaserRanger,
     LaserRay,
-    Matrix,
     Noise,
-    Parameters,
     Provenance,
     ReferencePlane,
     Validity,
@@ -100,20 +99,9 @@ def _calibration(
     assessment: Assessment,
     worst: float,
 ) -> Calibration:
-    f, cx, cy = values["f_px"], values["cx_px"], values["cy_px"]
-    camera, model = fit.rig.camera, fit.layout.model
     standoffs = [s.standoff_mm for s in fit.used]
     return Calibration(
-        image_width=camera.width_px,
-        image_height=camera.height_px,
-        camera_name=fit.rig.rig,
-        camera_matrix=Matrix(rows=3, cols=3, data=(f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0)),
-        distortion_model=model.name,
-        distortion_coefficients=Matrix(
-            rows=1, cols=len(model.coefficients), data=tuple(values[name] for name in model.coefficients)
-        ),
-        rectification_matrix=Matrix(rows=3, cols=3, data=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)),
-        projection_matrix=Matrix(rows=3, cols=4, data=(f, 0.0, cx, 0.0, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0)),
+        **camera_info(fit).model_dump(),
         laser_ranger=LaserRanger(
             format=1,
             reference_plane=ReferencePlane(offset_mm=values["offset_mm"]),
@@ -130,7 +118,7 @@ def _calibration(
                 spot_sd_px=_typical_spot_sd(fit),
                 speckle_sd_px=_typical_speckle_sd(fit),
             ),
-            parameters=_parameters(fit),
+            parameters=parameters(fit, fit.sensor),
             validity=Validity(standoff_mm=(min(standoffs), max(standoffs)), max_relative_range_sd=worst),
             fit=FitSummary(
                 rms_px=fit.rms_px,
@@ -157,27 +145,6 @@ def _calibration(
 
 def _finite_or_none(value: float) -> float | None:
     return value if np.isfinite(value) else None
-
-
-def _parameters(fit: CalibrationFit) -> Parameters:
-    sensor = fit.sensor
-    table = fit.table.parameters[sensor]
-    names = [p.name for p in table]
-    covariance = np.array(fit.covariance[sensor, sensor])
-    # The image was anywhere along its drift: half the drift is added as the deviation of the image centre.
-    centre = [names.index(name) for name in ("cx_px", "cy_px")]
-    covariance[centre, centre] += (fit.drift_px / 2) ** 2
-    symmetric = (covariance + covariance.T) / 2
-    return Parameters(
-        names=tuple(names),
-        units=tuple(p.unit for p in table),
-        values=tuple(fit.values[sensor].tolist()),
-        sd=tuple(np.sqrt(np.diag(symmetric)).tolist()),
-        prior_sd=tuple(p.prior.sd for p in table),
-        data_share=tuple(fit.data_share[sensor].tolist()),
-        determined_by=determined_by(fit)[sensor],
-        covariance=Matrix(rows=len(table), cols=len(table), data=tuple(symmetric.ravel().tolist())),
-    )
 
 
 def _typical_spot_sd(fit: CalibrationFit) -> float:
