@@ -5,8 +5,12 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 from workbench.model import event as ev
+
+NONE_KEPT: Mapping[str, int] = MappingProxyType({})
+"""No placement is read from disk."""
 
 
 class ReplayProgress:

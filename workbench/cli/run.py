@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 
 from rich.console import Console
 
@@ -15,6 +14,7 @@ from workbench.cli.console import print_message
 from workbench.cli.in_force import note_if_not_in_force
 from workbench.cli.invocation import command_line
 from workbench.cli.refusal import ask_for_repair, refused_fit
+from workbench.cli.replay_progress import NONE_KEPT
 from workbench.cli.session_verdict import session_verdict
 from workbench.cli.stopping import StopAfterCapture
 from workbench.cli.terminal import FaultTolerantConsumer, Terminal
@@ -46,9 +46,6 @@ from workbench.session.repairs import repairs_of
 from workbench.spots import is_compiled
 from workbench.viewer.recording import RECORDING_FILE, RecordingConsumer
 from workbench.viewer.window import has_display, viewer_executable, watch
-
-NONE_KEPT: Mapping[str, int] = MappingProxyType({})
-"""No placement is read from disk."""
 
 
 @dataclass(frozen=True)

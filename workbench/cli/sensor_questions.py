@@ -13,6 +13,7 @@ from workbench.cli.dialogue import Question
 from workbench.cli.found_devices import FoundDevice
 from workbench.model.problems import THOUSANDS
 from workbench.model.rig import FEWEST_PX, UNKNOWN_SERIAL
+from workbench.model.text_length import LONGEST_NAME
 
 LASER_CLASSES = ("1", "1M", "2", "2M", "3R", "3B", "4")
 MEASURED_SD_MM = {"calliper": 0.2, "ruler": 0.5, "drawing": 0.3}
@@ -25,7 +26,6 @@ NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
 SIZE = re.compile(r"^(\d+)\s*(?:x|X|\*|×|by|\s)\s*(\d+)$")
 QUANTITY = re.compile(r"^([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*([A-Za-zµ°]*)$")
 BASELINE = re.compile(r"^([-+]?[\d.,]+)(?:mm)?(v?)$")
-LONGEST_SERIAL = 60
 YES, NO = "yes", "no"
 DIAGONAL = "diagonal"
 
@@ -173,9 +173,9 @@ def parse_serial(text: str) -> str:
     Raises:
         ValueError: it is blank, too long, or the word for an unknown one.
     """
-    if not text or len(text) > LONGEST_SERIAL or text == UNKNOWN_SERIAL:
+    if not text or len(text) > LONGEST_NAME or text == UNKNOWN_SERIAL:
         raise ValueError(
-            f"expected a serial number of up to {LONGEST_SERIAL} characters, got {text or 'nothing'}"
+            f"expected a serial number of up to {LONGEST_NAME} characters, got {text or 'nothing'}"
         )
     return text
 

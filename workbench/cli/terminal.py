@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from types import MappingProxyType, TracebackType
+from types import TracebackType
 
 from rich.console import Console
 from rich.padding import Padding
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.text import Text
 
-from workbench.cli.replay_progress import ReplayProgress
+from workbench.cli.replay_progress import NONE_KEPT, ReplayProgress
 from workbench.model import event as ev
 from workbench.model.errors import StoppedError
 from workbench.model.fit_tables import fit_tables
@@ -33,7 +33,7 @@ class Terminal:
         console: Console,
         forecast: TimeLeft,
         details: bool = False,
-        kept: Mapping[str, int] = MappingProxyType({}),
+        kept: Mapping[str, int] = NONE_KEPT,
     ) -> None:
         """Terminal without progress display.
 

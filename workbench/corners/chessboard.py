@@ -24,7 +24,7 @@ def find_chessboard(mean: FloatArray, board: Chessboard) -> LocatedCorners:
     """
     image = stretched(mean)
     found, corners = cv2.findChessboardCorners(image, board.corners)
-    if not found:  # the other detector stands more blur and noise, but misses small squares
+    if not found:  # the other detector tolerates more blur and noise, but misses small squares
         found, corners = cv2.findChessboardCornersSB(image, board.corners, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
     if not found:
         corners = np.zeros((0, 2))

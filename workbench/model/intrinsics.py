@@ -9,18 +9,18 @@ from workbench.model.errors import BadInputError
 from workbench.model.lens import COEFFICIENTS, LensName
 
 LARGEST_ASPECT = 0.005
-"""Largest relative difference of the two focal lengths; half of it widens the deviation of their mean."""
+"""Largest relative difference of the two focal lengths. Half the difference adds to the sd of their mean."""
 FACTORS = (1, 2, 3, 4, 6, 8)
 """Factors by which cameras bin pixels."""
 OFF_CENTRE = 0.25
 """Largest distance of the principal point from the middle of an image whose size the file does not state, as
 a share of the side."""
 ESTIMATED_F_SD = 0.005
-"""Relative: focal lengths of one camera by good calibrations at one focus differ by so much."""
+"""Relative: typical difference between good calibrations of one camera at one focus."""
 ESTIMATED_CENTRE_SD = 0.005
-"""Of the principal point, as a share of the image's width, likewise."""
+"""Typical difference of the principal point between them, as a share of the image's width."""
 ESTIMATED_SD = {"k1": 0.02, "k2": 0.1, "k3": 0.2, "k4": 0.2, "p1": 0.002, "p2": 0.002}
-"""Of distortion coefficients, likewise."""
+"""Typical differences of the distortion coefficients between them."""
 
 
 @dataclass(frozen=True)

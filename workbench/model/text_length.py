@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 LONGEST_NAME = 60
-"""Largest number of characters of a person's name."""
+"""Largest number of characters of a person's name or a serial number."""
 LONGEST_TEXT = 10_000
 """Largest number of characters of a reason, a note, or an item of the laboratory file: three pages."""
 

@@ -79,7 +79,7 @@ def _known_variance(line: LineShape, covariance: FloatArray) -> float:
     return float(by_calibration + line.closest_spot_sd_mm @ line.closest_spot_sd_mm)
 
 
-def _shape_variance(line: LineShape, covariance: FloatArray) -> float:
+def shape_variance(line: LineShape, covariance: FloatArray) -> float:
     """Variance of the closest range beyond that by spots and calibration, mm2."""
     return max(0.0, line.shape.closest_sigma_mm**2 - _known_variance(line, covariance))
 
@@ -102,7 +102,7 @@ def mean_of_lines(
     weight /= weight.sum()
     by_parameter = weight @ np.array([line.closest_by_parameter for line in lines])
     by_spot = [share * line.closest_spot_sd_mm for share, line in zip(weight, lines, strict=True)]
-    by_shape = weight**2 @ [_shape_variance(line, covariance) for line in lines]
+    by_shape = weight**2 @ [shape_variance(line, covariance) for line in lines]
     variance = by_parameter @ covariance @ by_parameter + sum(float(sd @ sd) for sd in by_spot) + by_shape
     mean = float(weight @ [line.shape.closest_mm for line in lines])
     return mean, float(np.sqrt(variance))

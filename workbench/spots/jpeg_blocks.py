@@ -23,7 +23,7 @@ FEWEST_BLOCKS: Final = 4
 def has_jpeg_blocks(image: np.ndarray[Any, Any]) -> bool:
     """Whether a grey image (height, width) shows the blocks of JPEG, along its rows and its columns alike.
 
-    Mild compression leaves none: 95 % and more of most cameras' scales.
+    Compression at high quality leaves none.
     """
     if min(image.shape) < FEWEST_BLOCKS * BLOCK_PX:
         return False

@@ -181,7 +181,7 @@ def test_boards_of_others_are_found_where_they_are(board: KnownBoard, view: int)
     assert len(found.ids) > 0.9 * len(board.corners_mm)
     true_px = cv2.perspectiveTransform(board.corners_mm[None], to_picture(board, view))[0]
     z = (found.position_px - true_px[found.ids]) / found.sd_px
-    if isinstance(board, Chessboard):  # half a turn of it looks the same
+    if isinstance(board, Chessboard):  # it looks the same after half a turn
         turned = (found.position_px - true_px[::-1][found.ids]) / found.sd_px
         z = min(z, turned, key=lambda one: float(np.abs(one).max()))
     # As `test_errors_are_as_large_as_stated`; drawn in steps of a quarter pixel, which adds some.

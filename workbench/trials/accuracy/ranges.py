@@ -15,6 +15,7 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 from workbench.model.event import LaserRange, ReadingTaken
 from workbench.model.trial_event import COVERAGE_FACTOR
+from workbench.ranging.lines import shape_variance
 from workbench.ranging.ranger import Reading
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.reference import Reference, TiltEffect, front_ends, laser_estimates, places_of
@@ -103,14 +104,12 @@ def _sensitivities(
         for n, i in enumerate(ids)
     }
     nearest = min(reading.lines, key=lambda line: line.shape.closest_mm)
-    by_parameter, spot_mm = nearest.closest_by_parameter, float(np.linalg.norm(nearest.closest_spot_sd_mm))
-    of_one_shape = float(by_parameter @ sensor.covariance @ by_parameter) + spot_mm**2
     closest = Sensitivities(
-        by_parameter,
-        spot_mm,
+        nearest.closest_by_parameter,
+        float(np.linalg.norm(nearest.closest_spot_sd_mm)),
         share,
         reference.at_near_end(front_ends(sensor)),
-        sqrt(max(nearest.shape.closest_sigma_mm**2 - of_one_shape, 0.0)),
+        sqrt(shape_variance(nearest, sensor.covariance)),
     )
     return {CLOSEST: closest, MEAN: mean, **lasers}
 

@@ -118,7 +118,7 @@ def test_a_start_far_from_the_truth_ends_in_the_same_place() -> None:
 
 
 def test_an_unsquare_board_upside_down() -> None:
-    """Nothing is assumed of how the board is turned: half a turn of it is another roll."""
+    """Nothing is assumed of how the board is turned: after half a turn it has another roll."""
     rig = board_rig()
     observations, views = BoardWorld(World(rig, 7)).measure()
     count = len(rig.board.corners_mm)
