@@ -133,6 +133,7 @@ def keep_grabbing(camera: OpenCvCamera) -> None:
         camera.grab()
 
 
+@pytest.mark.real_time
 @pytest.mark.parametrize("how", ["falls silent", "closes"])
 def test_a_camera_that_is_unplugged(streams: Callable[..., Stream], how: str) -> None:
     stream = streams(Scene().picture)

@@ -138,6 +138,7 @@ def test_nothing_before_the_sensor(live: Live) -> None:
     assert ended.out == ["0  no_points  no spot was seen", "1  no_points  no spot was seen"]
 
 
+@pytest.mark.real_time
 def test_a_camera_that_hangs_ends_it_within_two_seconds(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
     """It hangs at the sixth frame, with the lasers lit: a dark one comes before the first pair."""
     released, hung_at = threading.Event(), list[float]()
