@@ -134,7 +134,7 @@ def test_doctor_sees_each_laser(lab: Lab, tmp_path: Path) -> None:
     rig = load_rig(lab.rig)
     with open_bench(rig, tmp_path / "s") as bench:
         results = list(examine(rig, bench, Says(("laser_class", Answer(value="2")))))
-    assert [result.part for result in results if not result.ok] == []
+    assert [result for result in results if not result.ok] == []
     assert {"laser L1", "laser L2"} <= {result.part for result in results}
     assert lab.lit() == [False, False]
 
