@@ -39,8 +39,12 @@ def is_interactive() -> bool:
     return not os.environ.get("CI") and sys.stdin.isatty() and sys.stderr.isatty()
 
 
-def ask_all(questions: Sequence[Question]) -> dict[str, str]:
+def ask_all(questions: Sequence[Question], without: str = "") -> dict[str, str]:
     """Ask all questions in order; returns the valid answers by key.
+
+    Args:
+        questions: questions.
+        without: advice to somebody who cannot answer.
 
     Raises:
         AnswerNeededError: the terminal was closed, or end-of-file was typed.
@@ -53,7 +57,13 @@ def ask_all(questions: Sequence[Question]) -> dict[str, str]:
     while index < len(questions):
         question = questions[index]
         _show(question, f"{index + 1} of {len(questions)}", given.get(question.key, question.default))
-        answer = _answer(question, given)
+        try:
+            answer = _answer(question, given)
+        except EOFError:
+            raise AnswerNeededError(
+                f"{question.text}: expected an answer, got the end of the input; nothing was written"
+                + (without and f". {without}")
+            ) from None
         if answer is None:
             index = max(0, index - 1)
             continue
@@ -72,7 +82,7 @@ def _show(question: Question, number: str, default: str) -> None:
 def _answer(question: Question, given: Mapping[str, str]) -> str | None:
     """Valid answer; None to return to the previous question."""
     while True:
-        typed = _line(question) or given.get(question.key, question.default)
+        typed = _line() or given.get(question.key, question.default)
         if typed.lower() == BACK:
             return None
         try:
@@ -85,13 +95,11 @@ def _answer(question: Question, given: Mapping[str, str]) -> str | None:
             return typed
 
 
-def _line(question: Question) -> str:
+def _line() -> str:
     typer.echo("> ", nl=False, err=True)
     typed = sys.stdin.readline()
     if not typed:
-        raise AnswerNeededError(
-            f"{question.text}: expected an answer, got the end of the input; nothing was written"
-        )
+        raise EOFError
     return printable(typed.strip())
 
 

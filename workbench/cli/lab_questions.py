@@ -3,45 +3,27 @@
 from __future__ import annotations
 
 import io
-import os
 import re
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import date
+from functools import partial
 from math import isfinite
 from pathlib import Path
 
 from ruamel.yaml import YAML
 
-from workbench.cli.console import print_message
+from workbench.cli.dialogue import Question, ask_all, is_interactive
 from workbench.model.laboratory import LABORATORY_FILE, Laboratory, load_laboratory
 from workbench.model.text_length import length_error
 from workbench.session.files import write_output
 
-Ask = Callable[[str], str]
-QUESTIONS = (
-    ("laboratory.name", "Name of the laboratory"),
-    ("laboratory.address", "Its address"),
-    ("country", "Its country, two letters such as DE; --dcc needs it"),
-    ("customer.name", "Name of the customer"),
-    ("customer.address", "Address of the customer"),
-    ("authorised_by", "Person who authorises certificates"),
-    ("standard.name", "Reference standard of the standoffs (for example a steel rule)"),
-    ("standard.serial", "Its serial number"),
-    ("standard.certificate", "Its calibration certificate"),
-    ("standard.calibrated", "Day of its calibration, as 2026-11-30"),
-    ("standard.uncertainty_mm", "Its expanded uncertainty (k = 2), mm"),
-    ("temperature.low", "Lowest temperature of the room, deg C"),
-    ("temperature.high", "Highest temperature of the room, deg C"),
-    ("target_material", "Material of the target"),
-)
 HEADING = """\
 # What certificates state about the laboratory. docs/certificate.md lists further keys, such as several
 # standards, warm-up and the interval of recalibration. What is missing here is reported as not stated.
 """
 
 
-def laboratory_of(sessions: Path, no_input: bool, ask: Ask) -> Laboratory:
+def laboratory_of(sessions: Path, no_input: bool) -> Laboratory:
     """The laboratory file of a folder of sessions; without one its items are asked for, once.
 
     Nothing is written and nothing is stated where there is no terminal, on CI, or with `no_input`.
@@ -49,34 +31,19 @@ def laboratory_of(sessions: Path, no_input: bool, ask: Ask) -> Laboratory:
     Args:
         sessions: folder of sessions.
         no_input: whether to ask nothing.
-        ask: shows a question and returns the typed answer.
 
     Raises:
         BadInputError: the file is wrong, or cannot be written.
+        AnswerNeededError: the terminal was closed, or end-of-file was typed.
     """
     known = load_laboratory(sessions)
     if known is not None:
         return known
-    if no_input or os.environ.get("CI") or not (sys.stdin.isatty() and sys.stderr.isatty()):
+    if no_input or not is_interactive():
         return Laboratory(format=1)
-    answers = {key: _answer(key, question, ask) for key, question in QUESTIONS}
+    answers = ask_all(QUESTIONS, without="--no-input reports what is not known as not stated")
     write_output(sessions / LABORATORY_FILE, (HEADING + _yaml(answers)).encode())
     return load_laboratory(sessions) or Laboratory(format=1)
-
-
-def _answer(key: str, question: str, ask: Ask) -> str:
-    """Answer in the form of its item, or empty; asked for again, with the reason, until it has that form."""
-    parse = FORMS.get(key, _text)
-    while True:
-        typed = ask(f"{question} (Enter: not stated)").strip()
-        if not typed:
-            return ""
-        try:
-            parse(typed)
-        except ValueError as wrong:
-            print_message(str(wrong))
-        else:
-            return typed.upper() if key == "country" else typed
 
 
 def _text(typed: str) -> str:
@@ -112,14 +79,32 @@ def _positive(typed: str) -> float:
     return value
 
 
-FORMS: dict[str, Callable[[str], object]] = {
-    "country": _country,
-    "standard.calibrated": _day,
-    "standard.uncertainty_mm": _positive,
-    "temperature.low": _finite,
-    "temperature.high": _finite,
-}
-"""Parsers of the answers that are no free text; they raise ValueError with the reason."""
+def _question(key: str, text: str, hint: str = "", check: Callable[[str], object] = _text) -> Question:
+    """A question that may be left open: Enter alone is the answer "not stated"."""
+    open_or_checked = partial(_open_or, check)
+    return Question(key, text, f"{hint}; Enter: not stated" if hint else "Enter: not stated", open_or_checked)
+
+
+def _open_or(check: Callable[[str], object], typed: str, _: Mapping[str, str]) -> object:
+    return check(typed) if typed else None
+
+
+QUESTIONS = (
+    _question("laboratory.name", "Name of the laboratory"),
+    _question("laboratory.address", "Its address"),
+    _question("country", "Its country", "two letters such as DE; --dcc needs it", _country),
+    _question("customer.name", "Name of the customer"),
+    _question("customer.address", "Address of the customer"),
+    _question("authorised_by", "Person who authorises certificates"),
+    _question("standard.name", "Reference standard of the standoffs", "for example a steel rule"),
+    _question("standard.serial", "Its serial number"),
+    _question("standard.certificate", "Its calibration certificate"),
+    _question("standard.calibrated", "Day of its calibration", "such as 2026-11-30", _day),
+    _question("standard.uncertainty_mm", "Its expanded uncertainty (k = 2), mm", "such as 0.1", _positive),
+    _question("temperature.low", "Lowest temperature of the room, deg C", check=_finite),
+    _question("temperature.high", "Highest temperature of the room, deg C", check=_finite),
+    _question("target_material", "Material of the target"),
+)
 
 
 def _yaml(answers: dict[str, str]) -> str:
@@ -128,7 +113,9 @@ def _yaml(answers: dict[str, str]) -> str:
         if answers[f"{party}.name"]:
             named = {key: answers[f"{party}.{key}"] for key in ("name", "address")}
             content[party] = {key: value for key, value in named.items() if value}
-    content |= {key: answers[key] for key in ("country", "authorised_by", "target_material") if answers[key]}
+    content |= {key: answers[key] for key in ("authorised_by", "target_material") if answers[key]}
+    if answers["country"]:
+        content["country"] = answers["country"].upper()
     if answers["standard.name"]:
         content["standards"] = [_standard(answers)]
     span = [number(answers[f"temperature.{end}"]) for end in ("low", "high")]

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-import typer
-
 from workbench.cli.console import print_message
 from workbench.cli.lab_questions import laboratory_of
 from workbench.cli.sessions import find_session
-from workbench.model.contents import printable
-from workbench.model.errors import AnswerNeededError, BadInputError
+from workbench.model.errors import BadInputError
 from workbench.model.laboratory import Laboratory
 from workbench.report.certificate.assemble import Certificate, certificate_of
 from workbench.report.certificate.assessment import future_texts
@@ -72,7 +68,7 @@ def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool)
     folder = find_session(name, sessions).resolve()
     outputs.check()
     session = read_session(folder)
-    laboratory = laboratory_of(folder.parent, no_input, _ask)
+    laboratory = laboratory_of(folder.parent, no_input)
     if outputs.dcc is not None:
         required_parties(laboratory, session)  # before a number is assigned
     certificate = _issued(session, laboratory)
@@ -111,21 +107,6 @@ def _issued(session: SessionRecord, laboratory: Laboratory) -> Certificate:
     if note:
         print_message(f"note: {note}")
     return numbered(certificate_of(sources))  # one that cannot be made gets no number
-
-
-def _ask(question: str) -> str:
-    """Typed answer in one line.
-
-    Raises:
-        AnswerNeededError: the terminal was closed, or end-of-file was typed (^D).
-    """
-    typer.echo(f"{question}: ", err=True, nl=False)
-    typed = sys.stdin.readline()
-    if not typed:
-        raise AnswerNeededError(
-            f"{question}: no answer; nothing was written. --no-input reports what is not known as not stated"
-        )
-    return printable(typed)
 
 
 def _print_summary(certificate: Certificate, outputs: Outputs) -> None:

@@ -93,7 +93,8 @@ class CaptureGridStep(StepModel):
         placements = [*self.placements(name, context.rig)]
         if takes_added(context.steps, context.step_index):
             placements += self._added_placements(name, context.recorder.repairs.added_mm)
-        return counted(sum(visit_placements(context, placements, work)), "pair")
+        expect = _unseen_lasers(context.rig, placements)
+        return counted(sum(visit_placements(context, placements, work, expect=expect)), "pair")
 
     def added_prompts(self, name: str, rig: Rig, added_mm: Sequence[float]) -> Sequence[Prompt]:
         """Prompts of the added placements; see `prompts`."""
@@ -108,6 +109,18 @@ class CaptureGridStep(StepModel):
             visited.append(standoff_mm)
             added.append(flat_placement(name, standoff_mm, number if number > 1 else None))
         return added
+
+
+def _unseen_lasers(rig: Rig, placements: Sequence[Placement]) -> dict[str, str]:
+    """Sentence about the lasers whose spots are expected outside the image, by key of the placement."""
+    from workbench.calibration.design.expected_spot import lasers_outside
+
+    outside = lasers_outside(rig, sorted({placement.standoff_mm for placement in placements}))
+    return {
+        placement.key: f"By the rig file {', '.join(unseen)} will be outside the image."
+        for placement in placements
+        if (unseen := outside[placement.standoff_mm])
+    }
 
 
 def _check_standoff(context: Context, placement: Placement) -> None:

@@ -66,6 +66,16 @@ def test_it_counts_the_pairs_that_it_took(tmp_path: Path) -> None:
     ] * 2
 
 
+def test_prompts_name_the_lasers_outside_the_image(tmp_path: Path) -> None:
+    operator = Scripted()
+    step = parse_step("step: capture_grid, standoffs_mm: [60, 600], repeats: 1")
+    with running(tmp_path, operator=operator) as session:
+        step.run(session.context, "p.1")
+    expected = {prompt.key: prompt.expect for prompt in operator.asked}
+    assert expected["p.1/60mm"].endswith("By the rig file L1, L2 will be outside the image.")
+    assert "outside" not in expected["p.1/600mm"]
+
+
 def test_the_next_standoff_is_advised_where_a_fit_follows(tmp_path: Path) -> None:
     grid, fit = (
         parse_step("step: capture_grid, standoffs_mm: [300, 900], repeats: 1"),

@@ -65,6 +65,21 @@ def expected_spot(
     return _placed(rig, spot[asked], sd_px)
 
 
+def lasers_outside(rig: Rig, standoffs_mm: Sequence[float]) -> dict[float, tuple[str, ...]]:
+    """Lasers whose most probable spot is outside the image at each standoff, by the rig file alone.
+
+    Args:
+        rig: priors, size of the image.
+        standoffs_mm: of a square flat target, by the ruler.
+    """
+    prior_mean = ParameterTable(sensor_parameters(rig)).prior_mean
+    (seen,) = Expectation(rig, prior_mean[None]).in_frame(np.array(standoffs_mm))
+    return {
+        standoff_mm: tuple(laser_id for laser_id, inside in zip(rig.laser_ids, at, strict=True) if not inside)
+        for standoff_mm, at in zip(standoffs_mm, seen.tolist(), strict=True)
+    }
+
+
 def _residuals(
     cells: MeanObservations, y: FloatArray, spot: FloatArray, slopes: FloatArray, sd: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 from workbench.model import event as ev
@@ -39,7 +40,12 @@ class _SkipError(Exception):
 
 
 def visit_placements(
-    context: Context, placements: Sequence[Placement], work: Callable[[Placement], T], *, lights: bool = True
+    context: Context,
+    placements: Sequence[Placement],
+    work: Callable[[Placement], T],
+    *,
+    lights: bool = True,
+    expect: Mapping[str, str] | None = None,
 ) -> list[T]:
     """Ask for the target at one placement after the other and do the `work` at each.
 
@@ -51,6 +57,7 @@ def visit_placements(
         placements: placements of the target, with distinct keys.
         work: called with the placement as measured; must take its captures under the placement's key.
         lights: whether the work captures spots, so that the exposure must be set before.
+        expect: further sentences about what the operator will see, by key of the placement.
 
     Returns:
         Results of `work` for the placements that were not skipped. A placement's standoff is as measured, so
@@ -67,7 +74,7 @@ def visit_placements(
         asked = placements[index]
         before = placements[index - 1] if index and placements[index - 1].key in began else None
         context.pairs.replayed = context.recorder.complete_placement(asked.key)
-        answer = _place_answer(context, asked, before)
+        answer = _place_answer(context, asked, before, (expect or {}).get(asked.key, ""))
         if answer.action == "redo" and before is not None:
             _set_aside(context, before.key, began.pop(before.key), answer.reason or "")
             results.pop(before.key, None)
@@ -129,14 +136,15 @@ def _journal_skip(context: Context, asked: Placement, answer: Answer) -> None:
     context.emit(ev.Answered(key=asked.key, question=f"{asked.standoff_mm:g} mm", answer=answer))
 
 
-def _place_answer(context: Context, asked: Placement, before: Placement | None) -> Answer:
+def _place_answer(context: Context, asked: Placement, before: Placement | None, expect: str) -> Answer:
     if context.pairs.replayed is not None:
         return Answer()
     known = context.recorder.answer(asked.key)
     if known is not None and known.action == "skip":
         return known
     context.confirm_safety()
-    return context.ask_now(placement_prompt(asked, before))
+    prompt = placement_prompt(asked, before)
+    return context.ask_now(replace(prompt, expect=f"{prompt.expect} {expect}".rstrip()))
 
 
 def _place(context: Context, asked: Placement, answer: Answer) -> tuple[ev.Record, Placement]:

@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.rigs import World, thesis_rig
 from workbench.calibration.data.observations import Observation
-from workbench.calibration.design.expected_spot import SURE_SD, expected_spot
+from workbench.calibration.design.expected_spot import SURE_SD, expected_spot, lasers_outside
 from workbench.calibration.model.parameters import sensor_parameters
 from workbench.model.arrays import FloatArray
 from workbench.model.nested import fix_parameters
@@ -145,3 +145,12 @@ def test_spots_seen_narrow_it_down() -> None:
     assert (
         expected_spot(EMULATED, seen(sensor, [125.0, 160.0], "L1 L2 L3", rng), "L4", 125.0).place == "inside"
     )
+
+
+def test_lasers_outside_are_those_whose_spot_is_expected_there() -> None:
+    standoffs = (30.0, 60.0, 85.0, 100.0, 300.0)
+    found = lasers_outside(RIG, standoffs)
+    for standoff_mm in standoffs:
+        u_px = {laser: expected_spot(RIG, [], laser, standoff_mm).u_px for laser in RIG.laser_ids}
+        assert found[standoff_mm] == tuple(laser for laser, u in u_px.items() if not -0.5 <= u <= 639.5)
+    assert [len(found[mm]) for mm in standoffs] == [4, 2, 2, 0, 0]
