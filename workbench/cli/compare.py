@@ -11,6 +11,7 @@ from rich.console import Console
 from workbench.calibration.verdict.comparison import Comparison, compare
 from workbench.calibration.verdict.tables import difference_table
 from workbench.model.calibration import load_calibration
+from workbench.model.number_text import probability
 from workbench.report.terminal_table import TerminalTable
 
 
@@ -36,7 +37,7 @@ def verdict(result: Comparison) -> str:
         return "identical: both files contain the same numbers to the last digit"
     evidence = (
         f"chi2 {result.chi2:.1f} for {result.degrees_of_freedom} degrees of freedom,"
-        f" p = {result.probability:.2g}"
+        f" {probability(result.probability)}"
     )
     if not result.moved:
         return f"same within uncertainty ({evidence})"

@@ -15,6 +15,7 @@ from scipy.stats import chi2
 
 from workbench.model.arrays import FloatArray
 from workbench.model.event import ReadingTaken
+from workbench.model.number_text import probability
 from workbench.model.rig import BenchSpec
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 from workbench.sensor.calibrated import CalibratedSensor
@@ -121,7 +122,7 @@ def other_target(
     p = _probability(points.range_mm - surface.depth_mm, np.ones((len(points.range_mm), 1)), covariance)
     if p is None or p >= ALARM:
         return ""
-    return f"the readings show {_found(points, readings)}, not {_name(placement)} (p = {p:.1g})"
+    return f"the readings show {_found(points, readings)}, not {_name(placement)} ({probability(p)})"
 
 
 def fit_plane(points: Points) -> Plane:

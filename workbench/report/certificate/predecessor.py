@@ -11,6 +11,7 @@ from workbench.calibration.verdict.comparison import Comparison, compare
 from workbench.model.calibration import Calibration, load_calibration
 from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
+from workbench.model.number_text import probability
 from workbench.model.table import Cell, Column, Table
 from workbench.report.document import Section
 from workbench.trials.errors import EXPANSION
@@ -66,7 +67,7 @@ def verdict_text(found: Comparison) -> str:
     """Whether the sensor changed between two calibrations, in one sentence."""
     if found.identical:
         return "Both have the same numbers."
-    evidence = f"p = {found.probability:.2g}"
+    evidence = probability(found.probability)
     if not found.moved:
         return f"The sensor has not changed significantly ({evidence})."
     cause = f"; explained by {' or '.join(found.explanations)} alone" if found.explanations else ""

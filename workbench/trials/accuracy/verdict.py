@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from workbench.model.number_text import probability
 from workbench.trials.accuracy.agreement import Agreement
 from workbench.trials.accuracy.completeness import Completeness
 from workbench.trials.accuracy.limits import AccuracyLimits
@@ -42,7 +43,8 @@ class Verdict:
         decided = "" if self.decision is None else f"{self.decision.upper()}: "
         incomplete = f"; {self.unmeasured}" if self.unmeasured else ""
         exact = "; standoffs count as exact: state bench.placement_sd_mm" if self.has_exact_standoffs else ""
-        return f"{decided}{agreement} the stated uncertainty (p = {self.probability:.2g}){incomplete}{exact}"
+        notes = f"({probability(self.probability)}){incomplete}{exact}"
+        return f"{decided}{agreement} the stated uncertainty {notes}"
 
 
 def verdict_of(ranges: Sequence[Agreement], limits: AccuracyLimits, done: Completeness) -> Verdict:

@@ -9,6 +9,7 @@ import pandas as pd
 
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.errors import BadInputError
+from workbench.model.number_text import probability
 from workbench.model.table import Cell, Column, Table
 from workbench.trials.reading_frame import table_of
 from workbench.trials.statistics.estimate import Estimate
@@ -60,14 +61,14 @@ def gauge_table(name: str, frame: pd.DataFrame) -> Table:
 
 def _rows(study: GaugeStudy) -> list[dict[str, Cell]]:
     categories = study.distinct_categories
-    pooled = f"pooled with EV (p = {study.interaction_probability:.2g})"
+    pooled = f"pooled with EV ({probability(study.interaction_probability)})"
     rows: list[dict[str, Cell]] = [
         {"component": "EV (repeatability)", **_sd_cells(study, study.equipment)},
         {"component": "AV (operators)", "sd_mm": study.appraiser},
         {
             "component": "interaction",
             "sd_mm": study.interaction,
-            "note": pooled if study.interaction is None else f"p = {study.interaction_probability:.2g}",
+            "note": pooled if study.interaction is None else probability(study.interaction_probability),
         },
         {
             "component": "GRR",
@@ -91,7 +92,7 @@ def _sd_cells(study: GaugeStudy, found: Estimate) -> dict[str, Cell]:
         note = f"{found.degrees_of_freedom:.3g} degrees of freedom"
         return {"sd_mm": found.value, "low_mm": found.low, "high_mm": found.high, "note": note}
     p = study.homogeneity_probability
-    note = f"no interval: repeatability differs between standoffs or operators (p = {p:.2g})"
+    note = f"no interval: repeatability differs between standoffs or operators ({probability(p)})"
     return {"sd_mm": found.value, "note": note}
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from workbench.model.number_text import probability
 from workbench.model.table import Cell, Column, Table
 from workbench.model.trial_event import COVERAGE_FACTOR
 from workbench.trials.reading_frame import dependence, levels, table_of
@@ -116,6 +117,6 @@ def _total(budgets: Sequence[ErrorBudget]) -> list[dict[str, Cell]]:
             "degrees_of_freedom": test.degrees_of_freedom,
             "variance_ratio": test.ratio,
             "alarm": test.probability < JOINT_ALARM,
-            "note": f"all standoffs: p = {test.probability:.2g}",
+            "note": f"all standoffs: {probability(test.probability)}",
         }
     ]
