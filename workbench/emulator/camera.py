@@ -69,9 +69,12 @@ class EmulatedCamera:
         self._queue: deque[Exposure] = deque(self._expose(()) for _ in range(spec.camera.latency_frames))
 
     def mark(self, key: str) -> None:
-        """Set the key of the next capture, from which the noise of its frames is derived."""
+        """Set the key of the next capture, from which the noise of its frames is derived.
+
+        With the same key again, the capture is repeated: a lease may have ended before its last frame.
+        """
+        self.clock.switch(again=key == self._key)
         self._key, self._number = key, 0
-        self.clock.switch()
 
     def grab(self) -> Frame:
         """Frame after discarding `discard_frames` frames."""

@@ -20,6 +20,8 @@ class SimulatedClock:
 
     def __init__(self) -> None:
         self._now_ns = 0
+        self._switched_ns: int | None = None
+        """Time after the last switching for this placement; None: there was none."""
 
     def now_ns(self) -> int:
         """Present time."""
@@ -27,11 +29,13 @@ class SimulatedClock:
 
     def continue_after(self, time_ns: int) -> None:
         """Place the target after the last capture that counts."""
-        self._now_ns = time_ns + PLACING_NS
+        self._now_ns, self._switched_ns = time_ns + PLACING_NS, None
 
-    def switch(self) -> None:
-        """Let the lasers settle before a capture."""
-        self._now_ns += SETTLING_NS
+    def switch(self, again: bool = False) -> None:
+        """Let the lasers settle before a capture; `again`: before the same one, which takes its time once."""
+        if not again or self._switched_ns is None:
+            self._switched_ns = self._now_ns + SETTLING_NS
+        self._now_ns = self._switched_ns
 
     def expose(self, exposure_s: float) -> None:
         """Advance by one frame."""

@@ -214,12 +214,13 @@ def _row(path: Path, row: CsvRow) -> CaptureRow:
     Raises:
         BadInputError: values are wrong; one line for each, with row and column.
     """
-    where, given = f"{path}: row {row.line}", row.cells
+    given = row.cells
     images = {name: path.parent / given[name] for name in IMAGES if name in given}
     try:
-        return CaptureRow.model_validate(given | images | {"row": row.line})
+        return CaptureRow.model_validate({**given, **images, "row": row.line})
     except ValidationError as error:
         found = problems(CaptureRow, given, error.errors())
         # A rule about the whole row names its column in its own text.
         lines = [one.message if one.location else one.text for one in found]
+        where = f"{path}: row {row.line}"
         raise BadInputError("\n".join(f"{where}, column {line}" for line in lines)) from None

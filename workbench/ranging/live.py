@@ -76,8 +76,7 @@ class LiveRanger:
         return reading
 
     def _shoot(self, scene: str, ids: tuple[str, ...]) -> Finding:
-        self.bench.mark(f"{scene}/{ids[0] if len(ids) == 1 else 'all'}")
-        on = within_lease(lambda: self._grab_lit(ids))
+        on = within_lease(lambda: self._grab_lit(scene, ids))
         off = self.bench.camera.grab()
         self._second_frame_at = time.perf_counter()
         self._dark = off.image
@@ -86,7 +85,8 @@ class LiveRanger:
             self.seen = on.image, off.image, finding.spots
         return finding
 
-    def _grab_lit(self, ids: tuple[str, ...]) -> Frame:
+    def _grab_lit(self, scene: str, ids: tuple[str, ...]) -> Frame:
+        self.bench.mark(f"{scene}/{ids[0] if len(ids) == 1 else 'all'}")
         with self.bench.lasers.lit(ids, for_s=LEASE_S):
             return self.bench.camera.grab()
 

@@ -27,6 +27,17 @@ def test_a_placement_follows_the_last_capture_that_counts() -> None:
     assert clock.now_ns() == 9 + PLACING_NS
 
 
+def test_a_capture_that_is_taken_again_takes_its_time_once() -> None:
+    clock = SimulatedClock()
+    clock.switch()
+    clock.expose(0.0)
+    clock.switch(again=True)
+    assert clock.now_ns() == SETTLING_NS
+    clock.continue_after(9)
+    clock.switch(again=True)
+    assert clock.now_ns() == 9 + PLACING_NS + SETTLING_NS
+
+
 @pytest.mark.parametrize("stale", [0, 3])
 def test_captures_advance_the_clock_of_the_bench(tmp_path: Path, stale: int) -> None:
     """A frame and those that are discarded before it, as stale as the camera's latency."""

@@ -24,7 +24,7 @@ from workbench.calibration.data.averaging import (
 )
 from workbench.calibration.data.capture_times import NO_TIMES, CaptureTimes
 from workbench.calibration.estimation.noise_scale import significant_scale
-from workbench.model.arrays import FloatArray, IndexArray
+from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.errors import BadInputError
 from workbench.model.fit_event import Rejected
 from workbench.model.rig import NoiseSpec
@@ -174,21 +174,25 @@ def group(
             _check_placement(placements.setdefault(s.placement, PlacementInfo.of(s)), s)
     kept: dict[tuple[str, str], list[Observation]] = {}
     rejected: list[Rejected] = []
-    usual = usual_scale([_scatter(members, noise) for members in buckets.values()])
+    # Read once: there may be a hundred thousand.
+    measured = {key: (positions(members), stated_sd(members, noise)) for key, members in buckets.items()}
+    usual = usual_scale([scatter_chi2(*one) for one in measured.values()])
     for key, members in buckets.items():
-        left, dropped = _without_outliers(members, noise, usual)
+        position, sd = measured.pop(key)
+        outlying, dropped = _outliers(members, position, sd, usual)
         rejected += dropped
-        if left:  # repeats may lie apart one in u and the next in v: then none is left
-            kept[key] = left
-    scatter = [_scatter(members, noise) for members in kept.values()]
+        if not outlying.all():  # repeats may lie apart one in u and the next in v: then none is left
+            kept[key] = [s for s, out in zip(members, outlying.tolist(), strict=True) if not out]
+            measured[key] = position[~outlying], sd[~outlying]
+    scatter = [scatter_chi2(*one) for one in measured.values()]
     inconsistent = [n for n, one in enumerate(scatter) if is_inconsistent(one, usual)]
     alike = [one for n, one in enumerate(scatter) if n not in inconsistent]
     freedom = sum(free for _, free in alike)
     scale = float(significant_scale(sum(chi2 for chi2, _ in alike), freedom))
     scales = [(chi2 / free) ** 0.5 if n in inconsistent else scale for n, (chi2, free) in enumerate(scatter)]
     means = [
-        weighted_mean(positions(m), own * stated_sd(m, noise))
-        for m, own in zip(kept.values(), scales, strict=True)
+        weighted_mean(position, own * sd)
+        for (position, sd), own in zip(measured.values(), scales, strict=True)
     ]
     speckle_sd = [np.sqrt((stated_speckle_sd(m, noise) ** 2).mean(axis=0)) for m in kept.values()]
     times = CaptureTimes.of(np.array([s.time_s for s in seen]), [s.part for s in seen])
@@ -273,26 +277,19 @@ def _check_placement(first: PlacementInfo, observation: Observation) -> None:
         )
 
 
-def _without_outliers(
-    members: Sequence[Observation], noise: NoiseSpec, usual: float
-) -> tuple[list[Observation], list[Rejected]]:
-    """The repeats of one cell without outliers, and the outliers with their distance from the median."""
-    position, sd = positions(members), stated_sd(members, noise)
+def _outliers(
+    members: Sequence[Observation], position: FloatArray, sd: FloatArray, usual: float
+) -> tuple[BoolArray, list[Rejected]]:
+    """Which of the n repeats of one cell are outliers, and those with their distance from the median."""
     outlying = outliers(position, sd) | outliers_of_few(position, usual * sd)
-    kept = [s for s, out in zip(members, outlying.tolist(), strict=True) if not out]
     median = np.nanmedian(position, axis=0) if outlying.any() else np.zeros(2)
     dropped: list[Rejected] = [
         RejectedObservation(
-            s.source,
-            f"laser {s.laser_id} at {s.standoff_mm:g} mm:"
-            f" {np.nanmax(np.abs(p - median)):.2f} px from the median of its repeats",
-            s,
+            members[n].source,
+            f"laser {members[n].laser_id} at {members[n].standoff_mm:g} mm:"
+            f" {np.nanmax(np.abs(position[n] - median)):.2f} px from the median of its repeats",
+            members[n],
         )
-        for s, p, out in zip(members, position, outlying.tolist(), strict=True)
-        if out
+        for n in np.flatnonzero(outlying).tolist()
     ]
-    return kept, dropped
-
-
-def _scatter(members: Sequence[Observation], noise: NoiseSpec) -> tuple[float, int]:
-    return scatter_chi2(positions(members), stated_sd(members, noise))
+    return outlying, dropped

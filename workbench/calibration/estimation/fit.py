@@ -365,13 +365,14 @@ def _rms(cells: MeanObservations, residual_px: FloatArray) -> float:
 def _check(rig: Rig, observations: Sequence[Observation]) -> None:
     if not observations:
         raise BadInputError("no observations to fit: expected captures with a known standoff and one spot")
+    known, scale, offset_mm = set(rig.laser_ids), 1 + rig.bench.ruler_scale.value, rig.bench.offset_mm.value
     for s in observations:
-        if s.laser_id not in rig.laser_ids:
+        if s.laser_id not in known:
             raise BadInputError(
                 f"{s.source}: laser_id: expected one of {', '.join(rig.laser_ids)} (rig {rig.rig}),"
                 f" got {s.laser_id}"
             )
-        depth_mm = s.standoff_mm * (1 + rig.bench.ruler_scale.value) + rig.bench.offset_mm.value
+        depth_mm = s.standoff_mm * scale + offset_mm
         if not depth_mm > 0:
             raise BadInputError(
                 f"{s.source}: standoff_mm: expected a target in front of the pinhole, got"

@@ -90,10 +90,13 @@ def set_exposure(
     searched = searched_pixels(rig)
 
     def look(exposure: float, number: int) -> ExposureTrial:
-        begin(f"{placement_key}/exposure/{number:02d}")
         taken = camera.set_exposure(exposure)
-        before = camera.grab().image
-        on = within_lease(lambda: _grab_lit(bench, camera, rig.laser_ids))
+
+        def take() -> list[Image]:
+            begin(f"{placement_key}/exposure/{number:02d}")
+            return [camera.grab().image, *_grab_lit(bench, camera, rig.laser_ids)]
+
+        before, *on = within_lease(take)
         off = [before, camera.grab().image]
         return ExposureTrial(taken, measure_brightness(on, off, searched, 2**rig.camera.bits - 1))
 

@@ -128,7 +128,7 @@ class PairSource:
     ) -> tuple[Image, Image, ev.CaptureTaken]:
         self._refuse_unsafe()
         lit = [i for i in laser_ids if i not in left_off]
-        on, clock_ns, lit_s = within_lease(lambda: self._grab_lit(lit))
+        on, clock_ns, lit_s = within_lease(lambda: self._grab_lit(key, lit))
         frames = FrameStore(self.session_dir)
         with ThreadPoolExecutor(1) as beside:  # the lit frame is stored while the dark one is exposed
             storing = beside.submit(frames.save, key, "on", on.image, on.time_ns)
@@ -155,8 +155,9 @@ class PairSource:
         )
         return on.image, off.image, taken
 
-    def _grab_lit(self, laser_ids: Sequence[str]) -> tuple[Frame, int, float]:
+    def _grab_lit(self, key: str, laser_ids: Sequence[str]) -> tuple[Frame, int, float]:
         """Frame with lasers on, the bench's time, and how long they were on, s."""
+        self.bench.mark(key)  # here, as a virtual frame that is taken again must be the same
         began = time.monotonic()
         with self.bench.lasers.lit(laser_ids, for_s=LEASE_S):
             on = self.bench.camera.grab()
