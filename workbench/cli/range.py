@@ -10,13 +10,14 @@ from rich.console import Console
 from workbench.cli.console import print_message
 from workbench.cli.in_force import note_if_not_in_force, sessions_of
 from workbench.cli.reading_json import plain
-from workbench.model.captures import check_images, errors_name_file, load_captures
+from workbench.model.captures import check_images, errors_name_file, parse_captures, read_captures_file
 from workbench.model.errors import BadInputError
 from workbench.ranging.captures import read_captures
 from workbench.ranging.ranger import Ranger
 from workbench.report.readings import reading_list
 from workbench.sensor.usable import check_same_sensor, load_usable
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE
+from workbench.session.capture_table_check import check_capture_table, check_frames
 from workbench.session.compression import compression_notes
 from workbench.session.manifest import MANIFEST, load_session_rig
 
@@ -29,11 +30,14 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
     """
     ranger = Ranger(load_usable(calibration))
     note_if_not_in_force(calibration, ranger.calibration, sessions_of(captures, calibration))
-    if (captures / MANIFEST).is_file():
-        check_same_sensor(load_session_rig(captures), ranger.calibration)
     readings = []
     table = _table(captures)
-    rows = load_captures(table)
+    content = read_captures_file(table)
+    rows = parse_captures(table, content)
+    if (captures / MANIFEST).is_file():
+        check_same_sensor(load_session_rig(captures), ranger.calibration)
+        check_capture_table(table, content.decode("utf-8-sig"))
+        check_frames(captures)
     check_images(table, rows)
     with errors_name_file(table):
         for note in compression_notes(rows):

@@ -1,4 +1,4 @@
-"""Comparison of a session's captures file with its journal: an edited file is found."""
+"""Comparison of a session's captures files and frames with its journal: an edited file is found."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from workbench.model import event as ev
+from workbench.model.contents import file_sha256
 from workbench.model.errors import BadInputError
-from workbench.session.capture_table import CALIBRATION_TABLE, COLUMNS, table_row
+from workbench.session.capture_table import CALIBRATION_TABLE, COLUMNS, TRIAL_TABLE, table_row
 from workbench.session.journal import JOURNAL, read_journal
 from workbench.session.state import effective
 
@@ -18,44 +19,72 @@ LATER_COLUMNS = ("time_s", "part")
 Row = dict[str, str]
 
 
-def check_capture_table(session_dir: Path, content: str) -> None:
-    """Compare a captures file with the captures that the journal records for one of the session's fits.
+def check_capture_table(table: Path, content: str) -> None:
+    """Compare a captures file of a session with the captures that the journal records for it.
+
+    They are those before one of the session's fits or, of the trials, before the end of one of its trials.
 
     Args:
-        session_dir: folder of the session; without a journal nothing is compared.
-        content: text of its captures file.
+        table: file in the folder of a session; without a journal nothing is compared.
+        content: its text.
 
     Raises:
         BadInputError: a line of the journal is damaged or edited, or a row differs from it; names the line.
     """
-    if not (session_dir / JOURNAL).exists():
+    if not (table.parent / JOURNAL).exists():
         return
-    found = _differences(list(read_journal(session_dir)), content)
-    table = session_dir / CALIBRATION_TABLE
+    found = _differences(list(read_journal(table.parent)), content, table.name)
     if (difference := next(found)) and all(found):
+        own = f"fit {table} --rig RIG -o FILE"
+        if table.name == TRIAL_TABLE:
+            own = f"range {table} --calibration FILE"
         raise BadInputError(
-            f"{table}: {difference}; restore it from a copy, or fit it as a file of your own:"
-            f" workbench fit {table} --rig RIG -o FILE"
+            f"{table}: {difference}; restore it from a copy, or use it as a file of your own: workbench {own}"
         )
 
 
-def _differences(records: Sequence[ev.Record], content: str) -> Iterator[str]:
-    """First difference from the captures that are in effect now, then from those of each fit.
+def check_frames(session_dir: Path) -> None:
+    """Compare the frames of a session's captures with the sums of their content in the journal.
+
+    Frames that are missing are left to whoever needs them.
+
+    Raises:
+        BadInputError: a line of the journal is damaged or edited, or a frame is another one than captured.
+    """
+    if not (session_dir / JOURNAL).exists():
+        return
+    for record in effective(list(read_journal(session_dir))):
+        if not isinstance(record.event, ev.CaptureTaken):
+            continue
+        for frame in filter(None, (record.event.on, record.event.off)):
+            path = session_dir / frame.path
+            if path.is_file() and file_sha256(path) != frame.sha256:
+                raise BadInputError(
+                    f"{path}: expected the frame that was captured, as the journal records its sha256, got"
+                    " another; restore it from a copy, or capture its placement again: workbench repair"
+                    f" {session_dir} --recapture {record.event.placement_key} --reason TEXT"
+                )
+
+
+def _differences(records: Sequence[ev.Record], content: str, name: str) -> Iterator[str]:
+    """First difference from the captures that are in effect now, then from those of each fit or trial.
 
     A repair that was interrupted before its fit leaves the file of the fit before.
     """
-    ends = [n for n, record in enumerate(records) if isinstance(record.event, ev.FitFinished)]
+    end_event = ev.FitFinished if name == CALIBRATION_TABLE else ev.TrialFinished
+    ends = [n for n, record in enumerate(records) if isinstance(record.event, end_event)]
     for end in (len(records), *reversed(ends)):
         before = effective(records[:end])
-        fits = [n for n, record in enumerate(before) if isinstance(record.event, ev.FitFinished)]
+        fits = [n for n, record in enumerate(before) if isinstance(record.event, end_event)]
         last = fits[-1] if fits and end == len(records) else len(before)
-        yield _difference(_expected(before[:last]), content)
+        yield _difference(_expected(before[:last], name), content)
 
 
-def _expected(records: Sequence[ev.Record]) -> dict[str, Row]:
-    """Rows of the captures of the calibration, by the path of their lit frame."""
+def _expected(records: Sequence[ev.Record], name: str) -> dict[str, Row]:
+    """Rows of a captures file, by the path of their lit frame."""
+    purpose = "calibration" if name == CALIBRATION_TABLE else "trial"
     taken = {r.event.key: r.event for r in records if isinstance(r.event, ev.CaptureTaken)}
-    captures = [one for one in taken.values() if one.purpose == "calibration"]
+    captures = [one for one in taken.values() if one.purpose == purpose]
     zero_ns = min((one.time_ns for one in captures), default=0)
     rows = (dict(zip(COLUMNS, table_row(one, zero_ns), strict=True)) for one in captures)
     return {row["on"]: row for row in rows}
