@@ -1,0 +1,98 @@
+"""Campaign `refit`: sessions of the repository, fitted again."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.support.campaigns import ROOT, frames_of, write_campaign
+from workbench.campaign.campaign_file import Campaign, load_campaign
+from workbench.model.calibration import load_calibration
+from workbench.model.errors import BadInputError
+
+REFERENCE, BAD = "20261130-085045-reference", "20261130-120758-bad-standoff"
+UNFITTED = "20261130-114530-calibrate-flat"
+TEXT = """format: 1
+campaign: again
+title: Again
+work:
+  kind: refit
+  sessions: sessions
+  chunk: 2
+"""
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("archive")
+    for name in (REFERENCE, BAD, UNFITTED):
+        shutil.copytree(ROOT / "data/sessions" / name, folder / "sessions" / name)
+    return folder
+
+
+def campaign_of(archive: Path, more: str = "") -> Campaign:
+    return load_campaign(write_campaign(archive, TEXT + more))
+
+
+@pytest.fixture(scope="module")
+def same_model(archive: Path) -> list[pd.DataFrame]:
+    return frames_of(campaign_of(archive))
+
+
+def test_the_same_model_gives_the_calibration_of_the_session(
+    archive: Path, same_model: list[pd.DataFrame]
+) -> None:
+    row = pd.concat(same_model).set_index("session").loc[REFERENCE]
+    fit = load_calibration(archive / "sessions" / REFERENCE / "calibration.yaml").laser_ranger.fit
+    assert (row["before"], row["now"]) == ("accepted", "accepted")
+    assert row["rms_px_before"] == fit.rms_px
+    # The solver stops at 1e-6 of a standard deviation, or below.
+    assert row["rms_px_now"] == pytest.approx(fit.rms_px, rel=1e-6)
+    assert abs(row["difference_mm"]) < 1e-4 * row["difference_sd_mm"]
+
+
+def test_sessions_that_cannot_be_fitted_have_the_reason(same_model: list[pd.DataFrame]) -> None:
+    every = pd.concat(same_model).set_index("session")
+    assert every.loc[UNFITTED, "now"] == "not fitted"
+    assert every.loc[UNFITTED, "reason"]
+    assert every.loc[BAD, "now"] == "refused"
+    assert "600 mm" in every.loc[BAD, "reason"]
+
+
+def test_another_prior_moves_ranges(archive: Path, same_model: list[pd.DataFrame]) -> None:
+    campaign = campaign_of(archive, f"  fix: [f_px]\n  of_rig: {_serial(archive)}\n  verdict: accepted\n")
+    frames = frames_of(campaign)
+    assert pd.concat(frames)["session"].tolist() == [REFERENCE]
+    assert abs(frames[0]["relative_difference"][0]) > 1e-4
+    summary = campaign.file.work.summarise(campaign.inputs, [*same_model, *frames])
+    assert summary.headline.startswith("3 of 4 sessions are fitted, 2 accepted")
+    verdicts, sessions = summary.tables
+    counts = {(row["before"], row["now"]): row["sessions"] for row in verdicts.records()}
+    assert counts["accepted", "accepted"] == 2
+    assert [row["session"] for row in sessions.records()] == [UNFITTED, REFERENCE, REFERENCE, BAD]
+
+
+def test_equal_sessions_give_equal_rows(archive: Path, same_model: list[pd.DataFrame]) -> None:
+    campaign = campaign_of(archive)
+    again = campaign.file.work.run(campaign.inputs, campaign.chunks[1])
+    pd.testing.assert_frame_equal(again, same_model[1], check_exact=True)
+
+
+def test_a_query_without_sessions_is_refused(archive: Path) -> None:
+    with pytest.raises(BadInputError, match=r"campaign\.yaml:6: work\.sessions: .*none is selected"):
+        campaign_of(archive, "  until: 2020-01-01\n")
+
+
+def test_an_unknown_parameter_is_refused_before_the_run(archive: Path) -> None:
+    rig = ROOT / "rigs/thesis-emulated.yaml"
+    with pytest.raises(BadInputError, match="focal"):
+        campaign_of(archive, f"  rig: {rig}\n  fix: [focal]\n")
+
+
+def _serial(archive: Path) -> str:
+    from workbench.session.manifest import load_manifest
+
+    return load_manifest(archive / "sessions" / REFERENCE).rig.serial
