@@ -111,6 +111,7 @@ certificate: $(INSTALLED)
 
 schema: $(INSTALLED)
 	$(BIN)/python -c 'import json; from workbench.model.calibration import Calibration; print(json.dumps(Calibration.model_json_schema(), indent=2))' > docs/calibration.schema.json
+	$(BIN)/python -c 'import json; from workbench.campaign.campaign_file import CampaignFile; print(json.dumps(CampaignFile.model_json_schema(), indent=2))' > docs/campaign.schema.json
 
 clean:
 	rm -rf .venv .venv-* sessions build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -141,9 +141,10 @@ def sessions_(
     json: Json = False,
 ) -> None:
     """List sessions with their states."""
-    from workbench.cli.sessions import Selection, list_sessions
+    from workbench.cli.sessions import list_sessions
+    from workbench.session.index import SessionSelection
 
-    selection = Selection(rig, since, None if verdict is None else verdict.value)
+    selection = SessionSelection(rig, since, None if verdict is None else verdict.value)
     list_sessions(sessions if folder is None else folder, json, selection)
 
 
@@ -283,6 +284,33 @@ def range_(
         from workbench.cli.live import LiveRequest, range_live
 
         range_live(LiveRequest(rig, calibration, readings, standoff, stats, view), json)
+
+
+@app.command()
+def campaign(
+    file: Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="Campaign file (YAML).")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the results; also one to continue."),
+    ],
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="N", parser=whole, help="Worker processes. Default: one for each core."),
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers do the work.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Run a campaign on many sensors or sessions. On all cores, or on a cluster.
+
+    A campaign that was stopped continues with the same command; finished chunks are kept.
+    """
+    if workers is not None and scheduler is not None:
+        raise typer.BadParameter("expected either --workers or --scheduler")
+    from workbench.cli.campaign import CampaignRequest, run_campaign
+
+    run_campaign(CampaignRequest(file, output, workers, scheduler), json)
 
 
 class TrialKind(StrEnum):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from workbench.campaign.campaign_file import is_campaign, load_campaign
 from workbench.model.errors import BadInputError
 from workbench.model.number_text import duration
 from workbench.model.table import Column, Table
@@ -38,6 +39,10 @@ def check_files(files: list[Path]) -> None:
     mistakes: list[str] = []
     for path in files:
         try:
+            if is_campaign(path):
+                load_campaign(path)
+                console.print(f"{path}: good")
+                continue
             result = check_file(path)
         except BadInputError as error:
             mistakes.append(str(error))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 
 from rich.console import Console
@@ -19,7 +17,13 @@ from workbench.model import event as ev
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.number_text import counted
 from workbench.report.history.dates import future_text
-from workbench.session.index import IndexedSession, copies_text, indexed_sessions, read_indexed
+from workbench.session.index import (
+    IndexedSession,
+    SessionSelection,
+    copies_text,
+    indexed_sessions,
+    read_indexed,
+)
 from workbench.session.journal import read_journal
 from workbench.session.manifest import MANIFEST
 from workbench.session.state import SessionStatus, effective, session_statuses
@@ -28,26 +32,7 @@ SHOWN = 20
 """Number of latest sessions that are listed."""
 
 
-@dataclass(frozen=True)
-class Selection:
-    """Sessions to list; None: all."""
-
-    rig: str | None = None
-    """Name or serial number of the rig."""
-    since: date | None = None
-    verdict: str | None = None
-    """A key of `VERDICTS`."""
-
-    def includes(self, one: IndexedSession) -> bool:
-        """Whether a session is selected."""
-        return (
-            self.rig in {None, one.serial, one.status.rig}
-            and (self.since is None or one.began[:10] >= self.since.isoformat())
-            and self.verdict in {None, one.verdict}
-        )
-
-
-def list_sessions(sessions: Path, as_json: bool, selection: Selection = Selection()) -> None:
+def list_sessions(sessions: Path, as_json: bool, selection: SessionSelection = SessionSelection()) -> None:
     """Print the status of every session, and the commands that continue unfinished ones.
 
     Args:

@@ -11,6 +11,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 from typing import Literal
 
@@ -73,6 +74,29 @@ class IndexedSession:
     def name(self) -> str:
         """Name of the session's folder."""
         return self.status.session_dir.name
+
+
+@dataclass(frozen=True)
+class SessionSelection:
+    """Sessions to list; None: all."""
+
+    rig: str | None = None
+    """Name or serial number of the rig."""
+    since: date | None = None
+    verdict: str | None = None
+    """A key of `VERDICTS`."""
+    until: date | None = None
+    """Last day."""
+
+    def includes(self, one: IndexedSession) -> bool:
+        """Whether a session is selected."""
+        day = one.began[:10]
+        return (
+            self.rig in {None, one.serial, one.status.rig}
+            and (self.since is None or day >= self.since.isoformat())
+            and (self.until is None or day <= self.until.isoformat())
+            and self.verdict in {None, one.verdict}
+        )
 
 
 CONTENT = TypeAdapter(IndexedSession)

@@ -18,8 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +27,7 @@ from jax import Array
 
 from workbench.calibration.data.observations import PlacementInfo
 from workbench.calibration.estimation.fit import table_of
+from workbench.calibration.estimation.jit_cache import jit_cached
 from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.parameters import PLACEMENT, ParameterTable
@@ -106,9 +106,12 @@ def fit_batch(
     layout = Layout(rig.camera.lens, len(rig.lasers), len(placements))
     varied = tuple(np.flatnonzero(table.prior_sd[layout.common]).tolist())
     standoff_mm = np.array([p.standoff_mm for p in placements])
-    shared = (layout, varied, table.prior_mean, table.prior_sd, standoff_mm)
+    shared = (table.prior_mean, table.prior_sd, standoff_mm)
+    program = (layout, varied)
     scale = np.ones(len(position))
-    solved = _in_chunks(shared, np.zeros((len(position), len(table.prior_mean))), position, inverse_sd)
+    solved = _in_chunks(
+        shared, program, np.zeros((len(position), len(table.prior_mean))), position, inverse_sd
+    )
     for _ in range(SCALE_ROUNDS):
         called_for = significant_scale(solved.chi2 * scale**2, solved.freedom)
         again = np.flatnonzero(called_for > scale * SCALE_TOLERANCE)
@@ -116,7 +119,7 @@ def fit_batch(
             break
         scale[again] = called_for[again]
         scaled = inverse_sd[again] / scale[again, None, None, None]
-        better = _in_chunks(shared, solved.y[again], position[again], scaled)
+        better = _in_chunks(shared, program, solved.y[again], position[again], scaled)
         for whole, part in zip(solved, better, strict=True):
             whole[again] = part
     sd, of_sensor = table.prior_sd, table.prior_sd[layout.sensor]
@@ -145,14 +148,18 @@ class _Solved(NamedTuple):
 
 
 def _in_chunks(
-    shared: tuple[Any, ...], start: FloatArray, position: FloatArray, inverse_sd: FloatArray
+    shared: tuple[FloatArray, ...],
+    program: tuple[Layout, tuple[int, ...]],
+    start: FloatArray,
+    position: FloatArray,
+    inverse_sd: FloatArray,
 ) -> _Solved:
     """Solve the fits in chunks of CHUNK; the last chunk is filled with copies of its first fit."""
     parts = []
     for first in range(0, len(position), CHUNK):
         chosen = np.arange(first, first + CHUNK)
         chosen = np.where(chosen < len(position), chosen, first)
-        solved = _solve_chunk(*shared, start[chosen], position[chosen], inverse_sd[chosen])
+        solved = _solve_chunk(*shared, start[chosen], position[chosen], inverse_sd[chosen], *program)
         parts.append([np.asarray(part)[: len(position) - first] for part in solved])
     return _Solved(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
@@ -220,16 +227,16 @@ class _Normal(NamedTuple):
     """(P,)"""
 
 
-@partial(jax.jit, static_argnums=(0, 1))
+@jit_cached(static=2)
 def _solve_chunk(
-    layout: Layout,
-    varied: tuple[int, ...],
     mean: Array,
     sd: Array,
     standoff_mm: Array,
     start: Array,
     position: Array,
     inverse_sd: Array,
+    layout: Layout,
+    varied: tuple[int, ...],
 ) -> tuple[Array, ...]:
     kept = np.array([*varied, *range(layout.common.stop, mean.size)])
     shared = _Shared(Layout(layout.lens_name), varied, mean[layout.common], mean[kept], sd[kept], standoff_mm)

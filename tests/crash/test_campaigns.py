@@ -1,0 +1,175 @@
+"""Campaigns whose workers and client are killed end with the same results to the bit."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tests.support.campaigns import SIMULATE, write_campaign
+from tests.support.command_line import SCRIPT
+from workbench.campaign.cluster import local_client
+from workbench.campaign.identity import ENVIRONMENT
+
+CHUNKS = 24
+TEXT = SIMULATE.replace("sensors: 40", f"sensors: {16 * CHUNKS}")
+LONGEST_S = 120
+
+
+def start(campaign: Path, out: Path, *options: str) -> subprocess.Popen[str]:
+    """The command in a group of its own, as at a terminal."""
+    command = [str(SCRIPT), "campaign", str(campaign), "-o", str(out), *options]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def wait_for(what: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+    end_s = time.monotonic() + LONGEST_S
+    while not what():
+        assert process.poll() is None, process.communicate()[1]
+        assert time.monotonic() < end_s
+        time.sleep(0.01)
+
+
+def finished(out: Path) -> int:
+    return len(list(out.glob("chunks/*.sha256")))
+
+
+def workers(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    """Worker processes: they import the workbench, other children of multiprocessing do not."""
+    return _children(process.pid)
+
+
+def _children(pid: int | None = None) -> list[psutil.Process]:
+    found = []
+    for child in psutil.Process(pid).children(recursive=True):
+        with suppress(psutil.Error):  # it has ended
+            if any("spawn_main" in word for word in child.cmdline()):
+                found.append(child)
+    return found
+
+
+def results(out: Path) -> dict[str, str]:
+    """Hashes of all chunks and tables."""
+    paths = [*out.glob("chunks/*"), *out.glob("tables/*")]
+    assert finished(out) == CHUNKS
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_campaign(tmp_path_factory.mktemp("campaign"), TEXT)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(campaign: Path) -> dict[str, str]:
+    """Results of one worker."""
+    out = campaign.parent / "undisturbed"
+    process = start(campaign, out, "--workers", "1")
+    assert (process.communicate()[1], process.returncode)[1] == 0
+    return results(out)
+
+
+thorough = pytest.mark.thorough
+
+
+@pytest.mark.parametrize(
+    ("seed", "kills"), [(1, 1), *(pytest.param(seed, 3, marks=thorough) for seed in (2, 3, 4))]
+)
+def test_killed_workers_and_a_killed_client_change_no_bit(
+    campaign: Path, undisturbed: dict[str, str], tmp_path: Path, seed: int, kills: int
+) -> None:
+    rng, out = random.Random(seed), tmp_path / "out"  # noqa: S311 - no secret
+    process = start(campaign, out, "--workers", "2")
+    for after in sorted(rng.sample(range(1, CHUNKS // 2), kills)):
+        wait_for(lambda after=after: finished(out) >= after, process)  # type: ignore[misc]
+        wait_for(lambda: bool(workers(process)), process)
+        rng.choice(workers(process)).kill()
+    wait_for(lambda: finished(out) > CHUNKS // 2, process)
+    orphans = workers(process)
+    process.kill()
+    process.communicate()
+    psutil.wait_procs(orphans, timeout=LONGEST_S)
+    assert not any(orphan.is_running() for orphan in orphans)
+    kept = {path: path.stat().st_mtime_ns for path in out.glob("chunks/*.sha256")}
+    assert CHUNKS // 2 < len(kept) <= CHUNKS
+
+    process = start(campaign, out, "--workers", "2")
+    errors = process.communicate()[1]
+    assert process.returncode == 0, errors
+    assert f"{16 * len(kept)} done before" in errors or len(kept) == CHUNKS
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    assert results(out) == undisturbed
+
+
+@pytest.mark.thorough
+def test_workers_killed_while_they_start_are_replaced() -> None:
+    with local_client(2) as client:
+        for wait_s in (0.1, 1.0, 2.0, 0.5):
+            for worker in _children():
+                worker.kill()
+            time.sleep(wait_s)
+        client.wait_for_workers(2, timeout=LONGEST_S)
+        assert client.submit(sum, [1, 2]).result(timeout=LONGEST_S) == 3
+
+
+def test_ctrl_c_ends_cleanly_with_the_command_that_continues(campaign: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = start(campaign, out, "--workers", "1")
+    wait_for(lambda: finished(out) >= 1, process)
+    sockets = [
+        connection.laddr.ip
+        for one in [psutil.Process(process.pid), *workers(process)]
+        for connection in one.net_connections("inet")
+        if connection.status == psutil.CONN_LISTEN
+    ]
+    assert set(sockets) == {"127.0.0.1"}
+    os.killpg(process.pid, signal.SIGINT)
+    errors = process.communicate()[1]
+    assert process.returncode == 5
+    assert "Traceback" not in errors
+    assert errors.splitlines()[-2:] == [
+        "stopped by Ctrl-C",
+        f"resume:  workbench campaign {campaign} -o {out} --workers 1",
+    ]
+
+
+@pytest.mark.thorough
+def test_two_programs_share_a_scheduler_and_a_folder_only(
+    campaign: Path, undisturbed: dict[str, str], tmp_path: Path
+) -> None:
+    """A scheduler and two workers as `dask` starts them, each in a folder of its own."""
+    bin_folder = Path(sys.executable).parent
+    scheduler_file, out = tmp_path / "scheduler.json", tmp_path / "out"
+
+    def dask(name: str, *arguments: str) -> subprocess.Popen[str]:
+        (tmp_path / name).mkdir()
+        command = [str(bin_folder / "dask"), *arguments, "--scheduler-file", str(scheduler_file)]
+        return subprocess.Popen(
+            command, cwd=tmp_path / name, env=os.environ | ENVIRONMENT, stderr=subprocess.DEVNULL, text=True
+        )
+
+    local = ("--host", "127.0.0.1", "--no-dashboard")
+    others = [dask("scheduler", "scheduler", "--port", "0", *local)]
+    try:
+        wait_for(scheduler_file.exists, others[0])
+        others += [dask(f"w{n}", "worker", "--nthreads", "1", *local) for n in (1, 2)]
+        address = json.loads(scheduler_file.read_text())["address"]
+        process = start(campaign, out, "--scheduler", address)
+        errors = process.communicate()[1]
+        assert process.returncode == 0, errors
+        assert results(out) == undisturbed
+    finally:
+        for other in reversed(others):
+            other.terminate()
+            other.wait()

@@ -1,0 +1,46 @@
+"""Work on one chunk, as a worker of the cluster runs it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from workbench.campaign.campaign_file import Campaign
+from workbench.campaign.chunk_file import is_finished, write_chunk
+from workbench.campaign.folder import CHUNKS, CampaignManifest
+from workbench.campaign.identity import Identity, check_environment, difference, identity_of
+from workbench.model.errors import BadInputError
+
+
+def run_chunk(manifest: str, folder: str, index: int) -> int:
+    """Compute a chunk and write its file, unless it is there.
+
+    Args:
+        manifest: text of the campaign's manifest.
+        folder: folder of the campaign, as this worker sees it.
+        index: of the chunk.
+
+    Returns:
+        `index`.
+
+    Raises:
+        BadInputError: this worker runs another version or with several threads, or the work cannot be done.
+        OSError: the file could not be written.
+    """
+    check_environment()
+    campaign, identity = _read(manifest)
+    chunks = Path(folder) / CHUNKS
+    chunk = campaign.chunks[index]
+    if not is_finished(chunks, chunk, identity.sha256):
+        write_chunk(chunks, chunk, identity.sha256, campaign.file.work.run(campaign.inputs, chunk))
+    return index
+
+
+@lru_cache(maxsize=4)
+def _read(manifest: str) -> tuple[Campaign, Identity]:
+    """The campaign of a manifest, with its identity, which is that of this worker."""
+    found = CampaignManifest.model_validate_json(manifest)
+    campaign = Campaign(found.file, found.inputs)
+    if differs := difference(found.identity, identity_of(campaign)):
+        raise BadInputError(f"a worker differs from this program: {differs}; install one version on both")
+    return campaign, found.identity
