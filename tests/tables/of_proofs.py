@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from tests.support.stored_output import newest
@@ -11,7 +11,7 @@ from tests.tables.markdown import markdown_table
 
 FIGURE = re.compile(
     r"(?P<trial>.{14})(?P<quantity>.+?) +(?P<value>-?\d+\.\d{3})  (?P<expected>.+?)"
-    r" \((?P<runs>\d+)\)(?P<missed>  MISSED.*)?$"
+    r" \((?P<runs>\d+)\)(?P<missed>  MISSED(: (?P<reason>.+))?)?$"
 )
 """A line of `tests.proofs.figure.Figure`."""
 SITUATION = re.compile(
@@ -39,6 +39,8 @@ class ProofFigure:
     expected: str
     runs: str
     is_missed: bool
+    reason: str
+    """Why it is missed; empty where no reason is known."""
 
     @property
     def head(self) -> str:
@@ -107,16 +109,31 @@ def trials() -> str:
 
     Figures that differ in a place or a number alone are one row.
     """
-    rows: dict[tuple[str, ...], list[ProofFigure]] = {}
-    for one in proof_figures():
-        if not _is_about_a_change(one):
-            rows.setdefault((one.trial, one.head, one.expected, one.runs), []).append(one)
     texts, previous = [], ""
-    for (trial, head, expected, runs), figures in rows.items():
-        quantity = figures[0].quantity if len(figures) == 1 else f"{head}, {len(figures)} cases"
-        texts.append((trial if trial != previous else "", quantity, _found(figures), expected, runs))
-        previous = trial
+    for quantity, figures in _shared_rows(one for one in proof_figures() if not _is_about_a_change(one)):
+        first = figures[0]
+        trial = first.trial if first.trial != previous else ""
+        texts.append((trial, quantity, _found(figures), first.expected, first.runs))
+        previous = first.trial
     return markdown_table(("trial", "figure", "found", "expected", "runs"), texts, numbers_from=2)
+
+
+def missed() -> str:
+    """Figures of the trials that are missed, with the reasons."""
+    rows = [
+        (figures[0].trial, quantity, figures[0].reason)
+        for quantity, figures in _shared_rows(one for one in proof_figures() if one.is_missed)
+    ]
+    return markdown_table(("trial", "missed", "reason"), rows, numbers_from=3)
+
+
+def _shared_rows(figures: Iterable[ProofFigure]) -> Iterator[tuple[str, list[ProofFigure]]]:
+    """Name and figures of each row."""
+    rows: dict[tuple[str, ...], list[ProofFigure]] = {}
+    for one in figures:
+        rows.setdefault((one.trial, one.head, one.expected, one.runs), []).append(one)
+    for (_, head, *_), shared in rows.items():
+        yield shared[0].quantity if len(shared) == 1 else f"{head}, {len(shared)} cases", shared
 
 
 def verification() -> str:
@@ -155,6 +172,7 @@ def proof_figures() -> Iterator[ProofFigure]:
                 found["expected"],
                 found["runs"],
                 bool(found["missed"]),
+                found["reason"] or "",
             )
 
 
