@@ -41,7 +41,6 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "situations": of_proofs.situations,
     "validation": of_proofs.validation,
     "trials": of_proofs.trials,
-    "trials-missed": of_proofs.missed,
     "verification": of_proofs.verification,
     "control-charts": of_proofs.control_charts,
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from tests.support.stored_output import newest
@@ -11,7 +11,7 @@ from tests.tables.markdown import markdown_table
 
 FIGURE = re.compile(
     r"(?P<trial>.{14})(?P<quantity>.+?) +(?P<value>-?\d+\.\d{3})  (?P<expected>.+?)"
-    r" \((?P<runs>\d+)\)(?P<missed>  MISSED(: (?P<reason>.+))?)?$"
+    r" \((?P<runs>\d+)\)(?P<missed>  MISSED.*)?$"
 )
 """A line of `tests.proofs.figure.Figure`."""
 SITUATION = re.compile(
@@ -39,8 +39,6 @@ class ProofFigure:
     expected: str
     runs: str
     is_missed: bool
-    reason: str
-    """Why it is missed; empty where no reason is known."""
 
     @property
     def head(self) -> str:
@@ -109,43 +107,28 @@ def trials() -> str:
 
     Figures that differ in a place or a number alone are one row.
     """
-    texts, previous = [], ""
-    for quantity, figures in _shared_rows(one for one in proof_figures() if not _is_about_a_change(one)):
-        first = figures[0]
-        trial = first.trial if first.trial != previous else ""
-        texts.append((trial, quantity, _found(figures), first.expected, first.runs))
-        previous = first.trial
-    return markdown_table(("trial", "figure", "found", "expected", "runs"), texts, numbers_from=2)
-
-
-def missed() -> str:
-    """Figures of the trials that are missed, with the reasons."""
-    rows = [
-        (figures[0].trial, quantity, figures[0].reason)
-        for quantity, figures in _shared_rows(one for one in proof_figures() if one.is_missed)
-    ]
-    return markdown_table(("trial", "missed", "reason"), rows, numbers_from=3)
-
-
-def _shared_rows(figures: Iterable[ProofFigure]) -> Iterator[tuple[str, list[ProofFigure]]]:
-    """Name and figures of each row."""
     rows: dict[tuple[str, ...], list[ProofFigure]] = {}
-    for one in figures:
-        rows.setdefault((one.trial, one.head, one.expected, one.runs), []).append(one)
-    for (_, head, *_), shared in rows.items():
-        yield shared[0].quantity if len(shared) == 1 else f"{head}, {len(shared)} cases", shared
+    for one in proof_figures():
+        if not _is_about_a_change(one):
+            rows.setdefault((one.trial, one.head, one.expected, one.runs), []).append(one)
+    texts, previous = [], ""
+    for (trial, head, expected, runs), figures in rows.items():
+        quantity = figures[0].quantity if len(figures) == 1 else f"{head}, {len(figures)} cases"
+        texts.append((trial if trial != previous else "", quantity, _found(figures), expected, runs))
+        previous = trial
+    return markdown_table(("trial", "figure", "found", "expected", "runs"), texts, numbers_from=2)
 
 
 def verification() -> str:
     """Changes of a sensor that a verification finds and names, per cent."""
     found = {one.quantity: f"{100 * one.value:.0f}" for one in proof_figures() if _is_about_a_change(one)}
-    changes = [re.fullmatch("best test: (.+), other bench", quantity) for quantity in found]
+    changes = [re.fullmatch("best test: (.+), own bench", quantity) for quantity in found]
     rows = [
         (
             change,
             *(
                 found[f"{what}: {change}, {bench}"]
-                for bench in ("other bench", "same bench")
+                for bench in ("own bench", "same bench")
                 for what in ("refused", "best test", "named where refused")
             ),
         )
@@ -172,7 +155,6 @@ def proof_figures() -> Iterator[ProofFigure]:
                 found["expected"],
                 found["runs"],
                 bool(found["missed"]),
-                found["reason"] or "",
             )
 
 
