@@ -44,7 +44,7 @@ def ask_all(questions: Sequence[Question], without: str = "") -> dict[str, str]:
 
     Args:
         questions: questions.
-        without: advice to somebody who cannot answer.
+        without: advice for runs without an operator.
 
     Raises:
         AnswerNeededError: the terminal was closed, or end-of-file was typed.

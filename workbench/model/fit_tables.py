@@ -70,9 +70,9 @@ def cross_validation_table(placements: Sequence[CrossValidatedPlacement]) -> Tab
         rows=tuple(_placement_row(one, ids) for one in placements),
         caption=(
             "error: range - standoff, empty where the spots give no finite range; u: 1 sigma at the standoff;"
-            " error / u: to first order in pixels; %: relative error of each laser alone; !: the placement"
-            " contradicts the others, found by its range error (range) or by the distance of all its spots"
-            " from their predictions (spots)"
+            " error / u: from the linearised model, so it can differ from the quotient of the two columns;"
+            " %: relative error of each laser alone; !: the placement contradicts the others, found by its"
+            " range error (range) or by the distance of all its spots from their predictions (spots)"
         ),
     )
 

@@ -93,7 +93,7 @@ class CaptureGridStep(StepModel):
         placements = [*self.placements(name, context.rig)]
         if takes_added(context.steps, context.step_index):
             placements += self._added_placements(name, context.recorder.repairs.added_mm)
-        expect = _unseen_lasers(context.rig, placements)
+        expect = _sentences_on_lasers_outside(context.rig, placements)
         return counted(sum(visit_placements(context, placements, work, expect=expect)), "pair")
 
     def added_prompts(self, name: str, rig: Rig, added_mm: Sequence[float]) -> Sequence[Prompt]:
@@ -111,15 +111,15 @@ class CaptureGridStep(StepModel):
         return added
 
 
-def _unseen_lasers(rig: Rig, placements: Sequence[Placement]) -> dict[str, str]:
+def _sentences_on_lasers_outside(rig: Rig, placements: Sequence[Placement]) -> dict[str, str]:
     """Sentence about the lasers whose spots are expected outside the image, by key of the placement."""
     from workbench.calibration.design.expected_spot import lasers_outside
 
     outside = lasers_outside(rig, sorted({placement.standoff_mm for placement in placements}))
     return {
-        placement.key: f"By the rig file {', '.join(unseen)} will be outside the image."
+        placement.key: f"By the rig file {', '.join(ids)} will be outside the image."
         for placement in placements
-        if (unseen := outside[placement.standoff_mm])
+        if (ids := outside[placement.standoff_mm])
     }
 
 

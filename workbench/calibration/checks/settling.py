@@ -36,8 +36,8 @@ STEADY_GAIN = 6.63
 """Gain over the steady drift above which a time constant is stated: chi-square of one degree, 1 %."""
 INTERVAL_GAIN = 3.84
 """Loss of gain at the ends of the 95 % interval."""
-BY_ORDER = "judged by the order of the captures, as they have no times (time_s)"
-"""Remark on a drift whose time is an order."""
+BY_ORDER = " The captures have no times (time_s); their order was used."
+"""Sentence added to a remark on a drift whose time is an order."""
 DRIFTS_P = 0.003
 """P value below which a drift within the parts is taken for real, beside the steps between them."""
 LEAST_INFORMATION = 1e-6
@@ -152,10 +152,10 @@ def _step_advice(fitted: CalibrationFit) -> str:
 def _warm_up_advice(fitted: CalibrationFit, found: Settling | None) -> str:
     """Duration of the warm-up, or that the drift has not settled."""
     duration_s = fitted.cells.times.duration_s
-    by_order = "" if isfinite(duration_s) else f" ({BY_ORDER})"
+    by_order = "" if isfinite(duration_s) else BY_ORDER
     if found is None:
         return (
-            f"No settling shows: it takes longer than the session{by_order}. Do: warm up longer, or fix the"
+            f"No settling shows: it takes longer than the session.{by_order} Do: warm up longer, or fix the"
             " camera"
         )
     # A shift below the deviation of a single mean position is one that no spot shows.
@@ -170,6 +170,6 @@ def _warm_up_advice(fitted: CalibrationFit, found: Settling | None) -> str:
         )
     return (
         f"It settles with a time constant of {found.time_constant:.2g} ({low:.2g} to {high:.2g}) of the"
-        f" session{by_order}, by {found.amplitude_px:.2g} px in all. Do: let the camera warm up for"
+        f" session, by {found.amplitude_px:.2g} px in all.{by_order} Do: let the camera warm up for"
         f" {found.warm_up(limit_px):.2g} times the duration of this session before the first capture"
     )

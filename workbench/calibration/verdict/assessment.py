@@ -241,7 +241,7 @@ def _hidden_text(hidden_px: float) -> str:
 
 def _by_order(fit: CalibrationFit) -> str:
     """Remark on a drift by the order of the captures; empty where they have times."""
-    return "" if np.isfinite(fit.cells.times.duration_s) else f"; {BY_ORDER}"
+    return "" if np.isfinite(fit.cells.times.duration_s) else BY_ORDER
 
 
 def _drift_text(fit: CalibrationFit) -> str:
@@ -298,10 +298,10 @@ def _warnings(fit: CalibrationFit) -> list[str]:
     hidden = 0.0 if fits_drift(fit.rig) else _hidden_drift_px(fit)
     if hidden > LARGEST_HIDDEN_PX:
         warnings.append(
-            f"a drift of the image of {_hidden_text(hidden)} over the session would not be noticed (expected"
-            f" {LARGEST_HIDDEN_PX:g} px at most{_by_order(fit)}), because it follows the standoff. Do: visit"
-            " the standoffs in shuffled order (order: shuffled), and return to two of them at the end"
-            " (returns: 2)."
+            f"a drift of the image of {_hidden_text(hidden)} during the session would look like an effect of"
+            f" the standoff, and would not be noticed (at most {LARGEST_HIDDEN_PX:g} px is expected)."
+            f"{_by_order(fit)} Do: visit the standoffs in shuffled order (order: shuffled), and return to two"
+            " of them at the end (returns: 2)."
         )
     if np.any(fit.drift_px):
         warnings.append(
@@ -316,8 +316,8 @@ def _warnings(fit: CalibrationFit) -> list[str]:
         )
     if fit.noise_scale > SPECKLE_SCALE and not fit.cells.speckle_sd_px.any():
         warnings.append(
-            "the rig file states no speckle (noise.speckle_sd_px): all repeats of a spot share it, so their"
-            " scatter does not show it. State it: docs/rig-format.md computes it from wavelength, f-number"
-            " and pixel pitch."
+            "the rig file has no value for speckle (noise.speckle_sd_px). Speckle is the same in all repeats,"
+            " so their scatter does not show it. Enter a value: docs/rig-format.md computes it from"
+            " wavelength, f-number and pixel pitch."
         )
     return warnings
