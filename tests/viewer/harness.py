@@ -77,8 +77,8 @@ class Viewer:
     def tabs(self) -> list[str]:
         """Names of the screens, from the left."""
         layout = self.client.get_blueprint().blueprint
-        (root,) = (tabs for tabs in _tabs(layout) if tabs["contents"][0].startswith("container/"))
-        return [layout[f"/{screen}"]["ContainerBlueprint"]["display_name"] for screen in root["contents"]]
+        screens = _root(layout)["contents"]
+        return [layout[f"/{screen}"]["ContainerBlueprint"]["display_name"] for screen in screens]
 
     def show_tab(self, name: str) -> None:
         """Bring a tab of the layout to the front: a view in a hidden tab cannot be photographed."""
@@ -98,8 +98,7 @@ class Viewer:
     def views_in_front(self) -> list[Any]:
         """Views that no other tab hides."""
         layout = self.client.get_blueprint().blueprint
-        root = layout["/viewport"]["ViewportBlueprint"]["root_container"]
-        front = set(_in_front(layout, f"container/{root}"))
+        front = set(_in_front(layout, _root_path(layout)))
         return [view for view in self.state().views if f"view/{view.view_id}" in front]
 
     def shot(self, view_id: Any = None) -> Picture:
@@ -146,6 +145,15 @@ def _tabs(layout: Any) -> list[Any]:
     """Containers of tabs in a layout."""
     containers = (parts["ContainerBlueprint"] for parts in layout.values() if "ContainerBlueprint" in parts)
     return [container for container in containers if container.get("container_kind") == "Tabs"]
+
+
+def _root_path(layout: Any) -> str:
+    """The container that has all others."""
+    return f"container/{layout['/viewport']['ViewportBlueprint']['root_container']}"
+
+
+def _root(layout: Any) -> Any:
+    return layout[f"/{_root_path(layout)}"]["ContainerBlueprint"]
 
 
 def _in_front(layout: Any, part: str) -> Iterator[str]:

@@ -22,7 +22,7 @@ from workbench.viewer.window import viewer_environment, viewer_executable
 TABS = ["Captures", "Calibration: which standoff?", "Calibration: details", TRIAL, "3D"]
 HIDDEN = {
     "Parameters": TABS[0],
-    "Largest range uncertainty so far [%]": TABS[0],
+    "Largest [%]": TABS[0],
     "Fitted parameters": TABS[2],
     SENSOR_CHART: TRIAL,
 }
