@@ -33,7 +33,10 @@ def _block(columns: Sequence[TextColumn]) -> Iterator[str]:
     yield from _lines(columns, widths, [("",) * (height - len(c.heading)) + c.heading for c in columns])
     yield RULE * (sum(widths) + GAP * (len(columns) - 1))
     for cells in zip(*(column.cells for column in columns), strict=True):
-        wrapped = [wrap(cell, width) or [""] for cell, width in zip(cells, widths, strict=True)]
+        wrapped = [
+            [cell] if len(cell) <= width else wrap(cell, width)
+            for cell, width in zip(cells, widths, strict=True)
+        ]
         yield from _lines(columns, widths, wrapped)
 
 

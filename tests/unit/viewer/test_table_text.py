@@ -47,3 +47,9 @@ def test_a_wide_table_is_split_into_blocks_and_long_texts_are_wrapped() -> None:
     assert words.count("300") == 2
     assert {str(1234567890 + n) for n in range(8)} <= set(words)
     assert words.count("note") == 24
+
+
+def test_a_column_without_any_text_takes_no_place() -> None:
+    columns = (Column(key="a", name="a"), Column(key="b", name=""), Column(key="c", name="c"))
+    table = Table(name="t", title="T", columns=columns, rows=(("x", "", "y"),))
+    assert table_text(table).splitlines()[-1] == "x    y"
