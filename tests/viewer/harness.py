@@ -6,7 +6,7 @@ import os
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,13 +76,13 @@ class Viewer:
 
     def tabs(self) -> list[str]:
         """Names of the screens, from the left."""
-        layout = self.client.get_blueprint().blueprint
-        (root,) = (tabs for tabs in _tabs(layout) if tabs["contents"][0].startswith("container/"))
-        return [layout[f"/{screen}"]["ContainerBlueprint"]["display_name"] for screen in root["contents"]]
+        layout = self.layout()
+        screens = _root(layout)["contents"]
+        return [layout[f"/{screen}"]["ContainerBlueprint"]["display_name"] for screen in screens]
 
     def show_tab(self, name: str) -> None:
         """Bring a tab of the layout to the front: a view in a hidden tab cannot be photographed."""
-        layout = self.client.get_blueprint().blueprint
+        layout = self.layout()
         named = {
             path.lstrip("/")
             for path, parts in layout.items()
@@ -93,13 +93,28 @@ class Viewer:
         assert found, f"no tab {name}"
         for tabs, tab in found:
             tabs["active_tab"] = tab
+        self.lay_out(layout)
+
+    def layout(self) -> Any:
+        """The present layout."""
+        return self.client.get_blueprint().blueprint
+
+    def lay_out(self, layout: Any) -> None:
+        """Replace the layout."""
         self.client.set_blueprint(layout, "recording")
+
+    def change(self, part: str, values: Callable[[Any], dict[str, Any]]) -> None:
+        """Change the values of each part of the layout of a kind, such as `VisualBounds2D`."""
+        layout = self.layout()
+        for parts in layout.values():
+            if part in parts:
+                parts[part] |= values(parts[part])
+        self.lay_out(layout)
 
     def views_in_front(self) -> list[Any]:
         """Views that no other tab hides."""
-        layout = self.client.get_blueprint().blueprint
-        root = layout["/viewport"]["ViewportBlueprint"]["root_container"]
-        front = set(_in_front(layout, f"container/{root}"))
+        layout = self.layout()
+        front = set(_in_front(layout, _root_path(layout)))
         return [view for view in self.state().views if f"view/{view.view_id}" in front]
 
     def shot(self, view_id: Any = None) -> Picture:
@@ -148,6 +163,15 @@ def _tabs(layout: Any) -> list[Any]:
     return [container for container in containers if container.get("container_kind") == "Tabs"]
 
 
+def _root_path(layout: Any) -> str:
+    """The container that has all others."""
+    return f"container/{layout['/viewport']['ViewportBlueprint']['root_container']}"
+
+
+def _root(layout: Any) -> Any:
+    return layout[f"/{_root_path(layout)}"]["ContainerBlueprint"]
+
+
 def _in_front(layout: Any, part: str) -> Iterator[str]:
     """Views below a part of a layout that no other tab hides."""
     if part.startswith("view/"):
@@ -177,7 +201,7 @@ def _connected(process: subprocess.Popen[bytes], port: int, log_file: Path) -> A
     deadline = time.monotonic() + START_SECONDS
     while time.monotonic() < deadline:
         if process.poll() is not None:
-            _cannot(f"the viewer ended with {process.returncode}: {log_file.read_text()[-2000:]}")
+            cannot(f"the viewer ended with {process.returncode}: {log_file.read_text()[-2000:]}")
         try:
             client = ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
             client.get_state()
@@ -185,15 +209,16 @@ def _connected(process: subprocess.Popen[bytes], port: int, log_file: Path) -> A
             time.sleep(0.2)
         else:
             return client
-    return _cannot(f"the viewer did not answer in {START_SECONDS} s: {log_file.read_text()[-2000:]}")
+    return cannot(f"the viewer did not answer in {START_SECONDS} s: {log_file.read_text()[-2000:]}")
 
 
 def _need_vulkan() -> None:
     if not any(folder.glob("*.json") for folder in _ICD_FOLDERS if folder.is_dir()):
-        _cannot("no Vulkan driver (Debian: mesa-vulkan-drivers libvulkan1)")
+        cannot("no Vulkan driver (Debian: mesa-vulkan-drivers libvulkan1)")
 
 
-def _cannot(reason: str) -> Any:
+def cannot(reason: str) -> Any:
+    """Skip the test for a reason, or fail it where the viewer is required."""
     if os.environ.get(REQUIRE) == "1":
         pytest.fail(f"{REQUIRE}=1, but {reason}")
     pytest.skip(f"the viewer cannot run here: {reason}")

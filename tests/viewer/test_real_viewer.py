@@ -12,21 +12,34 @@ import pytest
 
 from tests.viewer.conftest import Recorded
 from tests.viewer.harness import Picture, Viewer, distinct_colors, headless_viewer
+from tests.viewer.ocr import missing_words, need_tesseract
 from tests.viewer.readback import Contents
-from tests.viewer.session import LASERS, REPEATS, SENSOR_CHART, SESSION, STANDOFFS, TRIAL
+from tests.viewer.session import LASERS, REPEATS, SENSOR_CHART, SESSION, STANDOFFS, TRIAL, a_fit
+from workbench.figures.figure import TICK_DISTANCE
 from workbench.model import event as ev
-from workbench.viewer.blueprint import FRAME_VIEW
+from workbench.model.chart import Chart
+from workbench.model.chart_scale import tick_texts, x_scale, x_ticks, y_scale
+from workbench.model.fit_charts import residual_chart
+from workbench.viewer.blueprint import CROPS_VIEW, FRAME_VIEW
 from workbench.viewer.entities import laser_colors
+from workbench.viewer.table_text import table_text
 from workbench.viewer.window import viewer_environment, viewer_executable
 
 TABS = ["Captures", "Calibration: which standoff?", "Calibration: details", TRIAL, "3D"]
 HIDDEN = {
     "Parameters": TABS[0],
-    "Largest range uncertainty so far [%]": TABS[0],
+    "Largest [%]": TABS[0],
     "Fitted parameters": TABS[2],
     SENSOR_CHART: TRIAL,
 }
 """Views behind another one in a tab, with their screens."""
+RESIDUALS = "Residuals along u"
+TABLES = "Tables: scroll, or enlarge"
+SHARES, NARROW = [6.0, 7.0, 13.0], {"col_shares": [6.0, 7.0, 6.0]}
+"""Widths of frame, spots and tables of a trial, and such that cut the tables."""
+CUT = {"range": {"x_range": [250, 1350], "y_range": [0, 370]}}
+"""Bounds of a chart that cut the first standoff, the labels beside the axis, and the legend below it."""
+SERIES = "Error [mm], u shaded; right click: go to the reading"
 
 
 @pytest.fixture(scope="module", params=["1280x720"])
@@ -74,6 +87,63 @@ def test_every_view_shows_something_and_none_complains(viewer: Viewer) -> None:
         viewer.show_tab(name)
         viewer.shot()
         assert distinct_colors(viewer.glance(viewer.view_id(name))) > 30, name
+
+
+def test_titles_tables_ticks_and_legends_are_whole(recorded: Recorded, viewer: Viewer) -> None:
+    need_tesseract()
+    viewer.show_tab(TABS[1])
+    viewer.shot()
+    assert missing_words(_view(viewer, RESIDUALS), _texts(residual_chart(a_fit(), "u"))) == set()
+    errors, table = _results(recorded)
+    _show_trial(viewer, errors)
+    titles = [*TABS, FRAME_VIEW, CROPS_VIEW, TABLES, SENSOR_CHART, SERIES, str(errors.title)]
+    assert missing_words(viewer.shot(), titles) == set()
+    assert missing_words(_view(viewer, str(errors.title)), _texts(errors)) == set()
+    assert missing_words(_view(viewer, TABLES), table) == set()
+
+
+def test_a_label_that_is_cut_is_found(recorded: Recorded, viewer: Viewer) -> None:
+    """The test above can fail: a legend below the view, ticks beside it, a table wider than its view."""
+    need_tesseract()
+    errors, table = _results(recorded)
+    _show_trial(viewer, errors)
+    before = viewer.layout()
+    try:
+        viewer.change("VisualBounds2D", lambda _: CUT)
+        viewer.change("ContainerBlueprint", lambda one: NARROW if one.get("col_shares") == SHARES else {})
+        viewer.shot()
+        missing = missing_words(_view(viewer, str(errors.title)), _texts(errors))
+        assert {"300", "0.5", "sensor"} <= missing
+        assert missing.isdisjoint({"800", "2000", "standoff"})
+        assert "reference" in missing_words(_view(viewer, TABLES), table)
+    finally:
+        viewer.lay_out(before)
+
+
+def _show_trial(viewer: Viewer, chart: Chart) -> None:
+    viewer.show_tab(TRIAL)
+    viewer.show_tab(str(chart.title))
+
+
+def _results(recorded: Recorded) -> tuple[Chart, list[str]]:
+    """Chart in front of the trial, and the words of its table; digits of its font are often misread."""
+    (finished,) = (r.event for r in recorded.records if isinstance(r.event, ev.TrialFinished))
+    text = table_text(finished.tables[0])
+    return finished.charts[0], [word for word in text.split() if word.strip(".,:;()").isalpha()]
+
+
+def _texts(chart: Chart) -> list[str]:
+    """Everything that is written level in the picture of a chart."""
+    x, y = x_scale(chart), y_scale(chart)
+    above, below = x_ticks(chart, x, TICK_DISTANCE)
+    ticks = [*tick_texts([*above, *below]), *tick_texts(y.round_ticks())]
+    return [chart.title, chart.x.text, *ticks, *(series.name for series in chart.series)]
+
+
+def _view(viewer: Viewer, name: str) -> Picture:
+    """The view in front with a title."""
+    (view,) = (view for view in viewer.views_in_front() if view.name == name)
+    return viewer.glance(view.view_id)
 
 
 @pytest.mark.parametrize("viewer", ["1600x900"], indirect=True)

@@ -12,7 +12,7 @@ from matplotlib.transforms import ScaledTranslation, Transform
 
 from workbench.figures.plot_style import own_style
 from workbench.model.chart import Chart, Series, series_colors
-from workbench.model.chart_scale import x_scale, x_ticks, y_scale
+from workbench.model.chart_scale import tick_texts, x_scale, x_ticks, y_scale
 
 SIZE_IN = (7.6, 4.4)
 TICK_DISTANCE = 0.07
@@ -85,8 +85,10 @@ def _draw_axes(axes: Axes, chart: Chart) -> None:
     axes.set_xlabel("\n".join(line for line in (chart.x.text, chart.caption) if line))
     axes.set(xlim=(x.low, x.high), ylim=(y.low, y.high))
     above, below = x_ticks(chart, x, TICK_DISTANCE)
-    axes.set_xticks([*above, *below], [*(f"{tick:g}" for tick in above), *(f"\n{tick:g}" for tick in below)])
-    axes.set_yticks(y.round_ticks(), [f"{tick:g}" for tick in y.round_ticks()])
+    texts = tick_texts([*above, *below])
+    rows = [*texts[: len(above)], *(f"\n{text}" for text in texts[len(above) :])]
+    axes.set_xticks([*above, *below], rows)
+    axes.set_yticks(y.round_ticks(), tick_texts(y.round_ticks()))
     for one in (axes.xaxis, axes.yaxis):
         one.set_minor_locator(NullLocator())
     axes.grid()

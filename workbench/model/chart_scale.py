@@ -13,6 +13,8 @@ MARGIN = 0.05
 MOST_TICKS = 8
 LEAST_LOG_TICKS = 2
 """Minimum number of logarithmic ticks; an axis with fewer gets linear ticks."""
+LEAST_DIGITS, MOST_DIGITS = 4, 12
+"""Numbers of digits in the label of a tick."""
 MOST_LABELLED = 30
 """Largest number of distinct x values that each get a tick; with more, ticks are round numbers."""
 
@@ -61,6 +63,15 @@ def x_ticks(chart: Chart, scale: Scale, least_distance: float) -> tuple[list[flo
         return _thinned(scale.round_ticks(), scale, least_distance), []
     first = _thinned(own, scale, least_distance)
     return first, _thinned([x for x in own if x not in first], scale, least_distance)
+
+
+def tick_texts(ticks: Sequence[float]) -> list[str]:
+    """Labels of ticks with as few digits as tell them apart, but at least `LEAST_DIGITS` of each."""
+    for digits in range(LEAST_DIGITS, MOST_DIGITS):
+        texts = [f"{float(f'{tick:.{digits}g}'):.{MOST_DIGITS}g}" for tick in ticks]
+        if len(set(texts)) == len(set(ticks)):
+            return texts
+    return [f"{tick:.{MOST_DIGITS}g}" for tick in ticks]
 
 
 def linear_ticks(low: float, high: float) -> list[float]:

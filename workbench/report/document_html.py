@@ -14,9 +14,8 @@ from markupsafe import Markup
 from workbench.figures.figure import svg
 from workbench.model.chart import Chart
 from workbench.model.table import ALARM, MISSING, Table
-from workbench.model.table_layout import TextColumn, text_columns
+from workbench.model.table_layout import GAP, TextColumn, blocks, text_columns
 from workbench.report.document import Document, Fact
-from workbench.report.terminal_table import GAP, blocks
 
 TEMPLATE, STYLE = "document.html.j2", "document.css"
 WIDTH_CHARACTERS = 104

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import ceil
 
 from rich import box
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -12,12 +11,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from workbench.model.table import Table
-from workbench.model.table_layout import TextColumn, text_columns
-
-GAP = 2
-"""Number of characters between columns."""
-NARROWEST_TEXT = 12
-"""Minimum width of a text column in characters; below it, columns move to a further block."""
+from workbench.model.table_layout import GAP, TextColumn, blocks, text_columns
 
 
 @dataclass(frozen=True)
@@ -37,31 +31,6 @@ class TerminalTable:
             yield _rich_table(block)
         if self.table.caption:
             yield Text(self.table.caption, style="dim italic")
-
-
-def blocks(columns: Sequence[TextColumn], width: int) -> list[list[TextColumn]]:
-    """Split columns into the fewest blocks that are at most `width` characters wide, if possible.
-
-    Blocks have equal numbers of columns as far as possible. Each block begins with the first column.
-    """
-    first, *others = columns
-    for size in range(len(others), 0, -1):
-        parts = [[first, *others[i : i + size]] for i in range(0, len(others), size)]
-        if all(_least_width(part) <= width for part in parts):
-            # Same number of blocks, with the columns distributed evenly.
-            even = ceil(len(others) / len(parts))
-            return [[first, *others[i : i + even]] for i in range(0, len(others), even)]
-    return [[first, other] for other in others] or [[first]]
-
-
-def _least_width(columns: Sequence[TextColumn]) -> int:
-    return sum(map(_least_column_width, columns)) + GAP * (len(columns) - 1)
-
-
-def _least_column_width(column: TextColumn) -> int:
-    if column.is_number:
-        return column.width
-    return min(column.width, max(NARROWEST_TEXT, *map(len, column.heading)))
 
 
 def _rich_table(columns: Sequence[TextColumn]) -> RichTable:

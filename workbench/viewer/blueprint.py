@@ -19,8 +19,8 @@ from workbench.model.rig import Rig
 from workbench.viewer import entities as at
 from workbench.viewer.crops import mosaic_size
 
-FRAME_VIEW = "Frame, lasers on, contrast stretched"
-CROPS_VIEW = "Spots: lit minus dark | remainder of the fit"
+FRAME_VIEW = "Frame, stretched"
+CROPS_VIEW = "Spots: lit minus dark | remainder"
 Phase = Literal["capture", "fit", "trial"]
 """Screen in front: captures, result of the fit, the last trial."""
 PLAYED_PER_SECOND = 10.0
@@ -45,6 +45,8 @@ class TrialTab:
     """Name and title of each chart."""
     reads: bool = True
     """Whether it takes readings; a simulation or a comparison of trials takes none."""
+    errors_mm: tuple[float, float] | None = None
+    """Ends of the axis of the readings' errors, with their uncertainty; None: by Rerun, without it."""
 
 
 def blueprint(
@@ -122,9 +124,9 @@ def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
         row_shares=[3, 2],
     )
     progress = rrb.Tabs(
-        picture_view(at.UNCERTAINTY, "Range uncertainty", SMALL_PX),
+        picture_view(at.UNCERTAINTY, "Uncertainty", SMALL_PX),
         picture_view(at.NARROWING, "Parameters", SMALL_PX),
-        _series(at.ADVICE, "Largest range uncertainty so far [%]"),
+        _series(at.ADVICE, "Largest [%]"),
         active_tab=0,
     )
     curves = rrb.Horizontal(
@@ -134,7 +136,7 @@ def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
         rrb.StateTimelineView(origin=at.LANES, name="Steps"),
         column_shares=[3, 3, *([5] if calibrates else []), 4],
     )
-    return rrb.Vertical(_seen(rig, texts), curves, row_shares=[5, 4], name="Captures")
+    return rrb.Vertical(_seen(rig, texts, (8, 9, 11)), curves, row_shares=[9, 8], name="Captures")
 
 
 def _steps(live: bool) -> rrb.Container:
@@ -179,14 +181,14 @@ def _parameters() -> rrb.Container:
 
 
 def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
-    tables = table_view(at.trial_tables(trial.trial), "Tables")
+    tables = table_view(at.trial_tables(trial.trial), "Tables: scroll, or enlarge", titlebar=True)
     pictures = [picture_view(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
     if not trial.reads:
-        shown = [*(_grid(pictures[n : n + PER_PAGE]) for n in range(0, len(pictures), PER_PAGE))]
+        shown = [_page(n + 1, pictures[n : n + PER_PAGE]) for n in range(0, len(pictures), PER_PAGE)]
         return rrb.Horizontal(
             shown[0] if len(shown) == 1 else rrb.Tabs(*shown, active_tab=0),
             _texts(live, (tables, 8)),
-            column_shares=[3, 2],
+            column_shares=[1, 1],
             name=trial.trial,
         )
     texts = _texts(live, (tables, 8))
@@ -195,16 +197,17 @@ def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
         _series(
             at.trial_errors(trial.trial),
             "Error [mm], u shaded; right click: go to the reading",
-            legend="LeftTop",  # errors are larger towards the right, at longer standoffs
+            y=trial.errors_mm,
         ),
         column_shares=[10, 5],
     )
-    return rrb.Vertical(_seen(rig, texts, (3, 4, 6)), charts, row_shares=[5, 4], name=trial.trial)
+    return rrb.Vertical(_seen(rig, texts, (6, 7, 13), (5, 2)), charts, row_shares=[5, 4], name=trial.trial)
 
 
-def _grid(pictures: Sequence[rrb.View]) -> rrb.Container:
-    """Charts one below the other, named by the first."""
-    return rrb.Vertical(*pictures, name=pictures[0].name)
+def _page(first: int, pictures: Sequence[rrb.View]) -> rrb.Container:
+    """Charts one below the other, named by their numbers: titles of ten charts do not fit side by side."""
+    last = first + len(pictures) - 1
+    return rrb.Vertical(*pictures, name=f"Charts {first}, {last}" if last > first else f"Chart {first}")
 
 
 def _bench() -> rrb.Container:
@@ -229,10 +232,19 @@ def _texts(live: bool, *parts: tuple[rrb.View, int]) -> rrb.Container:
     return rrb.Vertical(*views, row_shares=list(shares))
 
 
-def _seen(rig: Rig, texts: rrb.Container, shares: tuple[int, int, int] = (4, 5, 5)) -> rrb.Container:
-    """Upper half of a screen: the frame with the subject of its capture below, the spots, texts."""
-    frame = rrb.Vertical(frame_view(rig), text_view(at.NOW, "Now"), row_shares=[5, 1])
-    return rrb.Horizontal(frame, crops_view(rig), texts, column_shares=list(shares))
+def _seen(
+    rig: Rig, texts: rrb.Container, columns: tuple[int, int, int] = (4, 5, 5), rows: tuple[int, int] = (3, 1)
+) -> rrb.Container:
+    """Upper half of a screen: the frame with the subject of its capture below, the spots, texts.
+
+    Args:
+        rig: rig with the camera and the lasers.
+        texts: column of texts.
+        columns: shares of the width.
+        rows: shares of the height of the frame and the subject of its capture.
+    """
+    frame = rrb.Vertical(frame_view(rig), text_view(at.NOW, "Now"), row_shares=list(rows))
+    return rrb.Horizontal(frame, crops_view(rig), texts, column_shares=list(columns))
 
 
 def frame_view(rig: Rig, prefix: str = "", name: str = FRAME_VIEW) -> rrb.View:
@@ -258,10 +270,15 @@ def _series(
     origin: str,
     name: str,
     time: rrb.TimeAxis | None = None,
-    legend: Literal["LeftTop", "RightTop"] = "RightTop",
+    y: tuple[float, float] | None = None,
 ) -> rrb.View:
+    """View of series without a legend, which would cover them: the picture beside it has the same colours."""
     return rrb.TimeSeriesView(
-        origin=origin, name=name, axis_x=time, plot_legend=rrb.PlotLegend(corner=legend)
+        origin=origin,
+        name=name,
+        axis_x=time,
+        axis_y=None if y is None else rrb.ScalarAxis(range=y),
+        plot_legend=rrb.PlotLegend(visible=False),
     )
 
 

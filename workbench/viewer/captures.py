@@ -82,10 +82,13 @@ class CaptureLog:
         return {key: f"{min(n)}-{max(n)}" for key, n in found.items()}
 
 
-def capture_record(capture: CaptureTaken) -> dict[str, str | float | int]:
-    """Subject of a capture, for `readback.observations_of_recording`."""
+def capture_record(capture: CaptureTaken) -> dict[str, list[str | float | int]]:
+    """Subject of a capture, for `readback.observations_of_recording`: a list of one value for each quantity.
+
+    Rerun converts lists faster than single values.
+    """
     unknown = float("nan")
-    return {
+    values = {
         "purpose": capture.purpose,
         "laser_id": capture.laser_id,
         "placement": capture.placement_key,
@@ -96,6 +99,7 @@ def capture_record(capture: CaptureTaken) -> dict[str, str | float | int]:
         "clock_ns": capture.time_ns,
         "part": part_name(capture),
     }
+    return {name: [value] for name, value in values.items() if value is not None}
 
 
 def _defect(spots: tuple[Spot, ...]) -> str:

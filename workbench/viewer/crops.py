@@ -161,7 +161,9 @@ class Crops:
         self._log_outlines(at.CROPS_ELLIPSES, lambda crop: crop.ellipses)
         self.stream.log(
             at.CROPS_LABELS,
-            rr.Points2D(places, labels=labels, colors=label_colors, radii=_NO_DOT, show_labels=True),
+            rr.Points2D(
+                places, labels=labels, colors=at.packed(label_colors), radii=_NO_DOT, show_labels=True
+            ),
         )
 
     def _log_outlines(self, entity: str, of: Callable[[Crop], FloatArray]) -> None:
@@ -177,7 +179,10 @@ class Crops:
             colors += [color] * len(lines)
         # As one array it is converted ten times faster.
         drawn_strips = np.array(strips, dtype=np.float32)
-        self.stream.log(entity, rr.LineStrips2D(drawn_strips, colors=colors, radii=_THIN if strips else None))
+        self.stream.log(
+            entity,
+            rr.LineStrips2D(drawn_strips, colors=at.packed(colors), radii=_THIN if strips else None),
+        )
 
 
 def label(laser: str, crop: Crop | None, is_earlier: bool) -> str:

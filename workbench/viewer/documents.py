@@ -21,7 +21,7 @@ def capture_line(number: int, capture: CaptureTaken, step: str) -> str:
     )
     return (
         f"**Capture {number}: {capture.standoff_mm:g} mm, {laser}{off}**, repeat {capture.repeat}"
-        f"{exposure.rstrip()}\n\n{step}"
+        f"{exposure.rstrip()}  \n{step}"
     )
 
 

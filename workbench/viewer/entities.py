@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
 
 from workbench.model import chart
 
@@ -23,7 +27,6 @@ SCANLINES = f"{FRAME}/scanlines"
 PREDICTED_SPOTS = f"{FRAME}/predicted"
 PREDICTED_ELLIPSES = f"{FRAME}/predicted_ellipses"
 SPOTS_IN_IMAGE = f"{FRAME}/spots"
-LEADERS_IN_IMAGE = f"{FRAME}/leaders"
 
 CROPS = "crops"
 CROPS_IMAGE = f"{CROPS}/image"
@@ -79,6 +82,9 @@ FIT_PICTURE = "fit/picture"
 TRIALS = "trials"
 
 Rgb = tuple[int, int, int]
+OPAQUE = 255
+MOST_PACKED = 1024
+"""Number of packed lists of colours that are kept."""
 
 GREY: Rgb = (150, 150, 150)
 WHITE: Rgb = (235, 235, 235)
@@ -88,6 +94,17 @@ RED: Rgb = (255, 70, 70)
 def laser_colors(laser_ids: Sequence[str]) -> dict[str, Rgb]:
     """Colours of lasers for Rerun."""
     return {laser: from_hex(color) for laser, color in chart.laser_colors(laser_ids).items()}
+
+
+def packed(colors: Sequence[Rgb]) -> NDArray[np.uint32]:
+    """Opaque colours as Rerun keeps them, 0xRRGGBBAA; its own conversion takes 0.1 ms for each mark."""
+    return _packed(tuple(colors))
+
+
+@lru_cache(MOST_PACKED)
+def _packed(colors: tuple[Rgb, ...]) -> NDArray[np.uint32]:
+    values = [red << 24 | green << 16 | blue << 8 | OPAQUE for red, green, blue in colors]
+    return np.array(values, dtype=np.uint32)
 
 
 def from_hex(color: str) -> Rgb:

@@ -33,7 +33,7 @@ AMBIENT_SHARE = 0.12
 LEAST_WHITE = 0.25
 """Least value that is shown as white, as a share of full scale; above the noise of a dark room."""
 PNG_SIGNATURE = b"\x89PNG"
-SAMPLED = 4
+SAMPLED = 8
 """Distance of the rows and columns from which the room light is taken."""
 LABEL_DISTANCE_PX = 44.0
 """Distance between labels of neighbouring spots."""
@@ -106,7 +106,7 @@ def log_ambient(stream: Stream, ambient_dn: float) -> None:
 
 
 def median_dn(frame: Image) -> float:
-    """Median of a frame (height, width), DN, from every fourth row and column."""
+    """Median of a frame (height, width), DN, from every eighth row and column."""
     return float(np.median(frame[::SAMPLED, ::SAMPLED]))
 
 
@@ -216,11 +216,11 @@ def _draw(stream: Stream, spots: Sequence[Spot], colors: Mapping[str, at.Rgb], h
     ordered = sorted(spots, key=lambda spot: spot.u_px)
     columns = label_columns([spot.u_px for spot in ordered])
     leaders = [leader(spot, column, height_px) for spot, column in zip(ordered, columns, strict=True)]
-    drawn = [colors.get(spot.laser_id or at.UNASSIGNED, at.WHITE) for spot in ordered]
+    drawn = at.packed([colors.get(spot.laser_id or at.UNASSIGNED, at.WHITE) for spot in ordered])
     lines = [[(u + RERUN_PIXEL_CENTRE, v + RERUN_PIXEL_CENTRE) for u, v in leader] for leader in leaders]
-    stream.log(at.LEADERS_IN_IMAGE, rr.LineStrips2D(lines, colors=drawn, radii=_LINE if lines else None))
     stream.log(
         at.SPOTS_IN_IMAGE,
+        rr.LineStrips2D(lines, colors=drawn, radii=_LINE if lines else None),
         rr.Points2D(
             [line[-1] for line in lines],
             colors=drawn,

@@ -66,6 +66,8 @@ class OpenRecording:
         self._live = True
         self._phase: Phase = "capture"
         self._length = ""
+        self._states: dict[str, tuple[str, int, float | None]] = {}
+        """Last state of a lane, with its step and standoff."""
         self._capture = 1
         self._steps = 0
 
@@ -122,7 +124,7 @@ class OpenRecording:
         self._note(f"**{event.title}**")
         steps.lane(self.stream, at.LANE_STEP, event.title)
         if event.shots == 0:
-            steps.lane(self.stream, at.LANE_LASER, steps.LASERS_OFF)
+            self._lane(at.LANE_LASER, steps.LASERS_OFF, moment)
         steps.log_text(self.stream, f"Step {event.index}: {event.title}")
 
     @_log.register
@@ -178,13 +180,14 @@ class OpenRecording:
         self._show_frame(event)
         self.stream.log(at.CAPTURE_RECORD, rr.AnyValues(drop_untyped_nones=True, **capture_record(event)))
         self._note(documents.capture_line(moment.capture, event, self._title))
-        steps.lane(self.stream, at.LANE_LASER, event.laser_id)
+        self._lane(at.LANE_LASER, event.laser_id, self._exposure)
 
     @_log.register
     def _(self, event: ev.SpotsFound, moment: Moment) -> None:
         capture = self._captures.taken[event.key]
         placement = self._captures.placements[event.key]
-        self.stream.at(self._captures.moments[event.key])
+        exposure = self._captures.moments[event.key]
+        self.stream.at(exposure)
         self._spots = event.spots
         if capture.laser_id in self._colors:
             self._captures.spots[event.key] = event.spots
@@ -192,7 +195,7 @@ class OpenRecording:
         if capture.laser_id in self._colors:
             self._show_crops(event.spots, [capture.laser_id])
         saturated = any(Failure.SATURATED in spot.flags for spot in event.spots)
-        steps.lane(self.stream, at.LANE_SATURATION, "saturated" if saturated else "no pixel saturated")
+        self._lane(at.LANE_SATURATION, "saturated" if saturated else "no pixel saturated", exposure)
         if placement is not None:
             scene.log_spots_on_target(self.stream, event.spots, placement, self._geometry, self._colors)
         for failure in event.failures:
@@ -316,6 +319,13 @@ class OpenRecording:
             calibrates=self._calibrates,
             live=self._live,
         )
+
+    def _lane(self, entity: str, state: str, moment: Moment) -> None:
+        """Log the state of a lane where it is not that of the same step and standoff just before."""
+        now = state, moment.step, moment.standoff_mm
+        if self._states.get(entity) != now:
+            self._states[entity] = now
+            steps.lane(self.stream, entity, state)
 
     def _note(self, markdown: str) -> None:
         self.stream.log(at.NOW, rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN))

@@ -5,6 +5,7 @@ Journal and frames are the record. A damaged or incomplete recording can be made
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
@@ -20,6 +21,8 @@ from workbench.viewer.stream import Stream
 from workbench.viewer.window import free_port
 
 RECORDING_FILE = "recording.rrd"
+CHECK_S = 1.0
+"""Least time between checks of the file within a step; a check at each capture takes a tenth of the time."""
 
 
 class RecordingConsumer:
@@ -33,7 +36,7 @@ class RecordingConsumer:
 
     Raises:
         BadInputError: a frame of a record is missing in the session folder, or has changed.
-        OSError: the file cannot be written (disk full); found at the end of a capture.
+        OSError: the file cannot be written (disk full); found within a second, or at the end of the step.
     """
 
     def __init__(
@@ -45,6 +48,7 @@ class RecordingConsumer:
         self._out = out or session_dir / RECORDING_FILE
         self._colors = at.laser_colors(rig.laser_ids)
         self._open: OpenRecording | None = None
+        self._checked_s = 0.0
 
     def __call__(self, record: ev.Record) -> None:
         """Log one record. The first one must be `SessionStarted`, which names the recording."""
@@ -59,7 +63,10 @@ class RecordingConsumer:
             if self._watch is not None and port is not None:
                 self._watch(port)
         self._open.take(record)
-        if isinstance(record.event, ev.SpotsFound):
+        now_s = time.monotonic()
+        is_due = isinstance(record.event, ev.SpotsFound) and now_s - self._checked_s > CHECK_S
+        if is_due or isinstance(record.event, ev.StepFinished):
+            self._checked_s = now_s
             self._open.stream.check_written()
 
     def show_prompt(self, prompt: Prompt) -> None:

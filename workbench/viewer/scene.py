@@ -108,7 +108,7 @@ def log_spots_on_target(
     for i, spot in enumerate(spots):
         by_laser[spot.laser_id or at.UNASSIGNED].append(i)
     for laser, found in by_laser.items():
-        dots = rr.Points3D(points[found], colors=colors.get(laser, at.WHITE), radii=_DOT)
+        dots = rr.Points3D(points[found], colors=at.packed([colors.get(laser, at.WHITE)]), radii=_DOT)
         stream.log(at.under(at.SPOTS_ON_TARGET, laser), dots)
 
 

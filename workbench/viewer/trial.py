@@ -22,6 +22,8 @@ from workbench.viewer.table_text import table_text
 
 LIVE_CHART = "errors"
 NO_READING = "no reading yet"
+MARGIN, LEAST_MARGIN_MM = 0.05, 0.01
+"""Blank at each end of the axis of errors, as a share of them, and at least."""
 
 
 @dataclass
@@ -42,7 +44,8 @@ class TrialView:
         """The trial's part of the layout."""
         charts = [(chart.name, chart.title or chart.name) for chart in self.charts]
         reads = bool(self.readings) or not self.charts
-        return TrialTab(self.trial, tuple(charts) or ((LIVE_CHART, "Errors so far"),), reads)
+        ends_mm = error_ends_mm(self.readings) if self.charts else None
+        return TrialTab(self.trial, tuple(charts) or ((LIVE_CHART, "Errors so far"),), reads, ends_mm)
 
     def start(self) -> None:
         """Log notes in the views that the first reading does not fill."""
@@ -98,6 +101,19 @@ class TrialView:
 def tabs(trials: Sequence[TrialView]) -> list[TrialTab]:
     """Tabs of the trials of a session."""
     return [trial.tab for trial in trials]
+
+
+def error_ends_mm(readings: Sequence[ReadingTaken]) -> tuple[float, float] | None:
+    """Ends of an axis with all errors of readings and of their lasers, each with its stated uncertainty."""
+    errors = [(one.error_mm, one.sigma_mm or 0.0) for one in readings if one.error_mm is not None]
+    for one in readings:
+        sigmas_mm = {laser.laser_id: laser.sigma_mm for laser in one.lasers}
+        errors += [(error_mm, sigmas_mm[laser]) for laser, error_mm in one.laser_errors_mm.items()]
+    if not errors:
+        return None
+    low, high = min(error - sd for error, sd in errors), max(error + sd for error, sd in errors)
+    margin = max(MARGIN * (high - low), LEAST_MARGIN_MM)
+    return low - margin, high + margin
 
 
 def log_errors(stream: Stream, parent: str, reading: ReadingTaken, colors: Mapping[str, at.Rgb]) -> None:

@@ -11,7 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from workbench.model.chart import Axis, Chart, LimitLine, Series
-from workbench.model.chart_scale import MARGIN, MOST_LABELLED, linear_ticks, x_scale, x_ticks, y_scale
+from workbench.model.chart_scale import (
+    MARGIN,
+    MOST_LABELLED,
+    linear_ticks,
+    tick_texts,
+    x_scale,
+    x_ticks,
+    y_scale,
+)
 
 
 def chart(
@@ -116,3 +124,16 @@ def test_a_short_logarithmic_axis_has_ticks_inside(low: float, high: float) -> N
     for ticks in (above, y):
         assert len(ticks) >= 2
         assert all(scale.low * (1 - 1e-9) <= tick <= scale.high * (1 + 1e-9) for tick in ticks)
+
+
+@pytest.mark.parametrize(
+    ("ticks", "texts"),
+    [
+        ([124.598, 999.833], ["124.6", "999.8"]),
+        ([20261.0, 20262.0], ["20261", "20262"]),
+        ([12500.0, -0.5, 0.0], ["12500", "-0.5", "0"]),
+        ([], []),
+    ],
+)
+def test_labels_of_ticks_have_as_few_digits_as_tell_them_apart(ticks: list[float], texts: list[str]) -> None:
+    assert tick_texts(ticks) == texts

@@ -76,7 +76,7 @@ def test_a_long_list_ends_with_the_number_of_the_others() -> None:
 
 
 def test_the_line_of_a_capture_has_number_standoff_laser_and_exposure() -> None:
-    line, _, step = capture_line(17, a_capture(), "Capture").partition("\n\n")
+    line, _, step = capture_line(17, a_capture(), "Capture").partition("  \n")
     for part in ("17", "1250 mm", "L2", "repeat 3", "1850 us"):
         assert part in line
     assert step == "Capture"

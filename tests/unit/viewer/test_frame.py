@@ -93,7 +93,7 @@ SPOTS = (a_spot("L2", 310.0), a_spot("L1", 300.25, 241.0), a_spot(None, 500.0, 1
 
 def test_leaders_do_not_touch_their_spots_and_end_at_the_labels(tmp_path: Path) -> None:
     contents = logged(tmp_path, lambda stream: frame.log_spots(stream, SPOTS, COLORS, 480))
-    ((_, leaders),) = contents.values("/frame/leaders", STRIPS)
+    ((_, leaders),) = contents.values("/frame/spots", STRIPS)
     ((_, places),) = contents.values("/frame/spots", "Points2D:positions")
     ordered = sorted(SPOTS, key=lambda spot: spot.u_px)
     for leader, place, spot in zip(leaders, places, ordered, strict=True):
@@ -102,7 +102,7 @@ def test_leaders_do_not_touch_their_spots_and_end_at_the_labels(tmp_path: Path) 
         assert leader[-1] == place
     ((_, texts),) = contents.values("/frame/spots", "Points2D:labels")
     assert texts == ["L1", "L2", "? (merged)"]
-    for entity, component in (("/frame/leaders", "LineStrips2D:colors"), ("/frame/spots", "Points2D:colors")):
+    for entity, component in (("/frame/spots", "LineStrips2D:colors"), ("/frame/spots", "Points2D:colors")):
         ((_, colors),) = contents.values(entity, component)
         assert colors[:2] == [packed(COLORS["L1"]), packed(COLORS["L2"])]
 
@@ -142,7 +142,7 @@ def test_a_capture_without_spots_removes_the_marks_of_the_last_one(tmp_path: Pat
         frame.log_spots(stream, (), COLORS, 480)
 
     contents = logged(tmp_path, log)
-    for entity, component in (("/frame/leaders", STRIPS), ("/frame/spots", "Points2D:positions")):
+    for entity, component in (("/frame/spots", STRIPS), ("/frame/spots", "Points2D:positions")):
         assert contents.values(entity, component)[-1] == (2, [])
 
 

@@ -18,7 +18,7 @@ from workbench.viewer.chart import CURSOR_HALF_PX
 from workbench.viewer.entities import to_hex
 from workbench.viewer.stream import Moment, Stream
 from workbench.viewer.table_text import table_text
-from workbench.viewer.trial import LIVE_CHART, NO_READING, TrialView, tabs
+from workbench.viewer.trial import LIVE_CHART, NO_READING, TrialView, error_ends_mm, tabs
 
 TEXT, BLOB, STRIPS = "TextDocument:text", "EncodedImage:blob", "LineStrips2D:strips"
 VALUES = "Measurements:values"
@@ -212,3 +212,18 @@ def test_a_chart_without_a_title_has_its_name_in_the_tab(tmp_path: Path) -> None
 
     logged(tmp_path, log)
     assert kept[0].tab.charts == (("one", "one"),)
+
+
+def test_the_axis_of_errors_has_room_for_their_uncertainty_once_the_trial_has_finished(
+    tmp_path: Path,
+) -> None:
+    kept: list[TrialView] = []
+    logged(tmp_path, lambda stream: kept.append(take_all(stream, SIX)))
+    assert kept[0].tab.errors_mm is None
+    kept[0].charts = (a_chart("one"),)
+    ends = kept[0].tab.errors_mm
+    assert ends is not None
+    sds = [(one.error_mm, one.sigma_mm) for one in SIX]
+    sds += [(laser.range_mm - one.standoff_mm, laser.sigma_mm) for one in SIX for laser in one.lasers]
+    assert all(e is not None and sd is not None and ends[0] < e - sd and e + sd < ends[1] for e, sd in sds)
+    assert error_ends_mm([]) is None

@@ -8,8 +8,7 @@ from tests.support.accuracy_runs import COMPLETE, STANDOFFS_MM, accuracy_run, in
 from tests.support.rangers import IDS, thesis_ranger
 from tests.support.rigs import thesis_rig
 from tests.support.simulated_trials import SimulatedBench
-from workbench.model.table_layout import text_columns
-from workbench.report.terminal_table import blocks
+from workbench.model.table_layout import blocks, text_columns
 from workbench.trials.accuracy.limits import AccuracyLimits
 from workbench.trials.accuracy.ranges import CLOSEST, MEAN
 from workbench.trials.accuracy.statistics import AccuracyRow
