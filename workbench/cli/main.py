@@ -302,7 +302,7 @@ def campaign(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Run a campaign. Many sensors or sessions, on many cores.
+    """Run a campaign on many sensors or sessions. On all cores, or on a cluster.
 
     A campaign that was stopped continues with the same command; finished chunks are kept.
     """
