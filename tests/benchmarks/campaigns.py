@@ -22,6 +22,8 @@ from tests.support.stored_output import store
 ROOT = Path(__file__).parents[2]
 CAMPAIGN = ROOT / "procedures/campaigns/thesis.yaml"
 SIZES = (10_000, 30_000, 100_000)
+CHUNK = 1000
+"""Number of calibrations of a chunk: the default of the campaign file."""
 SMALL = 16_000
 """Number of calibrations by one worker."""
 TARGET = 1_000_000
@@ -42,6 +44,8 @@ class Measured:
     """Peak of the resident memory of the client."""
     worker_mib: float
     """The same of the largest worker."""
+    processor_s: float
+    """Processor time of the workers between the first and the last chunk, for each calibration."""
 
 
 def measured(folder: Path, sensors: int, workers: int) -> Measured:
@@ -56,17 +60,24 @@ def measured(folder: Path, sensors: int, workers: int) -> Measured:
     began_s = time.monotonic()
     process = subprocess.Popen([*command, "--workers", str(workers)], stderr=subprocess.DEVNULL)
     client, peaks = psutil.Process(process.pid), {"client": 0.0, "worker": 0.0}
+    used: list[tuple[int, float]] = []
     while process.poll() is None:
         peaks["client"] = max(peaks["client"], _peak_mib(client))
-        for child in _children(client):
+        children = _children(client)
+        for child in children:
             peaks["worker"] = max(peaks["worker"], _peak_mib(child))
+        done = len(list(out.glob("chunks/*.sha256")))
+        if workers <= done < sensors // CHUNK:
+            used.append((done, sum(map(_processor_s, children))))
         time.sleep(POLL_S)
     seconds = time.monotonic() - began_s
     if process.returncode:
         raise RuntimeError(f"{command}: exit code {process.returncode}")
     ends_s = sorted(path.stat().st_mtime for path in out.glob("chunks/*.sha256"))
     rate = (len(ends_s) - workers) / (ends_s[-1] - ends_s[workers - 1]) * sensors / len(ends_s)
-    return Measured(sensors, workers, seconds, rate, peaks["client"], peaks["worker"])
+    (first, before_s), (last, after_s) = used[0], used[-1]
+    processor_s = (after_s - before_s) / ((last - first) * CHUNK)
+    return Measured(sensors, workers, seconds, rate, peaks["client"], peaks["worker"], processor_s)
 
 
 def lines() -> list[str]:
@@ -77,18 +88,19 @@ def lines() -> list[str]:
     sizes, seconds = np.array(SIZES), np.array([run.seconds for run in two])
     slope, start = np.polyfit(sizes, seconds, 1)
     off = np.abs(seconds / (start + slope * sizes) - 1).max()
-    names = ("calibrations", "workers", " time s", " per s", "client MiB", "worker MiB")
+    names = ("calibrations", "workers", " time s", " per s", "client MiB", "worker MiB", "processor ms")
     found = [" ".join(names)]
     found += [
         f"{run.sensors:>12} {run.workers:>7} {run.seconds:>7.0f} {run.rate:>6.0f} {run.client_mib:>10.0f}"
-        f" {run.worker_mib:>10.0f}"
+        f" {run.worker_mib:>10.0f} {1000 * run.processor_s:>12.2f}"
         for run in (one, *two)
     ]
     return [
         *found,
         "",
         f"calibrations per second and core: {one.rate:.0f}",
-        f"efficiency of two workers: {100 * two[-1].rate / (2 * one.rate):.0f} % of one times two",
+        f"efficiency of two workers: {100 * two[-1].rate / (2 * one.rate):.0f} % of one times two; by the"
+        f" processor time of a calibration {100 * one.processor_s / two[-1].processor_s:.0f} %",
         f"time: {start:.0f} s + {1000 * slope:.2f} ms for each calibration; off this line by at most"
         f" {100 * off:.1f} %",
         f"{TARGET} calibrations on two cores, extrapolated: {(start + slope * TARGET) / 60:.0f} min",
@@ -103,6 +115,15 @@ def _peak_mib(process: psutil.Process) -> float:
         return 0.0
     peaks = [int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")]
     return peaks[0] * 1024 / MIB if peaks else 0.0
+
+
+def _processor_s(process: psutil.Process) -> float:
+    """User and system time so far; 0 if the process has ended."""
+    try:
+        times = process.cpu_times()
+    except psutil.Error:
+        return 0.0
+    return float(times.user + times.system)
 
 
 def _children(process: psutil.Process) -> list[psutil.Process]:
