@@ -21,6 +21,7 @@ from workbench.model.problems import Location, SchemaProblem, problems
 KINDS = {
     "procedure": "a procedure",
     "rig": "a rig",
+    "world": "a world",
     "laser_ranger": "a calibration",
     "workbench_camera": "a calibration of a camera without lasers",
 }
