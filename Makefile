@@ -51,6 +51,7 @@ prove: $(INSTALLED)
 	$(BIN)/python -m tests.proofs.situations
 	$(BIN)/python -m tests.proofs.shapes
 	$(BIN)/python -m tests.proofs.trials
+	$(BIN)/python -m tests.proofs.worlds
 
 mutants: $(INSTALLED)
 	$(BIN)/python -m tests.mutants

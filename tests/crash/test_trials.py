@@ -9,9 +9,13 @@ import pytest
 
 from tests.crash.killer import Killer, serving
 from tests.crash.trials import differs, undisturbed
+from workbench.model.event import SpotsFound
 from workbench.session.journal import read_journal
 
-TRIAL = "missing_spots"
+TRIAL = "missing_spots_trial"
+DRIVE = "drive"
+MIDDLE_OF_A_DRIVE = 15
+"""Record of the short drive that is killed: of its third step."""
 RECORDS = 21
 """Of the short trial; a test compares this number with the journal."""
 
@@ -40,3 +44,11 @@ def test_a_trial_killed_at_a_record_gives_the_same_files(
     tmp_path: Path, whole: Path, killer: Killer, record: int
 ) -> None:
     assert differs(killer, whole, tmp_path, record) == ""
+
+
+def test_a_drive_killed_on_its_way_is_driven_again(tmp_path: Path) -> None:
+    driven = undisturbed(tmp_path, DRIVE)
+    event = list(read_journal(driven))[MIDDLE_OF_A_DRIVE].event
+    assert isinstance(event, SpotsFound)
+    with serving(tmp_path) as killer:
+        assert differs(killer, driven, tmp_path / "killed", MIDDLE_OF_A_DRIVE) == ""

@@ -22,15 +22,18 @@ NAME = "s"
 RIG = ROOT / "rigs/thesis-emulated.yaml"
 EXPOSURE_S = 4e-5
 TRIALS = {
-    "missing_spots": "ranges_mm: [400], missing: [1], blocked: [1], readings: 1",
-    "accuracy": "standoffs_mm: [300, 500], readings: 2",
-    "repeatability": "standoffs_mm: [400], placements: 2, repeats: 2, dither_mm: 2",
-    "gauge_rr": "standoffs_mm: [300, 500], operators: [A, B], trials: 2",
-    "incline": "ranges_mm: [300], targets: [{kind: incline, angle_deg: 30}], readings: 2",
-    "round": "ranges_mm: [250], target: {kind: cylinder, diameter_mm: 178}, readings: 2",
-    "verify": "standoffs_mm: [300, 700], readings: 1",
+    "missing_spots_trial": "ranges_mm: [400], missing: [1], blocked: [1], readings: 1",
+    "accuracy_trial": "standoffs_mm: [300, 500], readings: 2",
+    "repeatability_trial": "standoffs_mm: [400], placements: 2, repeats: 2, dither_mm: 2",
+    "gauge_rr_trial": "standoffs_mm: [300, 500], operators: [A, B], trials: 2",
+    "incline_trial": "ranges_mm: [300], targets: [{kind: incline, angle_deg: 30}], readings: 2",
+    "round_trial": "ranges_mm: [250], target: {kind: cylinder, diameter_mm: 178}, readings: 2",
+    "verify_trial": "standoffs_mm: [300, 700], readings: 1",
+    "drive": f"world: {ROOT}/procedures/worlds/office.yaml, stop_mm: 200, step_mm: 50,"
+    " drives: [{name: leg, start: {x_mm: 2500, y_mm: 1030}, distance_mm: 100},"
+    " {name: aside, start: {x_mm: 2500, y_mm: 600}, distance_mm: 50}]",
 }
-"""Keys of the step of each trial."""
+"""Keys of the step of each trial, by its kind."""
 
 
 def write_trial(folder: Path, trial: str) -> None:
@@ -38,7 +41,7 @@ def write_trial(folder: Path, trial: str) -> None:
     # Without a search for the exposure, whose result depends on deadlines that a busy machine may miss.
     (folder / "rig.yaml").write_text(RIG.read_text() + f"  camera: {{exposure_s: {EXPOSURE_S}}}\n")
     (folder / "c.yaml").write_text(render(calibration_of(load_rig(RIG))))
-    head = f"format: 1\nprocedure: short\ntitle: Short\nsteps:\n  - step: {trial}_trial\n"
+    head = f"format: 1\nprocedure: short\ntitle: Short\nsteps:\n  - step: {trial}\n"
     (folder / "p.yaml").write_text(head + "".join(f"    {line}\n" for line in _lines(TRIALS[trial])))
 
 

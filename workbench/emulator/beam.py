@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from workbench.emulator.spec import BeamSpec
 from workbench.emulator.truth import TrueRay
 from workbench.model.arrays import FloatArray
+
+RINGS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+"""Circles around the axis that sample a beam's section, in its 1/e^2 radii."""
+RAYS_OF_RING = 24
 
 
 class Beam:
@@ -35,6 +41,13 @@ class Beam:
         peak = 2 * self._power_w / (np.pi * radius**2)
         cosine = np.maximum(0.0, -normals @ self._axis)
         return np.where(path > 0, peak * np.exp(-2 * rho2 / radius**2) * cosine, 0.0)
+
+    @cached_property
+    def section(self) -> tuple[FloatArray, FloatArray]:
+        """Rays (origins (n, 3), directions (n, 3)) over the beam's section; the first is its axis."""
+        rings = [self.outline(radii, RAYS_OF_RING) for radii in RINGS]
+        origins = np.vstack([self.origin, *(origin for origin, _ in rings)])
+        return origins, np.vstack([self.direction, *(direction for _, direction in rings)])
 
     def outline(self, radii: float, count: int) -> tuple[FloatArray, FloatArray]:
         """Rays (origins (n, 3), directions (n, 3)) on the cone at `radii` times the beam's 1/e^2 radius.

@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from workbench.emulator.lens import Lens
 from workbench.emulator.spec import SurfaceSpec
 from workbench.emulator.spot import ImageFormat
+from workbench.emulator.surfaces import Alone
 from workbench.emulator.truth import BoardError, PlacementError, Truth
 from workbench.model.arrays import BoolArray, Float32Array, FloatArray
 from workbench.model.board import Board, sag_mm
@@ -67,7 +68,7 @@ class Print:
 
 
 @dataclass(frozen=True)
-class BoardSurface:
+class BoardSurface(Alone):
     """Placed board, camera frame, mm; the front side faces the sensor."""
 
     origin_mm: FloatArray

@@ -141,10 +141,10 @@ class EmulatedCamera:
         return self._queue.popleft()
 
     def _expose(self, lit: tuple[str, ...]) -> Exposure:
-        drift = self._drift()
-        spots = tuple(spot for name in lit for spot in self._scene.spots(name, drift))
+        drift, exposure_s = self._drift(), self._exposure_s()
+        spots = tuple(spot for name in lit for spot in self._scene.spots(name, drift, exposure_s))
         picture = self._scene.picture(drift)
-        exposure = Exposure(spots, picture, bool(lit), self._key, self._number, self._exposure_s(), self.gain)
+        exposure = Exposure(spots, picture, bool(lit), self._key, self._number, exposure_s, self.gain)
         self._frames += 1
         self._number += 1
         return exposure

@@ -17,6 +17,7 @@ from workbench.model.lens import COEFFICIENTS, LensName
 
 NEWTON_STEPS = 30
 NEWTON_PX = 1e-7
+SIGHT_STEP_PX = 8
 ZERO = np.zeros(3)
 FORWARD: dict[LensName, tuple[Callable[..., Any], int]] = {
     "plumb_bob": (cv2.projectPoints, 3),
@@ -117,3 +118,23 @@ class Lens:
         derivatives = np.asarray(jacobian, dtype=np.float64).reshape(len(points), 2, -1)
         found = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
         return found, derivatives[:, :, column : column + 3]
+
+
+class SightMap:
+    """Lines of sight of all pixels of an image by splines, for many small grids.
+
+    The nodes are about `SIGHT_STEP_PX` apart. The error of the spline is of fourth order in that step over
+    the focal length: below 1e-4 px for the lenses of the rig files.
+    """
+
+    def __init__(self, lens: Lens, width: int, height: int) -> None:
+        u, v = (np.linspace(-2, side + 1, side // SIGHT_STEP_PX + 2) for side in (width, height))
+        uu, vv = np.meshgrid(u, v)
+        nodes = lens.back_project(uu.ravel(), vv.ravel())
+        self._splines = [
+            RectBivariateSpline(v, u, values.reshape(uu.shape)) for values in (nodes.x, nodes.y, nodes.area)
+        ]
+
+    def grid(self, samples_u: FloatArray, samples_v: FloatArray) -> LinesOfSight:
+        """Lines of sight (rows of v, columns of u) on a grid."""
+        return LinesOfSight(*(spline(samples_v, samples_u) for spline in self._splines))

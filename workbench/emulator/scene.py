@@ -9,9 +9,11 @@ from pathlib import Path
 
 from workbench.emulator.beam import Beam
 from workbench.emulator.board import BoardSurface, Print, stand
-from workbench.emulator.lens import STEADY, Drift, Lens
+from workbench.emulator.keyed import generator
+from workbench.emulator.lens import STEADY, Drift, Lens, SightMap
 from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
-from workbench.emulator.spot import ImageFormat, SpotImage, SpotPainter
+from workbench.emulator.speckle import SpeckleMap
+from workbench.emulator.spot import ImageFormat, PaintTables, SpotImage, SpotPainter, grain_px, streaked
 from workbench.emulator.surfaces import (
     CylinderSurface,
     PlaneSurface,
@@ -27,6 +29,7 @@ from workbench.emulator.truth import (
     draw_board_error,
     draw_placement_error,
 )
+from workbench.emulator.world import WorldBodies, WorldView
 from workbench.model.arrays import Float32Array
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
@@ -37,7 +40,9 @@ from workbench.model.target import (
     Placement,
     PolynomialTarget,
     TargetShape,
+    WorldTarget,
 )
+from workbench.model.world import World
 
 DRIFT_STEP = Drift(f_scale=4e-6, u_px=1e-3, v_px=1e-3)
 """Drift of the camera after which spots are painted again: 1e-3 px at the edge of the image."""
@@ -52,10 +57,14 @@ class BenchScene:
         self._image = ImageFormat(rig.camera.width_px, rig.camera.height_px)
         self._beams = {name: Beam(ray, spec.beam) for name, ray in truth.lasers.items()}
         self._surfaces: list[tuple[Surface, float]] = []
+        self._world: WorldView | None = None
+        self._known_world: tuple[World, WorldBodies] | None = None
+        self._paint_tables: tuple[Drift, PaintTables] | None = None
         self._blocked: tuple[str, ...] = ()
         self._key = ""
         self._drift = STEADY
-        self._spots: dict[str, list[SpotImage]] = {}
+        self._spots: dict[str, list[tuple[SpotImage, tuple[float, float]]]] = {}
+        """Spots of each laser, with their motion in the image, px/s."""
         self._picture: Float32Array | None = None
         self.moves = 0
         """Number of placements."""
@@ -80,7 +89,11 @@ class BenchScene:
             pitch_deg=own.pitch_deg + self._truth.target_pitch_deg,
         )
         z_mm = placement.standoff_mm * (1 + self._truth.ruler_scale) + error.error_mm + self._truth.offset_mm
-        if isinstance(placement.target, BoardTarget):
+        self._world = None
+        if isinstance(placement.target, WorldTarget):
+            self._world = WorldView(self._bodies(placement.target), placement.target, self._truth.offset_mm)
+            self._surfaces = []
+        elif isinstance(placement.target, BoardTarget):
             aside = self._put_board(placement.target, z_mm, error, placement.key)
             self._file.add(placement.key, own, aside)
         else:
@@ -91,12 +104,18 @@ class BenchScene:
         self.moves += 1
         return placement
 
-    def spots(self, laser_id: str, drift: Drift = STEADY) -> list[SpotImage]:
-        """Spots of one laser (two on a mirror-like target), with the camera's drift."""
+    def spots(self, laser_id: str, drift: Drift = STEADY, exposure_s: float = 0.0) -> list[SpotImage]:
+        """Spots of one laser (two on a mirror-like target or an edge), with the camera's drift.
+
+        In a world they are streaks by the vehicle's motion during the exposure.
+        """
         self._drift_to(drift)
         if laser_id not in self._spots:
             self._spots[laser_id] = self._paint(laser_id)
-        return self._spots[laser_id]
+        found = self._spots[laser_id]
+        if self._world is None or not self._world.speed_mm_s:
+            return [spot for spot, _ in found]
+        return [streaked(spot, (exposure_s * u, exposure_s * v), self._image) for spot, (u, v) in found]
 
     def picture(self, drift: Drift = STEADY) -> Float32Array | None:
         """Board in room light (height, width), with the camera's drift; None for other targets."""
@@ -133,19 +152,47 @@ class BenchScene:
         self._surfaces = [(board, 1.0)]
         return aside
 
-    def _paint(self, laser_id: str) -> list[SpotImage]:
+    def _paint(self, laser_id: str) -> list[tuple[SpotImage, tuple[float, float]]]:
         if laser_id in self._blocked:
             return []
-        painter = SpotPainter(self._spec, self._lens(), self._image, self._truth.f_px)
+        beam, lens, key = self._beams[laser_id], self._lens(), (self._key, laser_id)
+        tables = None if self._world is None else self._tables
+        painter = SpotPainter(self._spec, lens, self._image, self._truth.f_px, tables)
+        if self._world is not None:
+            met = self._world.met_by(beam)
+            found = [(painter.paint(beam, one, 1.0, (*key, str(one.index))), one) for one in met]
+            return [(spot, self._world.motion(beam, one, lens)) for spot, one in found if spot is not None]
         painted = [
-            painter.paint(self._beams[laser_id], surface, gain, (self._key, laser_id, str(index)))
+            painter.paint(beam, surface, gain, (*key, str(index)))
             for index, (surface, gain) in enumerate(self._surfaces)
         ]
-        return [spot for spot in painted if spot is not None]
+        return [(spot, (0.0, 0.0)) for spot in painted if spot is not None]
+
+    def _bodies(self, target: WorldTarget) -> WorldBodies:
+        if self._known_world is None or self._known_world[0] is not target.world:
+            self._known_world = target.world, WorldBodies(target.world, self._spec.surface.albedo)
+        return self._known_world[1]
+
+    @property
+    def _tables(self) -> PaintTables:
+        """Tables for fast rendering; lines of sight follow the drift of the camera."""
+        if self._paint_tables is None or self._paint_tables[0] != self._drift:
+            sight = SightMap(self._lens(), self._image.width, self._image.height)
+            self._paint_tables = self._drift, PaintTables(self._speckle_map, sight)
+        return self._paint_tables[1]
+
+    @cached_property
+    def _speckle_map(self) -> SpeckleMap:
+        """Speckle of every pixel, for worlds, in which each pose has another."""
+        rng = generator(self._spec.seed, "speckle map")
+        return SpeckleMap(grain_px(self._spec), self._spec.beam.speckle_contrast, rng)
 
 
 def _speckle_key(placement: Placement) -> str:
     """Key of the speckle pattern: each placement has its own, and each displacement along the face."""
+    if isinstance(placement.target, WorldTarget):
+        pose = placement.target.pose
+        return f"{placement.key}/{pose.x_mm!r}/{pose.y_mm!r}/{pose.heading_deg!r}"
     shift_mm: float = getattr(placement.target, "shift_mm", 0.0)
     return f"{placement.key}/{shift_mm:g}mm" if shift_mm else placement.key
 

@@ -7,6 +7,9 @@ from numpy.random import Generator
 
 from workbench.model.arrays import FloatArray
 
+MAP_PX = 256
+"""Side of a map of speckle, pixels."""
+
 
 def subsamples(grain_px: float) -> int:
     """Number of samples along a pixel's side: 1.5 per grain of lambda N (in pixels), from 4 to 16.
@@ -35,3 +38,21 @@ def speckle_field(
     amplitudes[pupil] = rng.standard_normal(count) + 1j * rng.standard_normal(count)
     intensity = np.abs(np.fft.ifft2(amplitudes)) ** 2 * (amplitudes.size**2 / (2 * count))
     return np.asarray(1 + contrast * (intensity - 1))
+
+
+class SpeckleMap:
+    """Speckle averaged over pixels, in a square map from which windows are cut at random.
+
+    A window of a spot covers some hundredths of the map, so that patterns seldom share pixels.
+    """
+
+    def __init__(self, grain_px: float, contrast: float, rng: Generator) -> None:
+        n = subsamples(grain_px)
+        field = speckle_field((MAP_PX * n, MAP_PX * n), 1 / n, grain_px, contrast, rng)
+        self._map = field.reshape(MAP_PX, n, MAP_PX, n).mean(axis=(1, 3))
+
+    def cut(self, shape: tuple[int, ...], rng: Generator) -> FloatArray:
+        """Relative intensity (height, width) of each pixel; the map continues at its opposite edge."""
+        top, left = rng.integers(0, MAP_PX, 2)
+        rows, columns = (np.arange(side) for side in shape)
+        return np.asarray(self._map[np.ix_((top + rows) % MAP_PX, (left + columns) % MAP_PX)])

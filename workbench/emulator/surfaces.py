@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from workbench.model.arrays import FloatArray
+from workbench.model.arrays import BoolArray, FloatArray
 
 NODES = 2049
 """Number of nodes for the interpolation of depths."""
@@ -34,9 +34,20 @@ class Surface(Protocol):
     def shade(self, points: FloatArray) -> FloatArray | float:
         """Diffuse reflectance at points (n, 3) on the surface, relative to `albedo`."""
 
+    def unhidden(self, source: FloatArray, points: FloatArray) -> BoolArray | bool:
+        """Whether no other body lies between points (n, 3) and the camera, or a source of light (3,)."""
 
-class Plain:
-    """Surface of uniform reflectance."""
+
+class Alone:
+    """Surface that nothing hides."""
+
+    def unhidden(self, source: FloatArray, points: FloatArray) -> bool:
+        """See `Surface`."""
+        return True
+
+
+class Plain(Alone):
+    """Surface of uniform reflectance that nothing hides."""
 
     def shade(self, points: FloatArray) -> float:
         """See `Surface`."""

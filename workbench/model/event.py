@@ -37,6 +37,7 @@ from workbench.model.trial_event import ReadingTaken as ReadingTaken
 from workbench.model.trial_event import TrialFinished as TrialFinished
 from workbench.model.trial_event import TrialProgress as TrialProgress
 from workbench.model.trial_event import TrueValues as TrueValues
+from workbench.model.trial_event import VehicleMoved as VehicleMoved
 from workbench.model.yamlfile import FileModel
 
 
@@ -357,6 +358,7 @@ Event = Annotated[
     | CalibrationExported
     | CalibrationLoaded
     | ReadingTaken
+    | VehicleMoved
     | TrialProgress
     | TrialFinished
     | Incident

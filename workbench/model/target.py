@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from workbench.model.world import Pose, Vehicle, World
 from workbench.model.yamlfile import FileModel
 
 
@@ -63,8 +64,20 @@ class NoTarget(FileModel):
     shape: Literal["none"] = "none"
 
 
+class WorldTarget(FileModel):
+    """World in front of the sensor on its vehicle; the standoff is the clearance at the pose."""
+
+    shape: Literal["world"] = "world"
+    world: World
+    vehicle: Vehicle = Vehicle()
+    pose: Pose
+    speed_mm_s: Annotated[float, Field(ge=0)] = 0.0
+    """Speed along the heading during an exposure."""
+
+
 TargetShape = Annotated[
-    FlatTarget | BoardTarget | CylinderTarget | PolynomialTarget | NoTarget, Field(discriminator="shape")
+    FlatTarget | BoardTarget | CylinderTarget | PolynomialTarget | NoTarget | WorldTarget,
+    Field(discriminator="shape"),
 ]
 
 

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 from workbench.model.chart import Chart
 from workbench.model.table import Table
 from workbench.model.target import is_measured
+from workbench.model.world import Pose
 from workbench.model.yamlfile import FileModel
 
 NOT_VALID = "NO"
@@ -206,3 +207,27 @@ class TrialFinished(FileModel):
             return None
         is_valid = all(row["valid"] != NOT_VALID for row in found)
         return VerificationVerdict(is_valid, str(found[-1].get("verdict") or ""))
+
+
+class SensorAnswer(FileModel):
+    """Range that a sensor of a vehicle states for the way ahead."""
+
+    sensor: str
+    range_mm: float | None
+    low_mm: float | None = None
+    high_mm: float | None = None
+    """Upper end of the 95 % interval; None with a lower end: it reaches infinity."""
+    full_angle_deg: float = 0.0
+    """Angle of its cone; 0: the front of the vehicle."""
+
+
+class VehicleMoved(FileModel):
+    """One step of a vehicle in a world, with the answers of its sensors there."""
+
+    kind: Literal["vehicle_moved"] = "vehicle_moved"
+    trial: str
+    scene: str
+    pose: Pose
+    clearance_mm: float | None
+    """Way ahead until the vehicle touches a body, by the world file; None without one."""
+    answers: tuple[SensorAnswer, ...]

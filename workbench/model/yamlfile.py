@@ -22,6 +22,7 @@ KINDS = {
     "procedure": "a procedure",
     "rig": "a rig",
     "campaign": "a campaign",
+    "world": "a world",
     "laser_ranger": "a calibration",
     "workbench_camera": "a calibration of a camera without lasers",
 }

@@ -80,8 +80,11 @@ def create_session(
     created: str,
     command: str,
     calibration: CalibrationEntry | None = None,
+    procedure_model: type[FileModel] = FileModel,
 ) -> None:
     """Create the session folder with its manifest.
+
+    Files that a procedure names, as known by `procedure_model`, are written out in its copy.
 
     Raises:
         BadInputError: the folder exists or cannot be created.
@@ -93,7 +96,10 @@ def create_session(
         raise BadInputError(f"{folder}: the session folder cannot be created: {error.strerror}") from None
     caller = {"created": created, "operator": operator, "command": command}
     entry = RigEntry(file=str(rig_path.resolve()), text=standalone_text(rig_path, Rig), serial=rig.serial)
-    procedures = [FileEntry(file=str(path.resolve()), text=_read(path)) for path in procedure_paths]
+    procedures = [
+        FileEntry(file=str(path.resolve()), text=standalone_text(path, procedure_model))
+        for path in procedure_paths
+    ]
     _write(folder, caller, entry, procedures, calibration)
 
 
@@ -157,7 +163,3 @@ def load_session_rig(session_dir: Path, *, bounded: bool = False) -> Rig:
     text = load_manifest(session_dir).rig.text
     context = None if bounded else RECORDED
     return parse_yaml_model(text, Path(f"{session_dir / MANIFEST} (rig)"), Rig, context)
-
-
-def _read(path: Path) -> str:
-    return path.read_text(encoding="utf-8")

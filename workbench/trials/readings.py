@@ -102,7 +102,7 @@ def take_full_reading(
     """Take the reading `number` at a placement; returns it as journalled and as the ranger gave it."""
     left_off = () if closest is None else closest.left_off
     scene = f"{placement.key}/{_without(closest)}{number:02d}"
-    reading = acquire(ranger, scene, _capture(context, ranger, placement, scene, number, left_off))
+    reading = acquire(ranger, scene, capture_of(context, ranger, placement, scene, number, left_off))
     taken = reading_taken(context.rig, ranger.sensor, name, placement, number, reading, closest)
     context.emit(taken)
     context.readings.append(taken)
@@ -197,13 +197,13 @@ def _interval(reading: Reading) -> dict[str, float | None]:
     return {"low_mm": low_mm, "high_mm": high_mm if isfinite(high_mm) else None}
 
 
-def _capture(
+def capture_of(
     context: Context,
     ranger: Ranger,
     placement: Placement,
     scene: str,
     number: int,
-    left_off: tuple[str, ...],
+    left_off: tuple[str, ...] = (),
 ) -> Callable[[tuple[str, ...]], Finding]:
     """Function that takes a capture of the scene with the given lasers."""
 

@@ -57,6 +57,7 @@ def blueprint(
     captures: bool = True,
     calibrates: bool = True,
     live: bool = False,
+    world: bool = False,
 ) -> rrb.Blueprint:
     """Layout for one rig; the time cursor follows new data.
 
@@ -67,10 +68,12 @@ def blueprint(
         captures: whether the session captures; a simulation does not.
         calibrates: whether the session calibrates; if not, there are no screens of a fit.
         live: whether the session is running, so that the present step and the open prompt are shown.
+        world: whether the sensor is driven through a world.
     """
     fit = [_result(rig, live), _parameters()] if calibrates else []
     before = [_captures(rig, calibrates, live) if captures else _steps(live), *fit]
-    screens = [*before, *(_trial(rig, one, live) for one in trials), *([_bench()] if captures else [])]
+    views = [*([_bench()] if captures else []), *([_world(rig)] if world else [])]
+    screens = [*before, *(_trial(rig, one, live) for one in trials), *views]
     front = {"capture": 0, "fit": 1, "trial": len(before) + len(trials) - 1}[phase]
     return rrb.Blueprint(
         rrb.Tabs(*screens, active_tab=front),
@@ -223,6 +226,14 @@ def _bench() -> rrb.Container:
         ),
         name="3D",
     )
+
+
+def _world(rig: Rig) -> rrb.Container:
+    """Screen of a drive: the world with the vehicle, and the frame at the time cursor."""
+    view = rrb.Spatial3DView(
+        origin=at.WORLD, name="World: beams, answer over the front (white), of a cone (red)"
+    )
+    return rrb.Horizontal(view, frame_view(rig), column_shares=[3, 2], name="World")
 
 
 def _texts(live: bool, *parts: tuple[rrb.View, int]) -> rrb.Container:

@@ -46,6 +46,12 @@ TARGET = f"{BENCH}/target"
 SPOTS_ON_TARGET = f"{BENCH}/spots"
 RANGED_POINTS = f"{BENCH}/ranged"
 
+WORLD = "world"
+WORLD_BODIES = f"{WORLD}/bodies"
+WORLD_VEHICLE = f"{WORLD}/vehicle"
+WORLD_BEAMS = f"{WORLD}/beams"
+WORLD_ANSWERS = f"{WORLD}/answers"
+
 SPOTS = "spots"
 AMBIENT = "ambient"
 """Median of the dark frame, DN."""

@@ -19,8 +19,8 @@ from workbench.model.prompt import Prompt
 from workbench.model.reading_text import reading_remark
 from workbench.model.rig import Rig
 from workbench.model.spot import Failure, Spot
-from workbench.model.target import Placement
-from workbench.viewer import documents, fit, frame, scene, steps
+from workbench.model.target import Placement, WorldTarget
+from workbench.viewer import documents, fit, frame, scene, steps, world_view
 from workbench.viewer import entities as at
 from workbench.viewer.advice import AdviceView
 from workbench.viewer.blueprint import Phase, blueprint
@@ -63,6 +63,9 @@ class OpenRecording:
         self._title = ""
         self._step = ""
         self._calibrates = False
+        self._has_world = False
+        self._lasers: tuple[ev.LaserRange, ...] = ()
+        """Ranges of the last reading."""
         self._live = True
         self._phase: Phase = "capture"
         self._length = ""
@@ -136,6 +139,11 @@ class OpenRecording:
         self.show_task()
         self._show_sensor()
         self._crops.log_none()
+        if isinstance(event.placement.target, WorldTarget):
+            world_view.log_world(self.stream, event.placement.target)
+            if not self._has_world:
+                self._has_world = True
+                self._lay_out(self._phase)
         frame.log_predicted(self.stream, expected_spots(self._geometry, self._placement), self._colors)
         frame.log_predicted_ellipses(
             self.stream, expected_ellipses(self._geometry, self._placement), self._colors
@@ -258,10 +266,18 @@ class OpenRecording:
         self._show_crops(spots, [laser for laser in self._colors if laser not in event.left_off])
         if self._placement is not None:
             scene.log_ranged(self.stream, event.lasers, self._placement, self._geometry, self._colors)
+        self._lasers = event.lasers
         self._trial(event.trial).take(event, self._exposure)
         self.stream.at(moment)
         if remark := reading_remark(event):
             steps.log_text(self.stream, remark, steps.WARN)
+
+    @_log.register
+    def _(self, event: ev.VehicleMoved, moment: Moment) -> None:
+        self.stream.at(self._exposure)
+        if self._placement is not None and isinstance(self._placement.target, WorldTarget):
+            vehicle = self._placement.target.vehicle
+            world_view.log_step(self.stream, event, vehicle, self._lasers, self._geometry, self._colors)
 
     @_log.register
     def _(self, event: ev.TrialFinished, moment: Moment) -> None:
@@ -318,6 +334,7 @@ class OpenRecording:
             captures=bool(self._captures.numbers),
             calibrates=self._calibrates,
             live=self._live,
+            world=self._has_world,
         )
 
     def _lane(self, entity: str, state: str, moment: Moment) -> None:

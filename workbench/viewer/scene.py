@@ -23,6 +23,7 @@ from workbench.model.target import (
     NoTarget,
     Placement,
     PolynomialTarget,
+    WorldTarget,
 )
 from workbench.viewer import entities as at
 from workbench.viewer.frame import RERUN_PIXEL_CENTRE
@@ -177,7 +178,7 @@ def _outline(placement: Placement, z_mm: float) -> list[list[Point]]:
             return _cylinder(target, z_mm)
         case PolynomialTarget():
             return _upright([(x, z_mm + _polynomial(target, x)) for x in _across()])
-        case NoTarget():
+        case NoTarget() | WorldTarget():  # a world has a view of its own
             return []
 
 

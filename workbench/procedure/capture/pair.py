@@ -11,7 +11,7 @@ from pathlib import Path
 
 from workbench.calibration.data.spot_rows import prior_scanline
 from workbench.devices.attempts import within_lease
-from workbench.devices.protocols import Bench, Frame
+from workbench.devices.protocols import Bench, Frame, settable
 from workbench.model import event as ev
 from workbench.model.arrays import Image
 from workbench.model.captures import ALL_LASERS, BOARD
@@ -66,6 +66,21 @@ class PairSource:
             found = self.replayed.exposure
         self._exposure = found
         return found
+
+    def change_exposure(self, exposure: float) -> None:
+        """Set the exposure of the next captures at the placement; a replay leaves the camera unchanged.
+
+        Nothing changes where the exposure was not set for the placement.
+
+        Raises:
+            RigNotReadyError: the camera does not accept the exposure.
+        """
+        found = settable(self.bench.camera)
+        if self.replayed is not None or self._exposure is None or found is None:
+            return
+        camera, (shortest, longest) = found
+        accepted = camera.set_exposure(min(max(exposure, shortest), longest))
+        self._exposure = self._exposure.model_copy(update={"exposure": accepted})
 
     def pair(
         self,

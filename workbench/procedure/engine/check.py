@@ -1,4 +1,4 @@
-"""Check of procedure and rig files before a session: all mistakes in one pass."""
+"""Check of procedure, rig and world files before a session: all mistakes in one pass."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 from workbench.devices.registry import bench_problems, has_bench
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
+from workbench.model.world import World
 from workbench.model.yamlfile import Document, Mistake, include_files, kind_of, line_of, read_document
 from workbench.procedure.engine.existing_calibration import GIVES
 from workbench.procedure.engine.procedure_file import Procedure
@@ -30,29 +31,32 @@ class FileCheck:
 
 
 def check_file(path: Path) -> FileCheck:
-    """Check a procedure or rig file.
+    """Check a procedure, rig or world file.
 
     Raises:
-        BadInputError: the file cannot be read, or is neither a procedure nor a rig.
+        BadInputError: the file cannot be read, or is none of these.
     """
     document = read_document(path)
-    kinds = [
-        kind for kind in ("procedure", "rig") if isinstance(document.data, dict) and kind in document.data
-    ]
+    checks = {"procedure": _in_procedure, "rig": _in_rig, "world": _in_world}
+    kinds = [kind for kind in checks if isinstance(document.data, dict) and kind in document.data]
     if len(kinds) != 1:
         raise BadInputError(
-            f"{path}:1: expected a procedure or a rig, with one key of these names; got"
+            f"{path}:1: expected a procedure, a rig or a world, with one key of these names; got"
             f" {kind_of(document.data)}"
         )
-    check = _in_procedure if kinds == ["procedure"] else _in_rig
-    found = sorted([*document.doubled, *check(document)], key=lambda one: one.line)
+    found = sorted([*document.doubled, *checks[kinds[0]](document)], key=lambda one: one.line)
     return FileCheck(
         mistakes=tuple(f"{path}:{one.line}: {one.text}" for one in found if not isinstance(one, _Note)),
         notes=tuple(f"{path}:{one.line}: {one.text}" for one in found if isinstance(one, _Note)),
     )
 
 
+def _in_world(document: Document) -> Iterator[Mistake]:
+    yield from document.mistakes(World)
+
+
 def _in_procedure(document: Document) -> Iterator[Mistake]:
+    include_files(document, Procedure)
     yield from document.mistakes(Procedure)
     steps = document.data.get("steps")
     if isinstance(steps, list):

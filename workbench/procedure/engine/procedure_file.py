@@ -7,14 +7,26 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from workbench.model.yamlfile import FileModel, load_yaml_model
-from workbench.procedure.engine.registry import AnyStep, rebuild_with_new_kinds
+from workbench.model.yamlfile import Document, FileModel, load_yaml_model
+from workbench.procedure.engine.registry import AnyStep, rebuild_with_new_kinds, step_kinds
 
 
 class Procedure(FileModel):
     """A procedure file, format 1."""
 
     kind_key = "procedure"
+
+    @classmethod
+    def include_files(cls, document: Document) -> bool:
+        """Replace the files that steps name by their contents; whether there was any."""
+        steps = document.data.get("steps")
+        known = step_kinds()
+        included = [
+            known[str(step["step"])].include_files(Document(document.path, step))
+            for step in (steps if isinstance(steps, list) else [])
+            if isinstance(step, dict) and str(step.get("step")) in known
+        ]
+        return any(included)
 
     format: Literal[1]
     procedure: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]

@@ -7,7 +7,7 @@ from typing import get_args
 
 from workbench.model.prompt import Action, Prompt, Quantity
 from workbench.model.rig import LaserClass, Rig
-from workbench.model.target import BoardTarget, CylinderTarget, FlatTarget, Placement
+from workbench.model.target import BoardTarget, CylinderTarget, FlatTarget, Placement, WorldTarget
 
 SAFETY = "safety"
 """Key of the confirmation before the first emission; asked again when a session is resumed."""
@@ -150,12 +150,20 @@ def _target(placement: Placement) -> str:
     target = placement.target
     if isinstance(target, CylinderTarget):
         return f"cylinder of {target.diameter_mm:g} mm diameter"
+    if isinstance(target, WorldTarget):
+        return "vehicle"
     return "board" if isinstance(target, BoardTarget) else "target"
 
 
 def _how(placement: Placement) -> str:
     """Instructions for a target that is not flat and square, with its reference uncertainties."""
     target, standoff_sd = placement.target, placement.standoff_sd_mm
+    if isinstance(target, WorldTarget):
+        pose = target.pose
+        return (
+            f" World {target.world.world}: the middle of its front at x = {pose.x_mm:g} mm,"
+            f" y = {pose.y_mm:g} mm, heading {pose.heading_deg:g} deg; the number is its free way ahead."
+        )
     ruler = "" if standoff_sd is None else f" Standard uncertainty of the standoff: {standoff_sd:g} mm."
     if not placement.is_measured:
         ruler = " The standoff need not be measured."
@@ -183,6 +191,8 @@ def _nearer(target: FlatTarget) -> str:
 def _expected_sight(placement: Placement) -> str:
     if isinstance(placement.target, CylinderTarget):
         return "Every spot lies on the cylinder, and no beam is reflected towards a person or the camera."
+    if isinstance(placement.target, WorldTarget):
+        return "The vehicle stands on the floor, and its way is as in the world file."
     if isinstance(placement.target, BoardTarget) and _turn(placement):
         return "It is turned about as stated (the angle need not be measured), and every spot lies on it."
     if _turn(placement):

@@ -15,6 +15,7 @@ from workbench.model.errors import BadInputError, StoppedError, WorkbenchError
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.operator import NoOperator, operator_of_bench
 from workbench.procedure.engine.plan import Plan
+from workbench.procedure.engine.procedure_file import Procedure
 from workbench.procedure.engine.replay import ReplayingJournal
 from workbench.session.journal import Journal
 from workbench.session.manifest import create_session, workbench_version
@@ -73,6 +74,7 @@ def run(
             created=caller.created,
             command=caller.command,
             calibration=None if plan.calibration is None else plan.calibration.entry,
+            procedure_model=Procedure,
         )
         if plan.calibration is not None:
             plan.calibration.write_copy(session_dir)

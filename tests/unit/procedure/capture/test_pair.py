@@ -13,7 +13,7 @@ import pytest
 from tests.support.plain_bench import plain_bench
 from tests.support.running import two_laser_rig
 from workbench.calibration.data.spot_rows import prior_scanline
-from workbench.devices.protocols import Frame
+from workbench.devices.protocols import ExposableCamera, Frame
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.event import CaptureTaken, ExposureSet, TargetPlaced
 from workbench.model.target import Placement
@@ -50,6 +50,26 @@ def test_a_pair_is_stored_with_placement_and_exposure(source: PairSource) -> Non
     assert take(source, "L1", "L2").laser_id == "all"
     assert taken.lit_s is not None
     assert taken.lit_s > 0
+
+
+def test_the_exposure_may_follow_the_brightness_within_its_limits(source: PairSource) -> None:
+    found = source.set_exposure(PLACEMENT.key, lambda key: None)
+    assert found is not None
+    source.change_exposure(found.exposure / 2)
+    assert take(source).exposure == found.exposure / 2
+    assert isinstance(source.bench.camera, ExposableCamera)
+    assert source.bench.camera.exposure_limits is not None
+    source.change_exposure(1e12)
+    assert take(source).exposure == source.bench.camera.exposure_limits[1]
+
+
+def test_a_replay_changes_no_exposure(source: PairSource) -> None:
+    source.set_exposure(PLACEMENT.key, lambda key: None)
+    before = take(source).exposure
+    source.replayed = PlacementCaptures(TargetPlaced(placement=PLACEMENT), SET)
+    source.change_exposure(1.0)
+    source.replayed = None
+    assert take(source).exposure == before
 
 
 def test_every_trial_exposure_is_named_before_it_is_taken(source: PairSource) -> None:
