@@ -46,7 +46,7 @@ def check_capture_table(table: Path, content: str) -> None:
 def check_frames(session_dir: Path) -> None:
     """Compare the frames of a session's captures with the sums of their content in the journal.
 
-    Frames that are missing are left to whoever needs them.
+    A missing frame is no error here.
 
     Raises:
         BadInputError: a line of the journal is damaged or edited, or a frame is another one than captured.

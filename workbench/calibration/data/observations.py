@@ -280,7 +280,7 @@ def _check_placement(first: PlacementInfo, observation: Observation) -> None:
 def _outliers(
     members: Sequence[Observation], position: FloatArray, sd: FloatArray, usual: float
 ) -> tuple[BoolArray, list[Rejected]]:
-    """Which of the n repeats of one cell are outliers, and those with their distance from the median."""
+    """(n,) outliers among the repeats of one cell, and each with its distance from the median."""
     outlying = outliers(position, sd) | outliers_of_few(position, usual * sd)
     median = np.nanmedian(position, axis=0) if outlying.any() else np.zeros(2)
     dropped: list[Rejected] = [
