@@ -65,7 +65,7 @@ def _read(picture: Picture, scale: int) -> str:
     brightest, darkest = picture.max(axis=2), picture.min(axis=2)
     grey = np.where(brightest - darkest > COLORED, np.median(brightest), brightest).astype(np.uint8)
     large = 255 - cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
-    framed = cv2.copyMakeBorder(large, *[MARGIN_PX] * 4, cv2.BORDER_REPLICATE)
+    framed = np.pad(large, MARGIN_PX, mode="edge")
     sparse = ("--psm", "11", "--dpi", "200")
     command = ["tesseract", "stdin", "stdout", *sparse]
     png = cv2.imencode(".png", framed)[1].tobytes()

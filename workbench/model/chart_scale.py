@@ -66,7 +66,7 @@ def x_ticks(chart: Chart, scale: Scale, least_distance: float) -> tuple[list[flo
 
 
 def tick_texts(ticks: Sequence[float]) -> list[str]:
-    """Labels of ticks with as few digits as distinguish them, but at least `LEAST_DIGITS` of each."""
+    """Labels of ticks with as few digits as distinguish them, but at least `LEAST_DIGITS`."""
     for digits in range(LEAST_DIGITS, MOST_DIGITS):
         texts = [f"{float(f'{tick:.{digits}g}'):.{MOST_DIGITS}g}" for tick in ticks]
         if len(set(texts)) == len(set(ticks)):

@@ -104,11 +104,12 @@ def comparison(columns: Mapping[str, tuple[Rig, str]]) -> rrb.Blueprint:
 
 def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
     axis, below = rig.lasers[0].axis, f"{prefix}/"
-    texts = rrb.Horizontal(
-        rrb.Vertical(text_view(f"{below}{at.NOW}", "Now"), text_view(f"{below}{at.FIT_VERDICT}", "Verdict")),
-        table_view(f"{below}{at.FIT_WORST}", "Worst"),
-        column_shares=[5, 11],
+    results = rrb.Tabs(
+        rrb.TextDocumentView(origin=f"{below}{at.FIT_VERDICT}", name="Verdict"),
+        table_view(f"{below}{at.FIT_WORST}", "Worst placements", titlebar=True),
+        active_tab=0,
     )
+    texts = rrb.Horizontal(text_view(f"{below}{at.NOW}", "Now"), results, column_shares=[5, 11])
     return rrb.Vertical(
         rrb.Horizontal(frame_view(rig, below, f"{title}: frame"), crops_view(rig, below, "Spots")),
         picture_view(f"{below}{at.FIT_PICTURE}/{axis}", f"{title}: residuals along {axis}"),

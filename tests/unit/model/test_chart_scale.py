@@ -135,5 +135,5 @@ def test_a_short_logarithmic_axis_has_ticks_inside(low: float, high: float) -> N
         ([], []),
     ],
 )
-def test_labels_of_ticks_have_as_few_digits_as_tell_them_apart(ticks: list[float], texts: list[str]) -> None:
+def test_labels_of_ticks_have_as_few_digits_as_distinguish_them(ticks: list[float], texts: list[str]) -> None:
     assert tick_texts(ticks) == texts

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from workbench.viewer.entities import from_hex, laser_colors, to_hex, trial_picture, under
+import rerun as rr
+
+from workbench.viewer.entities import RED, WHITE, from_hex, laser_colors, packed, to_hex, trial_picture, under
 
 
 def test_lasers_have_colors_of_their_own_and_names_may_be_odd() -> None:
@@ -19,3 +21,9 @@ def test_colours_of_charts_and_of_the_recording_are_the_same() -> None:
 def test_trials_and_charts_of_any_name_have_entities_of_their_own() -> None:
     assert trial_picture("a/b", "c") == "trials/a\\/b/pictures/c"
     assert trial_picture("accuracy-flat.1", "errors") != trial_picture("accuracy-flat.2", "errors")
+
+
+def test_packed_colors_are_those_that_rerun_makes() -> None:
+    for colors in ([], [RED], [RED, WHITE, (1, 2, 3)], [(1, 2, 3)] * 4):
+        rerun = rr.components.ColorBatch(colors)
+        assert rr.components.ColorBatch(packed(colors)) == rerun

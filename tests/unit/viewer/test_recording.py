@@ -32,6 +32,7 @@ from workbench.model.prompt import Prompt
 from workbench.viewer.open_recording import OpenRecording
 from workbench.viewer.recording import RecordingConsumer, rebuild
 from workbench.viewer.scene import BEYOND, DRAWN_DEPTH_MM
+from workbench.viewer.stream import Stream
 from workbench.viewer.table_text import table_text
 
 DATA = Path(__file__).parents[3] / "data"
@@ -326,6 +327,26 @@ def test_lanes_and_log_follow_the_steps(contents: Contents) -> None:
     log = [text for _, (text,) in contents.values("/steps/log", "TextLog:text", "time")]
     assert log[0].startswith(f"Session {SESSION} on made-up")
     assert log[-1] == "Session ended (0): done"
+
+
+def test_an_equal_state_of_a_lane_is_logged_once_a_standoff(contents: Contents) -> None:
+    for lane, states in (("laser", len(LASERS)), ("saturation", 1)):
+        logged = contents.values(f"/steps/lanes/{lane}", "StateChange:state", "standoff_mm")
+        assert [mm for mm, _ in logged if mm in STANDOFFS] == [mm for mm in STANDOFFS for _ in range(states)]
+
+
+@pytest.mark.parametrize(("least_s", "kind"), [(0.0, ev.SpotsFound), (float("inf"), ev.StepFinished)])
+def test_the_file_is_checked_now_and_then_and_at_the_end_of_each_step(
+    recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, least_s: float, kind: type[ev.Event]
+) -> None:
+    monkeypatch.setattr("workbench.viewer.recording.CHECK_S", least_s)
+    checked: list[ev.Event] = []
+    with RecordingConsumer(recorded.folder, recorded.rig, tmp_path / "r.rrd") as consumer:
+        for record in recorded.records:
+            monkeypatch.setattr(Stream, "check_written", lambda _, event=record.event: checked.append(event))
+            consumer(record)
+    expected = [one.event for one in recorded.records if isinstance(one.event, kind | ev.StepFinished)]
+    assert checked == expected
 
 
 def test_rays_are_of_the_priors_before_the_fit_and_of_the_fit_afterwards(contents: Contents) -> None:
