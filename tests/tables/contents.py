@@ -9,6 +9,7 @@ from tests.tables import of_proofs, of_sessions, of_thesis
 
 PAGES = (
     "README.md",
+    "docs/campaigns.md",
     "docs/demo.md",
     "docs/design-of-standoffs.md",
     "docs/history.md",
@@ -36,6 +37,7 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "shapes-exact": partial(of_proofs.shapes, "Calibration exact"),
     "shapes-calibrated": partial(of_proofs.shapes, "Calibration with the stated errors"),
     "shapes-flat": partial(of_proofs.shapes, "Flats, calibration exact"),
+    "campaigns": of_proofs.campaigns,
     "speed": of_proofs.speed,
     "speckle": of_proofs.speckle,
     "situations": of_proofs.situations,

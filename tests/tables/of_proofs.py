@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from tests.support.stored_output import newest
-from tests.tables.markdown import markdown_table
+from tests.tables.markdown import code_block, markdown_table
 
 FIGURE = re.compile(
     r"(?P<trial>.{14})(?P<quantity>.+?) +(?P<value>-?\d+\.\d{3})  (?P<expected>.+?)"
@@ -49,6 +49,11 @@ class ProofFigure:
 def shapes(heading: str) -> str:
     """A table of `tests.proofs.shapes`, which are in Markdown."""
     return "\n".join(newest("shapes").section(heading))
+
+
+def campaigns() -> str:
+    """Speed of a campaign, as printed by `tests.benchmarks.campaigns`."""
+    return code_block("\n".join(newest("campaigns").lines))
 
 
 def speed() -> str:

@@ -45,6 +45,10 @@ class Campaign:
         """All chunks of the work."""
         return self.file.work.chunks(self.inputs, self.file.seed)
 
+    def chunk_at(self, index: int) -> Chunk:
+        """The chunk with an index."""
+        return self.file.work.chunk_at(self.inputs, self.file.seed, index)
+
 
 def load_campaign(path: Path) -> Campaign:
     """Read a campaign file, and the files that it names.

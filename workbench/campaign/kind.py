@@ -92,10 +92,11 @@ class Work(FileModel, ABC):
     def summarise(self, inputs: Inputs, frames: Iterable[pd.DataFrame]) -> Summary:
         """Summary of the results of all chunks, in their order; `frames` is read once."""
 
+    def chunk_at(self, inputs: Inputs, seed: int, index: int) -> Chunk:
+        """The chunk with an index."""
+        first = index * self.chunk
+        return Chunk(index, range(first, min(first + self.chunk, self.count(inputs))), seed)
+
     def chunks(self, inputs: Inputs, seed: int) -> list[Chunk]:
         """All chunks."""
-        count = self.count(inputs)
-        return [
-            Chunk(n, range(n * self.chunk, min((n + 1) * self.chunk, count)), seed)
-            for n in range(ceil(count / self.chunk))
-        ]
+        return [self.chunk_at(inputs, seed, n) for n in range(ceil(self.count(inputs) / self.chunk))]

@@ -36,9 +36,12 @@ def run_chunks(
 
     Raises:
         BadInputError: a worker runs another version, or the work cannot be done.
-        StoppedError: a file cannot be written, or every worker that computes some chunk dies.
+        StoppedError: a file cannot be written, every worker that computes some chunk dies, or the scheduler
+            ends.
     """
     from distributed import KilledWorker, as_completed
+    from distributed.client import FutureCancelledError
+    from distributed.comm import CommClosedError
 
     manifest, path = (folder.path / MANIFEST).read_text(encoding="utf-8"), str(folder.path.resolve())
     left = iter(missing)
@@ -61,6 +64,8 @@ def run_chunks(
                 f"chunk {chunk.index} ({folder.campaign.file.work.thing} {chunk.items.start} to"
                 f" {chunk.items.stop - 1}): every worker that computed it died; check memory and disk"
             ) from None
+        except (FutureCancelledError, CommClosedError) as error:
+            raise StoppedError(f"the connection to the scheduler was lost: {error}") from None
         except OSError as error:
             raise StoppedError(f"chunk {chunk.index}: cannot be written: {error}") from None
         finished(chunk)

@@ -221,7 +221,7 @@ class _Totals:
             columns=(
                 Column(key="parameter", name="parameter"),
                 Column(key="unit", name="unit"),
-                Column(key="prior_sd", name="prior sd"),
+                Column(key="prior_sd", name="prior sd", format="sd"),
                 Column(key="mean_error", name="mean error", format="+.2g"),
                 Column(key="rms_error", name="rms error", format="sd"),
                 Column(key="stated_sd", name="stated sd", format="sd"),

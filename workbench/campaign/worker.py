@@ -30,7 +30,7 @@ def run_chunk(manifest: str, folder: str, index: int) -> int:
     check_environment()
     campaign, identity = _read(manifest)
     chunks = Path(folder) / CHUNKS
-    chunk = campaign.chunks[index]
+    chunk = campaign.chunk_at(index)
     if not is_finished(chunks, chunk, identity.sha256):
         write_chunk(chunks, chunk, identity.sha256, campaign.file.work.run(campaign.inputs, chunk))
     return index

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import distributed
 import pytest
+from distributed.client import FutureCancelledError
 
 from tests.support.campaigns import SIMULATE, simulated_campaign
 from workbench.campaign.folder import CampaignFolder, open_folder
@@ -85,6 +86,7 @@ def test_a_bounded_number_of_chunks_is_at_the_scheduler(folder: CampaignFolder) 
     ("failure", "expected", "words"),
     [
         (BadInputError("another version"), BadInputError, "another version"),
+        (FutureCancelledError("key", "lost"), StoppedError, "connection to the scheduler was lost"),
         (OSError(28, "No space left on device"), StoppedError, "chunk 5: cannot be written.*No space left"),
     ],
 )
