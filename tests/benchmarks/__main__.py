@@ -20,6 +20,7 @@ from tests.benchmarks import (
     rows,
     speckle,
     speed,
+    world_frames,
 )
 from tests.support.stored_output import store
 
@@ -34,6 +35,7 @@ def main() -> None:
         "ranging": (ranging.lines,),
         "capture": (capture.lines, recording.lines),
         "listing": (listing.lines,),
+        "world-frames": (world_frames.lines,),
     }
     for subject, tables in subjects.items():
         lines = [f"Python {platform.python_version()}"]

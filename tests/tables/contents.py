@@ -19,6 +19,7 @@ PAGES = (
     "docs/thesis-simulation.md",
     "docs/trials.md",
     "docs/validation.md",
+    "docs/worlds.md",
 )
 """Pages with such tables."""
 TABLES: Mapping[str, Callable[[], str]] = {
@@ -45,4 +46,6 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "trials": of_proofs.trials,
     "verification": of_proofs.verification,
     "control-charts": of_proofs.control_charts,
+    "worlds": of_proofs.worlds,
+    "worlds-errors": of_proofs.worlds_errors,
 }

@@ -172,3 +172,24 @@ def _found(figures: Sequence[ProofFigure]) -> str:
     values = sorted({one.value for one in figures})
     text = " to ".join(f"{value:.3f}" for value in dict.fromkeys((values[0], values[-1])))
     return f"{text}, missed" if any(one.is_missed for one in figures) else text
+
+
+def worlds() -> str:
+    """Missed obstacles and false stops of drawn drives: `tests.proofs.worlds`."""
+    heading = ("rig", "world", "drives", "courses", "met", "missed: nearest", "closest", "sonar", "at most")
+    more = ("not met, missed: nearest", "sonar", "false stops: nearest", "closest", "sonar", "least at rest")
+    rows = []
+    for line in newest("worlds").section("drives")[1:]:
+        cells = line.split(" | ")
+        cells[8], cells[-1] = f"{float(cells[8]):.1%}", f"{float(cells[-1]):.0f} mm"
+        rows.append(cells)
+    return markdown_table((*heading, *more), rows, numbers_from=2)
+
+
+def worlds_errors() -> str:
+    """Errors of lasers on faces in drawn drives."""
+    rows = []
+    for line in newest("worlds").section("errors of lasers")[1:]:
+        rig, count, *shares = line.split(" | ")
+        rows.append((rig, count, *(f"{float(share):.2%}" for share in shares)))
+    return markdown_table(("rig", "readings", "median abs error", "wrong", "inside"), rows)

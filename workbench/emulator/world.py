@@ -51,18 +51,20 @@ class Convex:
 
     def span(self, origin: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(n,) t of entry and of exit of each ray; entry > exit where it misses."""
-        gap = self.limits - origin @ self.normals.T
-        along = direction @ self.normals.T
+        # Rows are half spaces: numpy reduces over the first axis several times as fast.
+        gap = self.limits[:, None] - self.normals @ origin.reshape(-1, 3).T
+        along = self.normals @ direction.T
         with np.errstate(divide="ignore", invalid="ignore"):
             t = gap / along
-        enter = np.where(along < 0, t, -np.inf).max(axis=1)
-        leave = np.where(along > 0, t, np.inf).min(axis=1)
-        outside = ((along == 0) & (gap < 0)).any(axis=1)
+        enter = np.where(along < 0, t, -np.inf).max(axis=0)
+        leave = np.where(along > 0, t, np.inf).min(axis=0)
+        outside = ((along == 0) & (gap < 0)).any(axis=0)
         return np.where(outside, np.inf, enter), leave
 
     def normal(self, points: FloatArray) -> FloatArray:
         """(n, 3) normals at points on the surface."""
-        return np.asarray(self.normals[(points @ self.normals.T - self.limits).argmax(axis=1)])
+        depth = self.normals @ points.T - self.limits[:, None]
+        return np.asarray(self.normals[depth.argmax(axis=0)])
 
 
 @dataclass(frozen=True)
@@ -179,13 +181,17 @@ class WorldBodies:
         to_centre = self._centres - origin
         scale = float(np.linalg.norm(direction))
         t = np.maximum(to_centre @ direction / scale**2, 0.0)
-        distance = np.linalg.norm(to_centre - np.outer(t, direction), axis=1)
+        aside_of_axis = to_centre - np.outer(t, direction)
+        distance = np.sqrt(np.einsum("ij,ij->i", aside_of_axis, aside_of_axis))
         # A ray meets a body at most its radius beyond the foot of the perpendicular; twice, to be safe.
         width = np.sqrt(3) * (aside + spread * (t + 2 * self._radii / scale))
-        across = np.cross(direction, self._axes)
-        length = np.linalg.norm(across, axis=1)
+        x, y, z = direction
+        across = self._axes @ np.array([(0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)])  # direction x axis
+        length = np.sqrt(np.einsum("ij,ij->i", across, across))
         with np.errstate(divide="ignore", invalid="ignore"):
-            between_axes = np.abs((to_centre * across).sum(axis=1)) / length  # NaN: parallel, or no bar
+            between_axes = (
+                np.abs(np.einsum("ij,ij->i", to_centre, across)) / length
+            )  # NaN: parallel, or no bar
         misses = (distance > self._radii + width) | (between_axes > self._thickness + width)
         return np.asarray(self._others[~misses])
 
