@@ -22,6 +22,7 @@ PAGES = {
     "laser-controller.md": "the laser controller, and what turns the lasers off",
     "board.md": "the printed board",
     "trials.md": "trials and their statistics",
+    "worlds.md": "worlds, and drives of the sensor on its vehicle",
     "viewer.md": "live view, replay, finding a bad standoff",
     "certificate.md": "reports, certificates, `lab.yaml`, `workbench sessions`",
     "history.md": "verifications, control charts, calibration in force",
