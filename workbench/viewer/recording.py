@@ -22,7 +22,7 @@ from workbench.viewer.window import free_port
 
 RECORDING_FILE = "recording.rrd"
 CHECK_S = 1.0
-"""Least time between checks of the file within a step; a check at each capture takes a tenth of the time."""
+"""Least time between checks of the file within a step: each waits until everything is written."""
 
 
 class RecordingConsumer:

@@ -53,7 +53,7 @@ def gauge_table(name: str, frame: pd.DataFrame) -> Table:
         return table_of(name, TITLE, COLUMNS, [row], "")
     caption = (
         f"{study.parts} standoffs, {study.operators} operators, {study.trials} trials of each;"
-        f" {len(used) / len(trials):.3g} readings a trial; low, high: 95 % interval; ndc: distinct"
+        f" readings a trial: {len(used) / len(trials):.3g}; low, high: 95 % interval; ndc: distinct"
         " categories; PV, study variation and ndc follow from the choice of standoffs"
     )
     return table_of(name, TITLE, COLUMNS, _rows(study), caption)
