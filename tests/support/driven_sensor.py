@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,7 @@ class DrivenSensor:
                 TrueValues(range_mm=front_mm, range_sd_mm=at.front_sd_mm), self.ranger.sensor.front_mm("u")
             )
             scene = f"{key}/{number:03d}"
-            reading = acquire(self.ranger, scene, lambda ids, scene=scene: self._capture(scene, ids))
+            reading = acquire(self.ranger, scene, partial(self._capture, scene))
             taken = reading_taken(self.rig, self.ranger.sensor, "drive", placed, number, reading, closest)
             if not at.front_is_one:
                 taken = taken.model_copy(update={"reference_sd_mm": None})

@@ -105,7 +105,8 @@ def _dead_workers_replaced(cluster: LocalCluster, workers: int) -> Iterator[None
 
     def watch() -> None:
         while not ended.wait(WATCHED_S):
-            cluster.loop.add_callback(replace)
+            if cluster.loop is not None:  # it has ended
+                cluster.loop.add_callback(replace)
 
     thread = threading.Thread(target=watch, name="watch of workers", daemon=True)
     thread.start()

@@ -41,7 +41,7 @@ def run_chunks(
     """
     from distributed import KilledWorker, as_completed
     from distributed.client import FutureCancelledError
-    from distributed.comm import CommClosedError
+    from distributed.comm.core import CommClosedError
 
     manifest, path = (folder.path / MANIFEST).read_text(encoding="utf-8"), str(folder.path.resolve())
     left = iter(missing)

@@ -88,7 +88,7 @@ def capture_record(capture: CaptureTaken) -> dict[str, list[str | float | int]]:
     Rerun converts lists faster than single values.
     """
     unknown = float("nan")
-    values = {
+    values: dict[str, str | float | int | None] = {
         "purpose": capture.purpose,
         "laser_id": capture.laser_id,
         "placement": capture.placement_key,

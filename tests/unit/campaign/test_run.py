@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import cast
 
 import distributed
 import pytest
 from distributed.client import FutureCancelledError
+from distributed.scheduler import WorkerState
 
 from tests.support.campaigns import SIMULATE, simulated_campaign
 from workbench.campaign.folder import CampaignFolder, open_folder
@@ -98,6 +100,6 @@ def test_a_failure_ends_the_run(
 
 
 def test_a_chunk_that_takes_every_worker_with_it_is_named(folder: CampaignFolder) -> None:
-    killed = distributed.KilledWorker("task", None, 3)
+    killed = distributed.KilledWorker("task", cast(WorkerState, None), 3)
     with pytest.raises(StoppedError, match=r"chunk 5 \(calibration 80 to 95\): every worker"):
         run(folder, FakeClient({5: killed}))

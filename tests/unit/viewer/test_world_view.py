@@ -13,6 +13,7 @@ from workbench.model.target import WorldTarget
 from workbench.model.trial_event import SensorAnswer, VehicleMoved
 from workbench.model.world import Pose, Vehicle, World
 from workbench.viewer.geometry import Geometry
+from workbench.viewer.stream import Stream
 from workbench.viewer.world_view import answer_strip, edges, log_step, log_world
 
 STRIPS = "LineStrips3D:strips"
@@ -81,13 +82,12 @@ def test_a_step_shows_vehicle_beams_and_answers(tmp_path: Path) -> None:
         answers=(SensorAnswer(sensor="closest", range_mm=500), SensorAnswer(sensor="sonar", range_mm=None)),
     )
     target = WorldTarget(world=WORLD, pose=event.pose)
-    contents = logged(
-        tmp_path,
-        lambda stream: (
-            log_world(stream, target),
-            log_step(stream, event, VEHICLE, [a_range(laser, 480.0)], geometry, COLORS),
-        ),
-    )
+
+    def log(stream: Stream) -> None:
+        log_world(stream, target)
+        log_step(stream, event, VEHICLE, [a_range(laser, 480.0)], geometry, COLORS)
+
+    contents = logged(tmp_path, log)
     (((_, beams),)) = contents.values("/world/beams", STRIPS)
     (beam,) = beams
     x, y, *_ = geometry.rays[laser]

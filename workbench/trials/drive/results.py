@@ -47,7 +47,7 @@ def range_errors(drives: Sequence[DriveRecord]) -> Iterator[RangeError]:
                 truth = one.truth.lasers[laser.laser_id]
                 if isfinite(truth.range_mm):
                     half_mm = COVERAGE_FACTOR * hypot(laser.sigma_mm, truth.sd_mm)
-                    inside = abs(laser.range_mm - truth.range_mm) <= half_mm
+                    inside: bool | None = abs(laser.range_mm - truth.range_mm) <= half_mm
                     quantity = AT_EDGE if truth.at_edge else ON_FACE
                     error_mm = laser.range_mm - truth.range_mm
                     yield RangeError(quantity, drive.name, truth.range_mm, error_mm, inside)
