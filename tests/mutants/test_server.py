@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-SERVER = "from tests.mutants import server; server.LIBRARIES = (); server.main()"
+SERVER = "from tests.mutants import server; server.LIBRARIES = ('pytest',); server.main()"
 TESTS = """
 import os, subprocess, sys, time
 
@@ -34,7 +34,7 @@ def test_a_run_passes_fails_or_does_not_end_and_leaves_no_process(tmp_path: Path
     usual = ["-q", "-p", "no:cacheprovider", "-p", "no:xdist", f"--rootdir={tmp_path}"]
     requests = [
         {"arguments": [*usual, f"test_it.py::{name}"], "environment": {"NAME": "value"}}
-        | {"limit_s": 600, "cpu_limit_s": 2}
+        | {"limit_s": 600, "cpu_limit_s": 5}
         for name in ("test_good", "test_bad", "test_no_end")
     ]
     done = subprocess.run(

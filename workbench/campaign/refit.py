@@ -6,7 +6,6 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 from typing import Literal
 
@@ -24,6 +23,7 @@ from workbench.model.calibration import Calibration, Provenance
 from workbench.model.captures import check_images, parse_captures, read_captures_file
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.errors import BadInputError, WorkbenchError
+from workbench.model.laboratory import Day
 from workbench.model.nested import fix_parameters
 from workbench.model.rig import Rig
 from workbench.model.table import PERCENT, Column, Table
@@ -49,8 +49,8 @@ class Refit(Work):
     """Folder of sessions, relative to the campaign file."""
     of_rig: str | None = None
     """Name or serial number of a rig; None: all."""
-    since: date | None = None
-    until: date | None = None
+    since: Day | None = None
+    until: Day | None = None
     """Last day; with one, sessions made later do not change the campaign."""
     verdict: FitVerdict | None = None
     """Verdict on the last fit of a session."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 import re
 from collections.abc import Iterator
@@ -56,7 +57,11 @@ def every_model() -> list[type[BaseModel]]:
             yield one
             yield from below(one)
 
-    ours = {m for m in below(BaseModel) if m.__module__.startswith("workbench.") and "[" not in m.__name__}
+    ours = {
+        m
+        for m in below(BaseModel)
+        if m.__module__.startswith("workbench.") and "[" not in m.__name__ and not inspect.isabstract(m)
+    }
     return sorted(ours, key=lambda m: (m.__module__, m.__qualname__))
 
 
