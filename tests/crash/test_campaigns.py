@@ -123,6 +123,7 @@ def test_workers_killed_while_they_start_are_replaced() -> None:
         assert client.submit(sum, [1, 2]).result(timeout=LONGEST_S) == 3
 
 
+@pytest.mark.thorough
 def test_ctrl_c_ends_cleanly_with_the_command_that_continues(campaign: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     process = start(campaign, out, "--workers", "1")

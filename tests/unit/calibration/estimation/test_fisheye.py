@@ -24,6 +24,7 @@ def seen(seed: int, rig: Rig | None = None) -> tuple[list[Observation], World]:
     return world.observations(FISHEYE_STANDOFFS_MM), world
 
 
+@pytest.mark.thorough
 def test_ranges_are_covered_as_stated() -> None:
     """24 sensors; the large run is `python -m tests.proofs.fisheye`."""
     distance2, count = 0.0, 0

@@ -27,6 +27,7 @@ def moved(seed: int, **change: float) -> Comparison:
     return compare(before, calibration_of(world, 2))
 
 
+@pytest.mark.thorough
 def test_two_sessions_of_one_sensor_agree_as_often_as_chance_says() -> None:
     probabilities = np.array([moved(seed).probability for seed in range(30)])
     # One in a hundred by chance: 3 or more of 30 would happen once in 300.

@@ -97,6 +97,7 @@ def test_too_few_or_equal_sessions_have_no_limits() -> None:
     assert control_chart(np.ones(30), np.full(30, np.nan), np.ones(30, int), 1) is None
 
 
+@pytest.mark.thorough
 def test_false_alarms_are_rarer_than_one_in_370_sessions_and_drift_is_found_before_3_sd() -> None:
     found, root = simulated(), np.sqrt(SENSORS)
     # Two standard deviations of a Poisson number of alarms.
