@@ -33,11 +33,11 @@ def lines() -> Iterator[str]:
     yield "frames a second of a core in a world, 640 x 480, four spots, a pair at each pose"
     rig = load_rig(ROOT / "rigs/thesis-emulated.yaml")
     spec = emulator_spec(rig)
-    lit: tuple[str, ...] = ()
+    lit = list[str]()
     with tempfile.TemporaryDirectory() as folder:
         scene = BenchScene(rig, spec, draw_truth(rig, spec), Path(folder) / "truth.yaml")
         sensor = ImageSensor(spec, ImageFormat(rig.camera.width_px, rig.camera.height_px), rig.camera.bits)
-        camera = EmulatedCamera(spec, scene, sensor, lambda: lit)
+        camera = EmulatedCamera(spec, scene, sensor, lambda: tuple(lit))
         camera.exposure_s = EXPOSURE_S
         for name, (text, start) in STARTS.items():
             world = load_world(ROOT / f"procedures/worlds/{name.split(',')[0]}.yaml")
@@ -48,6 +48,7 @@ def lines() -> Iterator[str]:
                 target = WorldTarget(world=world, pose=start.ahead(10.0 * n), speed_mm_s=300.0)
                 scene.place(Placement(key="w", standoff_mm=1000.0, target=target))
                 camera.mark(f"w/{n}")
-                for lit in (rig.laser_ids, ()):  # noqa: B007 - read by the camera
+                for lasers in (rig.laser_ids, ()):
+                    lit[:] = lasers
                     camera.grab()
             yield f"{name:16s} {text:18s} {2 * POSES / (time.process_time() - began):6.0f}"

@@ -5,15 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import random
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
@@ -43,6 +44,10 @@ def wait_for(what: Callable[[], bool], process: subprocess.Popen[str]) -> None:
 
 def finished(out: Path) -> int:
     return len(list(out.glob("chunks/*.sha256")))
+
+
+def have_finished(out: Path, chunks: int) -> bool:
+    return finished(out) >= chunks
 
 
 def workers(process: subprocess.Popen[str]) -> list[psutil.Process]:
@@ -89,12 +94,13 @@ thorough = pytest.mark.thorough
 def test_killed_workers_and_a_killed_client_change_no_bit(
     campaign: Path, undisturbed: dict[str, str], tmp_path: Path, seed: int, kills: int
 ) -> None:
-    rng, out = random.Random(seed), tmp_path / "out"  # noqa: S311 - no secret
+    rng, out = np.random.default_rng(seed), tmp_path / "out"
     process = start(campaign, out, "--workers", "2")
-    for after in sorted(rng.sample(range(1, CHUNKS // 2), kills)):
-        wait_for(lambda after=after: finished(out) >= after, process)  # type: ignore[misc]
+    for after in sorted(rng.choice(np.arange(1, CHUNKS // 2), kills, replace=False).tolist()):
+        wait_for(partial(have_finished, out, after), process)
         wait_for(lambda: bool(workers(process)), process)
-        rng.choice(workers(process)).kill()
+        alive = workers(process)
+        alive[rng.integers(len(alive))].kill()
     wait_for(lambda: finished(out) > CHUNKS // 2, process)
     orphans = workers(process)
     process.kill()

@@ -8,6 +8,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -131,11 +132,9 @@ def _without_interrupts(start: Callable[..., Started], **arguments: Any) -> Star
 
 
 def _require_distributed() -> None:
-    try:
-        import cryptography  # noqa: F401
-        import distributed  # noqa: F401
-    except ImportError as error:
-        raise BadInputError(
-            f"workbench campaign: expected the package {error.name}, it is not installed. Do: pip install"
-            " 'laser-range-workbench[campaign]'"
-        ) from None
+    for package in ("cryptography", "distributed"):
+        if find_spec(package) is None:
+            raise BadInputError(
+                f"workbench campaign: expected the package {package}, it is not installed. Do: pip install"
+                " 'laser-range-workbench[campaign]'"
+            )

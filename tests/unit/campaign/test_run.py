@@ -70,7 +70,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Campaign
 
 def run(folder: CampaignFolder, client: FakeClient) -> list[int]:
     finished: list[int] = []
-    run_chunks(client, folder, folder.missing(), lambda chunk: finished.append(chunk.index))  # type: ignore[arg-type]
+    dask = cast(distributed.Client, client)
+    run_chunks(dask, folder, folder.missing(), lambda chunk: finished.append(chunk.index))
     return finished
 
 

@@ -16,7 +16,7 @@ quasi-Newton iteration with linear convergence and much cheaper steps (`_close_i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -106,12 +106,13 @@ def fit_batch(
     layout = Layout(rig.camera.lens, len(rig.lasers), len(placements))
     varied = tuple(np.flatnonzero(table.prior_sd[layout.common]).tolist())
     standoff_mm = np.array([p.standoff_mm for p in placements])
-    shared = (table.prior_mean, table.prior_sd, standoff_mm)
-    program = (layout, varied)
+    prior = (table.prior_mean, table.prior_sd)
+
+    def solve(*chunk: FloatArray) -> tuple[Array, ...]:
+        return _solve_chunk(*prior, standoff_mm, *chunk, layout, varied)
+
     scale = np.ones(len(position))
-    solved = _in_chunks(
-        shared, program, np.zeros((len(position), len(table.prior_mean))), position, inverse_sd
-    )
+    solved = _in_chunks(solve, np.zeros((len(position), len(table.prior_mean))), position, inverse_sd)
     for _ in range(SCALE_ROUNDS):
         called_for = significant_scale(solved.chi2 * scale**2, solved.freedom)
         again = np.flatnonzero(called_for > scale * SCALE_TOLERANCE)
@@ -119,7 +120,7 @@ def fit_batch(
             break
         scale[again] = called_for[again]
         scaled = inverse_sd[again] / scale[again, None, None, None]
-        better = _in_chunks(shared, program, solved.y[again], position[again], scaled)
+        better = _in_chunks(solve, solved.y[again], position[again], scaled)
         for whole, part in zip(solved, better, strict=True):
             whole[again] = part
     sd, of_sensor = table.prior_sd, table.prior_sd[layout.sensor]
@@ -147,20 +148,14 @@ class _Solved(NamedTuple):
     converged: BoolArray
 
 
-def _in_chunks(
-    shared: tuple[FloatArray, ...],
-    program: tuple[Layout, tuple[int, ...]],
-    start: FloatArray,
-    position: FloatArray,
-    inverse_sd: FloatArray,
-) -> _Solved:
+def _in_chunks(solve: Callable[..., tuple[Array, ...]], *fits: FloatArray) -> _Solved:
     """Solve the fits in chunks of CHUNK; the last chunk is filled with copies of its first fit."""
-    parts = []
-    for first in range(0, len(position), CHUNK):
+    parts, count = [], len(fits[0])
+    for first in range(0, count, CHUNK):
         chosen = np.arange(first, first + CHUNK)
-        chosen = np.where(chosen < len(position), chosen, first)
-        solved = _solve_chunk(*shared, start[chosen], position[chosen], inverse_sd[chosen], *program)
-        parts.append([np.asarray(part)[: len(position) - first] for part in solved])
+        chosen = np.where(chosen < count, chosen, first)
+        solved = solve(*(part[chosen] for part in fits))
+        parts.append([np.asarray(part)[: count - first] for part in solved])
     return _Solved(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
