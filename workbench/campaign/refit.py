@@ -29,6 +29,7 @@ from workbench.model.rig import Rig
 from workbench.model.table import PERCENT, Column, Table
 from workbench.report.certificate.session_record import read_session
 from workbench.session.capture_table import CALIBRATION_TABLE
+from workbench.session.capture_table_check import check_captures
 from workbench.session.index import SessionSelection, indexed_sessions
 from workbench.session.index import Verdict as FitVerdict
 from workbench.session.manifest import load_session_rig
@@ -111,7 +112,9 @@ class Refit(Work):
         table = path / CALIBRATION_TABLE
         if not table.is_file():
             raise BadInputError(f"{path.name}: the session has no {CALIBRATION_TABLE}")
-        rows = parse_captures(table, read_captures_file(table))
+        content = read_captures_file(table)
+        rows = parse_captures(table, content)
+        check_captures(table, content)
         check_images(table, rows)
         model = fix_parameters(rig, self.fix)
         observations, rejected, boards = observations_of_rows(model, rows)

@@ -180,10 +180,9 @@ def _captures(request: Request) -> tuple[Path, bytes, tuple[CaptureRow, ...]]:
     rows = parse_captures(captures, content)
     if (request.source / MANIFEST).is_file():
         # Imported here: a fit of a captures file needs no events.
-        from workbench.session.capture_table_check import check_capture_table, check_frames
+        from workbench.session.capture_table_check import check_captures
 
-        check_capture_table(captures, content.decode("utf-8-sig"))
-        check_frames(request.source)
+        check_captures(captures, content)
     check_images(captures, rows)
     return captures, content, rows
 

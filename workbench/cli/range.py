@@ -17,7 +17,7 @@ from workbench.ranging.ranger import Ranger
 from workbench.report.readings import reading_list
 from workbench.sensor.usable import check_same_sensor, load_usable
 from workbench.session.capture_table import CALIBRATION_TABLE, TRIAL_TABLE
-from workbench.session.capture_table_check import check_capture_table, check_frames
+from workbench.session.capture_table_check import check_captures
 from workbench.session.compression import compression_notes
 from workbench.session.manifest import MANIFEST, load_session_rig
 
@@ -36,8 +36,7 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
     rows = parse_captures(table, content)
     if (captures / MANIFEST).is_file():
         check_same_sensor(load_session_rig(captures), ranger.calibration)
-        check_capture_table(table, content.decode("utf-8-sig"))
-        check_frames(captures)
+        check_captures(table, content)
     check_images(table, rows)
     with errors_name_file(table):
         for note in compression_notes(rows):

@@ -43,6 +43,16 @@ def check_capture_table(table: Path, content: str) -> None:
         )
 
 
+def check_captures(table: Path, content: bytes) -> None:
+    """Compare a captures file of a session, and all frames of the session, with the journal.
+
+    Raises:
+        BadInputError: see `check_capture_table` and `check_frames`.
+    """
+    check_capture_table(table, content.decode("utf-8-sig"))
+    check_frames(table.parent)
+
+
 def check_frames(session_dir: Path) -> None:
     """Compare the frames of a session's captures with the sums of their content in the journal.
 
