@@ -13,7 +13,6 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["OMP_NUM_THREADS"] = "1"
 
 import json
-import resource
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -85,6 +84,12 @@ def distance_sd(batch: BatchFit, index: int, a: FloatArray, b: FloatArray) -> fl
     return float(np.abs((a - b) * batch.table.prior_sd[free] / batch.sd[index, free]).max())
 
 
+def peak_gib() -> float:
+    """Largest memory of this process, GiB; `ru_maxrss` begins at that of the process which started it."""
+    (line,) = [x for x in Path("/proc/self/status").read_text().splitlines() if x.startswith("VmHWM:")]
+    return int(line.split()[1]) / 1024**2
+
+
 def main() -> None:
     """Print the figures as JSON."""
     # JAX counts its cores at its first use, which is below: one, as numpy's.
@@ -101,7 +106,7 @@ def main() -> None:
         begin = time.process_time()
         batch = fit_batch(rig, placements, data.position_px, data.sd_px)
         rounds.append((time.process_time() - begin) / FITS)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
+    peak = peak_gib()
 
     scales = batch.noise_scale
     tasks = [residuals_of(batch, rig, data.position_px[i], data.sd_px[i], scales[i]) for i in range(LOOP)]
