@@ -108,7 +108,11 @@ SLOW = {
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of these files, so that they can be chosen and left out."""
+    """Mark the tests of these files, so that they can be chosen and left out.
+
+    Of a slow test of several seeds the first is for every run, the others are for `make thorough`.
+    """
+    begun: dict[str, object] = {}
     for item in items:
         file = item.nodeid.partition("::")[0]
         if file in REAL_TIME:
@@ -117,3 +121,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("slow")
         if item.nodeid.startswith("tests/wheel/"):
             item.add_marker("wheel")
+        if isinstance(item, pytest.Function) and hasattr(item, "callspec") and file in SLOW:
+            seed = item.callspec.params.get("seed")
+            if begun.setdefault(f"{file}::{item.originalname}", seed) != seed:
+                item.add_marker("thorough")

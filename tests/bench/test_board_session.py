@@ -13,6 +13,7 @@ from workbench.model.calibration import load_calibration
 from workbench.model.event import CaptureTaken, StepFinished
 from workbench.session.journal import read_journal
 
+pytestmark = pytest.mark.thorough
 ROOT = Path(__file__).parents[2]
 SCRIPT = Path(sys.executable).with_name("workbench")
 PROCEDURE = """

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.support.terminal import Terminal, at_terminal, plain_lines
 from workbench.model import event as ev
 from workbench.model.calibration import load_calibration
@@ -12,6 +14,7 @@ from workbench.model.rig import load_rig
 from workbench.session.journal import read_journal
 from workbench.session.state import effective
 
+pytestmark = pytest.mark.thorough
 ANSWERS = {
     "Name of the sensor?": ["three"],
     "Serial number of the sensor?": ["LS-0042"],

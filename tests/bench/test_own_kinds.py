@@ -246,6 +246,7 @@ def test_the_recording_shows_table_and_chart(bench: Bench, session: tuple[Path, 
     assert event.charts[0].title in {view.name for view in layout_views(folder / "recording.rrd")}
 
 
+@pytest.mark.thorough
 def test_killed_and_resumed_it_ends_the_same(bench: Bench, session: tuple[Path, str]) -> None:
     whole, _ = session
     sessions = bench.folder / "killed"

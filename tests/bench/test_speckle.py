@@ -17,7 +17,8 @@ PLACEMENTS = 60
 
 
 @pytest.mark.parametrize(
-    ("name", "standoff_mm"), [("thesis-emulated", 200.0), ("thesis-both-emulated", 700.0)]
+    ("name", "standoff_mm"),
+    [("thesis-emulated", 200.0), pytest.param("thesis-both-emulated", 700.0, marks=pytest.mark.thorough)],
 )
 def test_spots_scatter_by_speckle_as_the_rig_file_says(tmp_path: Path, name: str, standoff_mm: float) -> None:
     """Two frames of a placement share its speckle; whatever else they share is left out here."""

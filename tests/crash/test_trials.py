@@ -46,6 +46,7 @@ def test_a_trial_killed_at_a_record_gives_the_same_files(
     assert differs(killer, whole, tmp_path, record) == ""
 
 
+@pytest.mark.thorough
 def test_a_drive_killed_on_its_way_is_driven_again(tmp_path: Path) -> None:
     driven = undisturbed(tmp_path, DRIVE)
     event = list(read_journal(driven))[MIDDLE_OF_A_DRIVE].event

@@ -102,6 +102,7 @@ def test_joint_distance_of_a_small_error_is_that_in_the_parameters() -> None:
     np.testing.assert_allclose(found, chi2.sf((whitened**2).sum(axis=1), free.sum()), rtol=0.01)
 
 
+@pytest.mark.thorough
 def test_a_small_proof_of_the_fisheye_scores_every_range() -> None:
     scores, unsolved = fisheye.scores(fisheye_rig(), 24, 7)
     assert unsolved == 0

@@ -17,7 +17,7 @@ from tests.proofs.trials import (
 )
 
 
-@pytest.mark.parametrize("proof", [precision, gauge])
+@pytest.mark.parametrize("proof", [precision, pytest.param(gauge, marks=pytest.mark.thorough)])
 def test_intervals_hold_their_share(proof: Proof) -> None:
     """400 and 200 trials; a figure is missed where they contradict its bounds."""
     assert [figure.line() for figure in proof(40) if figure.is_missed] == []

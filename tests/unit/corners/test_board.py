@@ -74,6 +74,7 @@ def errors(found: BoardCorners, seen: Seen) -> FloatArray:
     return found.position_px - seen.true_px[found.ids]
 
 
+@pytest.mark.thorough
 def test_errors_are_as_large_as_stated(tmp_path: Path) -> None:
     scores: list[float] = []
     for n, seed in enumerate(SEEDS):

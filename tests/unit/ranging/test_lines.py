@@ -36,6 +36,7 @@ def test_the_mean_of_a_cylinder_s_line_is_known_as_well_as_the_line(ranger: Rang
     assert reading.mean_sigma_mm == pytest.approx(reading.sigma_mm, rel=1e-4)
 
 
+@pytest.mark.thorough
 def test_angle_and_closest_range_lie_where_stated_whatever_the_calibration() -> None:
     """50 rigs, calibrated once each, before a wall turned by 30 degrees: pointing and lens are in sigma."""
     angle, closest = [], []

@@ -90,6 +90,7 @@ def test_the_speckle_of_a_spot_replaces_that_of_the_calibration(sensor: Calibrat
     assert own / typical == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_ranges_of_unseen_standoffs_lie_where_stated() -> None:
     """40 rigs: errors of ranges at standoffs that the fits did not see, whitened by their covariance."""
     seen = [(i, r) for i in ("L1", "L2", "L3", "L4") for r in (180.0, 750.0, 1800.0)]

@@ -59,6 +59,7 @@ def test_the_board_gives_the_focal_length_where_the_flat_does_not(seed: int) -> 
     assert of(flat, "f_px")[1] > 10 * sd
 
 
+@pytest.mark.thorough
 def test_the_truth_lies_where_the_covariance_says() -> None:
     rig = board_rig()
     sensor = [p.name for p in joint(rig, 50)[0].table.parameters if p.kind == "sensor" and p.prior.sd]

@@ -112,7 +112,11 @@ def seen(
 
 @pytest.mark.parametrize(
     ("standoffs_mm", "lasers"),
-    [([], ""), ([160.0, 210.0], "L1 L2 L3"), ([160.0, 210.0, 400.0], "L1 L2 L3 L4")],
+    [
+        pytest.param([], "", marks=pytest.mark.thorough),
+        ([160.0, 210.0], "L1 L2 L3"),
+        pytest.param([160.0, 210.0, 400.0], "L1 L2 L3 L4", marks=pytest.mark.thorough),
+    ],
 )
 def test_the_spot_is_where_it_is_said_to_be(standoffs_mm: list[float], lasers: str) -> None:
     """In sensors drawn from the rig's tolerances it lies as far off as stated: no bias, the right spread.

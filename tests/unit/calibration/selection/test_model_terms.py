@@ -66,6 +66,7 @@ def test_the_bayes_factor_is_the_ratio_of_marginal_likelihoods(name: str, mean: 
     assert model_terms._compare(fitted, index).log10_bayes_factor == pytest.approx(expected, abs=1e-4)
 
 
+@pytest.mark.thorough
 def test_p_values_of_an_absent_term_are_uniform() -> None:
     rig = lens(thesis_rig(), k3=0.3)
     worlds = [World(lens(rig, k3=0.0), seed) for seed in range(40)]
