@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from tests.tables import of_proofs, of_sessions, of_thesis
+from tests.tables import budget, of_proofs, of_sessions, of_thesis
 
 PAGES = (
     "README.md",
+    "docs/budget.md",
     "docs/campaigns.md",
     "docs/demo.md",
     "docs/design-of-standoffs.md",
@@ -39,6 +40,8 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "shapes-calibrated": partial(of_proofs.shapes, "Calibration with the stated errors"),
     "shapes-flat": partial(of_proofs.shapes, "Flats, calibration exact"),
     "campaigns": of_proofs.campaigns,
+    "budget": budget.budget,
+    "budget-others": budget.others,
     "speed": of_proofs.speed,
     "speckle": of_proofs.speckle,
     "situations": of_proofs.situations,

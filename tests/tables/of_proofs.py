@@ -58,16 +58,22 @@ def campaigns() -> str:
 
 def speed() -> str:
     """Times of a reading: `make bench`."""
-    rows = {}
-    for line in newest("ranging").lines:
-        if found := re.match(r" *(horizontal|both lines), (.+?)((?: +[\d.]+){6})  ", line):
-            _, p99, cpu, per_second, *_ = found[3].split()
-            rows[found[1], found[2]] = (cpu, p99, per_second)
+    rows = ranging_times()
     heading = ("", "one line", "p99", "readings/s", "both lines", "p99", "readings/s")
     return markdown_table(
         heading,
         [(name, *rows["horizontal", key], *rows["both lines", key]) for key, name in SPEED_ROWS.items()],
     )
+
+
+def ranging_times() -> dict[tuple[str, str], tuple[str, str, str]]:
+    """By lines and scene of the benchmark: processor time and 99th percentile (us), readings/s."""
+    rows = {}
+    for line in newest("ranging").lines:
+        if found := re.match(r" *(horizontal|both lines), (.+?)((?: +[\d.]+){6})  ", line):
+            _, p99, cpu, per_second, *_ = found[3].split()
+            rows[found[1], found[2]] = (cpu, p99, per_second)
+    return rows
 
 
 def speckle() -> str:
