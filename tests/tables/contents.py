@@ -15,6 +15,7 @@ PAGES = (
     "docs/design-of-standoffs.md",
     "docs/history.md",
     "docs/ranging.md",
+    "docs/scanning.md",
     "docs/spots.md",
     "docs/target-trials.md",
     "docs/thesis-simulation.md",
@@ -49,6 +50,7 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "trials": of_proofs.trials,
     "verification": of_proofs.verification,
     "control-charts": of_proofs.control_charts,
+    "scanning": of_proofs.scanning,
     "worlds": of_proofs.worlds,
     "worlds-errors": of_proofs.worlds_errors,
 }

@@ -155,9 +155,28 @@ def control_charts() -> str:
     return markdown_table(("sensor", "result"), rows, numbers_from=2)
 
 
-def proof_figures() -> Iterator[ProofFigure]:
-    """All figures of the newest proof of the trials."""
-    for line in newest("trials").lines:
+def scanning() -> str:
+    """Coverage of calibrated scanning heads: `python -m tests.proofs.scanning`."""
+    found = list(proof_figures("scanning"))
+    rows = []
+    for trial, one in (("parameter", "a parameter"), ("scan", "a point at one angle, x or range")):
+        single = [figure.value for figure in found if figure.trial == trial]
+        share = f"{100 * min(single):.1f} to {100 * max(single):.1f} %"
+        rows.append((f"{one}: smallest and largest of {len(single)}", share))
+    rows += [
+        (f"{figure.quantity}, together", f"{100 * figure.value:.1f} %")
+        for figure in found
+        if figure.trial in ("together", "blind")
+    ]
+    (precision,) = (line for line in newest("scanning").lines if line.startswith("median sd"))
+    rows.append(("median standard deviation of a range", precision.partition(": ")[2]))
+    heads = max(int(figure.runs) for figure in found)
+    return markdown_table((f"95 % intervals of {heads} heads", "contain the truth"), rows)
+
+
+def proof_figures(subject: str = "trials") -> Iterator[ProofFigure]:
+    """All figures of the newest proof of a subject."""
+    for line in newest(subject).lines:
         if found := FIGURE.match(line):
             yield ProofFigure(
                 found["trial"].strip(),
