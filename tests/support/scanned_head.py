@@ -18,8 +18,8 @@ from workbench.emulator.spec import EmulatorSpec, emulator_spec
 from workbench.emulator.surfaces import PlaneSurface
 from workbench.emulator.truth import TrueRay, Truth, draw_placement_error, draw_truth
 from workbench.model.arrays import BoolArray, FloatArray
+from workbench.model.head_calibration import HEAD
 from workbench.model.rig import Rig
-from workbench.optics.head import HEAD
 
 MARGIN_PX = 3.0
 

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from workbench.model.calibration import Noise, Parameters, Provenance
-from workbench.model.lens import LensName
+from workbench.model.lens import LensName, lens_parameters
 from workbench.model.rig import MOST_PX, LaserId, NonNegativeFloat
 from workbench.model.yamlfile import FileModel
 
+HEAD = (
+    "axis_z_mm",
+    "axis_slope_x",
+    "axis_slope_z",
+    "beam_offset_mm",
+    "scale",
+    "eccentricity_cos_rad",
+    "eccentricity_sin_rad",
+)
+"""Names of a head's parameters beyond those of its laser's ray."""
+RAY = ("x_mm", "y_mm", "tx", "ty")
 Span = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
 
 
@@ -44,6 +55,22 @@ class ScanningHead(FileModel):
     """Smallest and largest standoff of the calibration."""
     fit: HeadFitSummary
     provenance: Provenance
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters that a point depends on: lens, offset, ray, head."""
+        return (
+            *lens_parameters(self.distortion_model),
+            "offset_mm",
+            *(f"{self.laser}.{name}" for name in RAY),
+            *(f"head.{name}" for name in HEAD),
+        )
+
+    @model_validator(mode="after")
+    def _has_every_parameter(self) -> ScanningHead:
+        if missing := [name for name in self.names if name not in self.parameters.names]:
+            raise ValueError(f"parameters.names: expected {missing[0]} among them")
+        return self
 
 
 class HeadCalibration(FileModel):

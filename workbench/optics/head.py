@@ -15,20 +15,9 @@ from jax.typing import ArrayLike
 
 from workbench.optics.rays import Ray
 
-HEAD = (
-    "axis_z_mm",
-    "axis_slope_x",
-    "axis_slope_z",
-    "beam_offset_mm",
-    "scale",
-    "eccentricity_cos_rad",
-    "eccentricity_sin_rad",
-)
-"""Names of a head's parameters, in the order of `Head`."""
-
 
 class Head(NamedTuple):
-    """Parameters of a head beyond those of its laser's ray."""
+    """Parameters of a head beyond those of its laser's ray, in the order of `HEAD`."""
 
     axis_z_mm: ArrayLike
     axis_slope_x: ArrayLike

@@ -19,9 +19,9 @@ from jax import Array
 from workbench.model.arrays import FloatArray
 from workbench.model.head_calibration import HeadCalibration
 from workbench.model.lens import LensName
-from workbench.optics.head import HEAD, Head, turned_ray
+from workbench.optics.head import Head, turned_ray
 from workbench.optics.lens_models import lens_model
-from workbench.optics.rays import RAY, Ray
+from workbench.optics.rays import Ray
 from workbench.optics.undistort import undistort
 
 POINT = ("x_mm", "y_mm", "range_mm")
@@ -55,15 +55,8 @@ class CalibratedHead:
     def __init__(self, calibration: HeadCalibration) -> None:
         self.calibration = calibration.scanning_head
         self.model = lens_model(self.calibration.distortion_model)
-        parameters, laser = self.calibration.parameters, self.calibration.laser
-        names = list(parameters.names)
-        wanted = (
-            *self.model.parameters,
-            "offset_mm",
-            *(f"{laser}.{name}" for name in RAY),
-            *(f"head.{name}" for name in HEAD),
-        )
-        at = [names.index(name) for name in wanted]
+        parameters = self.calibration.parameters
+        at = [parameters.names.index(name) for name in self.calibration.names]
         self.values = np.array(parameters.values)[at]
         """(P,) lens, offset, ray and head."""
         self.covariance = parameters.covariance_array[np.ix_(at, at)]

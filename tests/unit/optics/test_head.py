@@ -9,7 +9,8 @@ import pytest
 
 from workbench.emulator.head import turned
 from workbench.emulator.truth import TrueHead, TrueRay
-from workbench.optics.head import HEAD, Head, beam_angle, turned_ray
+from workbench.model.head_calibration import HEAD
+from workbench.optics.head import Head, beam_angle, turned_ray
 from workbench.optics.rays import Plane, Ray, depth_on_plane
 
 PERFECT = Head(*np.zeros(len(HEAD)))

@@ -24,9 +24,10 @@ from workbench.calibration.model.parameters import (
     sensor_parameters,
 )
 from workbench.calibration.model.prediction import predict_cell
+from workbench.model.head_calibration import HEAD
 from workbench.model.lens import LensName
 from workbench.model.rig import Prior, Rig
-from workbench.optics.head import HEAD, Head, turned_ray
+from workbench.optics.head import Head, turned_ray
 from workbench.optics.rays import Ray
 
 

@@ -15,8 +15,8 @@ from tests.support.scanned_head import SimulatedHead
 from workbench.calibration.scanning.prediction import HeadLayout, head_table, predict_head_spots
 from workbench.emulator.truth import draw_placement_error
 from workbench.model.errors import BadInputError
+from workbench.model.head_calibration import HEAD
 from workbench.model.rig import Rig, load_rig
-from workbench.optics.head import HEAD
 
 RIG = load_rig(Path(__file__).parents[4] / "rigs/scanning-head-emulated.yaml")
 
