@@ -164,7 +164,7 @@ def scanning() -> str:
         share = f"{100 * min(single):.1f} to {100 * max(single):.1f} %"
         rows.append((f"{one}: smallest and largest of {len(single)}", share))
     rows += [
-        (f"{figure.quantity}, together", f"{100 * figure.value:.1f} %")
+        (figure.quantity + ", together" * (figure.trial == "together"), f"{100 * figure.value:.1f} %")
         for figure in found
         if figure.trial in ("together", "blind")
     ]
