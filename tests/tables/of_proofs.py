@@ -174,6 +174,33 @@ def scanning() -> str:
     return markdown_table((f"95 % intervals of {heads} heads", "contain the truth"), rows)
 
 
+def colours() -> str:
+    """Lasers of three colours: `python -m tests.proofs.colours`."""
+    lines = [line.split(" | ") for line in newest("colours").lines if " | " in line]
+    rows = [
+        (
+            way,
+            pairs,
+            rate,
+            f"{100 * float(missing):.1f} %",
+            f"{beside} of {count}",
+            f"{100 * float(wrong):.1f} %",
+            lost,
+        )
+        for way, _, pairs, rate, missing, wrong, count, beside, lost in lines[1:]
+    ]
+    heading = (
+        "",
+        "pairs a reading",
+        "readings/s",
+        "missing",
+        "beside an object",
+        "wrong",
+        "ranges of lost beams",
+    )
+    return markdown_table(heading, rows)
+
+
 def proof_figures(subject: str = "trials") -> Iterator[ProofFigure]:
     """All figures of the newest proof of a subject."""
     for line in newest(subject).lines:
