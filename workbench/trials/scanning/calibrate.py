@@ -19,6 +19,7 @@ from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.placements import visit_placements
 from workbench.session.files import write_record
+from workbench.trials.limits import Result, check_results, skipped_results
 from workbench.trials.results import finish_trial
 from workbench.trials.scanning.calibrate_step import CalibrateHeadStep
 from workbench.trials.scanning.moves import HeadCapture, sweep
@@ -31,7 +32,7 @@ def calibrate(context: Context, name: str, step: CalibrateHeadStep, placements: 
 
     Raises:
         BadInputError: no spot is left to fit.
-        LimitFailedError: the fit has no result.
+        LimitFailedError: the fit has no result, or a limit failed.
         WorkbenchError: see `visit_placements`.
     """
     swept = visit_placements(
@@ -41,18 +42,26 @@ def calibrate(context: Context, name: str, step: CalibrateHeadStep, placements: 
     seen = [(one.found, one.reading_deg) for one in captures if not isinstance(one.found, Rejected)]
     spots, outliers = head_spots(context.rig, seen)
     fit = fit_head(context.rig, spots)
-    context.head = calibrated_head(fit, context.provenance)
-    write_record(context.session_dir / FILE, render(context.head).encode())
-    for warning in context.head.scanning_head.fit.warnings:
+    head = calibrated_head(fit, context.provenance)
+    for warning in head.scanning_head.fit.warnings:
         context.emit(TrialProgress(trial=name, text=warning))
     tables = [
-        parameter_table(name, context.head, fit),
+        parameter_table(name, head, fit),
         move_table(name, fit),
         missing_table(name, captures, outliers),
     ]
     finish_trial(context, name, [one for one in tables if one.rows], residual_charts(name, fit))
-    moves = counted(len(spots.placement), "move")
-    return f"{moves} of the head, rms {context.head.scanning_head.fit.rms_px:.3f} px, {FILE} written"
+    rms_px = head.scanning_head.fit.rms_px
+    visited = {one.key for one in spots.placements}
+    results = [
+        Result("rms_px", "all moves", rms_px),
+        Result("noise_scale", "all moves", fit.noise_scale),
+        *skipped_results([one for one in placements if one.key not in visited], step.limits),
+    ]
+    check_results(context, name, results, step.limits)
+    context.head = head
+    write_record(context.session_dir / FILE, render(head).encode())
+    return f"{counted(len(spots.placement), 'move')} of the head, rms {rms_px:.3f} px, {FILE} written"
 
 
 def parameter_table(name: str, head: HeadCalibration, fit: HeadFit) -> Table:

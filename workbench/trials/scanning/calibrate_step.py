@@ -8,15 +8,28 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from workbench.model.fields import Count, Standoffs, require_different
+from workbench.model.limit import Limit
 from workbench.model.number_text import counted
+from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
+from workbench.procedure.engine.limits import result_limit_prompts
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel, flat_placement
 from workbench.trials.scanning.moves import check_reach
+from workbench.trials.trial_step import ResultLimits
 
 Angles = Annotated[tuple[float, ...], Field(min_length=2)]
+
+
+class HeadLimits(ResultLimits):
+    """Limits on the fit of a head; without a fit that keeps them there is no `head.yaml`."""
+
+    rms_px: Limit | None = None
+    """Root mean square of the residuals of both coordinates."""
+    noise_scale: Limit | None = None
+    """Factor of the residuals on the stated noise, 1 where they agree."""
 
 
 @register
@@ -29,6 +42,7 @@ class CalibrateHeadStep(StepModel):
     angles_deg: Angles
     """Readings of the encoder, in the order of the moves; begin near 0, where every spot is in the image."""
     repeats: Count = 3
+    limits: HeadLimits = HeadLimits()
 
     @model_validator(mode="after")
     def _all_differ(self) -> CalibrateHeadStep:
@@ -61,11 +75,15 @@ class CalibrateHeadStep(StepModel):
         """Number of pairs at all angles and standoffs."""
         return len(self.standoffs_mm) * len(self.angles_deg) * self.repeats
 
+    def prompts(self, name: str, rig: Rig) -> Sequence[Prompt]:
+        """Prompts of the placements and of limits."""
+        return [*super().prompts(name, rig), *result_limit_prompts(name, self.limits)]
+
     def run(self, context: Context, name: str) -> str:
         """Capture, fit, and write the calibration of the head.
 
         Raises:
-            LimitFailedError: the fit has no result.
+            LimitFailedError: the fit has no result, or a limit failed.
             WorkbenchError: see `visit_placements`.
         """
         # Imported here: checking a file must not import the fit.

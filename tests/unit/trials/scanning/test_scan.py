@@ -14,7 +14,7 @@ from tests.support.rigs import thesis_rig
 from tests.support.running import running
 from workbench.devices.placed_by_hand import ByHandBlock, PlacedByHand
 from workbench.model import event as ev
-from workbench.model.errors import BadInputError, RigNotReadyError
+from workbench.model.errors import BadInputError, LimitFailedError, RigNotReadyError
 from workbench.model.event import TrialFinished
 from workbench.model.head_calibration import HeadCalibration
 from workbench.model.rig import Rig, exactly, load_rig
@@ -102,6 +102,19 @@ def test_the_file_is_that_of_the_session(done: Done) -> None:
     assert done.head.scanning_head.fit.noise_scale < 1.5
     moves = rows(done.folder / "s/c.1-moves.csv")
     assert len(moves) == done.head.scanning_head.fit.moves >= 10
+
+
+def test_a_fit_beyond_its_limits_calibrates_no_head(done: Done, tmp_path: Path) -> None:
+    limits = {"rms_px": {"in": [None, 0.001]}}
+    strict = CalibrateHeadStep.model_validate(CALIBRATE.model_dump(by_alias=True) | {"limits": limits})
+    before = [one for one in done.records if not isinstance(one.event, TrialFinished)]
+    shutil.copytree(done.folder / "s/frames/c.1", tmp_path / "s/frames/c.1")
+    with running(tmp_path, low_rig(), before=before) as session:
+        with pytest.raises(LimitFailedError, match=r"rms_px: expected at most 0\.001"):
+            strict.run(session.context, "c.1")
+        assert session.context.head is None
+    assert not (tmp_path / "s/head.yaml").exists()
+    assert (tmp_path / "s/c.1-parameters.csv").exists()
 
 
 def test_a_beam_beyond_the_image_is_listed(done: Done) -> None:
