@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from tests.support.rigs import thesis_rig
 from tests.support.running import running
+from tests.support.scanned_head import SimulatedHead
 from workbench.devices.placed_by_hand import ByHandBlock, PlacedByHand
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError, LimitFailedError, RigNotReadyError
@@ -102,6 +104,18 @@ def test_the_file_is_that_of_the_session(done: Done) -> None:
     assert done.head.scanning_head.fit.noise_scale < 1.5
     moves = rows(done.folder / "s/c.1-moves.csv")
     assert len(moves) == done.head.scanning_head.fit.moves >= 10
+
+
+def test_the_head_from_rendered_frames_is_the_true_one(done: Done) -> None:
+    true = SimulatedHead.of(low_rig(), 3).values
+    parameters = done.head.scanning_head.parameters
+    free = np.array(parameters.sd) > 0
+    z = (np.array(parameters.values) - true)[free]
+    within = np.abs(z) / np.array(parameters.sd)[free]
+    assert within.max() < 4.5
+    # All together: the distance in the posterior's covariance has as many degrees of freedom.
+    distance2 = z @ np.linalg.solve(parameters.covariance_array[np.ix_(free, free)], z)
+    assert chi2.sf(distance2, free.sum()) > 1e-4
 
 
 def test_a_fit_beyond_its_limits_calibrates_no_head(done: Done, tmp_path: Path) -> None:
