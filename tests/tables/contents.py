@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from tests.tables import of_proofs, of_sessions, of_thesis
+from tests.tables import budget, of_proofs, of_sessions, of_thesis
 
 PAGES = (
     "README.md",
+    "docs/budget.md",
     "docs/campaigns.md",
+    "docs/colours.md",
     "docs/demo.md",
     "docs/design-of-standoffs.md",
     "docs/history.md",
     "docs/ranging.md",
+    "docs/scanning.md",
     "docs/spots.md",
     "docs/target-trials.md",
     "docs/thesis-simulation.md",
@@ -39,6 +42,8 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "shapes-calibrated": partial(of_proofs.shapes, "Calibration with the stated errors"),
     "shapes-flat": partial(of_proofs.shapes, "Flats, calibration exact"),
     "campaigns": of_proofs.campaigns,
+    "budget": budget.budget,
+    "budget-others": budget.others,
     "speed": of_proofs.speed,
     "speckle": of_proofs.speckle,
     "situations": of_proofs.situations,
@@ -46,6 +51,8 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "trials": of_proofs.trials,
     "verification": of_proofs.verification,
     "control-charts": of_proofs.control_charts,
+    "colours": of_proofs.colours,
+    "scanning": of_proofs.scanning,
     "worlds": of_proofs.worlds,
     "worlds-errors": of_proofs.worlds_errors,
 }

@@ -58,16 +58,22 @@ def campaigns() -> str:
 
 def speed() -> str:
     """Times of a reading: `make bench`."""
-    rows = {}
-    for line in newest("ranging").lines:
-        if found := re.match(r" *(horizontal|both lines), (.+?)((?: +[\d.]+){6})  ", line):
-            _, p99, cpu, per_second, *_ = found[3].split()
-            rows[found[1], found[2]] = (cpu, p99, per_second)
+    rows = ranging_times()
     heading = ("", "one line", "p99", "readings/s", "both lines", "p99", "readings/s")
     return markdown_table(
         heading,
         [(name, *rows["horizontal", key], *rows["both lines", key]) for key, name in SPEED_ROWS.items()],
     )
+
+
+def ranging_times() -> dict[tuple[str, str], tuple[str, str, str]]:
+    """By lines and scene of the benchmark: processor time and 99th percentile (us), readings/s."""
+    rows = {}
+    for line in newest("ranging").lines:
+        if found := re.match(r" *(horizontal|both lines), (.+?)((?: +[\d.]+){6})  ", line):
+            _, p99, cpu, per_second, *_ = found[3].split()
+            rows[found[1], found[2]] = (cpu, p99, per_second)
+    return rows
 
 
 def speckle() -> str:
@@ -149,9 +155,55 @@ def control_charts() -> str:
     return markdown_table(("sensor", "result"), rows, numbers_from=2)
 
 
-def proof_figures() -> Iterator[ProofFigure]:
-    """All figures of the newest proof of the trials."""
-    for line in newest("trials").lines:
+def scanning() -> str:
+    """Coverage of calibrated scanning heads: `python -m tests.proofs.scanning`."""
+    found = list(proof_figures("scanning"))
+    rows = []
+    for trial, one in (("parameter", "a parameter"), ("scan", "a point at one angle, x or range")):
+        single = [figure.value for figure in found if figure.trial == trial]
+        share = f"{100 * min(single):.1f} to {100 * max(single):.1f} %"
+        rows.append((f"{one}: smallest and largest of {len(single)}", share))
+    rows += [
+        (figure.quantity + ", together" * (figure.trial == "together"), f"{100 * figure.value:.1f} %")
+        for figure in found
+        if figure.trial in ("together", "blind")
+    ]
+    (precision,) = (line for line in newest("scanning").lines if line.startswith("median sd"))
+    rows.append(("median standard deviation of a range", precision.partition(": ")[2]))
+    heads = max(int(figure.runs) for figure in found)
+    return markdown_table((f"95 % intervals of {heads} heads", "contain the truth"), rows)
+
+
+def colours() -> str:
+    """Lasers of three colours: `python -m tests.proofs.colours`."""
+    lines = [line.split(" | ") for line in newest("colours").lines if " | " in line]
+    rows = [
+        (
+            way,
+            pairs,
+            rate,
+            f"{100 * float(missing):.1f} %",
+            f"{beside} of {count}",
+            f"{100 * float(wrong):.1f} %",
+            lost,
+        )
+        for way, _, pairs, rate, missing, wrong, count, beside, lost in lines[1:]
+    ]
+    heading = (
+        "",
+        "pairs a reading",
+        "readings/s",
+        "missing",
+        "beside an object",
+        "wrong",
+        "ranges of lost beams",
+    )
+    return markdown_table(heading, rows)
+
+
+def proof_figures(subject: str = "trials") -> Iterator[ProofFigure]:
+    """All figures of the newest proof of a subject."""
+    for line in newest(subject).lines:
         if found := FIGURE.match(line):
             yield ProofFigure(
                 found["trial"].strip(),

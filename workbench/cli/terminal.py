@@ -24,6 +24,9 @@ from workbench.procedure.engine.progress import TimeLeft
 from workbench.report.rejected_lines import rejected_lines
 from workbench.report.terminal_table import TerminalTable
 
+HEAD = "head"
+"""Key of the spots of a scanning head among those of lasers."""
+
 
 class Terminal:
     """Consumer that shows the records of a session."""
@@ -158,13 +161,16 @@ class Terminal:
 
     def _show_capture(self, capture: ev.CaptureTaken, found: ev.SpotsFound) -> None:
         """Update the live line: quality of this laser at this placement, over its repeats so far."""
-        self._spots[capture.laser_id].append(found.spots)
+        # A turned head is another beam: its spots have no common scatter.
+        self._spots[capture.laser_id if capture.head_deg is None else HEAD].append(found.spots)
         self._placement = f"{capture.standoff_mm:g} mm: {_summary(self._spots)}"
         if self._task is not None and self._replay.keeps(capture.placement_key):
             self._progress.update(self._task, description=f"     {self._replay_text()}")
         elif self._task is not None:
-            name = f"{capture.standoff_mm:g} mm {capture.laser_id}"
-            seen = _live(quality_of(self._spots[capture.laser_id])) if capture.laser_id != "all" else ""
+            turned = "" if capture.head_deg is None else f" at {capture.head_deg:g} deg"
+            name = f"{capture.standoff_mm:g} mm {capture.laser_id}{turned}"
+            repeats = self._spots.get(capture.laser_id, [found.spots])
+            seen = _live(quality_of(repeats)) if capture.laser_id != "all" else ""
             self._progress.update(self._task, description=f"     {name} {seen}")
 
     _placement = _placed = ""
@@ -218,7 +224,7 @@ def about(seconds: float) -> str:
 
 def _counts(capture: ev.CaptureTaken) -> bool:
     """Whether the step announced the capture; captures of single lasers in trials are extra."""
-    return capture.purpose == "calibration" or capture.laser_id == "all"
+    return capture.purpose == "calibration" or capture.laser_id == "all" or capture.head_deg is not None
 
 
 def _live(quality: Quality) -> str:
@@ -237,6 +243,9 @@ def _summary(spots: dict[str, list[Sequence[Spot]]]) -> str:
     if "all" in spots:
         each = spots["all"]
         return f"{counted(len(each), 'reading')}, at least {counted(min(map(len, each)), 'spot')}"
+    if HEAD in spots:
+        each = spots[HEAD]
+        return f"{counted(len(each), 'capture')} of the head, {sum(map(bool, each))} with a spot"
     found = {name: quality_of(each) for name, each in spots.items()}
     snr = [q.snr for q in found.values() if q.snr is not None]
     scatter = [q.scatter_px for q in found.values() if q.scatter_px is not None]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from workbench.model.device_block import DeviceBlock
+from workbench.model.errors import RigNotReadyError
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 
@@ -24,5 +25,13 @@ class PlacedByHand:
         return cls()
 
     def place(self, placement: Placement) -> Placement:
-        """Placement as the operator confirmed it."""
+        """Placement as the operator confirmed it.
+
+        Raises:
+            RigNotReadyError: a scanning head is to be turned.
+        """
+        if placement.head_deg is not None:
+            raise RigNotReadyError(
+                "target: expected a driver that turns the scanning head (docs/scanning.md), got by_hand"
+            )
         return placement

@@ -131,7 +131,10 @@ class Target(Protocol):
     """Positioning of the target: by a person, a rail, or an emulated bench."""
 
     def place(self, placement: Placement) -> Placement:
-        """Place the target; returns the placement as measured by the ruler."""
+        """Place the target; returns the placement as measured by the ruler.
+
+        With `head_deg` also turn the scanning head; the result has the reading of its encoder.
+        """
 
 
 class Operator(Protocol):

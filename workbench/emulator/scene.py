@@ -9,6 +9,7 @@ from pathlib import Path
 
 from workbench.emulator.beam import Beam
 from workbench.emulator.board import BoardSurface, Print, stand
+from workbench.emulator.head import reading_error_deg, turned
 from workbench.emulator.keyed import generator
 from workbench.emulator.lens import STEADY, Drift, Lens, SightMap
 from workbench.emulator.spec import EmulatorSpec, SurfaceSpec
@@ -56,6 +57,7 @@ class BenchScene:
         self._file = TruthFile(truth_file, spec, truth)
         self._image = ImageFormat(rig.camera.width_px, rig.camera.height_px)
         self._beams = {name: Beam(ray, spec.beam) for name, ray in truth.lasers.items()}
+        self._turn_head("", 0.0)
         self._surfaces: list[tuple[Surface, float]] = []
         self._world: WorldView | None = None
         self._known_world: tuple[World, WorldBodies] | None = None
@@ -99,6 +101,7 @@ class BenchScene:
         else:
             self._surfaces = _surfaces(placement.target, z_mm, error, self._spec.surface)
             self._file.add(placement.key, own)
+        self._turn_head(placement.key, placement.head_deg or 0.0)
         self._key, self._blocked = _speckle_key(placement), placement.blocked
         self._spots, self._picture = {}, None
         self.moves += 1
@@ -126,6 +129,14 @@ class BenchScene:
         if self._picture is None:
             self._picture = board.lit_by_room(self._lens(), self._image, self._spec.lens.blur_px)
         return self._picture
+
+    def _turn_head(self, key: str, reading_deg: float) -> None:
+        """Turn the scanning head of a rig that has one, with the error of its encoder."""
+        head = self._truth.head
+        if head is not None:
+            error_deg = reading_error_deg(head, self._spec, key, reading_deg)
+            ray = turned(self._truth.lasers[head.laser], head, reading_deg + error_deg)
+            self._beams[head.laser] = Beam(ray, self._spec.beam)
 
     def _drift_to(self, drift: Drift) -> None:
         stepped = Drift(
@@ -189,12 +200,14 @@ class BenchScene:
 
 
 def _speckle_key(placement: Placement) -> str:
-    """Key of the speckle pattern: each placement has its own, and each displacement along the face."""
+    """Key of the speckle pattern, of each placement, each displacement along the face, and each angle."""
+    key = placement.key
     if isinstance(placement.target, WorldTarget):
         pose = placement.target.pose
-        return f"{placement.key}/{pose.x_mm!r}/{pose.y_mm!r}/{pose.heading_deg!r}"
-    shift_mm: float = getattr(placement.target, "shift_mm", 0.0)
-    return f"{placement.key}/{shift_mm:g}mm" if shift_mm else placement.key
+        key += f"/{pose.x_mm!r}/{pose.y_mm!r}/{pose.heading_deg!r}"
+    elif shift_mm := getattr(placement.target, "shift_mm", 0.0):
+        key += f"/{shift_mm:g}mm"
+    return f"{key}/{placement.head_deg!r}deg" if placement.head_deg else key
 
 
 def _turn_sds_deg(target: TargetShape) -> tuple[float | None, float | None]:

@@ -18,7 +18,7 @@ from workbench.emulator.spec import EmulatorSpec, LaserTruth, PlacementTruth
 from workbench.model.board import BOW
 from workbench.model.errors import BadInputError
 from workbench.model.lens import COEFFICIENTS, LensName
-from workbench.model.rig import CameraSpec, Prior, Rig
+from workbench.model.rig import CameraSpec, HeadSpec, Prior, Rig
 from workbench.model.yamlfile import FileModel
 
 BOARD_SHIFT_SD_MM = 2.0
@@ -41,6 +41,23 @@ class TrueRay:
     y_mm: float
     tx: float
     ty: float
+
+
+@dataclass(frozen=True)
+class TrueHead:
+    """True values of a scanning head, as in the rig file; the laser's ray has axis, zero and inclination."""
+
+    laser: str
+    axis_z_mm: float
+    axis_slope_x: float
+    axis_slope_z: float
+    beam_offset_mm: float
+    scale: float
+    eccentricity_cos_deg: float
+    """Error of the encoder, a (cos(reading) - 1) + b sin(reading): a."""
+    eccentricity_sin_deg: float
+    """b"""
+    reading_sd_deg: float
 
 
 @dataclass(frozen=True)
@@ -86,6 +103,7 @@ class Truth:
     """First of three coefficients of the sag of the board's paper, see `workbench.model.board.sag_mm`."""
     bow_y_mm: float = 0.0
     bow_xy_mm: float = 0.0
+    head: TrueHead | None = None
 
 
 def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
@@ -128,6 +146,7 @@ def draw_truth(rig: Rig, spec: EmulatorSpec) -> Truth:
             )
             for laser in rig.lasers
         },
+        head=None if rig.head is None else _draw_head(rig.head, spec.seed),
     )
 
 
@@ -185,7 +204,8 @@ class TruthFile:
     def __init__(self, path: Path, spec: EmulatorSpec, truth: Truth) -> None:
         self._path = path
         text = StringIO()
-        YAML(typ="safe", pure=True).dump({"seed": spec.seed, **asdict(truth)}, text)
+        stated = {name: value for name, value in asdict(truth).items() if value is not None}
+        YAML(typ="safe", pure=True).dump({"seed": spec.seed, **stated}, text)
         head = text.getvalue() + "placements:\n"
         before = path.read_text(encoding="utf-8") if path.exists() else ""
         # A line that a kill interrupted ends without a newline.
@@ -252,6 +272,19 @@ def _reaches_corner(name: LensName, lens: dict[str, float], corner: float) -> bo
     height = a * (1 + sum(k * a**n for n, k in powers))
     climbing = np.logical_and.accumulate(slope >= 0.3)
     return bool(np.any(climbing & (height >= corner)))
+
+
+def _draw_head(head: HeadSpec, seed: int) -> TrueHead:
+    eccentricity = Prior(value=0.0, sd=head.eccentricity_sd_deg)
+    priors = {
+        **{
+            name: getattr(head, name)
+            for name in ("axis_z_mm", "axis_slope_x", "axis_slope_z", "beam_offset_mm", "scale")
+        },
+        **dict.fromkeys(("eccentricity_cos_deg", "eccentricity_sin_deg"), eccentricity),
+    }
+    drawn = {name: _drawn(generator(seed, "truth", "head", name), prior) for name, prior in priors.items()}
+    return TrueHead(laser=head.laser, reading_sd_deg=head.reading_sd_deg, **drawn)
 
 
 def _tilt(rig: Rig, measured_deg: float) -> Prior:

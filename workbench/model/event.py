@@ -190,6 +190,8 @@ class CaptureTaken(FileModel):
     that did not record it."""
     part: Annotated[int, Field(ge=0)] = 0
     """Number of the uninterrupted part of the session, from 0; a resumption or a repair begins the next."""
+    head_deg: float | None = None
+    """Reading of the scanning head's encoder; None without a head that was turned."""
 
     @property
     def time_ns(self) -> int:

@@ -79,6 +79,8 @@ Baseline = Annotated[Prior, prior_within(-10_000, 10_000, 1000, "millimetres fro
 Slope = Annotated[Prior, prior_within(-10, 10, 1, "tangent of the beam's angle to the optical axis")]
 Scale = Annotated[Prior, prior_within(-0.5, 0.5, 0.5, "relative: 0.001 is one millimetre in a metre")]
 Drift = Annotated[Prior, prior_within(-1000, 1000, 1000, "pixels over all captures")]
+STEEPEST_DEG = 80.0
+"""Largest angle of a turned beam to the optical axis; at 90 degrees the beam meets no target."""
 SpotSd = Annotated[float, Field(ge=1e-6), within(0, 100, "pixels; a spot is some pixels wide")]
 
 TARGET_TILT = ("target_slope_x", "target_slope_y")
@@ -186,6 +188,42 @@ class LaserSpec(FileModel):
         return self
 
 
+class HeadSpec(FileModel):
+    """Scanning head: one laser that turns about an axis beside the camera; its angle is read by an encoder.
+
+    The laser's own entry states the axis: `x_mm`, `y_mm` its position at the height of the beam, `tx` the
+    beam's direction where the encoder reads 0, `ty` its inclination.
+    """
+
+    laser: LaserId
+    axis_z_mm: Baseline = exactly(0.0)
+    """Depth of the axis in the camera frame."""
+    axis_slope_x: Slope = exactly(0.0)
+    """Tilt of the axis: x per y."""
+    axis_slope_z: Slope = exactly(0.0)
+    """Tilt of the axis: z per y."""
+    beam_offset_mm: Baseline = exactly(0.0)
+    """Distance at which the beam passes the axis, positive to the right of the axis."""
+    scale: Scale = exactly(0.0)
+    """Relative error of the encoder's scale: angle turned = angle read x (1 + scale)."""
+    eccentricity_sd_deg: Annotated[float, within(0, 10, "degrees")] = 0.0
+    """Error of an encoder with an eccentric disc, a cos(reading) + b sin(reading): 1 sigma of a and of b."""
+    reading_sd_deg: Annotated[float, within(0, 10, "degrees")] = 0.0
+    """Noise of the encoder's reading and of the bearing, independent at every move."""
+    reach_deg: tuple[float, float] = (-45.0, 45.0)
+    """Smallest and largest reading that the head can be turned to."""
+
+    @field_validator("reach_deg")
+    @classmethod
+    def _is_an_arc(cls, reach_deg: tuple[float, float]) -> tuple[float, float]:
+        if not -STEEPEST_DEG <= reach_deg[0] < reach_deg[1] <= STEEPEST_DEG:
+            raise ValueError(
+                f"expected [smallest, largest] within {STEEPEST_DEG:g} deg of the laser's direction at 0, got"
+                f" {list(reach_deg)}"
+            )
+        return reach_deg
+
+
 class BenchSpec(FileModel):
     """Ruler and target: uncertainty of standoffs. All standard deviations are 1 sigma."""
 
@@ -290,6 +328,8 @@ class Rig(FileModel):
     camera: CameraSpec
     lasers: tuple[LaserSpec, ...] = ()
     """Empty: a camera alone, to be fitted to views of a board."""
+    head: HeadSpec | None = None
+    """Scanning head that turns one of the lasers; None: all lasers are fixed."""
     bench: BenchSpec = BenchSpec()
     board: AnyBoard = Board()
     noise: NoiseSpec = NoiseSpec()
@@ -303,6 +343,38 @@ class Rig(FileModel):
         if len(set(ids)) != len(ids):
             raise ValueError(f"ids must differ, got {', '.join(ids)}")
         return lasers
+
+    @model_validator(mode="after")
+    def _head_turns_a_laser(self) -> Rig:
+        if self.head is None:
+            return self
+        if (wanted := self.head.laser) not in self.laser_ids:
+            raise ValueError(
+                f"head.laser: expected a laser of the rig ({', '.join(self.laser_ids)}), got {wanted}"
+            )
+        if self.head_laser.axis != "u":
+            raise ValueError(
+                f"head.laser: expected a laser with axis u, beside the camera; {wanted} has axis v"
+            )
+        return self
+
+    @property
+    def scanning_head(self) -> HeadSpec:
+        """The scanning head.
+
+        Raises:
+            BadInputError: the rig has none.
+        """
+        if self.head is None:
+            raise BadInputError(
+                f"rig {self.rig}: expected a scanning head, with the key head (docs/scanning.md), got none"
+            )
+        return self.head
+
+    @property
+    def head_laser(self) -> LaserSpec:
+        """Laser that the head turns; raises the error of `scanning_head`."""
+        return self.lasers[self.laser_ids.index(self.scanning_head.laser)]
 
     @property
     def banded_board(self) -> Board:

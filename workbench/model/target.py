@@ -99,6 +99,8 @@ class Placement(FileModel):
     """Number of times that the session has been at this placement; repairs count."""
     blocked: tuple[str, ...] = ()
     """Lasers whose beams are blocked before they meet the target."""
+    head_deg: float | None = None
+    """Reading of the scanning head's encoder; None: a sensor without head, or with its head at 0."""
 
     @property
     def is_measured(self) -> bool:

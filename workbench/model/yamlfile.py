@@ -25,6 +25,7 @@ KINDS = {
     "world": "a world",
     "laser_ranger": "a calibration",
     "workbench_camera": "a calibration of a camera without lasers",
+    "scanning_head": "a calibration of a scanning head",
 }
 """Keys that identify the kind of a file, with the kind's name."""
 LARGEST_BYTES = 4 * 2**20

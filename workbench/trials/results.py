@@ -36,7 +36,8 @@ def finish_trial(context: Context, name: str, tables: Sequence[Table], charts: S
     Raises:
         StoppedError: the disk is full or cannot be written.
     """
-    captures = [capture for capture in context.captures if capture.purpose == "trial"]
+    # A turned head is another ray: its captures must not be ranged as those of a fixed laser.
+    captures = [one for one in context.captures if one.purpose == "trial" and one.head_deg is None]
     if captures:
         write_capture_table(context.session_dir / TRIAL_TABLE, captures)
     for table in tables:

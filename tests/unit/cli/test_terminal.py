@@ -57,6 +57,21 @@ def test_a_placement_is_summed_up_when_it_is_finished() -> None:
     assert [int(word) for word in progress.split()[1:4:2]] == [1, 3]
 
 
+def test_a_turned_head_has_no_common_scatter() -> None:
+    """Each angle is another beam: its spots are counted."""
+    session: list[tuple[float, ev.Event]] = []
+    for at, event in SESSION:
+        if isinstance(event, ev.CaptureTaken):
+            session.append((at, event.model_copy(update={"head_deg": 5.0})))
+        elif not isinstance(event, ev.SpotsFound | ev.PlacementFinished):
+            session.append((at, event))
+    seen = [(22.0, spots("a1", (10.0, 5.0))), (22.0, spots("a2"))]
+    lines = shown(*session[:4], *seen, (23.0, ev.PlacementFinished(key="a")))
+    (line,) = [line for line in lines if "of the head" in line]
+    assert "2 captures of the head, 1 with a spot" in line
+    assert "scatter" not in line
+
+
 def test_a_placement_that_is_kept_shows_no_progress_until_it_is_captured_again() -> None:
     end = ev.PlacementFinished(key="a")
     again = [(24.0, ev.SetAside(key="a", from_n=0, reason="moved")), *SESSION[1:4]]

@@ -256,3 +256,44 @@ def test_digits_whose_spelling_yaml_loses_need_quotes_as_an_id(tmp_path: Path, w
     assert load_rig(path).laser_ids[0] == written
     path.write_text(text)
     assert load_rig(path).laser_ids[0] == "1"
+
+
+HEAD = """\
+head:
+  laser: LASER
+  scale: {value: 0.0, sd: 0.001}
+  reach_deg: REACH
+"""
+
+
+def with_head(tmp_path: Path, laser: str = '"1"', reach: str = "[-40, 30]") -> Rig:
+    path = tmp_path / "rig.yaml"
+    text = RIG.replace("COEFFICIENTS", "  k1: {value: 0.0, sd: 0.1}")
+    path.write_text(text + HEAD.replace("LASER", laser).replace("REACH", reach))
+    return load_rig(path)
+
+
+def test_a_head_turns_one_of_the_lasers(tmp_path: Path) -> None:
+    rig = with_head(tmp_path)
+    assert rig.head_laser is rig.lasers[0]
+    assert rig.scanning_head.axis_z_mm.sd == 0.0
+    with pytest.raises(BadInputError, match=r"expected a laser of the rig \(1\), got 2"):
+        with_head(tmp_path, '"2"')
+    with pytest.raises(BadInputError, match=r"expected \[smallest, largest\] within 80 deg"):
+        with_head(tmp_path, reach="[10, -10]")
+
+
+def test_a_head_is_beside_the_camera(tmp_path: Path) -> None:
+    vertical = RIG.replace("axis: u, x_mm", "axis: v, y_mm").replace(
+        "y_mm: {value: 0.0, sd: 0.2}}", "x_mm: {value: 0.0, sd: 0.2}}"
+    )
+    path = tmp_path / "rig.yaml"
+    head = HEAD.replace("LASER", '"1"').replace("REACH", "[-40, 30]")
+    path.write_text(vertical.replace("COEFFICIENTS", "  k1: {value: 0.0, sd: 0.1}") + head)
+    with pytest.raises(BadInputError, match="expected a laser with axis u, beside the camera; 1 has axis v"):
+        load_rig(path)
+
+
+def test_a_rig_without_head_says_where_heads_are_described() -> None:
+    with pytest.raises(BadInputError, match="scanning head, with the key head"):
+        _ = thesis_rig().head_laser

@@ -167,6 +167,7 @@ class PairSource:
             lit_s=lit_s,
             clock_ns=clock_ns,
             part=self.part,
+            head_deg=placement.head_deg,
         )
         return on.image, off.image, taken
 

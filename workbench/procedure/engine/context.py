@@ -12,6 +12,7 @@ from workbench.model import event as ev
 from workbench.model.arrays import Image
 from workbench.model.calibration import Calibration, Provenance
 from workbench.model.errors import RigNotReadyError, StoppedError
+from workbench.model.head_calibration import HeadCalibration
 from workbench.model.prompt import Answer, Prompt
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
@@ -55,6 +56,8 @@ class Context:
     """Cross-validation of the last accepted fit, by placement."""
     calibration: Calibration | None = None
     """Exported or existing calibration, used by trials."""
+    head: HeadCalibration | None = None
+    """Calibration of the scanning head, used by scans."""
     readings: list[ev.ReadingTaken] = field(default_factory=list)
     """Readings of all trials so far, for steps that compare trials."""
     pairs: PairSource = field(init=False)

@@ -8,7 +8,6 @@ from math import isfinite
 import numpy as np
 
 from workbench.model.event import ReadingTaken, TrialProgress, TrueValues, VehicleMoved
-from workbench.model.exposure import AIM
 from workbench.model.number_text import counted
 from workbench.model.rig import LARGEST, ImageAxis
 from workbench.model.target import Placement, WorldTarget
@@ -18,6 +17,7 @@ from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.placements import visit_placements
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
+from workbench.trials.brightness import follow_brightness
 from workbench.trials.drive.outcome import CLOSEST, SONAR, DriveRecord, StepRecord
 from workbench.trials.drive.results import drive_results, result_charts, result_tables, step_frame
 from workbench.trials.drive.sonar import SonarView
@@ -27,11 +27,6 @@ from workbench.trials.drive.truth import StepTruth, TruthSource
 from workbench.trials.limits import check_results, skipped_results
 from workbench.trials.readings import ClosestRange, capture_of, reading_taken, session_ranger
 from workbench.trials.results import finish_trial, write_readings
-
-LARGEST_CHANGE = 8.0
-"""Largest ratio of the exposures of two steps."""
-SPOTLESS_CHANGE = 2.0
-"""Ratio of the exposures after a step without a spot."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +73,7 @@ def _drive(trial: _Trial, placed: Placement, index: int) -> DriveRecord:
     records = []
     for number, pose in enumerate(step.ways[index]):
         if number:
-            _follow_brightness(context)
+            follow_brightness(context)
             _move(context, placed, pose)
         truth = trial.truth.at(pose)
         reading = _read(trial, placed, number, truth)
@@ -97,19 +92,6 @@ def _move(context: Context, placed: Placement, pose: Pose) -> None:
     if context.pairs.replayed is None and isinstance(placed.target, WorldTarget):
         target = placed.target.model_copy(update={"pose": pose})
         context.bench.target.place(placed.model_copy(update={"target": target}))
-
-
-def _follow_brightness(context: Context) -> None:
-    """Scale the exposure by the brightest spot of the last capture, as an automatic exposure would."""
-    last = context.captures[-1]
-    if last.exposure is None:
-        return
-    spots = context.findings[last.key].spots
-    aim_dn = AIM * (2**context.rig.camera.bits - 1)
-    factor = SPOTLESS_CHANGE if not spots else aim_dn / max(spot.peak_dn for spot in spots)
-    context.pairs.change_exposure(
-        float(f"{last.exposure * min(max(factor, 1 / LARGEST_CHANGE), LARGEST_CHANGE):.3g}")
-    )
 
 
 def _read(trial: _Trial, placed: Placement, number: int, truth: StepTruth) -> ReadingTaken:
