@@ -47,6 +47,9 @@ def local_client(workers: int) -> Iterator[Client]:
         "distributed.scheduler.http.routes": [],
         "distributed.worker.http.routes": [],
         "distributed.admin.tick.limit": "1h",  # a compilation holds the interpreter for seconds
+        # Dask's value of 64 KiB returns the memory of every array to the kernel, and so ends the growth of
+        # glibc's thresholds: the page faults take as long as the work itself.
+        "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
     }
     with (
         dask.config.set(settings),
