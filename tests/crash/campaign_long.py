@@ -1,7 +1,7 @@
 """A campaign whose workers are killed twice: `python -m tests.crash.campaign_long [sensors]`.
 
 The campaign of procedures/campaigns/thesis.yaml runs undisturbed, and again with two kills of a worker at
-random. All chunks and tables must be the same to the bit.
+random. All chunks and tables must be bit-identical.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def main() -> int:
         f"undisturbed                            {calm[:32]} {calm_s:5.0f} s",
         f"a worker killed after {' and '.join(map(str, kills)):>9} chunks {killed[:32]} {killed_s:5.0f} s",
         "",
-        "the same to the bit" if killed == calm else "THEY DIFFER",
+        "bit-identical" if killed == calm else "THEY DIFFER",
     ]
     store("campaign-kills", "Campaign with kills", "python -m tests.crash.campaign_long", lines)
     return 0 if killed == calm else 1

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,18 @@ import psutil
 import pytest
 
 from tests.crash.campaigns import LONGEST_S, finished, kill_workers, results, start, wait_for, workers
+from tests.crash.short import PROCEDURE, write_files
 from tests.support.campaigns import SIMULATE, write_campaign
 from workbench.campaign.cluster import local_client
 from workbench.campaign.identity import ENVIRONMENT
 
 CHUNKS = 24
+SESSIONS_TEXT = """format: 1
+campaign: virtual
+title: Virtual sessions
+work: {kind: sessions, rig: rig.yaml, procedures: [p.yaml], sensors: 4}
+"""
+NAMES = [f"{item:06d}-short" for item in range(4)]
 TEXT = SIMULATE.replace("sensors: 40", f"sensors: {16 * CHUNKS}")
 
 
@@ -70,6 +78,26 @@ def test_killed_workers_and_a_killed_client_change_no_bit(
     assert f"{16 * len(kept)} done before" in errors or len(kept) == CHUNKS
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
     assert whole_results(out) == undisturbed
+
+
+def has_part_of_a_session(out: Path) -> bool:
+    return any((out / "sessions").glob(".*/*/frames/*/*"))
+
+
+@pytest.mark.thorough
+def test_a_killed_worker_leaves_no_part_of_a_session(tmp_path: Path) -> None:
+    write_files(tmp_path, PROCEDURE)
+    campaign, tables = write_campaign(tmp_path, SESSIONS_TEXT), []
+    for out, killed in ((tmp_path / "calm", 0), (tmp_path / "killed", 1)):
+        process = start(campaign, out, "--workers", "2")
+        for victim in range(killed):
+            wait_for(partial(has_part_of_a_session, out), process)
+            workers(process.pid)[victim].kill()
+        errors = process.communicate()[1]
+        assert process.returncode == 0, errors
+        assert [path.name for path in sorted((out / "sessions").iterdir())] == NAMES
+        tables.append(results(out))
+    assert tables[0] == tables[1]
 
 
 @pytest.mark.thorough
