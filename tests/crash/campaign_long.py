@@ -17,6 +17,7 @@ import numpy as np
 
 from tests.crash.campaigns import finished, kill_workers, results, start
 from tests.support.stored_output import store
+from workbench.campaign.folder import MANIFEST
 
 ROOT = Path(__file__).parents[2]
 CAMPAIGN = ROOT / "procedures/campaigns/thesis.yaml"
@@ -54,6 +55,9 @@ def main() -> int:
         campaign.write_text(text.replace(f"sensors: {SENSORS}", f"sensors: {sensors}"))
         calm, calm_s = run(campaign, folder / "calm", [], rng)
         killed, killed_s = run(campaign, folder / "killed", kills, rng)
+        manifests = {(folder / name / MANIFEST).read_bytes() for name in ("calm", "killed")}
+        if len(manifests) > 1:
+            raise RuntimeError("expected equal sources in both runs, some have changed meanwhile")
         if finished(folder / "killed") != chunks:
             raise RuntimeError(f"expected {chunks} chunks, found {finished(folder / 'killed')}")
     lines = [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import shutil
 from collections import Counter
@@ -14,7 +13,6 @@ from uuid import uuid4
 import numpy as np
 import pandas as pd
 from pydantic import Field
-from ruamel.yaml import YAML
 
 from workbench.campaign.kind import Chunk, ChunkSize, Inputs, Summary, Work
 from workbench.campaign.rig_input import read_rig, rig_of
@@ -32,8 +30,9 @@ from workbench.devices.registry import check_driver, whole_bench
 from workbench.model.arrays import FloatArray
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.errors import BadInputError, RigNotReadyError, StoppedError, WorkbenchError
+from workbench.model.rig_text import rig_text_of
 from workbench.model.table import PERCENT
-from workbench.model.yamlfile import parse_document, standalone_text
+from workbench.model.yamlfile import standalone_text
 from workbench.procedure.engine.plan import Plan
 from workbench.procedure.engine.procedure_file import Procedure
 from workbench.procedure.engine.resume import resume
@@ -49,8 +48,6 @@ BLOCK, SEED = "emulator", "seed"
 """Block and key of a rig file that draw the virtual sensor."""
 MOST_RESUMED = 5
 """Largest number of times that a session is resumed whose lasers ended their lease: the computer was busy."""
-SERIAL = "{serial}-{item:06d}"
-"""Serial number of a sensor."""
 SHARES = 101
 """Number of points of a chart of shares."""
 
@@ -105,7 +102,8 @@ class Sessions(Work):
     def _row(self, inputs: Inputs, item: int, seed: int, folder: Path) -> dict[str, object]:
         procedures = _procedure_files(inputs, folder)
         rig = folder / FILES / f"rig-{item:06d}.yaml"
-        write_atomically(rig, _rig_text(inputs[RIG], item, seed).encode())
+        serial = f"{rig_of(inputs[RIG]).serial}-{item:06d}"
+        write_atomically(rig, rig_text_of(inputs[RIG], serial, {BLOCK: {SEED: seed}}).encode())
         plan = Plan.load(rig, procedures)
         session = folder / SESSIONS / f"{item:06d}-{plan.procedures[0].procedure}"
         if not session.exists():
@@ -141,16 +139,6 @@ def _procedure_files(inputs: Inputs, folder: Path) -> list[Path]:
         found.append(folder / FILES / name)
         write_atomically(found[-1], text.encode())
     return found
-
-
-def _rig_text(text: str, item: int, seed: int) -> str:
-    """Text of the rig file with the seed and the serial number of a sensor."""
-    data = parse_document(text, Path("rig of the campaign")).data
-    data[BLOCK][SEED] = seed
-    data["serial"] = SERIAL.format(serial=rig_of(text).serial, item=item)
-    stream = io.StringIO()
-    YAML().dump(data, stream)
-    return stream.getvalue()
 
 
 def _run_aside(plan: Plan, session: Path) -> None:
