@@ -184,7 +184,8 @@ class Tally:
 def _sensor(one: IndexedSession) -> Sensor:
     status = one.status
     if status.state == "finished":
-        return Sensor(one.serial, status.session_dir, PASSED, status.calibration or "; ".join(status.trials))
+        result = status.calibration or "; ".join(status.trials)
+        return Sensor(one.serial, status.session_dir, PASSED, result.removeprefix("accepted: "))
     verdict = FAILED if _is_decided(status.session_dir) else UNFINISHED
     fit = refused_fit(status.session_dir)
     result = split_reason(status.why)[0] if fit is None else and_more(fit.reasons)
