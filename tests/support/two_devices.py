@@ -1,8 +1,8 @@
 """Batch fit on two devices, as a process of its own: XLA counts its devices once.
 
-Call with XLA_FLAGS=--xla_force_host_platform_device_count=2: python -m tests.support.two_devices. Prints JSON:
-the devices that solved each half of the sensors, whether the halves are bit-identical with all sensors on one
-device, and the largest difference of a program that is sharded over the sensors, in posterior sd.
+Call: XLA_FLAGS=--xla_force_host_platform_device_count=2 python -m tests.support.two_devices. The output is
+JSON. `used` are the devices of all sensors, and of each half. `equal` states whether the halves are
+bit-identical with the whole. `sharded` has the largest difference of a program over both devices, in sd.
 """
 
 from __future__ import annotations
