@@ -1,4 +1,4 @@
-"""Results of a campaign in its folder: tables as CSV and Parquet, a page, and a recording."""
+"""Results of a campaign in its folder: tables as CSV and Parquet, and a page."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from workbench.report.document import Document, Fact, Section, Verdict
 from workbench.report.document_files import write_document
 from workbench.report.frames import frame_of_table
 from workbench.session.files import write_atomically
-from workbench.viewer.recording import RECORDING_FILE
-from workbench.viewer.results_view import record_results
 
 TABLES, PAGE = "tables", "report.html"
 
@@ -27,7 +25,7 @@ def summarise(folder: CampaignFolder) -> Summary:
 
 
 def write_results(folder: CampaignFolder, summary: Summary) -> None:
-    """Write tables, page and recording.
+    """Write tables and page.
 
     Raises:
         BadInputError: a file cannot be written.
@@ -41,12 +39,6 @@ def write_results(folder: CampaignFolder, summary: Summary) -> None:
     except OSError as error:
         raise BadInputError(f"{tables}: cannot be written: {error.strerror or error}") from None
     write_document(campaign_document(folder, summary), html=folder.path / PAGE)
-    recording, name = folder.path / RECORDING_FILE, folder.identity.campaign
-    text = "\n".join((summary.headline, *summary.notes))
-    try:
-        record_results(recording, name, text, summary.tables, summary.charts, summary.colors)
-    except OSError as error:
-        raise BadInputError(f"{recording}: cannot be written: {error.strerror or error}") from None
 
 
 def campaign_document(folder: CampaignFolder, summary: Summary) -> Document:
