@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 
 from workbench.model.chart import Chart
 from workbench.model.table import Table
@@ -12,7 +13,7 @@ from workbench.viewer.blueprint import results_layout
 from workbench.viewer.chart import log_chart
 from workbench.viewer.compaction import compact
 from workbench.viewer.stream import Stream
-from workbench.viewer.table_text import table_text
+from workbench.viewer.table_text import WIDTH, table_text
 
 NO_POINTS = "no values"
 
@@ -30,7 +31,7 @@ def record_results(
     Args:
         out: file.
         name: name of the recording.
-        headline: result in words.
+        headline: result in words, in lines that are wrapped.
         tables: tables, shown in this order.
         charts: charts, two on a screen.
         colors: colours (`#rrggbb`) by name of a series.
@@ -45,7 +46,8 @@ def record_results(
         by_name = {series: at.from_hex(color) for series, color in colors.items()}
         for chart in charts:
             log_chart(stream, at.trial_picture(name, chart.name), chart, by_name, NO_POINTS)
-        text = "\n\n".join((headline, *map(table_text, tables)))
+        head = "\n".join(fill(line, WIDTH) for line in headline.splitlines())
+        text = "\n\n".join((head, *map(table_text, tables)))
         stream.log_static_text(at.trial_tables(name), text)
         stream.close()
         compact(partial, layout)

@@ -10,6 +10,7 @@ from tests.viewer.readback import Contents, layout_views
 from workbench.model.chart import Axis, Chart, Series
 from workbench.model.table import Column, Table
 from workbench.viewer.results_view import record_results
+from workbench.viewer.table_text import WIDTH
 
 TABLE = Table(
     name="counts",
@@ -27,13 +28,14 @@ def chart(name: str, *y: float) -> Chart:
 def test_every_table_and_chart_is_in_a_view(tmp_path: Path) -> None:
     out = tmp_path / "r.rrd"
     charts = [chart("one", 1.0, 2.0), chart("two", 3.0), chart("empty")]
-    record_results(out, "study", "12 sensors pass", [TABLE], charts, {"L1": "#ff0000"})
+    record_results(out, "study", "12 sensors pass, " * 9, [TABLE], charts, {"L1": "#ff0000"})
     contents, views = Contents(out), layout_views(out)
     assert len(views) == 4
     assert all(contents.below(view.origin) for view in views)
     assert {f"Title of {name}" for name in ("one", "two", "empty")} <= {view.name for view in views}
     ((text,),) = contents.static("/trials/study/tables", "TextDocument:text")
-    assert "12 sensors pass" in text
+    assert text.startswith("12 sensors pass")
+    assert max(map(len, text.splitlines())) <= WIDTH
     assert "Counts of sensors" in text
     assert not list(tmp_path.glob("*.partial"))
 
