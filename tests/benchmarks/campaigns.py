@@ -96,7 +96,9 @@ def _run(path: Path, out: Path, items: int, chunks: int, workers: int) -> Measur
     """Run a campaign."""
     command = [str(Path(sys.executable).with_name("workbench")), "campaign", str(path), "-o", str(out)]
     began_s = time.monotonic()
-    process = subprocess.Popen([*command, "--workers", str(workers)], stderr=subprocess.DEVNULL)
+    messages = path.with_suffix(".txt")
+    with messages.open("wb") as file:
+        process = subprocess.Popen([*command, "--workers", str(workers)], stderr=file)
     client, peaks = psutil.Process(process.pid), {"client": 0.0, "worker": 0.0}
     used: list[tuple[int, float]] = []
     while process.poll() is None:
@@ -110,7 +112,7 @@ def _run(path: Path, out: Path, items: int, chunks: int, workers: int) -> Measur
         time.sleep(POLL_S)
     seconds = time.monotonic() - began_s
     if process.returncode:
-        raise RuntimeError(f"{command}: exit code {process.returncode}")
+        raise RuntimeError(f"{command}: exit code {process.returncode}: {messages.read_text()}")
     ends_s = sorted(path.stat().st_mtime for path in out.glob("chunks/*.sha256"))
     rate = (len(ends_s) - workers) / (ends_s[-1] - ends_s[workers - 1]) * items / len(ends_s)
     (first, before_s), (last, after_s) = used[0], used[-1]
