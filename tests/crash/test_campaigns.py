@@ -22,6 +22,8 @@ from workbench.campaign.cluster import local_client
 from workbench.campaign.identity import ENVIRONMENT
 
 CHUNKS = 24
+ALLOCATOR = "MALLOC_TRIM_THRESHOLD_"
+"""Variable that Dask sets for workers, which makes them slow."""
 SESSIONS_TEXT = """format: 1
 campaign: virtual
 title: Virtual sessions
@@ -109,6 +111,7 @@ def test_workers_killed_while_they_start_are_replaced() -> None:
             time.sleep(wait_s)
         client.wait_for_workers(2, timeout=LONGEST_S)
         assert client.submit(sum, [1, 2]).result(timeout=LONGEST_S) == 3
+        assert {*client.run(os.getenv, ALLOCATOR).values()} == {os.getenv(ALLOCATOR)}
 
 
 @pytest.mark.thorough
