@@ -18,16 +18,8 @@ from workbench.model.errors import BadInputError
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
-
-class Closable(Protocol):
-    """Object that ends by `close`."""
-
-    def close(self) -> object:
-        """End it."""
-
-
 Started = TypeVar("Started")
-Closed = TypeVar("Closed", bound=Closable)
+Closed = TypeVar("Closed", bound="Closable")
 LOOPBACK = "127.0.0.1"
 MOST_DEATHS = 10
 """Number of workers that one chunk may take with it before it is given up: then the chunk is the cause."""
@@ -35,6 +27,13 @@ WATCHED_S = 2.0
 """Time between two looks for dead workers."""
 CONNECT_S = 10.0
 """Longest wait for a scheduler."""
+
+
+class Closable(Protocol):
+    """Object that ends by `close`."""
+
+    def close(self) -> object:
+        """End it."""
 
 
 @contextmanager
