@@ -60,6 +60,7 @@ mutants: $(INSTALLED)
 crash: $(INSTALLED)
 	$(BIN)/python -m tests.crash.long
 	$(BIN)/python -m tests.crash.trials
+	$(BIN)/python -m tests.crash.campaign_long
 
 fuzz: $(INSTALLED)
 	$(BIN)/python -m tests.fuzz

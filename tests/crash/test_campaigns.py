@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -18,57 +15,22 @@ import numpy as np
 import psutil
 import pytest
 
+from tests.crash.campaigns import LONGEST_S, finished, kill_workers, results, start, wait_for, workers
+from tests.crash.short import PROCEDURE, write_files
 from tests.support.campaigns import SIMULATE, write_campaign
-from tests.support.command_line import SCRIPT
 from workbench.campaign.cluster import local_client
 from workbench.campaign.identity import ENVIRONMENT
 
 CHUNKS = 24
+ALLOCATOR = "MALLOC_TRIM_THRESHOLD_"
+"""Variable that Dask sets for workers, which makes them slow."""
+SESSIONS_TEXT = """format: 1
+campaign: virtual
+title: Virtual sessions
+work: {kind: sessions, rig: rig.yaml, procedures: [p.yaml], sensors: 4}
+"""
+NAMES = [f"{item:06d}-short" for item in range(4)]
 TEXT = SIMULATE.replace("sensors: 40", f"sensors: {16 * CHUNKS}")
-LONGEST_S = 120
-
-
-def start(campaign: Path, out: Path, *options: str) -> subprocess.Popen[str]:
-    """The command in a group of its own, as at a terminal."""
-    command = [str(SCRIPT), "campaign", str(campaign), "-o", str(out), *options]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
-
-
-def wait_for(what: Callable[[], bool], process: subprocess.Popen[str]) -> None:
-    end_s = time.monotonic() + LONGEST_S
-    while not what():
-        assert process.poll() is None, process.communicate()[1]
-        assert time.monotonic() < end_s
-        time.sleep(0.01)
-
-
-def finished(out: Path) -> int:
-    return len(list(out.glob("chunks/*.sha256")))
-
-
-def have_finished(out: Path, chunks: int) -> bool:
-    return finished(out) >= chunks
-
-
-def workers(process: subprocess.Popen[str]) -> list[psutil.Process]:
-    """Worker processes: they import the workbench, other children of multiprocessing do not."""
-    return _children(process.pid)
-
-
-def _children(pid: int | None = None) -> list[psutil.Process]:
-    found = []
-    for child in psutil.Process(pid).children(recursive=True):
-        with suppress(psutil.Error):  # it has ended
-            if any("spawn_main" in word for word in child.cmdline()):
-                found.append(child)
-    return found
-
-
-def results(out: Path) -> dict[str, str]:
-    """Hashes of all chunks and tables."""
-    paths = [*out.glob("chunks/*"), *out.glob("tables/*")]
-    assert finished(out) == CHUNKS
-    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +44,11 @@ def undisturbed(campaign: Path) -> dict[str, str]:
     out = campaign.parent / "undisturbed"
     process = start(campaign, out, "--workers", "1")
     assert (process.communicate()[1], process.returncode)[1] == 0
+    return whole_results(out)
+
+
+def whole_results(out: Path) -> dict[str, str]:
+    assert finished(out) == CHUNKS
     return results(out)
 
 
@@ -96,13 +63,10 @@ def test_killed_workers_and_a_killed_client_change_no_bit(
 ) -> None:
     rng, out = np.random.default_rng(seed), tmp_path / "out"
     process = start(campaign, out, "--workers", "2")
-    for after in sorted(rng.choice(np.arange(1, CHUNKS // 2), kills, replace=False).tolist()):
-        wait_for(partial(have_finished, out, after), process)
-        wait_for(lambda: bool(workers(process)), process)
-        alive = workers(process)
-        alive[rng.integers(len(alive))].kill()
+    after = rng.choice(np.arange(1, CHUNKS // 2), kills, replace=False).tolist()
+    kill_workers(process, out, after, rng, LONGEST_S)
     wait_for(lambda: finished(out) > CHUNKS // 2, process)
-    orphans = workers(process)
+    orphans = workers(process.pid)
     process.kill()
     process.communicate()
     psutil.wait_procs(orphans, timeout=LONGEST_S)
@@ -115,18 +79,39 @@ def test_killed_workers_and_a_killed_client_change_no_bit(
     assert process.returncode == 0, errors
     assert f"{16 * len(kept)} done before" in errors or len(kept) == CHUNKS
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
-    assert results(out) == undisturbed
+    assert whole_results(out) == undisturbed
+
+
+def has_part_of_a_session(out: Path) -> bool:
+    return any((out / "sessions").glob(".*/*/frames/*/*"))
+
+
+@pytest.mark.thorough
+def test_a_killed_worker_leaves_no_part_of_a_session(tmp_path: Path) -> None:
+    write_files(tmp_path, PROCEDURE)
+    campaign, tables = write_campaign(tmp_path, SESSIONS_TEXT), []
+    for out, killed in ((tmp_path / "calm", 0), (tmp_path / "killed", 1)):
+        process = start(campaign, out, "--workers", "2")
+        for victim in range(killed):
+            wait_for(partial(has_part_of_a_session, out), process)
+            workers(process.pid)[victim].kill()
+        errors = process.communicate()[1]
+        assert process.returncode == 0, errors
+        assert [path.name for path in sorted((out / "sessions").iterdir())] == NAMES
+        tables.append(results(out))
+    assert tables[0] == tables[1]
 
 
 @pytest.mark.thorough
 def test_workers_killed_while_they_start_are_replaced() -> None:
     with local_client(2) as client:
         for wait_s in (0.1, 1.0, 2.0, 0.5):
-            for worker in _children():
+            for worker in workers():
                 worker.kill()
             time.sleep(wait_s)
         client.wait_for_workers(2, timeout=LONGEST_S)
         assert client.submit(sum, [1, 2]).result(timeout=LONGEST_S) == 3
+        assert {*client.run(os.getenv, ALLOCATOR).values()} == {os.getenv(ALLOCATOR)}
 
 
 @pytest.mark.thorough
@@ -136,7 +121,7 @@ def test_ctrl_c_ends_cleanly_with_the_command_that_continues(campaign: Path, tmp
     wait_for(lambda: finished(out) >= 1, process)
     sockets = [
         connection.laddr.ip
-        for one in [psutil.Process(process.pid), *workers(process)]
+        for one in [psutil.Process(process.pid), *workers(process.pid)]
         for connection in one.net_connections("inet")
         if connection.status == psutil.CONN_LISTEN
     ]
@@ -175,7 +160,7 @@ def test_two_programs_share_a_scheduler_and_a_folder_only(
         process = start(campaign, out, "--scheduler", address)
         errors = process.communicate()[1]
         assert process.returncode == 0, errors
-        assert results(out) == undisturbed
+        assert whole_results(out) == undisturbed
     finally:
         for other in reversed(others):
             other.terminate()

@@ -36,9 +36,9 @@ def simulated_campaign(folder: Path, text: str = SIMULATE) -> Campaign:
     return load_campaign(write_campaign(folder, text))
 
 
-def frames_of(campaign: Campaign) -> list[pd.DataFrame]:
+def frames_of(campaign: Campaign, folder: Path = Path()) -> list[pd.DataFrame]:
     """Results of all chunks, computed in this process."""
-    return [campaign.file.work.run(campaign.inputs, chunk) for chunk in campaign.chunks]
+    return [campaign.file.work.run(campaign.inputs, chunk, folder) for chunk in campaign.chunks]
 
 
 def as_worker(monkeypatch: pytest.MonkeyPatch) -> None:

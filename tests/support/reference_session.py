@@ -59,9 +59,9 @@ def copied(folder: Path, name: str = REFERENCE.name, frames: bool = False) -> Pa
     return Path(shutil.copytree(REFERENCE, folder / name, ignore=ignored))
 
 
-def repeated(folder: Path, name: str, days: int) -> Path:
+def repeated(folder: Path, name: str, days: int, frames: bool = False) -> Path:
     """Another session with the same results, which began some days later."""
-    session = copied(folder, name)
+    session = copied(folder, name, frames)
     manifest, journal, calibration = (session / one for one in (MANIFEST, JOURNAL, "calibration.yaml"))
     recorded = file_sha256(calibration)
     first, later = (f"{BEGAN + n * DAY:%Y-%m-%dT%H:%M:%S%z}" for n in (0, days))

@@ -44,6 +44,7 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "campaigns": of_proofs.campaigns,
     "budget": budget.budget,
     "budget-others": budget.others,
+    "campaign-kills": of_proofs.campaign_kills,
     "speed": of_proofs.speed,
     "speckle": of_proofs.speckle,
     "situations": of_proofs.situations,

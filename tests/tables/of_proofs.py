@@ -56,6 +56,11 @@ def campaigns() -> str:
     return code_block("\n".join(newest("campaigns").lines))
 
 
+def campaign_kills() -> str:
+    """Results of a campaign with and without kills, as printed by `tests.crash.campaign_long`."""
+    return code_block("\n".join(newest("campaign-kills").lines))
+
+
 def speed() -> str:
     """Times of a reading: `make bench`."""
     rows = ranging_times()

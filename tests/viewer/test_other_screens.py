@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.campaigns import frames_of, simulated_campaign
 from tests.support.rangers import spots, thesis_ranger
 from tests.support.viewer_stream import bright_spot, drawn_frame
 from tests.viewer.conftest import Recorded
@@ -27,6 +28,7 @@ from workbench.viewer.calibration_view import record_calibration
 from workbench.viewer.comparison import Source, compare
 from workbench.viewer.ranger_view import RangerView, Shown, ranger_layout
 from workbench.viewer.recording import rebuild
+from workbench.viewer.results_view import record_results
 from workbench.viewer.stream import Stream
 
 pytestmark = pytest.mark.thorough
@@ -76,13 +78,26 @@ def record_simulation(_: Recorded, out: Path) -> None:
     rebuild(SIMULATION, load_session_rig(SIMULATION), effective(read_journal(SIMULATION)), out)
 
 
+def record_campaign(_: Recorded, out: Path) -> None:
+    campaign = simulated_campaign(out.parent)
+    summary = campaign.file.work.summarise(campaign.inputs, frames_of(campaign))
+    record_results(out, "c", summary.headline, summary.tables, summary.charts, summary.colors)
+
+
 def record_of_calibration(_: Recorded, out: Path) -> None:
     record_calibration(load_calibration(DATA / "session-0.1.0/calibration.yaml"), "c", out)
 
 
 @pytest.mark.parametrize(
     "record",
-    [record_live_ranger, record_aim, record_comparison, record_simulation, record_of_calibration],
+    [
+        record_live_ranger,
+        record_aim,
+        record_comparison,
+        record_simulation,
+        record_of_calibration,
+        record_campaign,
+    ],
 )
 def test_every_view_in_front_shows_something(
     recorded: Recorded, tmp_path: Path, record: Callable[[Recorded, Path], None]

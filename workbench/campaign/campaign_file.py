@@ -11,11 +11,12 @@ from pydantic import Field
 from workbench.campaign.design import Design
 from workbench.campaign.kind import Chunk, Inputs
 from workbench.campaign.refit import Refit
+from workbench.campaign.sessions import Sessions
 from workbench.campaign.simulate import Simulate
 from workbench.model.errors import BadInputError
 from workbench.model.yamlfile import FileModel, line_of, load_yaml_model, read_document
 
-AnyWork = Annotated[Design | Refit | Simulate, Field(discriminator="kind")]
+AnyWork = Annotated[Design | Refit | Sessions | Simulate, Field(discriminator="kind")]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
 
 

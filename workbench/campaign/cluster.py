@@ -7,10 +7,10 @@ import signal
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from multiprocessing import resource_tracker
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from workbench.campaign.identity import ENVIRONMENT
 from workbench.model.errors import BadInputError
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
 Started = TypeVar("Started")
+Closed = TypeVar("Closed", bound="Closable")
 LOOPBACK = "127.0.0.1"
 MOST_DEATHS = 10
 """Number of workers that one chunk may take with it before it is given up: then the chunk is the cause."""
@@ -26,6 +27,13 @@ WATCHED_S = 2.0
 """Time between two looks for dead workers."""
 CONNECT_S = 10.0
 """Longest wait for a scheduler."""
+
+
+class Closable(Protocol):
+    """Object that ends by `close`."""
+
+    def close(self) -> object:
+        """End it."""
 
 
 @contextmanager
@@ -47,11 +55,14 @@ def local_client(workers: int) -> Iterator[Client]:
         "distributed.scheduler.http.routes": [],
         "distributed.worker.http.routes": [],
         "distributed.admin.tick.limit": "1h",  # a compilation holds the interpreter for seconds
+        # Dask's value of 64 KiB returns the memory of every array to the kernel, and so ends the growth of
+        # glibc's thresholds: the page faults take as long as the work itself.
+        "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
     }
     with (
         dask.config.set(settings),
         tempfile.TemporaryDirectory(prefix="workbench-campaign-") as scratch,
-        _without_interrupts(
+        _closed_at_end(
             LocalCluster,
             n_workers=workers,
             threads_per_worker=1,
@@ -68,6 +79,21 @@ def local_client(workers: int) -> Iterator[Client]:
         Client(cluster) as client,
     ):
         yield client
+
+
+@contextmanager
+def _closed_at_end(start: Callable[..., Closed], **arguments: Any) -> Iterator[Closed]:
+    """Start a cluster, and close it at the end.
+
+    Workers that do not end in Dask's time on a busy computer are no error: all chunks are on the disk, and
+    the processes end with this one.
+    """
+    cluster = _without_interrupts(start, **arguments)
+    try:
+        yield cluster
+    finally:
+        with suppress(TimeoutError):
+            cluster.close()
 
 
 @contextmanager
@@ -99,6 +125,8 @@ def _dead_workers_replaced(cluster: LocalCluster, workers: int) -> Iterator[None
     ended = threading.Event()
 
     def replace() -> None:
+        if cluster.status != Status.running:  # it is being closed
+            return
         for name, nanny in list(cluster.workers.items()):
             if nanny.status in {Status.closed, Status.failed}:
                 del cluster.workers[name]

@@ -76,7 +76,7 @@ class Design(Work):
         """Number of points."""
         return len(self._points(inputs))
 
-    def run(self, inputs: Inputs, chunk: Chunk) -> pd.DataFrame:
+    def run(self, inputs: Inputs, chunk: Chunk, folder: Path) -> pd.DataFrame:
         """One row per point: captures, time, and the largest relative uncertainty of a range."""
         points = self._points(inputs)
         return pd.DataFrame([self._row(points[item]) for item in chunk.items]).astype(TYPES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from workbench.campaign.campaign_file import Campaign, CampaignFile
 from workbench.campaign.chunk_file import is_finished, read_chunk
 from workbench.campaign.identity import Identity, difference, identity_of
 from workbench.campaign.kind import Chunk
+from workbench.campaign.sessions import SESSIONS
 from workbench.model.contents import read_file
 from workbench.model.errors import BadInputError
 from workbench.model.yamlfile import FileModel
@@ -90,8 +92,9 @@ def open_folder(path: Path, campaign: Campaign) -> Iterator[CampaignFolder]:
         _lock(lock, path)
         if differs := difference(_read_identity(manifest), identity):
             raise BadInputError(f"{path}: {differs}. Name another folder with -o, or delete this one")
-        _remove_remains(path / CHUNKS)
+        _remove_remains(path)
         yield CampaignFolder(path, campaign, identity)
+        _remove_remains(path)
     finally:
         os.close(lock)
 
@@ -114,7 +117,9 @@ def _read_identity(manifest: Path) -> Identity:
         ) from None
 
 
-def _remove_remains(chunks: Path) -> None:
-    """Remove files that a killed worker did not finish writing; their names begin with a dot."""
-    for remains in chunks.glob(".*"):
+def _remove_remains(path: Path) -> None:
+    """Remove files and sessions that a killed worker did not finish; their names begin with a dot."""
+    for remains in (path / CHUNKS).glob(".*"):
         remains.unlink(missing_ok=True)
+    for remains in (path / SESSIONS).glob(".*/"):
+        shutil.rmtree(remains)

@@ -81,8 +81,13 @@ class Work(FileModel, ABC):
         """Number of items."""
 
     @abstractmethod
-    def run(self, inputs: Inputs, chunk: Chunk) -> pd.DataFrame:
+    def run(self, inputs: Inputs, chunk: Chunk, folder: Path) -> pd.DataFrame:
         """Results of a chunk, one row per item; the same on every call.
+
+        Args:
+            inputs: texts of `input_keys`.
+            chunk: the chunk.
+            folder: folder of the campaign, for a kind that keeps more than rows.
 
         Raises:
             BadInputError: the work cannot be done for any item.

@@ -18,6 +18,16 @@ from workbench.calibration.verdict.comparison import compare
 from workbench.calibration.verdict.export import calibrate
 from workbench.campaign.kind import Chunk, ChunkSize, Inputs, Summary, Work
 from workbench.campaign.rig_input import read_rig, rig_of
+from workbench.campaign.session_rows import (
+    NO_FIT,
+    TYPES,
+    described,
+    listed,
+    no_rows,
+    row_of,
+    session_table,
+    verdict_table,
+)
 from workbench.model.acceptance import Acceptance
 from workbench.model.calibration import Calibration, Provenance
 from workbench.model.captures import check_images, parse_captures, read_captures_file
@@ -26,7 +36,7 @@ from workbench.model.errors import BadInputError, WorkbenchError
 from workbench.model.laboratory import Day
 from workbench.model.nested import fix_parameters
 from workbench.model.rig import Rig
-from workbench.model.table import PERCENT, Column, Table
+from workbench.model.table import PERCENT
 from workbench.report.certificate.session_record import read_session
 from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.capture_table_check import check_captures
@@ -35,9 +45,6 @@ from workbench.session.index import Verdict as FitVerdict
 from workbench.session.manifest import load_session_rig
 
 SESSIONS, RIG = "sessions", "rig"
-MOST_LISTED = 20
-"""Largest number of sessions in the table; the results of all are in the chunks."""
-NO_FIT = "not fitted"
 
 
 class Refit(Work):
@@ -84,7 +91,7 @@ class Refit(Work):
         """Number of sessions."""
         return len(_paths(inputs))
 
-    def run(self, inputs: Inputs, chunk: Chunk) -> pd.DataFrame:
+    def run(self, inputs: Inputs, chunk: Chunk, folder: Path) -> pd.DataFrame:
         """One row per session: its calibration before and now, and their largest difference."""
         rig = None if self.rig is None else rig_of(inputs[RIG])
         paths = _paths(inputs)[chunk.items.start : chunk.items.stop]
@@ -92,16 +99,15 @@ class Refit(Work):
         return pd.DataFrame(rows).astype(TYPES)
 
     def _row(self, path: Path, rig: Rig | None) -> Mapping[str, object]:
-        row: dict[str, object] = dict.fromkeys(TYPES)
-        row |= {"session": path.name, "now": NO_FIT, "before": "none", "reason": "", "serial": ""}
+        row = row_of(path.name)
         try:
             session = read_session(path)
             row["serial"] = session.rig.serial
             before = session.calibration if session.is_own_calibration else None
             if before is not None:
-                row |= _described(before, "before")
+                row |= described(before, "before")
             now = self._fit(path, rig or load_session_rig(path, bounded=True))
-            row |= _described(now, "now")
+            row |= described(now, "now")
             if before is not None:
                 row |= _difference(before, now)
         except WorkbenchError as error:
@@ -128,24 +134,6 @@ class Refit(Work):
         return _summary(self, inputs, _Totals.of(frames))
 
 
-TYPES = {
-    "session": "string",
-    "serial": "string",
-    "before": "string",
-    "now": "string",
-    "reason": "string",
-    "rms_px_before": "float64",
-    "rms_px_now": "float64",
-    "relative_sd_before": "float64",
-    "relative_sd_now": "float64",
-    "difference_mm": "float64",
-    "difference_sd_mm": "float64",
-    "range_mm": "float64",
-    "relative_difference": "float64",
-}
-"""Columns of the results, with their types."""
-
-
 def _paths(inputs: Inputs) -> list[Path]:
     found = json.loads(inputs[SESSIONS])
     return [Path(found["folder"]) / name for name in found["names"]]
@@ -163,15 +151,6 @@ def _provenance(path: Path, rig: Rig) -> Provenance:
         operator="",
         created="",
     )
-
-
-def _described(calibration: Calibration, when: str) -> dict[str, object]:
-    found = calibration.laser_ranger
-    return {
-        when: found.fit.verdict,
-        f"rms_px_{when}": found.fit.rms_px,
-        f"relative_sd_{when}": found.validity.max_relative_range_sd,
-    } | ({"reason": "; ".join(found.fit.reasons)} if when == "now" else {})
 
 
 def _difference(before: Calibration, now: Calibration) -> dict[str, object]:
@@ -200,7 +179,7 @@ class _Totals:
     @classmethod
     def of(cls, frames: Iterable[pd.DataFrame]) -> _Totals:
         """Add up the results of all chunks; at most `MOST_LISTED` sessions are kept."""
-        totals = cls(0, Counter(), pd.DataFrame({name: [] for name in TYPES}).astype(TYPES), Counter())
+        totals = cls(0, Counter(), no_rows(), Counter())
         for frame in frames:
             totals.sessions += len(frame)
             totals.verdicts.update(zip(frame["before"], frame["now"], strict=True))
@@ -208,9 +187,7 @@ class _Totals:
             known = size[size > 0]
             totals.differences.update(np.floor(np.log10(known) / BIN).astype(int).tolist())
             together = pd.concat([totals.listed, frame], ignore_index=True)
-            size = together["relative_difference"].abs().where(together["now"] != NO_FIT, np.inf)
-            order = size.fillna(-1.0).sort_values(ascending=False, kind="stable").index
-            totals.listed = together.loc[order[:MOST_LISTED]].reset_index(drop=True)
+            totals.listed = listed(together, together["relative_difference"].abs())
         return totals
 
 
@@ -225,47 +202,8 @@ def _summary(work: Refit, inputs: Inputs, totals: _Totals) -> Summary:
     largest = f"; the largest difference of a range is {PERCENT * known.max():.2g} %" if len(known) else ""
     return Summary(
         headline=f"{fitted} of {totals.sessions} sessions are fitted, {accepted} accepted{largest}",
-        tables=(_verdict_table(totals), _session_table(totals)),
+        tables=(verdict_table(totals.verdicts), session_table(totals.listed, "differ most")),
         charts=tuple(_charts(totals)),
-    )
-
-
-def _verdict_table(totals: _Totals) -> Table:
-    return Table(
-        name="verdicts",
-        title="Verdicts before and now",
-        columns=(
-            Column(key="before", name="before"),
-            Column(key="now", name="now"),
-            Column(key="sessions", name="sessions"),
-        ),
-        rows=tuple((*key, number) for key, number in sorted(totals.verdicts.items())),
-    )
-
-
-def _session_table(totals: _Totals) -> Table:
-    columns = (
-        Column(key="session", name="session"),
-        Column(key="before", name="before"),
-        Column(key="now", name="now"),
-        Column(key="rms_px_before", name="rms before", unit="px", format=".3f"),
-        Column(key="rms_px_now", name="rms now", unit="px", format=".3f"),
-        Column(key="relative_sd_before", name="sd before", unit="%", format=".2f", scale=PERCENT),
-        Column(key="relative_sd_now", name="sd now", unit="%", format=".2f", scale=PERCENT),
-        Column(key="difference_mm", name="difference", unit="mm", format="+.2f"),
-        Column(key="range_mm", name="at", unit="mm", format=".0f"),
-        Column(key="reason", name="reason"),
-    )
-    rows = totals.listed[[column.key for column in columns]]
-    return Table(
-        name="sessions",
-        title="Sessions without a fit, then those that differ most",
-        columns=columns,
-        rows=tuple(tuple(row) for row in rows.itertuples(index=False)),
-        caption=(
-            "sd: largest stated relative sd of a range; difference: now - before, largest in relation to the"
-            f" range. At most {MOST_LISTED} sessions; the files in chunks/ have all"
-        ),
     )
 
 

@@ -74,7 +74,7 @@ class Simulate(Work):
         """Number of sensors."""
         return self.sensors
 
-    def run(self, inputs: Inputs, chunk: Chunk) -> pd.DataFrame:
+    def run(self, inputs: Inputs, chunk: Chunk, folder: Path) -> pd.DataFrame:
         """One row per sensor: state of the fit, error and stated sd of each parameter and of each range."""
         rng = chunk.rng()
         rig = rig_of(inputs[RIG])

@@ -32,7 +32,8 @@ def run_chunk(manifest: str, folder: str, index: int) -> int:
     chunks = Path(folder) / CHUNKS
     chunk = campaign.chunk_at(index)
     if not is_finished(chunks, chunk, identity.sha256):
-        write_chunk(chunks, chunk, identity.sha256, campaign.file.work.run(campaign.inputs, chunk))
+        frame = campaign.file.work.run(campaign.inputs, chunk, Path(folder))
+        write_chunk(chunks, chunk, identity.sha256, frame)
     return index
 
 

@@ -1,4 +1,4 @@
-"""Declarations of the commands on a bench without a session: `aim`, `lasers off`, `lasers state`."""
+"""Declarations of the commands on a bench beside `run`: `aim`, `line`, `lasers off`, `lasers state`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from workbench.cli.option_types import NoInput, millimetres
+from workbench.cli.option_types import NoInput, OperatorName, millimetres
 
 lasers = typer.Typer(help="Control a rig's lasers without a session.", no_args_is_help=True)
 
@@ -32,6 +32,18 @@ def aim(
     from workbench.cli.aim import AimRequest, aim_lasers
 
     aim_lasers(AimRequest(rig, calibration, standoff, no_input, view))
+
+
+def line(
+    procedures: Annotated[list[Path], typer.Argument(help="Procedure files, run in this order.")],
+    rig: Annotated[Path, typer.Option(help="Rig file; every sensor gets its own serial number.")],
+    sessions: Annotated[Path, typer.Option(help="Folder for the sessions of the line.")] = Path("sessions"),
+    operator: OperatorName = None,
+) -> None:
+    """Run procedures on one sensor after another. Serial number, session, certificate, next."""
+    from workbench.cli.line import Line
+
+    Line(tuple(procedures), rig, sessions, operator).run()
 
 
 @lasers.command(name="off")

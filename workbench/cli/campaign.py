@@ -23,9 +23,11 @@ from workbench.campaign.results import page_path, summarise, write_results
 from workbench.campaign.run import run_chunks
 from workbench.cli.console import print_message
 from workbench.cli.invocation import command_line
-from workbench.model.errors import StoppedError
+from workbench.model.errors import BadInputError, StoppedError
 from workbench.model.number_text import counted, duration
 from workbench.report.terminal_table import TerminalTable
+from workbench.viewer.recording import RECORDING_FILE
+from workbench.viewer.results_view import record_results
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -70,6 +72,7 @@ def run_campaign(request: CampaignRequest, as_json: bool) -> None:
                 progress.end()
         summary = summarise(folder)
         write_results(folder, summary)
+        _record(folder, summary)
         if as_json:
             print(json.dumps({table.name: table.records() for table in summary.tables}))
         _print(folder, summary)
@@ -143,6 +146,20 @@ class Progress:
             typer.echo(err=True)
 
 
+def _record(folder: CampaignFolder, summary: Summary) -> None:
+    """Write the recording of the results.
+
+    Raises:
+        BadInputError: the file cannot be written.
+    """
+    path, text = folder.path / RECORDING_FILE, "\n".join((summary.headline, *summary.notes))
+    name = folder.identity.campaign
+    try:
+        record_results(path, name, text, summary.tables, summary.charts, summary.colors)
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
 def _print(folder: CampaignFolder, summary: Summary) -> None:
     console = Console(stderr=True, markup=False)
     for table in summary.tables:
@@ -152,3 +169,4 @@ def _print(folder: CampaignFolder, summary: Summary) -> None:
     for note in summary.notes:
         print_message(f"note: {note}")
     print_message(f"report:  {page_path(folder)}")
+    print_message(f"view:    workbench view {folder.path / RECORDING_FILE}")

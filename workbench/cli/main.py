@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from workbench.cli.bench_commands import aim, lasers
+from workbench.cli.bench_commands import aim, lasers, line
 from workbench.cli.console import print_message, print_warnings_as_notes
 from workbench.cli.exit import exit_program, report
 from workbench.cli.option_types import (
@@ -377,7 +377,7 @@ def view(
     raise typer.Exit(view(asked))
 
 
-for other in (aim, repair, export, history, use):
+for other in (aim, line, repair, export, history, use):
     app.command()(other)
 app.command(name="report")(report_)
 app.add_typer(lasers, name="lasers")

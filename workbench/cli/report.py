@@ -83,6 +83,17 @@ def report_session(name: Path, sessions: Path, outputs: Outputs, no_input: bool)
     _print_summary(certificate, outputs)
 
 
+def certify(session_dir: Path) -> str:
+    """Write the certificate of a session into its folder, without questions; returns its title and number.
+
+    Raises:
+        BadInputError: the session is damaged, or a file cannot be written.
+    """
+    certificate = _issued(read_session(session_dir), laboratory_of(session_dir.parent, no_input=True))
+    write_document(certificate.document, session_dir / DEFAULT_NAME)
+    return f"{certificate.document.title} {certificate.document.number}"
+
+
 def compare_sessions(names: tuple[Path, Path], sessions: Path, outputs: Outputs) -> None:
     """Write a comparison of the calibrations of two sessions; it has no number.
 

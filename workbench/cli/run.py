@@ -79,8 +79,11 @@ def run_procedures(
     sessions: Path,
     screen: Screen,
     calibration: Path | None = None,
-) -> None:
+) -> Path:
     """Run procedures in a new session with progress on the terminal and in the viewer.
+
+    Returns:
+        Folder of the session.
 
     Raises:
         WorkbenchError: see `workbench.procedure.engine.run.run`.
@@ -91,6 +94,7 @@ def run_procedures(
     session_dir = plan.new_session(sessions)
     with _repairable(session_dir, plan, screen) as ui:
         run(plan, session_dir, ui.consumers, _caller(screen), ui.stopping, ui.operator)
+    return session_dir
 
 
 def resume_session(

@@ -47,7 +47,10 @@ class InvertedSpots(NamedTuple):
 
 
 class SpotCurves:
-    """Spot curves of lasers with `rays` (L, 4) and a `lens` vector in the order of its `model`."""
+    """Spot curves of lasers with `rays` (L, 4), and the `lens` in the order of its `model`.
+
+    The lens is (C,) for all lasers, or (L, C) for lasers of different sensors.
+    """
 
     def __init__(self, model: LensModel, lens: FloatArray, rays: FloatArray) -> None:
         self._columns = len(model.parameters) + len(RAY)
@@ -65,7 +68,8 @@ class SpotCurves:
         position = table[:, :, :2]
         self._position_and_slope = np.concatenate((position, self._by.derivative(position)), axis=2)
         self._derivatives = table[:, :, 2:]
-        self._unfolded = self._unfolded_between(rays, float(model.unfolded_radius(lens[len(PINHOLE) :])))
+        fold = model.unfolded_radius(np.moveaxis(lens, -1, 0)[len(PINHOLE) :])
+        self._unfolded = self._unfolded_between(rays, fold)
         """(L, 2) ends of s before the fold of the lens model."""
         self._starts = self._by.starts
         self._start_px = (self._by.basis(self._starts) @ self._position_and_slope)[:, :, :2]
@@ -141,8 +145,8 @@ class SpotCurves:
     def _variable(self, laser: IndexArray, inverse_depth_per_mm: FloatArray) -> FloatArray:
         return self._by.variable(inverse_depth_per_mm / self._unit[laser] + self._at_infinity[laser])
 
-    def _unfolded_between(self, rays: FloatArray, radius: float) -> FloatArray:
-        """(L, 2) s at the ends of the part of each line within `radius` of the axis; NaN if there is none."""
+    def _unfolded_between(self, rays: FloatArray, radius: FloatArray) -> FloatArray:
+        """(L, 2) s at the ends of each line's part within a radius, () or (L,), of the axis; NaN if none."""
         line = image_line(rays)
         with np.errstate(invalid="ignore"):
             half = np.sqrt(radius**2 - line.off_axis**2)
@@ -162,11 +166,12 @@ def _model(model: LensModel, lens: FloatArray, rays: FloatArray, inverse_depth: 
     Complex-step derivatives, exact to rounding (W. Squire and G. Trapp, SIAM Rev. 40 (1998) 110). For so few
     points a compiled program takes far longer to load.
     """
-    inputs = np.concatenate((np.broadcast_to(lens, (len(rays), len(lens))), rays), axis=1)
+    size = lens.shape[-1]
+    inputs = np.concatenate((np.broadcast_to(lens, (len(rays), size)), rays), axis=1)
     columns = inputs.shape[1]
     steps = np.concatenate((np.zeros((1, columns)), np.eye(columns))) * (1j * STEP)
     stepped = np.moveaxis(inputs[:, None, None] + steps[:, None], -1, 0)  # (C, L, C + 1, 1)
-    ours = stepped[: len(lens)], Ray(*stepped[len(lens) :])
+    ours = stepped[:size], Ray(*stepped[size:])
     spots = np.stack(spot_at_inverse_depth(model, *ours, inverse_depth[:, None].astype(complex)))
     derivatives = (spots[:, :, 1:].imag / STEP).transpose(1, 3, 0, 2)  # of (2, L, C + 1, n)
     return np.concatenate(

@@ -102,6 +102,23 @@ def comparison(columns: Mapping[str, tuple[Rig, str]]) -> rrb.Blueprint:
     )
 
 
+def results_layout(name: str, charts: Sequence[tuple[str, str]]) -> rrb.Blueprint:
+    """Layout of results without a session: charts at the left, tables at the right.
+
+    Args:
+        name: name of the results.
+        charts: name and title of each chart.
+    """
+    return rrb.Blueprint(
+        _charts_and_tables(TrialTab(name, tuple(charts), reads=False), live=False),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
 def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
     axis, below = rig.lasers[0].axis, f"{prefix}/"
     results = rrb.Tabs(
@@ -185,16 +202,9 @@ def _parameters() -> rrb.Container:
 
 
 def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
-    tables = table_view(at.trial_tables(trial.trial), "Tables: scroll, or enlarge", titlebar=True)
-    pictures = [picture_view(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
     if not trial.reads:
-        shown = [_page(n + 1, pictures[n : n + PER_PAGE]) for n in range(0, len(pictures), PER_PAGE)]
-        return rrb.Horizontal(
-            shown[0] if len(shown) == 1 else rrb.Tabs(*shown, active_tab=0),
-            _texts(live, (tables, 8)),
-            column_shares=[1, 1],
-            name=trial.trial,
-        )
+        return _charts_and_tables(trial, live)
+    tables, pictures = _parts(trial)
     texts = _texts(live, (tables, 8))
     charts = rrb.Horizontal(
         pictures[0] if len(pictures) == 1 else rrb.Tabs(*pictures, active_tab=0),
@@ -206,6 +216,26 @@ def _trial(rig: Rig, trial: TrialTab, live: bool) -> rrb.Container:
         column_shares=[10, 5],
     )
     return rrb.Vertical(_seen(rig, texts, (6, 7, 13), (5, 2)), charts, row_shares=[5, 4], name=trial.trial)
+
+
+def _charts_and_tables(trial: TrialTab, live: bool) -> rrb.Container:
+    """Screen of results without readings."""
+    tables, pictures = _parts(trial)
+    shown = [_page(n + 1, pictures[n : n + PER_PAGE]) for n in range(0, len(pictures), PER_PAGE)]
+    if not shown:
+        return _texts(live, (tables, 8))
+    return rrb.Horizontal(
+        shown[0] if len(shown) == 1 else rrb.Tabs(*shown, active_tab=0),
+        _texts(live, (tables, 8)),
+        column_shares=[1, 1],
+        name=trial.trial,
+    )
+
+
+def _parts(trial: TrialTab) -> tuple[rrb.View, list[rrb.View]]:
+    """View of the tables of a trial, and those of its charts."""
+    tables = table_view(at.trial_tables(trial.trial), "Tables: scroll, or enlarge", titlebar=True)
+    return tables, [picture_view(at.trial_picture(trial.trial, name), title) for name, title in trial.charts]
 
 
 def _page(first: int, pictures: Sequence[rrb.View]) -> rrb.Container:

@@ -53,7 +53,8 @@ def test_a_file_of_another_kind_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", sorted(ROOT.glob("procedures/campaigns/*.yaml")), ids=lambda path: path.stem)
 def test_example_campaigns_are_valid(path: Path, tmp_path: Path) -> None:
     text = path.read_text().replace("../../sessions", str(ROOT / "data/sessions"))
-    assert load_campaign(write_campaign(tmp_path, text.replace("../../rigs", str(ROOT / "rigs")))).chunks
+    text = text.replace("../../rigs", str(ROOT / "rigs")).replace("[../", f"[{ROOT / 'procedures'}/")
+    assert load_campaign(write_campaign(tmp_path, text)).chunks
 
 
 def test_the_schema_in_the_documentation_is_that_of_the_code() -> None:

@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from workbench.campaign.cluster import _without_interrupts, local_client, remote_client
+from workbench.campaign.cluster import _closed_at_end, _without_interrupts, local_client, remote_client
 from workbench.model.errors import BadInputError
 
 
@@ -49,3 +49,16 @@ def test_threads_that_start_workers_do_not_get_interrupts() -> None:
     _without_interrupts(start)
     start()
     assert [signal.SIGINT in mask for mask in masks] == [True, False]
+
+
+def test_workers_that_do_not_end_in_time_are_no_error() -> None:
+    closed: list[bool] = []
+
+    class Busy:
+        def close(self) -> None:
+            closed.append(True)
+            raise TimeoutError
+
+    with _closed_at_end(Busy):
+        assert not closed
+    assert closed

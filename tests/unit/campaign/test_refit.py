@@ -77,6 +77,21 @@ def test_another_model_moves_ranges_and_limits_refuse(archive: Path, same_model:
     assert [row["session"] for row in sessions.records()] == [UNFITTED, REFERENCE, REFERENCE]
 
 
+@pytest.mark.parametrize("edited", ["captures.csv", "a frame"])
+def test_a_session_that_was_edited_is_not_fitted_and_named(tmp_path: Path, edited: str) -> None:
+    session = Path(shutil.copytree(ROOT / "data/sessions" / REFERENCE, tmp_path / "sessions" / REFERENCE))
+    if edited == "captures.csv":
+        path = session / edited
+        path.write_text(path.read_text().replace("L1,150.0,0,", "L1,151.0,0,", 1))
+    else:
+        first, other, *_ = sorted(session.glob("frames/reference.3/*/L1/*-on.png"))
+        path = Path(shutil.copy(other, first))
+    row = pd.concat(frames_of(campaign_of(tmp_path))).iloc[0]
+    assert (row["session"], row["before"], row["now"]) == (REFERENCE, "accepted", "not fitted")
+    assert row["reason"].startswith(f"{path}: ")
+    assert pd.isna(row["rms_px_now"])
+
+
 def test_a_query_without_sessions_is_refused(archive: Path) -> None:
     with pytest.raises(BadInputError, match=r"campaign\.yaml:6: work\.sessions: .*none is selected"):
         campaign_of(archive, "  until: 2020-01-01\n")

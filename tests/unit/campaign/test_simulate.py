@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -44,7 +45,7 @@ def test_there_is_one_row_for_each_sensor(frames: list[pd.DataFrame]) -> None:
 def test_a_chunk_depends_neither_on_order_nor_on_others(
     campaign: Campaign, frames: list[pd.DataFrame]
 ) -> None:
-    again = campaign.file.work.run(campaign.inputs, campaign.chunks[2])
+    again = campaign.file.work.run(campaign.inputs, campaign.chunks[2], Path())
     pd.testing.assert_frame_equal(again, frames[2], check_exact=True)
 
 

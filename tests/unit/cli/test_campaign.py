@@ -32,6 +32,7 @@ def test_a_finished_campaign_prints_its_results(workbench: Run, campaign: Path) 
     assert "40 sensors: " in outcome.err
     assert max(map(len, outcome.err.splitlines()[:20])) <= 80
     assert (campaign.parent / "out/report.html").is_file()
+    assert (campaign.parent / "out/recording.rrd").is_file()
 
 
 def test_another_seed_is_refused_before_workers_start(workbench: Run, campaign: Path) -> None:

@@ -25,7 +25,9 @@ from workbench.model.rig import Rig
 from workbench.optics.image import in_picture
 from workbench.optics.rays import RAY
 from workbench.sensor.curves import SpotCurves
-from workbench.sensor.range_model import RangeModel
+
+BLOCK = 64
+"""Number of sensors that are ranged together; their tables fit into the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -56,26 +58,45 @@ class SimulatedCalibrations:
         spot = _spots(self.rig, bench, range_mm, still)
         for sd_px in (noise.spot_sd_px, noise.speckle_sd_px):
             spot = spot + rng.normal(0.0, sd_px, spot.shape)
-        laser = np.tile(np.arange(layout.lasers), len(range_mm))
-        sd_px = np.hypot(noise.spot_sd_px, noise.speckle_sd_px) * self.fit.noise_scale
-        found = [
-            self._range_model(n).ranges(laser, one.reshape(-1, 2), np.full((len(laser), 2), sd_px[n]))
-            for n, one in enumerate(spot)
-        ]
-        measured = np.array([one.range_mm for one in found]).reshape(spot.shape[:3])
-        sd = np.array([one.sigma_mm for one in found]).reshape(spot.shape[:3])
+        measured, sd = self.ranges_of(spot)
         seen = self._seen(range_mm)
         return SimulatedRanges(
             np.where(seen, measured - range_mm[:, None], np.nan), np.where(seen, sd, np.nan)
         )
 
-    def _range_model(self, sensor: int) -> RangeModel:
-        """Inverse of the model by the calibration of one sensor, given by its index."""
-        layout = Layout(self.rig.camera.lens, len(self.rig.lasers))
-        values, covariance = self.fit.sensor[sensor], self.fit.sensor_covariance[sensor]
-        curves = SpotCurves(layout.model, values[layout.lens], values[layout.rays].reshape(-1, len(RAY)))
-        own = np.array([layout.own(n) for n in range(layout.lasers)])
-        return RangeModel(curves, float(values[layout.offset]), own, layout.offset, covariance)
+    def ranges_of(self, spot_px: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(N, K, L) ranges of spots (N, K, L, 2) by each calibration, and their sd; as `RangeModel`."""
+        shape = spot_px.shape[:3]
+        measured, sd = np.empty(shape), np.empty(shape)
+        for first in range(0, len(spot_px), BLOCK):
+            block = slice(first, first + BLOCK)
+            measured[block], sd[block] = self._ranges_of(spot_px[block], block)
+        return measured, sd
+
+    def _ranges_of(self, spot_px: FloatArray, sensors: slice) -> tuple[FloatArray, FloatArray]:
+        """`ranges_of` for some sensors."""
+        noise, layout, shape = (
+            self.rig.noise,
+            Layout(self.rig.camera.lens, len(self.rig.lasers)),
+            spot_px.shape,
+        )
+        values, covariance = self.fit.sensor[sensors], self.fit.sensor_covariance[sensors]
+        rays = values[:, layout.rays].reshape(-1, len(RAY))
+        curves = SpotCurves(layout.model, np.repeat(values[:, layout.lens], layout.lasers, axis=0), rays)
+        curve = np.broadcast_to(np.arange(len(rays)).reshape(-1, 1, layout.lasers), shape[:3])
+        sd_px = np.hypot(noise.spot_sd_px, noise.speckle_sd_px) * self.fit.noise_scale[sensors]
+        inverse_sd = np.broadcast_to(1.0 / sd_px[:, None, None, None], shape).reshape(-1, 2)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # no range, or infinite
+            found = curves.invert(curve.ravel(), spot_px.reshape(-1, 2), inverse_sd)
+            w = found.inverse_depth_per_mm.reshape(shape[:3])
+            range_mm = np.where(w <= 0, np.inf, 1.0 / w) - values[:, layout.offset, None, None]
+        # A range depends on the lens, the laser's own ray and the offset: no other covariance matters.
+        own = np.array([[*layout.own(n), layout.offset] for n in range(layout.lasers)])
+        by_offset = np.full((*shape[:3], 1), -1.0)
+        gradient = np.concatenate((found.dz.reshape(*shape[:3], -1), by_offset), axis=3).swapaxes(1, 2)
+        propagated = gradient @ covariance[:, own[:, :, None], own[:, None]]  # (n, L, K, C + 1)
+        variance = (propagated * gradient).sum(axis=3).swapaxes(1, 2)
+        return range_mm, np.sqrt(variance + found.z_sd_of_spot_mm.reshape(shape[:3]) ** 2)
 
     def _seen(self, range_mm: FloatArray) -> BoolArray:
         """(N, K, L) whether each sensor has the spot in its image."""

@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from tests.proofs import simulate
-from tests.support.rigs import thesis_rig
-from workbench.calibration.design.simulation import SimulatedCalibrations, simulate_calibrations
+from tests.support.rigs import fisheye_rig, thesis_rig
+from workbench.calibration.design.simulation import BLOCK, SimulatedCalibrations, simulate_calibrations
 from workbench.calibration.estimation.batch import BatchFit
+from workbench.calibration.model.layout import Layout
 from workbench.model.arrays import FloatArray
+from workbench.model.rig import Rig
+from workbench.sensor.curves import SpotCurves
+from workbench.sensor.range_model import RangeModel
 
 STANDOFFS_MM = (125.0, 210.0, 400.0, 900.0, 2200.0, 4500.0)
 RANGES_MM = np.array([200.0, 600.0, 2000.0])
@@ -54,6 +58,37 @@ def test_ranges_without_noise_invert_spots_of_another_program(simulated: Simulat
     seen = np.isfinite(found.error_mm)
     assert (seen == inside).mean() > 0.99
     assert np.abs(found.error_mm[seen]).max() < 1e-3
+
+
+@pytest.mark.parametrize("rig", [thesis_rig(), fisheye_rig()], ids=lambda rig: rig.camera.lens)
+def test_ranges_of_all_sensors_are_those_of_each_alone(rig: Rig) -> None:
+    count = BLOCK + BLOCK // 3
+    simulated = simulate_calibrations(rig, STANDOFFS_MM, 5, count, np.random.default_rng(3))
+    rng = np.random.default_rng(4)
+    depth = np.geomspace(150.0, 5000.0, 4) + simulated.truth[:, [simulate.lens_size(rig)]]
+    spots = simulate.spots(rig, simulated.truth, depth, np.zeros((*depth.shape, 2)))
+    spots = spots + rng.normal(0.0, 0.05, spots.shape)
+    spots[0] -= 1000.0  # beyond the vanishing points
+    together = simulated.ranges_of(spots)
+    alone = np.array([_ranges_alone(simulated, n, one) for n, one in enumerate(spots)])
+    for part, ours in enumerate(together):
+        np.testing.assert_allclose(ours, alone[:, part], rtol=1e-12)
+    assert np.isfinite(together[0]).mean() > 0.9
+    assert not np.isfinite(together[0][0]).all()
+
+
+def _ranges_alone(simulated: SimulatedCalibrations, sensor: int, spots: FloatArray) -> FloatArray:
+    """(2, K, L) ranges of spots (K, L, 2) by the ranger of one sensor, and their sd."""
+    noise, lasers = simulated.rig.noise, len(simulated.rig.lasers)
+    layout, values = Layout(simulated.rig.camera.lens, lasers), simulated.fit.sensor[sensor]
+    curves = SpotCurves(layout.model, values[layout.lens], values[layout.rays].reshape(lasers, -1))
+    own = np.array([layout.own(n) for n in range(lasers)])
+    covariance = simulated.fit.sensor_covariance[sensor]
+    model = RangeModel(curves, float(values[layout.offset]), own, layout.offset, covariance)
+    sd_px = np.hypot(noise.spot_sd_px, noise.speckle_sd_px) * simulated.fit.noise_scale[sensor]
+    laser = np.tile(np.arange(lasers), len(spots))
+    found = model.ranges(laser, spots.reshape(-1, 2), np.full((len(laser), 2), sd_px))
+    return np.array([found.range_mm, found.sigma_mm]).reshape(2, *spots.shape[:2])
 
 
 def _fitted_to(simulated: SimulatedCalibrations, truth: FloatArray) -> BatchFit:
