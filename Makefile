@@ -52,6 +52,7 @@ prove: $(INSTALLED)
 	$(BIN)/python -m tests.proofs.shapes
 	$(BIN)/python -m tests.proofs.trials
 	$(BIN)/python -m tests.proofs.worlds
+	$(BIN)/python -m tests.proofs.layouts
 
 mutants: $(INSTALLED)
 	$(BIN)/python -m tests.mutants

@@ -13,6 +13,7 @@ PAGES = (
     "docs/demo.md",
     "docs/design-of-standoffs.md",
     "docs/history.md",
+    "docs/layouts.md",
     "docs/ranging.md",
     "docs/spots.md",
     "docs/target-trials.md",
@@ -46,6 +47,9 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "trials": of_proofs.trials,
     "verification": of_proofs.verification,
     "control-charts": of_proofs.control_charts,
+    "layouts-view": of_proofs.layouts_view,
+    "layouts-resolution": of_proofs.layouts_resolution,
+    "layouts-missed": of_proofs.layouts_missed,
     "worlds": of_proofs.worlds,
     "worlds-errors": of_proofs.worlds_errors,
 }
