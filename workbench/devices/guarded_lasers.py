@@ -27,17 +27,17 @@ LONGEST_LEASE_S = 60.0
 
 
 class GuardedLaserBank:
-    """Lasers `ids`, in the order of the device's lines 1, 2, ...; see `protocols.LaserBank`."""
+    """Lasers `ids` on the device's lines 1, 2, ...; see `protocols.LaserBank`."""
 
     def __init__(
         self,
         line_type: type[GuardedLine],
         settings: DeviceBlock,
         ids: Sequence[str],
-        lines: Sequence[int] | None = None,
         boot_s: float = BOOT_S,
         hang_s: float = HANG_S,
         virtual: bool = False,
+        lines: Sequence[int] | None = None,
     ) -> None:
         """Start the guardian, which opens the device and switches every laser off.
 
@@ -45,10 +45,10 @@ class GuardedLaserBank:
             line_type: class of the laser driver.
             settings: block of the rig file.
             ids: lasers in the order of the lines.
-            lines: index of each laser's line; lasers with the same one are on together. None: one line each.
             boot_s: time in which the device must answer, s.
             hang_s: time without a beat after which lasers are switched off, s.
             virtual: whether the beams are simulated.
+            lines: index of each laser's line; lasers of one line are on together. None: a line for each.
 
         Raises:
             BadInputError: the device has fewer outputs than there are lasers.

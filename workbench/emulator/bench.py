@@ -64,9 +64,9 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
             ControllerLine,
             SerialBlock(port=server.port),
             rig.laser_ids,
-            rig.laser_lines,
             hang_s=LONGEST_LEASE_S,
             virtual=True,
+            lines=rig.laser_lines,
         )
     except BaseException:
         server.close()
