@@ -10,7 +10,7 @@ import pytest
 
 from tests.bench.sensors import calibration_of
 from workbench.emulator.bench import EmulatedBench, open_bench
-from workbench.model.rig import Rig, load_rig
+from workbench.model.rig import Rig, load_rig, nearest_image_axis
 from workbench.model.target import CylinderTarget, FlatTarget, NoTarget, Placement, TargetShape
 from workbench.ranging.lines import Weights
 from workbench.ranging.live import LiveRanger
@@ -24,7 +24,7 @@ SEEDS = (2001, 7)
 def rig_of(seed: int, axes: str) -> Rig:
     """The rig of both lines on a bench where every target stands exactly as it is put."""
     rig = load_rig(ROOT / "rigs/thesis-both-emulated.yaml")
-    lasers = tuple(laser for laser in rig.lasers if laser.axis in axes)
+    lasers = tuple(laser for laser in rig.lasers if nearest_image_axis(laser) in axes)
     steady = {"placement_sd_mm": 0.0, "tilt_sd_deg": 0.0, "target_tilt_sd_deg": 0.0}
     exact = rig.bench.model_copy(update=steady)
     return rig.model_copy(update={"lasers": lasers, "bench": exact, "emulator": {"seed": seed}})

@@ -77,7 +77,7 @@ class CalibratedSensor:
 
     def axis(self, laser_id: str) -> FloatArray:
         """(2,) unit vector along which the laser's spot moves in the image."""
-        return self._axes[self._index_of[laser_id]]
+        return np.asarray(self._axes[self._index_of[laser_id]])
 
     @cached_property
     def _axes(self) -> FloatArray:
