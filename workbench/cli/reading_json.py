@@ -23,7 +23,7 @@ def plain(reading: Reading) -> dict[str, Any]:
         "mean_mm": reading.mean_mm,
         "mean_sigma_mm": reading.mean_sigma_mm,
         "shape": {"kind": "unknown"} if nearest is None else _shape(nearest),
-        "lines": [_line(line, reading) for line in reading.lines],
+        "lines": [_line(line, reading) for line in reading.shapes],
         "lasers": [
             {
                 "id": laser.laser_id,

@@ -49,7 +49,8 @@ class Reading:
     lasers: tuple[LaserRange, ...] = ()
     """In the calibration's order."""
     lines: tuple[LineShape, ...] = ()
-    """Shape in front of each row of lasers with a range, by the row's angle: horizontal first."""
+    """Shape in front of each row of lasers with a range, by the row's angle: horizontal first. Lasers on no
+    row are in it, with an unknown shape."""
     flat_mm: float | None = None
     """Mean range of the lasers, weighted by their spots: the range of a flat target across the axis."""
     flat_sigma_mm: float | None = None
@@ -59,6 +60,13 @@ class Reading:
     """Mean x and y of the spots, weighted likewise: the point whose range is `flat_mm`."""
     notes: tuple[str, ...] = ()
     """Reasons of missing ranges, and remarks on uncertain ones."""
+
+    @property
+    def shapes(self) -> tuple[LineShape, ...]:
+        """Shapes to report: of the rows of two lasers or more; of the nearest laser where all are single."""
+        rows = tuple(line for line in self.lines if len(line.row.members) > 1)
+        nearest = sorted(self.lines, key=lambda line: line.shape.closest_mm)[:1]
+        return rows or tuple(nearest)
 
 
 @dataclass(frozen=True)

@@ -137,7 +137,7 @@ def reading_taken(
         placement_sd_mm=reference.own_sd_mm(tilt),
         closest_mm=reading.closest_mm,
         closest_sigma_mm=reading.sigma_mm,
-        shape=", ".join(line.shape.kind for line in reading.lines),
+        shape=", ".join(line.shape.kind for line in reading.shapes),
         notes=reading.notes,
         lasers=reading.lasers,
         lasers_true_mm=reference.lasers_true_mm(sensor, reading.lasers),

@@ -205,7 +205,7 @@ def answer_text(reading: Reading) -> str:
     if reading.interval_mm is not None:
         low, high = reading.interval_mm
         lines.append(f"closest point; 95 % from {low:.1f} to {high:.1f} mm")
-    for line in reading.lines:
+    for line in reading.shapes:
         angle = line.shape.angle_rad
         turned = "" if angle is None else f", angle {np.degrees(angle):+.1f} deg"
         lines.append(f"**{line.shape.kind}**{turned}{_odds(line.shape)}")

@@ -110,6 +110,8 @@ def test_lasers_on_no_row_give_ranges_without_a_shape(seed: int) -> None:
     assert [line.shape.kind for line in reading.lines] == ["unknown"] * len(world.rig.lasers)
     assert reading.closest_mm == min(one.range_mm for one in reading.lasers)
     assert len(reading.lasers) == len(world.rig.lasers)
+    (nearest,) = reading.shapes
+    assert nearest.shape.closest_mm == reading.closest_mm
 
 
 @pytest.mark.parametrize("seed", SEEDS)
