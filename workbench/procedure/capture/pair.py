@@ -149,7 +149,9 @@ class PairSource:
         if scene is None and (shared := self._shared_pair(laser_ids, placement, repeat)) is not None:
             on_image, off_image, taken = shared
             return on_image, off_image, taken.model_copy(update={"key": key, "laser_id": laser_ids[0]})
-        lit = [i for i in laser_ids if i not in left_off]
+        asked = set(laser_ids).difference(left_off)
+        groups = [[laser.id for laser in group] for group in self.rig.emitters]
+        lit = [laser_id for group in groups if asked.intersection(group) for laser_id in group]
         on, clock_ns, lit_s = within_lease(lambda: self._grab_lit(key, lit))
         frames = FrameStore(self.session_dir)
         with ThreadPoolExecutor(1) as beside:  # the lit frame is stored while the dark one is exposed

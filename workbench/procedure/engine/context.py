@@ -59,8 +59,8 @@ class Context:
     readings: list[ev.ReadingTaken] = field(default_factory=list)
     """Readings of all trials so far, for steps that compare trials."""
     pairs: PairSource = field(init=False)
-    _found: tuple[str, Finding] | None = field(default=None, init=False)
-    """Path of the last lit frame, and all spots in it: lasers that are on together share it."""
+    _found: tuple[tuple[object, ...], Finding] | None = field(default=None, init=False)
+    """Last search (frame, bands, number of spots) and its result, which lasers that are on together share."""
 
     def __post_init__(self) -> None:
         parts = [capture.part for capture in self.recorder.complete_captures]
@@ -136,11 +136,12 @@ class Context:
         """Spots of a capture; of one laser in a calibration, its own."""
         alone = taken.scene is None and len(laser_ids) == 1
         laser = self.rig.lasers[self.rig.laser_ids.index(laser_ids[0])] if alone else None
-        if self._found is None or self._found[0] != taken.on.path:
-            expected = len(laser_ids) if laser is None else sought(self.rig, laser)[1]
+        expected = len(laser_ids) if laser is None else sought(self.rig, laser)[1]
+        search = taken.on.path, taken.on.sha256, tuple(scanlines), expected
+        if self._found is None or self._found[0] != search:
             speckle_sd_px = self._speckle_sd_px(taken.scene)
             found = find_spots(on, off, scanlines=scanlines, expected=expected, speckle_sd_px=speckle_sd_px)
-            self._found = taken.on.path, found
+            self._found = search, found
         return self._found[1] if laser is None else own_spots(self.rig, laser, self._found[1])
 
     def _speckle_sd_px(self, scene: str | None) -> float:
