@@ -69,8 +69,7 @@ def fit_line(
     of_places[own_noise] += tangent**2 * spot
     cross[own_noise] += tangent * spot
     points = Points(place, own.range_mm, own.covariance_mm2, sensor.offset_mm, of_places, cross)
-    front = sensor.front_mm(row, float(own.range_mm.mean()))
-    shape = fit_shape(points, front, prior, len(row.members))
+    shape = fit_shape(points, sensor.front_mm(row, own.range_mm), prior, len(row.members))
     by_parameter = shape.closest_by_range @ own.by_parameter + shape.closest_by_place @ by_parameter
     spot_sd = (shape.closest_by_range + shape.closest_by_place * tangent) * own.spot_sd_mm
     return LineShape(row, shape, tuple(indices), by_parameter, spot_sd)

@@ -129,14 +129,14 @@ class CalibratedSensor:
         """(n,) indices of lasers in the order of `ids`."""
         return np.array([self._index_of[i] for i in laser_ids], np.intp)
 
-    def front_mm(self, row: Row, range_mm: float) -> tuple[float, float]:
+    def front_mm(self, row: Row, range_mm: float | FloatArray) -> tuple[float, float]:
         """From the first to the last laser of a row, mm along it.
 
         Where its beams leave the sensor at one point, as behind a grating, the front is that of their spots
-        at `range_mm`.
+        at `range_mm`; of several ranges, at their mean.
         """
         front = self._fronts_mm.get(row)
-        return front or self._row_ends_mm(row, range_mm + self.offset_mm)
+        return front or self._row_ends_mm(row, float(np.mean(range_mm)) + self.offset_mm)
 
     def across_mm(self, row: Row, range_mm: float) -> float:
         """Distance of a row from the optical axis at a range, to the right of its direction; mm.
@@ -237,8 +237,9 @@ class CalibratedSensor:
         gradient[:, self._columns["offset_mm"]] = 0.0  # the reference plane does not affect the position
         spots = np.arange(len(laser))
         for share, of_origin, of_tangent in zip(direction, *self._beam_columns[:, :, laser], strict=True):
-            gradient[spots, of_origin] += share
-            gradient[spots, of_tangent] += share * depth
+            if share:  # half of the work for a horizontal or vertical row
+                gradient[spots, of_origin] += share
+                gradient[spots, of_tangent] += share * depth
         return origin + tangent * depth, gradient, tangent
 
     def positions_mm(self, laser_ids: Sequence[str], range_mm: FloatArray) -> FloatArray:
