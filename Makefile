@@ -53,6 +53,7 @@ prove: $(INSTALLED)
 	$(BIN)/python -m tests.proofs.trials
 	$(BIN)/python -m tests.proofs.worlds
 	$(BIN)/python -m tests.proofs.scanning
+	$(BIN)/python -m tests.proofs.layouts
 
 mutants: $(INSTALLED)
 	$(BIN)/python -m tests.mutants

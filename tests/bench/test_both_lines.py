@@ -10,7 +10,7 @@ import pytest
 
 from tests.bench.sensors import calibration_of
 from workbench.emulator.bench import EmulatedBench, open_bench
-from workbench.model.rig import Rig, load_rig
+from workbench.model.rig import Rig, load_rig, nearest_image_axis
 from workbench.model.target import CylinderTarget, FlatTarget, NoTarget, Placement, TargetShape
 from workbench.ranging.lines import Weights
 from workbench.ranging.live import LiveRanger
@@ -24,7 +24,7 @@ SEEDS = (2001, 7)
 def rig_of(seed: int, axes: str) -> Rig:
     """The rig of both lines on a bench where every target stands exactly as it is put."""
     rig = load_rig(ROOT / "rigs/thesis-both-emulated.yaml")
-    lasers = tuple(laser for laser in rig.lasers if laser.axis in axes)
+    lasers = tuple(laser for laser in rig.lasers if nearest_image_axis(laser) in axes)
     steady = {"placement_sd_mm": 0.0, "tilt_sd_deg": 0.0, "target_tilt_sd_deg": 0.0}
     exact = rig.bench.model_copy(update=steady)
     return rig.model_copy(update={"lasers": lasers, "bench": exact, "emulator": {"seed": seed}})
@@ -60,7 +60,7 @@ def vertical(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 
 
 def shapes(reading: Reading) -> dict[str, Shape]:
-    return {line.axis: line.shape for line in reading.lines}
+    return {line.row.name: line.shape for line in reading.lines}
 
 
 def angle_deg(shape: Shape) -> tuple[float, float]:
@@ -73,7 +73,8 @@ def test_a_flat_before_both_lines(both: Setup) -> None:
     reading = both.read(FlatTarget(), 700.0)
     assert reading.status == "done"
     assert [laser.laser_id for laser in reading.lasers] == list(both.rig.laser_ids)
-    assert {axis: shape.kind for axis, shape in shapes(reading).items()} == {"u": "flat", "v": "flat"}
+    kinds = {name: shape.kind for name, shape in shapes(reading).items()}
+    assert kinds == {"horizontal": "flat", "vertical": "flat"}
     assert reading.mean_mm is not None
     assert reading.mean_sigma_mm is not None
     assert abs(reading.mean_mm - 700.0) < 4 * reading.mean_sigma_mm
@@ -94,7 +95,7 @@ def test_each_line_sees_its_own_incline(both: Setup, angle: float) -> None:
         shapes(both.read(FlatTarget(yaw_deg=angle), 600.0)),
         shapes(both.read(FlatTarget(pitch_deg=angle), 600.0)),
     )
-    for seen, receding, level in ((turned, "u", "v"), (tipped, "v", "u")):
+    for seen, receding, level in ((turned, "horizontal", "vertical"), (tipped, "vertical", "horizontal")):
         found, sigma = angle_deg(seen[receding])
         assert seen[receding].kind == "incline"
         assert abs(found - angle) < 4 * sigma
@@ -106,7 +107,7 @@ def test_each_line_sees_its_own_incline(both: Setup, angle: float) -> None:
 def test_a_line_that_sees_nothing_leaves_the_range_to_the_other(both: Setup) -> None:
     reading = both.read(FlatTarget(height_mm=30.0), 500.0)
     assert reading.status == "not_enough_points"
-    assert set(shapes(reading)) == {"u"}
+    assert set(shapes(reading)) == {"horizontal"}
     assert reading.closest_mm is not None
     assert reading.sigma_mm is not None
     assert abs(reading.closest_mm - 500.0) < 4 * reading.sigma_mm
@@ -114,10 +115,10 @@ def test_a_line_that_sees_nothing_leaves_the_range_to_the_other(both: Setup) -> 
 
 def test_a_cylinder_is_round_across_and_straight_along(both: Setup) -> None:
     seen = shapes(both.read(CylinderTarget(diameter_mm=178.0, shift_mm=15.0), 250.0))
-    assert seen["u"].kind in {"cylinder", "round"}
-    assert seen["u"].cylinder is not None
-    assert abs(seen["u"].cylinder.radius_mm - 89.0) < 4 * seen["u"].cylinder.radius_sigma_mm
-    nearest, farthest = seen["u"].closest_interval_mm
+    assert seen["horizontal"].kind in {"cylinder", "round"}
+    assert seen["horizontal"].cylinder is not None
+    assert abs(seen["horizontal"].cylinder.radius_mm - 89.0) < 4 * seen["horizontal"].cylinder.radius_sigma_mm
+    nearest, farthest = seen["horizontal"].closest_interval_mm
     assert nearest - 0.5 < 250.0 < farthest + 0.5
 
 
@@ -139,7 +140,7 @@ def test_nothing_there(both: Setup) -> None:
 def test_the_vertical_line_alone(vertical: Setup, standoff_mm: float) -> None:
     reading = vertical.read(FlatTarget(), standoff_mm)
     assert reading.status == "done"
-    assert set(shapes(reading)) == {"v"}
+    assert set(shapes(reading)) == {"vertical"}
     assert reading.closest_mm is not None
     assert reading.sigma_mm is not None
     # The ruler's own scale, 0.05 %, is not the calibration's to know.

@@ -16,7 +16,7 @@ from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
 from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import FloatArray
-from workbench.model.rig import Rig, load_rig
+from workbench.model.rig import Rig, load_rig, nearest_image_axis
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger
 from workbench.spots import Finding, SpotFinder
@@ -39,7 +39,9 @@ class Bench:
 
     def __init__(self, axes: str, rig: Rig | None = None) -> None:
         rig = rig or load_rig(RIG)
-        self.rig = rig.model_copy(update={"lasers": tuple(s for s in rig.lasers if s.axis in axes)})
+        self.rig = rig.model_copy(
+            update={"lasers": tuple(s for s in rig.lasers if nearest_image_axis(s) in axes)}
+        )
         self.world = World(self.rig, 3)
         calibration, _ = calibrate(fit(self.rig, self.world.observations()), Acceptance(), PROVENANCE)
         self.ranger = Ranger(calibration)
@@ -55,7 +57,7 @@ class Bench:
         light = dark.copy()
         for laser in self.rig.lasers:
             if laser.id in fired:
-                depth = self._depth(laser.id, laser.axis, scene)
+                depth = self._depth(laser.id, nearest_image_axis(laser), scene)
                 u, v = self.world.pixel(laser.id, depth)
                 light += 15_000.0 * spot(SHAPE, u, v, 1.5, 1.5)
         return SENSOR.expose(light, rng).astype(np.uint8), SENSOR.expose(dark, rng).astype(np.uint8)

@@ -35,7 +35,7 @@ class DrawnSensors:
     @cached_property
     def front_mm(self) -> tuple[float, float]:
         """Ends of the front by the calibration."""
-        return self.ranger.sensor.front_mm("u")
+        return self.ranger.sensor.front_mm(self.ranger.sensor.rows[0], 0.0)
 
     @cached_property
     def sensors(self) -> list[CalibratedSensor]:
@@ -62,7 +62,8 @@ class DrawnSensors:
             hit = np.flatnonzero(np.isfinite(spots).all(axis=1)).tolist()
             for noise in rng.normal(0.0, SD_PX, (n // self.draws, *spots.shape)):
                 ranges = self.ranger.sensor.ranges(IDS, spots + noise, sd)
-                shapes.append(fit_line(self.ranger.sensor, "u", IDS, ranges, hit).shape)
+                (row,) = self.ranger.sensor.rows
+                shapes.append(fit_line(self.ranger.sensor, row, IDS, ranges, hit).shape)
         return shapes
 
 

@@ -65,9 +65,9 @@ class DrivenSensor:
             placed = Placement(key=key, standoff_mm=1000.0, standoff_sd_mm=1000.0, target=target)
             self.scene.place(placed)
             front_mm = at.front_mm if np.isfinite(at.front_mm) else 1e6
-            closest = ClosestRange(
-                TrueValues(range_mm=front_mm, range_sd_mm=at.front_sd_mm), self.ranger.sensor.front_mm("u")
-            )
+            row = max(self.ranger.sensor.rows, key=lambda one: len(one.members))
+            true = TrueValues(range_mm=front_mm, range_sd_mm=at.front_sd_mm)
+            closest = ClosestRange(true, self.ranger.sensor.front_mm(row, front_mm), row)
             scene = f"{key}/{number:03d}"
             reading = acquire(self.ranger, scene, partial(self._capture, scene))
             taken = reading_taken(self.rig, self.ranger.sensor, "drive", placed, number, reading, closest)

@@ -15,6 +15,7 @@ PAGES = (
     "docs/demo.md",
     "docs/design-of-standoffs.md",
     "docs/history.md",
+    "docs/layouts.md",
     "docs/ranging.md",
     "docs/scanning.md",
     "docs/spots.md",
@@ -54,6 +55,10 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "control-charts": of_proofs.control_charts,
     "colours": of_proofs.colours,
     "scanning": of_proofs.scanning,
+    "layouts-view": of_proofs.layouts_view,
+    "layouts-resolution": of_proofs.layouts_resolution,
+    "layouts-missed": of_proofs.layouts_missed,
+    "layouts-drives": of_proofs.layouts_drives,
     "worlds": of_proofs.worlds,
     "worlds-errors": of_proofs.worlds_errors,
 }

@@ -250,3 +250,51 @@ def worlds_errors() -> str:
         rig, count, *shares = line.split(" | ")
         rows.append((rig, count, *(f"{float(share):.2%}" for share in shares)))
     return markdown_table(("rig", "readings", "median abs error", "wrong", "inside"), rows)
+
+
+def layouts_view() -> str:
+    """Fields of view of layouts: `tests.proofs.layouts`."""
+    heading = ("rig", "lasers", "rows", "all in view from", "width", "height", "width, 3 m", "height, 3 m")
+    rows = [line.split(" | ") for line in newest("layouts").section("field of view")[1:]]
+    return markdown_table(heading, [[*row[:3], *(f"{mm} mm" for mm in row[3:])] for row in rows])
+
+
+def layouts_resolution() -> str:
+    """Resolution of layouts: `tests.proofs.layouts`."""
+    names = [f"{which}, {mm} mm" for mm in (300, 1000, 3000) for which in ("one laser", "all")]
+    rows = []
+    for line in newest("layouts").section("resolution")[1:]:
+        rig, *shares, per_px = line.split(" | ")
+        rows.append((rig, *(f"{float(share):.3%}" for share in shares), f"{per_px} mm"))
+    return markdown_table(("rig", *names, "per px"), rows)
+
+
+def layouts_drives() -> str:
+    """Missed obstacles in drives of layouts: `tests.proofs.layouts`."""
+    heading = (
+        "rig",
+        "world",
+        "drives",
+        "courses",
+        "met",
+        "missed",
+        "at most",
+        "not met, missed",
+        "false stops",
+    )
+    rows = []
+    for line in newest("layouts").section("drives")[1:]:
+        cells = line.split(" | ")
+        at_most = f"{float(cells[8]):.1%}"
+        rows.append((cells[0].removesuffix("-emulated"), *cells[1:6], at_most, cells[9], cells[11]))
+    return markdown_table(heading, rows, numbers_from=2)
+
+
+def layouts_missed() -> str:
+    """Thin rods that no beam of a layout meets: `tests.proofs.layouts`."""
+    rows = []
+    for line in newest("layouts").section("missed rods")[1:]:
+        rig, *shares = line.split(" | ")
+        rows.append((rig, *(f"{float(share):.1%}" for share in shares)))
+    heading = ("rig", "vertical rods", "at most", "horizontal", "at most", "any direction", "at most")
+    return markdown_table(heading, rows)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from workbench.ranging.lines import NAMES, LineShape
+from workbench.ranging.lines import LineShape
 from workbench.ranging.ranger import Reading
 from workbench.ranging.shape import Shape
 
@@ -23,7 +23,7 @@ def plain(reading: Reading) -> dict[str, Any]:
         "mean_mm": reading.mean_mm,
         "mean_sigma_mm": reading.mean_sigma_mm,
         "shape": {"kind": "unknown"} if nearest is None else _shape(nearest),
-        "lines": [_line(line, reading) for line in reading.lines],
+        "lines": [_line(line, reading) for line in reading.shapes],
         "lasers": [
             {
                 "id": laser.laser_id,
@@ -41,7 +41,7 @@ def plain(reading: Reading) -> dict[str, Any]:
 
 def _line(line: LineShape, reading: Reading) -> dict[str, Any]:
     return {
-        "line": NAMES[line.axis],
+        "line": line.row.name,
         "lasers": [reading.lasers[i].laser_id for i in line.indices],
         "closest_mm": line.shape.closest_mm,
         "sigma_mm": line.shape.closest_sigma_mm,

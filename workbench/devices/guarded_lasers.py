@@ -27,7 +27,7 @@ LONGEST_LEASE_S = 60.0
 
 
 class GuardedLaserBank:
-    """Lasers `ids`, in the order of the device's lines 1, 2, ...; see `protocols.LaserBank`."""
+    """Lasers `ids` on the device's lines 1, 2, ...; see `protocols.LaserBank`."""
 
     def __init__(
         self,
@@ -37,6 +37,7 @@ class GuardedLaserBank:
         boot_s: float = BOOT_S,
         hang_s: float = HANG_S,
         virtual: bool = False,
+        lines: Sequence[int] | None = None,
     ) -> None:
         """Start the guardian, which opens the device and switches every laser off.
 
@@ -47,6 +48,7 @@ class GuardedLaserBank:
             boot_s: time in which the device must answer, s.
             hang_s: time without a beat after which lasers are switched off, s.
             virtual: whether the beams are simulated.
+            lines: index of each laser's line; lasers of one line are on together. None: a line for each.
 
         Raises:
             BadInputError: the device has fewer outputs than there are lasers.
@@ -55,7 +57,8 @@ class GuardedLaserBank:
             LaserOffNotConfirmedError: the opened device does not confirm that all lasers are off.
         """
         self.ids = tuple(ids)
-        self._guardian = GuardianClient(line_type, settings, len(ids), boot_s, hang_s, virtual)
+        self._lines = tuple(range(len(ids)) if lines is None else lines)
+        self._guardian = GuardianClient(line_type, settings, len(set(self._lines)), boot_s, hang_s, virtual)
         self.identity = self._guardian.identity
         self._lit = False
 
@@ -103,7 +106,7 @@ class GuardedLaserBank:
             RigNotReadyError: the device does not answer.
         """
         mask, interlock_closed = cast("tuple[int, bool | None]", self._guardian.ask("STATE"))
-        lit = tuple(name for bit, name in enumerate(self.ids) if mask >> bit & 1)
+        lit = tuple(name for bit, name in zip(self._lines, self.ids, strict=True) if mask >> bit & 1)
         return LaserState(lit, interlock_closed)
 
     def close(self) -> None:
@@ -120,4 +123,4 @@ class GuardedLaserBank:
         if unknown or not ids:
             got = ", ".join(ids) or "none"
             raise BadInputError(f"lasers to switch on: expected some of {', '.join(self.ids)}, got {got}")
-        return sum(1 << self.ids.index(name) for name in set(ids))
+        return sum(1 << line for line in {self._lines[self.ids.index(name)] for name in ids})

@@ -85,7 +85,7 @@ def open_lasers(rig: Rig) -> GuardedLaserBank:
     refuse_problems(rig, ("lasers",))
     line_type: type[GuardedLine]
     line_type, settings = _driver(rig, "lasers")
-    return GuardedLaserBank(line_type, settings, rig.laser_ids)
+    return GuardedLaserBank(line_type, settings, rig.laser_ids, lines=rig.laser_lines)
 
 
 def refuse_problems(rig: Rig, kinds: Sequence[str]) -> None:

@@ -52,8 +52,11 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
     truth = draw_truth(rig, spec)
     scene = BenchScene(rig, spec, truth, truth_path(session_dir))
     sensor = ImageSensor(spec, ImageFormat(rig.camera.width_px, rig.camera.height_px), rig.camera.bits)
-    controller = Controller(rig.laser_ids, spec.controller)
-    camera = EmulatedCamera(spec, scene, sensor, controller.lit)
+    beams = {group[0].id: tuple(laser.id for laser in group) for group in rig.emitters}
+    controller = Controller(tuple(beams), spec.controller)
+    camera = EmulatedCamera(
+        spec, scene, sensor, lambda: tuple(name for line in controller.lit() for name in beams[line])
+    )
     server = PtyServer(controller.receive)
     try:
         # Computing a frame may take longer than the usual time between beats.
@@ -63,6 +66,7 @@ def open_bench(rig: Rig, session_dir: Path) -> EmulatedBench:
             rig.laser_ids,
             hang_s=LONGEST_LEASE_S,
             virtual=True,
+            lines=rig.laser_lines,
         )
     except BaseException:
         server.close()

@@ -169,8 +169,12 @@ class LaserSpec(FileModel):
     """One laser as a ray in the camera frame: origin (x, y, 0) mm, direction (tx, ty, 1)."""
 
     id: LaserId
-    axis: ImageAxis
-    """Image axis along which the spot moves with range: u for a laser beside the camera, v above or below."""
+    axis: ImageAxis | None = None
+    """Image axis along which the spot moves with range, if it is one: u for a laser beside the camera, v for
+    one above or below. The position decides it: the key is a check of the position, and may be left out."""
+    emitter: LaserId | None = None
+    """Name of the laser that emits this beam and others, by a grating: all its beams are on together. They
+    are in a row, so that their order assigns their spots. None: a laser of its own."""
     x_mm: Baseline
     y_mm: Baseline
     tx: Slope = exactly(0.0)
@@ -182,8 +186,10 @@ class LaserSpec(FileModel):
             raise ValueError(
                 f"a laser must not have the id {self.id!r}, which is reserved in captures.csv; rename it"
             )
-        along, name = (self.x_mm, "x_mm") if self.axis == "u" else (self.y_mm, "y_mm")
-        if along.value == 0:
+        if self.x_mm.value == self.y_mm.value == 0:
+            raise ValueError("a laser needs a baseline: x_mm and y_mm must not both be 0")
+        along, name = (self.y_mm, "y_mm") if self.axis == "v" else (self.x_mm, "x_mm")
+        if self.axis is not None and along.value == 0:
             raise ValueError(f"a laser on axis {self.axis} needs a baseline: {name} must not be 0")
         return self
 
@@ -222,6 +228,11 @@ class HeadSpec(FileModel):
                 f" {list(reach_deg)}"
             )
         return reach_deg
+
+
+def nearest_image_axis(laser: LaserSpec) -> ImageAxis:
+    """Image axis nearest to the direction in which a laser's spot moves."""
+    return "u" if abs(laser.x_mm.value) >= abs(laser.y_mm.value) else "v"
 
 
 class BenchSpec(FileModel):
@@ -352,9 +363,9 @@ class Rig(FileModel):
             raise ValueError(
                 f"head.laser: expected a laser of the rig ({', '.join(self.laser_ids)}), got {wanted}"
             )
-        if self.head_laser.axis != "u":
+        if nearest_image_axis(self.head_laser) != "u":
             raise ValueError(
-                f"head.laser: expected a laser with axis u, beside the camera; {wanted} has axis v"
+                f"head.laser: expected a laser beside the camera, got {wanted}, which is above or below it"
             )
         return self
 
@@ -376,6 +387,19 @@ class Rig(FileModel):
         """Laser that the head turns; raises the error of `scanning_head`."""
         return self.lasers[self.laser_ids.index(self.scanning_head.laser)]
 
+    @field_validator("lasers")
+    @classmethod
+    def _beams_differ(cls, lasers: tuple[LaserSpec, ...]) -> tuple[LaserSpec, ...]:
+        seen: dict[tuple[float, ...], str] = {}
+        for laser in lasers:
+            beam = tuple(prior.value for prior in (laser.x_mm, laser.y_mm, laser.tx, laser.ty))
+            if (other := seen.setdefault(beam, laser.id)) != laser.id:
+                raise ValueError(
+                    f"lasers at different places or with different directions are expected, got {other} and"
+                    f" {laser.id} with the same beam; correct x_mm, y_mm, tx or ty of one of them"
+                )
+        return lasers
+
     @property
     def banded_board(self) -> Board:
         """The workbench's own board, whose blank band takes the spots.
@@ -390,6 +414,21 @@ class Rig(FileModel):
                 f" {self.board.kind} are for `workbench fit`"
             )
         return self.board
+
+    @property
+    def emitters(self) -> tuple[tuple[LaserSpec, ...], ...]:
+        """Lasers that are on together, one group for each output of the controller, in the file's order."""
+        groups: dict[tuple[bool, str], list[LaserSpec]] = {}
+        for laser in self.lasers:
+            key = (True, laser.id) if laser.emitter is None else (False, laser.emitter)
+            groups.setdefault(key, []).append(laser)
+        return tuple(tuple(group) for group in groups.values())
+
+    @property
+    def laser_lines(self) -> tuple[int, ...]:
+        """Index of each laser's output of the controller."""
+        line_of = {laser.id: n for n, group in enumerate(self.emitters) for laser in group}
+        return tuple(line_of[laser.id] for laser in self.lasers)
 
     @property
     def laser_ids(self) -> tuple[str, ...]:

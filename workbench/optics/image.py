@@ -31,6 +31,11 @@ def in_picture(position_px: ArrayLike, size_px: ArrayLike) -> BoolArray:
     return np.asarray(inside_px(position_px, size_px).all(axis=-1))
 
 
+def extent_px(direction: FloatArray, size_px: tuple[int, int]) -> float:
+    """Length of the line through the middle of an image (width, height) along a unit vector (2,)."""
+    return 1.0 / float((np.abs(direction) / size_px).max())
+
+
 def bend_px(
     model: LensModel,
     lens: FloatArray,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from workbench.calibration.data.spot_rows import prior_scanline
+from workbench.calibration.data.spot_rows import own_spots, prior_scanline, sought
 from workbench.calibration.design.expected_spot import expected_spot
 from workbench.devices.protocols import Bench
 from workbench.model.arrays import FloatArray, Image
@@ -76,7 +76,8 @@ class Aim:
     """Present standoff; None: not known."""
     exposure: ExposureSet | None = None
     """Exposure that was set for it; None: that of the rig file."""
-    _finder: SpotFinder | None = None
+    _finders: dict[int, SpotFinder] = field(default_factory=dict)
+    """By the number of spots: one, or all that are on together."""
     _expected: dict[str, Expected] = field(default_factory=dict)
     _least_px: dict[str, float] = field(default_factory=dict)
     _seen: dict[float, dict[str, Spot]] = field(default_factory=dict)
@@ -119,10 +120,12 @@ class Aim:
         with self.bench.lasers.lit([laser_id], for_s=LEASE_S):
             on = self.bench.camera.grab().image
         off = self.bench.camera.grab().image
-        if self._finder is None:
-            shape = on.shape[0], on.shape[1]
-            self._finder = SpotFinder(shape, (), expected=1, speckle_sd_px=self.rig.noise.speckle_sd_px)
-        found = self._finder.find(on, off)
+        laser = self.rig.lasers[self.rig.laser_ids.index(laser_id)]
+        _, expected = sought(self.rig, laser)
+        if expected not in self._finders:
+            shape, speckle_sd_px = (on.shape[0], on.shape[1]), self.rig.noise.speckle_sd_px
+            self._finders[expected] = SpotFinder(shape, (), expected=expected, speckle_sd_px=speckle_sd_px)
+        found = own_spots(self.rig, laser, self._finders[expected].find(on, off))
         spot = max(found.spots, key=lambda one: one.flux_dn, default=None)
         if spot is None:
             refuse_stuck_beam(

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from workbench.calibration.data.spot_rows import prior_scanline
+from workbench.calibration.data.spot_rows import own_spots, sought
 from workbench.devices.protocols import Bench, Camera, LaserBank, Operator, StreamingCamera
 from workbench.devices.real_bench import open_camera, open_lasers, open_target
 from workbench.devices.registry import open_bench, whole_bench
@@ -219,16 +219,18 @@ def _automatic_control(rig: Rig, bench: Bench) -> Iterator[CheckResult]:
 
 def _laser(rig: Rig, bench: Bench, laser: LaserSpec) -> str:
     bench.mark(f"doctor/{laser.id}")
+    scanlines, expected = sought(rig, laser)
     with bench.lasers.lit([laser.id], for_s=LEASE_S):
         on = bench.camera.grab().image
     off = bench.camera.grab().image
     found = find_spots(
         on,
         off,
-        scanlines=[prior_scanline(rig, laser)],
-        expected=1,
+        scanlines=scanlines,
+        expected=expected,
         speckle_sd_px=rig.noise.speckle_sd_px,
     )
+    found = own_spots(rig, laser, found)
     if len(found.spots) != 1:
         got = ", ".join(found.failures) or counted(len(found.spots), "spot")
         raise RigNotReadyError(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import permutations
 
 import numpy as np
 
@@ -23,7 +21,8 @@ SMOOTH = 0.05
 """Largest relative spread of inverse depths on one surface, where spots are missing."""
 FEWEST_FOR_SMOOTH = 3
 """Least number of spots for that test: two lie on some surface in any assignment."""
-MOST_LASERS = 6
+MOST_ASSIGNMENTS = 720
+"""Largest number of assignments that are compared: those of six lasers on one line."""
 
 
 @dataclass(frozen=True)
@@ -69,10 +68,11 @@ def pair_up(
 def assign(pairs: LaserSpotPairs, lasers: IndexArray) -> tuple[IndexArray, IndexArray] | None:
     """Indices of lasers and of their spots, equally many; None where the assignment is ambiguous.
 
-    Spots off the lines of all lasers are other light. Every injective assignment of the other spots is
-    enumerated. Assignments with improbable distances from the lasers' lines are rejected; this is often
-    sufficient, because the lines of real lasers are never quite coplanar. Of the rest, the assignment with
-    the smallest relative spread of inverse depths is taken, if the second best is clearly worse. On a
+    Spots off the lines of all lasers are other light. Every injective assignment of the other spots to lasers
+    on whose lines they lie is enumerated. Assignments with improbable distances from the lasers' lines are
+    rejected; this is often sufficient, because the lines of real lasers are never quite coplanar. Of the
+    rest, the assignment with the smallest relative spread of inverse depths is taken, if the second best is
+    clearly worse. On a
     surface without jumps all lasers have nearly the same inverse depth; exchanging two of them changes it
     by half and more, the ratio of neighbouring baselines. Where spots are missing, the spread must also be
     small. For lasers with coincident lines, a jump in depth as large as an exchange would cause gives an
@@ -80,16 +80,21 @@ def assign(pairs: LaserSpotPairs, lasers: IndexArray) -> tuple[IndexArray, Index
 
     Args:
         pairs: of all lasers with all spots.
-        lasers: (n,) indices of the lasers of one line that are on.
+        lasers: (n,) indices of the lasers of one row that are on.
     """
+    from workbench.ranging.assignment_kernels import assignments  # loads the compiler
+
     on_line = pairs.misfit_sd[lasers] < MOST_MISFIT_SD
     spots = np.flatnonzero(on_line.any(axis=0))
     n, m = len(lasers), len(spots)
-    if m > n or n > MOST_LASERS:
+    if m > n:
         return None
     if m == 0:
         return lasers[:0], spots
-    to, columns = lasers[_assignments(n, m)], spots[None, :]
+    found = assignments(on_line[:, spots], MOST_ASSIGNMENTS)
+    if len(found) > MOST_ASSIGNMENTS:
+        return None
+    to, columns = lasers[found], spots[None, :]
     inverse_depth = pairs.inverse_depth[to, columns]
     misfit2 = (pairs.misfit_sd[to, columns] ** 2).sum(axis=1)
     possible = (inverse_depth > 0).all(axis=1) & (misfit2 < MOST_MISFIT_SD**2 * m)
@@ -105,9 +110,3 @@ def assign(pairs: LaserSpotPairs, lasers: IndexArray) -> tuple[IndexArray, Index
     if next_best < CLEARLY_BETTER * best or not smooth:
         return None
     return to[remaining[spread.argmin()]], spots
-
-
-@lru_cache(maxsize=64)
-def _assignments(lasers: int, spots: int) -> IndexArray:
-    """(assignments, spots) laser of each spot, for every injective assignment."""
-    return np.array(list(permutations(range(lasers), spots)), np.intp)

@@ -1,4 +1,4 @@
-"""Shape in front of one line of lasers, from the ranges of its spots."""
+"""Shape in front of one row of lasers, from the ranges of its spots."""
 
 from __future__ import annotations
 
@@ -10,23 +10,25 @@ from typing import Literal
 import numpy as np
 
 from workbench.model.arrays import FloatArray
-from workbench.model.rig import ImageAxis
+from workbench.optics.image import extent_px
+from workbench.optics.rows import Row
 from workbench.ranging.points import Points
 from workbench.ranging.shape import DEFAULT_PRIOR, Shape, fit_shape
 from workbench.ranging.shape_prior import ShapePrior
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.sensor.range_model import RangeEstimates
 
-NAMES: dict[ImageAxis, str] = {"u": "horizontal", "v": "vertical"}
 Weights = Literal["information", "pixels"]
 
 
 @dataclass(frozen=True)
 class LineShape:
-    """Shape in front of one line of lasers, and the ranges that it was fitted to."""
+    """Shape in front of one row of lasers, and the ranges that it was fitted to.
 
-    axis: ImageAxis
-    """Image axis along which the spots move with range: u for the horizontal line, v for the vertical one."""
+    That of a laser on no row is `unknown`, with its range as the closest one.
+    """
+
+    row: Row
     shape: Shape
     indices: tuple[int, ...]
     """Indices of the line's ranges among those of the reading."""
@@ -39,38 +41,38 @@ class LineShape:
 
 def fit_line(
     sensor: CalibratedSensor,
-    axis: ImageAxis,
+    row: Row,
     ids: Sequence[str],
     ranges: RangeEstimates,
     indices: Sequence[int],
     prior: ShapePrior = DEFAULT_PRIOR,
 ) -> LineShape:
-    """Fit the shape in front of one line.
+    """Fit the shape in front of one row.
 
     A spot lies where its beam meets the surface, not at the origin of the beam. Errors of this position and
     of the range are correlated, because both come from the calibration. The front reaches from the first to
-    the last laser of the line, with or without a spot.
+    the last laser of the row, with or without a spot.
 
     Args:
         sensor: the calibrated sensor.
-        axis: the line.
+        row: the row.
         ids: lasers of all ranges of the reading.
         ranges: all ranges of the reading.
-        indices: indices of the line's ranges.
+        indices: indices of the row's ranges.
         prior: prior over shapes.
     """
     own = ranges if len(indices) == len(ids) else ranges.only(np.asarray(indices, np.intp))
-    place, by_parameter, tangent = sensor.places([ids[i] for i in indices], axis, own)
+    place, by_parameter, tangent = sensor.places([ids[i] for i in indices], row.direction, own)
     propagated, spot = by_parameter @ sensor.covariance, own.spot_sd_mm**2
     of_places, cross = propagated @ by_parameter.T, own.by_parameter @ propagated.T
     own_noise = np.diag_indices(len(spot))
     of_places[own_noise] += tangent**2 * spot
     cross[own_noise] += tangent * spot
     points = Points(place, own.range_mm, own.covariance_mm2, sensor.offset_mm, of_places, cross)
-    shape = fit_shape(points, sensor.front_mm(axis), prior, len(sensor.lasers_on(axis)))
+    shape = fit_shape(points, sensor.front_mm(row, own.range_mm), prior, len(row.members))
     by_parameter = shape.closest_by_range @ own.by_parameter + shape.closest_by_place @ by_parameter
     spot_sd = (shape.closest_by_range + shape.closest_by_place * tangent) * own.spot_sd_mm
-    return LineShape(axis, shape, tuple(indices), by_parameter, spot_sd)
+    return LineShape(row, shape, tuple(indices), by_parameter, spot_sd)
 
 
 def _known_variance(line: LineShape, covariance: FloatArray) -> float:
@@ -89,15 +91,15 @@ def mean_of_lines(
 ) -> tuple[float, float]:
     """Mean of the lines' closest ranges and its 1 sigma, mm.
 
-    `information` weights by 1 / sigma^2, `pixels` by the pixels along each line, as the thesis does. The
-    lines share the error of the calibration, which averaging does not reduce; `covariance` (P, P) is that of
-    its parameters. The rest of a line's sigma, by its shape, is its own.
+    `information` weights by 1 / sigma^2, `pixels` by the image's extent along each row, as the thesis does.
+    The lines share the error of the calibration, which averaging does not reduce; `covariance` (P, P) is that
+    of its parameters. The rest of a line's sigma, by its shape, is its own.
     """
     if len(lines) == 1:
         known = _known_variance(lines[0], covariance)
         return lines[0].shape.closest_mm, math.sqrt(max(known, lines[0].shape.closest_sigma_mm ** 2))
     by_information = [1.0 / line.shape.closest_sigma_mm**2 for line in lines]
-    by_pixels = [float(size_px[0] if line.axis == "u" else size_px[1]) for line in lines]
+    by_pixels = [extent_px(line.row.direction, size_px) for line in lines]
     weight = np.array(by_information if weights == "information" else by_pixels)
     weight /= weight.sum()
     by_parameter = weight @ np.array([line.closest_by_parameter for line in lines])

@@ -12,17 +12,17 @@ import numpy as np
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import Calibration
 from workbench.model.event import LaserRange
-from workbench.model.rig import ImageAxis
+from workbench.optics.rows import Row
 from workbench.ranging.assignment import MOST_MISFIT_SD, LaserSpotPairs, assign, pair_up
-from workbench.ranging.lines import NAMES, LineShape, Weights, fit_line, mean_of_lines
+from workbench.ranging.lines import LineShape, Weights, fit_line, mean_of_lines
 from workbench.ranging.records import flag_notes, flat_range, laser_ranges
-from workbench.ranging.search_band import band
 from workbench.ranging.shape import DEFAULT_PRIOR
 from workbench.ranging.shape_prior import ShapePrior
 from workbench.ranging.validity_checks import failed_checks, outside_validity
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.sensor.range_model import RangeEstimates
 from workbench.spots import Scanline, Spot
+from workbench.spots.search_band import band
 
 NOTHING_SEEN = "no spot was seen"
 Status = Literal["done", "not_enough_points", "no_points"]
@@ -49,7 +49,8 @@ class Reading:
     lasers: tuple[LaserRange, ...] = ()
     """In the calibration's order."""
     lines: tuple[LineShape, ...] = ()
-    """Shape in front of each line of lasers with a range; horizontal first."""
+    """Shape in front of each row of lasers with a range, by the row's angle: horizontal first. Lasers on no
+    row are in it, with an unknown shape."""
     flat_mm: float | None = None
     """Mean range of the lasers, weighted by their spots: the range of a flat target across the axis."""
     flat_sigma_mm: float | None = None
@@ -59,6 +60,13 @@ class Reading:
     """Mean x and y of the spots, weighted likewise: the point whose range is `flat_mm`."""
     notes: tuple[str, ...] = ()
     """Reasons of missing ranges, and remarks on uncertain ones."""
+
+    @property
+    def shapes(self) -> tuple[LineShape, ...]:
+        """Shapes to report: of the rows of two lasers or more; of the nearest laser where all are single."""
+        rows = tuple(line for line in self.lines if len(line.row.members) > 1)
+        nearest = sorted(self.lines, key=lambda line: line.shape.closest_mm)[:1]
+        return rows or tuple(nearest)
 
 
 @dataclass(frozen=True)
@@ -150,16 +158,15 @@ class Ranger:
         return self.calibration.laser_ranger.noise.speckle_sd_px
 
     def searched(self, laser_ids: Sequence[str]) -> list[Scanline]:
-        """Search bands for lasers that are on together, one for each line of lasers.
+        """Search bands for lasers that are on together, one for each row of lasers.
 
-        The scanlines of one line of lasers nearly coincide; searching each would repeat the same work.
+        The scanlines of one row nearly coincide, or lie side by side; searching each would repeat work.
         """
-        if len(laser_ids) == 1:
-            return [self._fields[laser_ids[0]]]
+        rows = ([i for i in laser_ids if i in names] for names in self._members)
         return [
-            band([self._fields[i] for i in own], axis)
-            for axis, lasers in self._axes.items()
-            if (own := [i for i in laser_ids if self.sensor.ids.index(i) in lasers])
+            self._fields[own[0]] if len(own) == 1 else band([self._fields[i] for i in own])
+            for own in rows
+            if own
         ]
 
     @cached_property
@@ -173,10 +180,9 @@ class Ranger:
         return {i: self.sensor.spot_px(i, ends) for i in self.sensor.ids}
 
     @cached_property
-    def _axes(self) -> dict[ImageAxis, IndexArray]:
-        """Indices of the lasers of each line, by its image axis; no empty lines."""
-        axes: tuple[ImageAxis, ...] = ("u", "v")
-        return {axis: lasers for axis in axes if len(lasers := self.sensor.lasers_on(axis))}
+    def _members(self) -> tuple[frozenset[str], ...]:
+        """Ids of the lasers of each row of the sensor."""
+        return tuple(frozenset(self.sensor.ids[i] for i in row.members) for row in self.sensor.rows)
 
     def read_known(
         self,
@@ -219,7 +225,7 @@ class Ranger:
     def read_lit(self, scene: str, spots: Sequence[Spot]) -> Reading:
         """Range the spots of a frame with all lasers on.
 
-        Lines of lasers with an ambiguous assignment have no range: capture these lasers one by one instead.
+        Rows of lasers with an ambiguous assignment have no range: capture these lasers one by one instead.
         """
         return self.read_assigned(scene, spots, self.assign_spots(spots))
 
@@ -240,25 +246,30 @@ class Ranger:
         return reading
 
     def assign_spots(self, spots: Sequence[Spot]) -> Assignment:
-        """Assign the spots of a frame with all lasers on, each line of lasers independently.
+        """Assign the spots of a frame with all lasers on, each row of lasers independently.
 
-        Two lines that claim the same spot are both ambiguous. Where the spot of a laser without one would lie
+        Two rows that claim the same spot are both ambiguous. Where the spot of a laser without one would lie
         on a spot of another laser, both lasers are ambiguous: the spot may be the sum of two.
         """
         pairs = pair_up(self.sensor, *spot_arrays(spots))
-        found = {axis: assign(pairs, lasers) for axis, lasers in self._axes.items()}
-        claimed = np.concatenate([np.empty(0, np.intp), *(f[1] for f in found.values() if f is not None)])
+        rows = self.sensor.rows
+        found = [assign(pairs, row.lasers) for row in rows]
+        claimed = np.concatenate([np.empty(0, np.intp), *(f[1] for f in found if f is not None)])
         twice = {i for i in claimed if (claimed == i).sum() > 1}
-        clear = {axis: f for axis, f in found.items() if f is not None and twice.isdisjoint(f[1].tolist())}
-        lasers = np.concatenate([np.empty(0, np.intp), *(f[0] for f in clear.values())])
-        assigned = np.concatenate([np.empty(0, np.intp), *(f[1] for f in clear.values())])
+        clear = [None if f is None or not twice.isdisjoint(f[1].tolist()) else f for f in found]
+        lasers = np.concatenate([np.empty(0, np.intp), *(f[0] for f in clear if f is not None)])
+        assigned = np.concatenate([np.empty(0, np.intp), *(f[1] for f in clear if f is not None)])
         hidden = [
-            pair for axis in clear for pair in self._hidden(spots, pairs, *clear[axis], self._axes[axis])
+            pair
+            for row, f in zip(rows, clear, strict=True)
+            if f is not None
+            for pair in self._hidden(spots, pairs, *f, row.lasers)
         ]
         single = ~np.isin(assigned, [spot for _, spot in hidden])
-        ambiguous = {int(i) for axis, all_ in self._axes.items() if axis not in clear for i in all_}
+        unclear = [row for row, f in zip(rows, clear, strict=True) if f is None]
+        ambiguous = {int(i) for row in unclear for i in row.lasers}
         ambiguous |= {laser for laser, _ in hidden} | set(lasers[~single].tolist())
-        notes = self._assignment_notes(pairs, len(spots), [axis for axis in self._axes if axis not in clear])
+        notes = self._assignment_notes(pairs, len(spots), unclear)
         notes += tuple(
             f"{self.sensor.ids[laser]}: its spot may be merged with that at u = {spots[spot].u_px:.0f},"
             f" v = {spots[spot].v_px:.0f} px: capture each laser alone"
@@ -276,16 +287,16 @@ class Ranger:
         assigned: IndexArray,
         lasers: IndexArray,
     ) -> list[tuple[int, int]]:
-        """Lasers of a line without a spot, each with a spot that its own would merge with.
+        """Lasers of a row without a spot, each with a spot that its own would merge with.
 
-        The expected spots are those at the ranges of the line's other lasers.
+        The expected spots are those at the ranges of the row's other lasers.
 
         Args:
             spots: all spots.
             pairs: all pairs of lasers and spots.
-            seen: (n,) lasers of the line with a spot.
+            seen: (n,) lasers of the row with a spot.
             assigned: (n,) their spots.
-            lasers: all lasers of the line.
+            lasers: all lasers of the row.
         """
         if len(seen) in (0, len(lasers)):
             return []
@@ -313,13 +324,13 @@ class Ranger:
         return [[spot for spot in spots if next(on_line)] for _, spots in captures]
 
     def _assignment_notes(
-        self, pairs: LaserSpotPairs, spots: int, ambiguous: Sequence[ImageAxis]
+        self, pairs: LaserSpotPairs, spots: int, ambiguous: Sequence[Row]
     ) -> tuple[str, ...]:
-        """Notes on spots off all lines, ambiguous lines, and too many spots."""
+        """Notes on spots off all lines, ambiguous rows, and too many spots."""
         other = int((pairs.misfit_sd >= MOST_MISFIT_SD).all(axis=0).sum())
         notes = [f"{other} of {spots} spots on no laser's line: other light"] if other else []
         if ambiguous:
-            lines = " and ".join(f"{len(self._axes[axis])} {NAMES[axis]}" for axis in ambiguous)
+            lines = " and ".join(f"{len(row.members)} {row.name}" for row in ambiguous)
             seen = f"{spots} spot{'s' * (spots != 1)}"
             notes.append(f"ambiguous assignment of {seen} to {lines} lasers: capture each laser alone")
         if spots - other > len(self.sensor.ids):
@@ -370,10 +381,9 @@ class Ranger:
 
     def _lines(self, ids: Sequence[str], ranges: RangeEstimates) -> tuple[LineShape, ...]:
         lines = []
-        for axis, lasers in self._axes.items():
-            names = {self.sensor.ids[i] for i in lasers}
+        for row, names in zip(self.sensor.rows, self._members, strict=True):
             if own := [n for n, i in enumerate(ids) if i in names]:
-                lines.append(fit_line(self.sensor, axis, ids, ranges, own, self.shape_prior))
+                lines.append(fit_line(self.sensor, row, ids, ranges, own, self.shape_prior))
         return tuple(lines)
 
     def _scanline(self, laser_id: str, nearest_mm: float) -> Scanline:

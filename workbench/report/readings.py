@@ -106,7 +106,7 @@ def _closest(r: Reading) -> str:
 
 
 def _shapes(r: Reading) -> str:
-    return ", ".join(shape_words(line.shape) for line in r.lines)
+    return ", ".join(shape_words(line.shape) for line in r.shapes)
 
 
 def _lasers(r: Reading) -> str:

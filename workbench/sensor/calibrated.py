@@ -10,17 +10,18 @@ import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.calibration import Calibration
-from workbench.model.rig import ImageAxis
 from workbench.optics.image import bend_px, in_picture
 from workbench.optics.lens import LensModel
 from workbench.optics.lens_models import lens_model
 from workbench.optics.rays import RAY
+from workbench.optics.rows import FLATNESS, Row, axes_of, rows_of
 from workbench.sensor.curves import SpotCurves
 from workbench.sensor.range_model import RangeEstimates, RangeModel
 
-ALONG: dict[ImageAxis, tuple[str, str]] = {"u": ("x_mm", "tx"), "v": ("y_mm", "ty")}
-"""Names of origin and tangent of a ray in the direction in which its spots move along an image axis."""
-AXES = tuple(ALONG)
+X, Y = np.eye(2)
+"""Directions across the optical axis: to the right, and down."""
+FAR_MM = 1000.0
+"""Depth at which the length of a row is compared with that at the sensor."""
 
 
 @dataclass(frozen=True)
@@ -70,33 +71,55 @@ class CalibratedSensor:
         return self.calibration.laser_ranger.parameters.covariance_array
 
     @cached_property
-    def _lines(self) -> dict[ImageAxis, IndexArray]:
-        on = [laser.axis for laser in self.calibration.laser_ranger.lasers]
-        return {axis: np.array([n for n, own in enumerate(on) if own == axis], np.intp) for axis in ALONG}
+    def rows(self) -> tuple[Row, ...]:
+        """Rows of the lasers, and the single ones, by their angle; each laser is in one."""
+        return rows_of(self._rays)
+
+    def axis(self, laser_id: str) -> FloatArray:
+        """(2,) unit vector along which the laser's spot moves in the image."""
+        return np.asarray(self._axes[self._index_of[laser_id]])
 
     @cached_property
-    def _beams(self) -> FloatArray:
-        """(2, 2, lasers) origins and tangents, each along x (axis u) and y (axis v)."""
-        return self._rays.T[
-            [[RAY.index(name) for name in names] for names in zip(*ALONG.values(), strict=True)]
-        ]
+    def _axes(self) -> FloatArray:
+        return axes_of(self._rays)
+
+    def row_at(self, angle_deg: int) -> Row | None:
+        """Row of two lasers or more at an angle, that with the most lasers; None without one."""
+        found = [row for row in self.rows if row.angle_deg == angle_deg and len(row.members) > 1]
+        return max(found, key=lambda row: len(row.members), default=None)
 
     @cached_property
-    def _beam_columns(self) -> dict[ImageAxis, IndexArray]:
-        """(2, lasers) columns of these parameters."""
-        return {
-            axis: np.array([[self._columns[f"{i}.{name}"] for i in self.ids] for name in names], np.intp)
-            for axis, names in ALONG.items()
-        }
+    def _origins(self) -> FloatArray:
+        """(2, lasers) x and y."""
+        return self._rays.T[[RAY.index("x_mm"), RAY.index("y_mm")]]
 
     @cached_property
-    def _fronts_mm(self) -> dict[ImageAxis, tuple[float, float]]:
-        origins = {
-            axis: self._beams[0, AXES.index(axis), own].tolist()
-            for axis, own in self._lines.items()
-            if len(own)
-        }
-        return {axis: (min(own), max(own)) for axis, own in origins.items()}
+    def _tangents(self) -> FloatArray:
+        """(2, lasers) along x and y."""
+        return self._rays.T[[RAY.index("tx"), RAY.index("ty")]]
+
+    @cached_property
+    def _beam_columns(self) -> IndexArray:
+        """(2, 2, lasers) columns of origin and tangent, each along x and y."""
+        names = (("x_mm", "y_mm"), ("tx", "ty"))
+        return np.array(
+            [[[self._columns[f"{i}.{name}"] for i in self.ids] for name in pair] for pair in names], np.intp
+        )
+
+    @cached_property
+    def _fronts_mm(self) -> dict[Row, tuple[float, float]]:
+        """Front of each row whose beams leave the sensor apart."""
+        fronts = {}
+        for row in self.rows:
+            near, far = (self._row_ends_mm(row, depth) for depth in (0.0, FAR_MM))
+            if np.ptp(near) > FLATNESS * np.ptp(far) or len(row.members) == 1:
+                fronts[row] = near
+        return fronts
+
+    def _row_ends_mm(self, row: Row, depth_mm: float) -> tuple[float, float]:
+        """Positions of the outer beams of a row along it."""
+        places = row.direction @ (self._origins + self._tangents * depth_mm)[:, row.lasers]
+        return float(places.min()), float(places.max())
 
     @cached_property
     def _index_of(self) -> dict[str, int]:
@@ -106,13 +129,25 @@ class CalibratedSensor:
         """(n,) indices of lasers in the order of `ids`."""
         return np.array([self._index_of[i] for i in laser_ids], np.intp)
 
-    def lasers_on(self, axis: ImageAxis) -> IndexArray:
-        """Indices of the lasers whose spots move along an image axis."""
-        return self._lines[axis]
+    def front_mm(self, row: Row, range_mm: float | FloatArray) -> tuple[float, float]:
+        """From the first to the last laser of a row, mm along it.
 
-    def front_mm(self, axis: ImageAxis) -> tuple[float, float]:
-        """From the first to the last laser of a line, mm along x or y."""
-        return self._fronts_mm[axis]
+        Where its beams leave the sensor at one point, as behind a grating, the front is that of their spots
+        at `range_mm`; of several ranges, at their mean.
+        """
+        front = self._fronts_mm.get(row)
+        return front or self._row_ends_mm(row, float(np.mean(range_mm)) + self.offset_mm)
+
+    def across_mm(self, row: Row, range_mm: float) -> float:
+        """Distance of a row from the optical axis at a range, to the right of its direction; mm.
+
+        It is 0 for a row that passes by the axis as closely as its own beams deviate from it.
+        """
+        depth = range_mm + self.offset_mm
+        places = (self._origins + self._tangents * depth)[:, row.lasers]
+        across = float((np.array([-row.direction[1], row.direction[0]]) @ places).mean())
+        near, far = self._row_ends_mm(row, depth)
+        return 0.0 if abs(across) <= FLATNESS * max(far - near, np.hypot(*places).max()) else across
 
     @cached_property
     def _curves(self) -> SpotCurves:
@@ -182,28 +217,35 @@ class CalibratedSensor:
         return np.hypot(own_sd, np.where(np.isfinite(scaled), scaled, file.noise.speckle_sd_px))
 
     def places(
-        self, laser_ids: Sequence[str], axis: ImageAxis, ranges: RangeEstimates
+        self, laser_ids: Sequence[str], direction: FloatArray, ranges: RangeEstimates
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Positions of n spots along x (axis u) or y (axis v), origin + tangent x depth.
+        """Positions of n spots along a direction across the optical axis, origin + tangent x depth.
+
+        Args:
+            laser_ids: the laser of each spot, n of them.
+            direction: (2,) unit vector, such as that of a row.
+            ranges: (n) of the spots.
 
         Returns:
             (n,) positions, mm; (n, P) derivatives by the parameters of the calibration; (n,) derivatives by
             the range (the tangents).
         """
         laser = self._indices(laser_ids)
-        origin, tangent = self._beams[:, AXES.index(axis), laser]
+        origin, tangent = direction @ self._origins[:, laser], direction @ self._tangents[:, laser]
         depth = ranges.range_mm + self.offset_mm
         gradient = ranges.by_parameter * tangent[:, None]
         gradient[:, self._columns["offset_mm"]] = 0.0  # the reference plane does not affect the position
-        rows, (of_origin, of_tangent) = np.arange(len(laser)), self._beam_columns[axis][:, laser]
-        gradient[rows, of_origin] += 1.0
-        gradient[rows, of_tangent] += depth
+        spots = np.arange(len(laser))
+        for share, of_origin, of_tangent in zip(direction, *self._beam_columns[:, :, laser], strict=True):
+            if share:  # half of the work for a horizontal or vertical row
+                gradient[spots, of_origin] += share
+                gradient[spots, of_tangent] += share * depth
         return origin + tangent * depth, gradient, tangent
 
     def positions_mm(self, laser_ids: Sequence[str], range_mm: FloatArray) -> FloatArray:
         """(2, n) positions of spots at ranges (n,) along x and y."""
-        origin, tangent = self._beams[:, :, self._indices(laser_ids)]
-        return np.asarray(origin + tangent * (range_mm + self.offset_mm))
+        laser = self._indices(laser_ids)
+        return np.asarray(self._origins[:, laser] + self._tangents[:, laser] * (range_mm + self.offset_mm))
 
     def relative_range_sd(self, laser_id: str, range_mm: FloatArray) -> FloatArray:
         """(n,) relative 1 sigma of a single range, for spots with the noise in the calibration."""

@@ -38,7 +38,7 @@ def check_same_sensor(rig: Rig, calibration: Calibration) -> None:
         ("serial", rig.serial, made.serial),
         ("image size", (rig.camera.width_px, rig.camera.height_px), size_px),
         ("lens", rig.camera.lens, calibration.distortion_model),
-        ("list of lasers", [(s.id, s.axis) for s in rig.lasers], [(s.id, s.axis) for s in ours.lasers]),
+        ("list of lasers", list(rig.laser_ids), [laser.id for laser in ours.lasers]),
     ):
         if of_rig != of_file:
             raise BadInputError(

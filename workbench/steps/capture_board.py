@@ -13,6 +13,7 @@ from workbench.model.number_text import counted
 from workbench.model.rig import NonNegativeFloat, Rig
 from workbench.model.target import BoardTarget, Placement
 from workbench.model.yamlfile import FileModel
+from workbench.optics.rows import rows_of_rig
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.lasers import capture_lasers
 from workbench.procedure.engine.placements import visit_placements
@@ -49,14 +50,13 @@ class CaptureBoardStep(StepModel):
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
         """Placements, numbered from 1 because the board may have several tilts at one standoff."""
-        upright = all(laser.axis == "v" for laser in rig.lasers)
+        rows = rows_of_rig(rig)
+        roll_deg = float(rows[0].angle_deg) if len(rows) == 1 else 0.0  # the blank band takes a single row
         return [
             Placement(
                 key=f"{name}/{number:02d}-{placing.standoff_mm:.12g}mm",
                 standoff_mm=placing.standoff_mm,
-                target=BoardTarget(
-                    yaw_deg=placing.yaw_deg, pitch_deg=placing.pitch_deg, roll_deg=90.0 if upright else 0.0
-                ),
+                target=BoardTarget(yaw_deg=placing.yaw_deg, pitch_deg=placing.pitch_deg, roll_deg=roll_deg),
                 standoff_sd_mm=placing.standoff_sd_mm,
             )
             for number, placing in enumerate(self.placings, start=1)

@@ -8,8 +8,9 @@ from math import degrees, isfinite
 
 from workbench.model.errors import BadInputError
 from workbench.model.event import ReadingTaken, TrueValues
-from workbench.model.rig import ImageAxis, Rig
+from workbench.model.rig import Rig
 from workbench.model.target import Placement
+from workbench.optics.rows import Row
 from workbench.procedure.engine.context import Context
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
@@ -17,7 +18,7 @@ from workbench.ranging.shape import Shape
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.spots import Finding
 from workbench.trials.reference import Reference
-from workbench.trials.targets import TargetSpec, front_axis, true_values
+from workbench.trials.targets import TargetSpec, front_row, true_values
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,8 @@ class ClosestRange:
     true: TrueValues
     front_mm: tuple[float, float]
     """Ends of the front."""
-    axis: ImageAxis = "u"
-    """Line of lasers whose shape gives angle and radius."""
+    row: Row | None = None
+    """Row of lasers whose shape gives angle and radius."""
     left_off: tuple[str, ...] = ()
     """Lasers that stay off as if they had failed."""
     blocked: tuple[str, ...] = ()
@@ -37,8 +38,9 @@ class ClosestRange:
     @classmethod
     def of(cls, target: TargetSpec, placed: Placement, sensor: CalibratedSensor, rig: Rig) -> ClosestRange:
         """Readings of a target at a placement as measured."""
-        axis = front_axis(target)
-        return cls(true_values(target, placed, sensor, rig), sensor.front_mm(axis), axis)
+        row = front_row(target, sensor)
+        front = (0.0, 0.0) if row is None else sensor.front_mm(row, placed.standoff_mm)
+        return cls(true_values(target, placed, sensor, rig), front, row)
 
 
 def session_ranger(context: Context, name: str) -> Ranger:
@@ -135,7 +137,7 @@ def reading_taken(
         placement_sd_mm=reference.own_sd_mm(tilt),
         closest_mm=reading.closest_mm,
         closest_sigma_mm=reading.sigma_mm,
-        shape=", ".join(line.shape.kind for line in reading.lines),
+        shape=", ".join(line.shape.kind for line in reading.shapes),
         notes=reading.notes,
         lasers=reading.lasers,
         lasers_true_mm=reference.lasers_true_mm(sensor, reading.lasers),
@@ -152,7 +154,7 @@ def _without(closest: ClosestRange | None) -> str:
 
 
 def _closest_reading(taken: ReadingTaken, reading: Reading, closest: ClosestRange) -> ReadingTaken:
-    shape = next((line.shape for line in reading.lines if line.axis == closest.axis), None)
+    shape = next((line.shape for line in reading.lines if line.row == closest.row), None)
     return taken.model_copy(
         update={
             "range_mm": reading.closest_mm,

@@ -16,12 +16,11 @@ from scipy.special import ndtri
 
 from workbench.model.arrays import FloatArray
 from workbench.model.event import LaserRange
-from workbench.model.rig import BenchSpec, ImageAxis
+from workbench.model.rig import BenchSpec
 from workbench.model.target import Placement
-from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.calibrated import CalibratedSensor, X, Y
 from workbench.sensor.range_model import RangeEstimates
 
-AXES: tuple[ImageAxis, ImageAxis] = ("u", "v")
 NODES = 31
 """Number of values of each random tilt: gives variances to some 5 %."""
 Shared = Sequence[float] | FloatArray
@@ -185,15 +184,16 @@ def places_of(
 ) -> FloatArray:
     """(n, 2) x and y of the spots of n lasers with these estimates, mm."""
     ids = [one.laser_id for one in lasers]
-    return np.stack([sensor.places(ids, axis, estimates)[0] for axis in AXES], axis=1)
+    return np.stack([sensor.places(ids, axis, estimates)[0] for axis in (X, Y)], axis=1)
 
 
-def front_ends(sensor: CalibratedSensor) -> tuple[Point, ...]:
-    """Ends (x, y) of the lines of lasers, mm."""
+def front_ends(sensor: CalibratedSensor, range_mm: float) -> tuple[Point, ...]:
+    """Ends (x, y) of the rows of lasers at a range, mm; a row about the optical axis is taken as on it."""
     ends: list[Point] = []
-    for n, axis in enumerate(AXES):
-        if len(sensor.lasers_on(axis)):
-            ends += [(end, 0.0) if n == 0 else (0.0, end) for end in sensor.front_mm(axis)]
+    for row in sensor.rows:
+        x, y = row.direction.tolist()
+        front, across = sensor.front_mm(row, range_mm), sensor.across_mm(row, range_mm)
+        ends += [(x * end - y * across, y * end + x * across) for end in front]
     return tuple(ends)
 
 

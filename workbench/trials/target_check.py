@@ -18,7 +18,7 @@ from workbench.model.event import ReadingTaken
 from workbench.model.number_text import probability
 from workbench.model.rig import BenchSpec
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
-from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.calibrated import CalibratedSensor, X, Y
 
 ALARM = 1e-4
 """P value below which the readings contradict the target asked for; a trial has some ten placements."""
@@ -65,7 +65,7 @@ class Points:
         position = np.array([np.array(px[i], np.float64).mean(axis=0) for i in ids])
         sd = np.array([[noise_px / sqrt(len(px[i]))] * 2 for i in ids])
         ranges = sensor.ranges(ids, position, sd)
-        along = [sensor.places(ids, axis, ranges) for axis in ("u", "v")]
+        along = [sensor.places(ids, axis, ranges) for axis in (X, Y)]
         return cls(
             ranges.range_mm,
             np.stack([place for place, _, _ in along], axis=1),

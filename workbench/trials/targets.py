@@ -14,9 +14,10 @@ from pydantic import AfterValidator, Field
 
 from workbench.model.errors import BadInputError
 from workbench.model.event import TrueValues
-from workbench.model.rig import LARGEST, BenchSpec, ImageAxis, NonNegativeFloat, Rig
+from workbench.model.rig import LARGEST, BenchSpec, NonNegativeFloat, Rig
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 from workbench.model.yamlfile import FileModel
+from workbench.optics.rows import Row, rays_of_rig, rows_of
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.trials.reference import ON_AXIS, Reference, front_ends
 
@@ -74,9 +75,9 @@ class CylinderSpec(FileModel):
 TargetSpec = Annotated[FlatTargetSpec | InclineSpec | CylinderSpec, Field(discriminator="kind")]
 
 
-def front_axis(spec: TargetSpec) -> ImageAxis:
-    """Image axis of the line of lasers that measures the target's angle or radius."""
-    return "v" if isinstance(spec, InclineSpec) and spec.axis == "horizontal" else "u"
+def front_angle_deg(spec: TargetSpec) -> int:
+    """Angle of the row of lasers that measures the target's angle or radius."""
+    return 90 if isinstance(spec, InclineSpec) and spec.axis == "horizontal" else 0
 
 
 def target_placement(spec: TargetSpec, key: str, range_mm: float, rig: Rig) -> Placement:
@@ -100,7 +101,7 @@ def target_placement(spec: TargetSpec, key: str, range_mm: float, rig: Rig) -> P
         return Placement(key=key, standoff_mm=range_mm, standoff_sd_mm=spec.reference_sd_mm)
     if len(front) < 2:
         raise BadInputError(
-            f"{key}: target: expected 2 lasers or more on a line across the turn about the {spec.axis} axis,"
+            f"{key}: target: expected 2 lasers or more in a row across the turn about the {spec.axis} axis,"
             f" got {len(front)}; turn the target about the other axis"
         )
     turn = {"yaw_deg" if spec.axis == "vertical" else "pitch_deg": spec.angle_deg}
@@ -122,9 +123,15 @@ def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, r
     reference = Reference.of(rig.bench, placed)
     on_axis_mm, on_axis_sd_mm = reference.true_mm(ON_AXIS), reference.sd_mm(ON_AXIS)
     if isinstance(spec, FlatTargetSpec):
-        tilt = reference.at_near_end(front_ends(sensor))
+        tilt = reference.at_near_end(front_ends(sensor, placed.standoff_mm))
         return TrueValues(range_mm=reference.true_mm(tilt), range_sd_mm=reference.sd_mm(tilt))
-    front = sensor.front_mm(front_axis(spec))
+    row = front_row(spec, sensor)
+    if row is None:
+        raise BadInputError(
+            f"{placed.key}: target: expected two calibrated lasers or more in a row at"
+            f" {front_angle_deg(spec)} degrees, got none; calibrate this rig again"
+        )
+    front = sensor.front_mm(row, placed.standoff_mm)
     if isinstance(spec, CylinderSpec):
         return TrueValues(
             range_mm=on_axis_mm + _cylinder_recess_mm(spec, front),
@@ -146,9 +153,16 @@ def true_values(spec: TargetSpec, placed: Placement, sensor: CalibratedSensor, r
 
 
 def _rig_front(spec: TargetSpec, rig: Rig) -> list[float]:
-    """Positions of the lasers of the line across the target, mm along x or y, as designed."""
-    axis = front_axis(spec)
-    return [(laser.x_mm if axis == "u" else laser.y_mm).value for laser in rig.lasers if laser.axis == axis]
+    """Positions of the lasers of the row across the target, mm along it, as designed; empty without one."""
+    rays = rays_of_rig(rig)
+    rows = [row for row in rows_of(rays) if row.angle_deg == front_angle_deg(spec)]
+    row = max(rows, key=lambda one: len(one.members), default=None)
+    return [] if row is None else (rays[row.lasers, :2] @ row.direction).tolist()
+
+
+def front_row(spec: TargetSpec, sensor: CalibratedSensor) -> Row | None:
+    """Row of the sensor that measures the target's angle or radius; None without one."""
+    return sensor.row_at(front_angle_deg(spec))
 
 
 def _angle_deg(spec: InclineSpec, bench: BenchSpec) -> float:

@@ -15,7 +15,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from workbench.figures.picture import SIZE_PX, SMALL_PX
-from workbench.model.rig import Rig
+from workbench.model.rig import Rig, nearest_image_axis
 from workbench.viewer import entities as at
 from workbench.viewer.crops import mosaic_size
 
@@ -120,7 +120,7 @@ def results_layout(name: str, charts: Sequence[tuple[str, str]]) -> rrb.Blueprin
 
 
 def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
-    axis, below = rig.lasers[0].axis, f"{prefix}/"
+    axis, below = nearest_image_axis(rig.lasers[0]), f"{prefix}/"
     results = rrb.Tabs(
         rrb.TextDocumentView(origin=f"{below}{at.FIT_VERDICT}", name="Verdict"),
         table_view(f"{below}{at.FIT_WORST}", "Worst placements", titlebar=True),
@@ -137,7 +137,7 @@ def _side(prefix: str, rig: Rig, title: str) -> rrb.Container:
 
 def _captures(rig: Rig, calibrates: bool, live: bool) -> rrb.Container:
     """Screen of the technician: what is captured now, and how the uncertainty decreases."""
-    axis = f"{rig.lasers[0].axis}_px"
+    axis = f"{nearest_image_axis(rig.lasers[0])}_px"
     texts = _texts(live, (_log(), 4))
     brightness = rrb.Vertical(
         curves_view(f"{at.SPOTS}/peak_dn", "Peak of each spot [DN]", y=(0.0, 2.0**rig.camera.bits)),
@@ -173,7 +173,7 @@ def _log() -> rrb.View:
 
 def _result(rig: Rig, live: bool) -> rrb.Container:
     """Screen of the engineer: which standoff is bad, and what the camera saw there."""
-    axis = rig.lasers[0].axis
+    axis = nearest_image_axis(rig.lasers[0])
     texts = _texts(
         live,
         (text_view(at.FIT_VERDICT, "Verdict"), 6),

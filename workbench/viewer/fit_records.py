@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import isfinite, nan
 
-from workbench.calibration.data.spot_rows import prior_scanline
+from workbench.calibration.data.spot_rows import own_spots, sought
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.model import event as ev
 from workbench.model.captures import BOARD, CaptureRow
@@ -91,6 +91,6 @@ def _spots(row: CaptureRow, source: str, rig: Rig) -> ev.SpotsFound:
         return ev.SpotsFound(key=source, spots=(stated,) if seen else ())
     size = rig.camera.width_px, rig.camera.height_px
     laser = rig.lasers[rig.laser_ids.index(row.laser_id)]
-    found = find_row_spots(row, size, [prior_scanline(rig, laser)], 1, rig.noise.speckle_sd_px)
+    found = own_spots(rig, laser, find_row_spots(row, size, *sought(rig, laser), rig.noise.speckle_sd_px))
     spots = tuple(replace(spot, laser_id=row.laser_id) for spot in found.spots)
     return ev.SpotsFound(key=source, spots=spots, failures=tuple(found.failures))

@@ -18,6 +18,7 @@ from workbench.model.spot import Spot
 from workbench.ranging.lines import LineShape
 from workbench.ranging.ranger import Ranger, Reading
 from workbench.ranging.shape import Shape
+from workbench.sensor.calibrated import CalibratedSensor
 from workbench.viewer import blueprint as layout
 from workbench.viewer import entities as at
 from workbench.viewer import frame
@@ -114,7 +115,7 @@ class RangerView:
         self._stream.log(
             f"{PLAN}/intervals", rr.LineStrips2D(bars, colors=colors, radii=_THICK if some else None)
         )
-        contours = [contour(line, sensor.front_mm(line.axis), depths) for line in reading.lines]
+        contours = [contour(line, _front_mm(sensor, line, reading), depths) for line in reading.lines]
         known = [strip for strip in contours if len(strip)]
         self._stream.log(
             f"{PLAN}/contour", rr.LineStrips2D(known, colors=at.WHITE, radii=_LINE if known else None)
@@ -125,12 +126,11 @@ class RangerView:
         )
 
     def _place_mm(self, laser_id: str, range_mm: float) -> float:
-        """Position of a laser's spot along its line."""
-        calibrated = self._ranger.calibration.laser_ranger
-        (ray,) = [laser for laser in calibrated.lasers if laser.id == laser_id]
-        along = 0 if ray.axis == "u" else 1
-        depth_mm = range_mm + calibrated.reference_plane.offset_mm
-        return ray.origin_mm[along] + ray.direction[along] * depth_mm
+        """Position of a laser's spot along its row."""
+        sensor = self._ranger.sensor
+        index = sensor.ids.index(laser_id)
+        (row,) = [one for one in sensor.rows if index in one.members]
+        return float(row.direction @ sensor.positions_mm([laser_id], np.array([range_mm]))[:, 0])
 
 
 @dataclass(frozen=True)
@@ -181,6 +181,12 @@ def closest_bar(reading: Reading, depths: Depths) -> list[list[tuple[float, floa
     return [[(x, ends[0]), (x, ends[-1])], *bars]
 
 
+def _front_mm(sensor: CalibratedSensor, line: LineShape, reading: Reading) -> tuple[float, float]:
+    """Front of a row at the mean range of its spots."""
+    range_mm = float(np.mean([reading.lasers[n].range_mm for n in line.indices]))
+    return sensor.front_mm(line.row, range_mm)
+
+
 def contour(line: LineShape, front_mm: tuple[float, float], depths: Depths) -> list[tuple[float, float]]:
     """Points of the fitted polynomial across the front, in the plan view; none for an unknown shape."""
     coefficients = line.shape.coefficients
@@ -199,7 +205,7 @@ def answer_text(reading: Reading) -> str:
     if reading.interval_mm is not None:
         low, high = reading.interval_mm
         lines.append(f"closest point; 95 % from {low:.1f} to {high:.1f} mm")
-    for line in reading.lines:
+    for line in reading.shapes:
         angle = line.shape.angle_rad
         turned = "" if angle is None else f", angle {np.degrees(angle):+.1f} deg"
         lines.append(f"**{line.shape.kind}**{turned}{_odds(line.shape)}")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from tests.support.lasers import serial_bank
+from workbench.devices.controller_line import ControllerLine, SerialBlock
 from workbench.devices.guarded_lasers import GuardedLaserBank
 from workbench.devices.guardian import WATCH_S
 from workbench.devices.protocols import LaserBank
@@ -92,6 +93,21 @@ def test_lit_inside_the_block_and_off_after(wired: Wired, bank: GuardedLaserBank
     with bank.lit(ids, for_s=5.0):
         assert set(wired.controller.lit()) == set(ids)
     assert wired.controller.lit() == ()
+
+
+def test_lasers_of_one_line_are_on_together(wired: Wired) -> None:
+    """Two beams behind a grating on line 1, a laser of its own on line 2."""
+    settings = SerialBlock(port=wired.server.port)
+    bank = GuardedLaserBank(ControllerLine, settings, ("G1", "G2", "L"), lines=(0, 0, 1))
+    for ids, outputs, lit in (
+        (["G2"], ("L1",), ("G1", "G2")),
+        (["L"], ("L2",), ("L",)),
+        (["G1", "G2", "L"], ("L1", "L2"), ("G1", "G2", "L")),
+    ):
+        with bank.lit(ids, for_s=5.0):
+            assert wired.controller.lit() == outputs
+            assert bank.state().lit == lit
+    bank.close()
 
 
 def test_off_is_asked_for_and_asked_about(wired: Wired, bank: GuardedLaserBank) -> None:

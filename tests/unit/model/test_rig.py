@@ -143,6 +143,36 @@ def test_a_laser_without_a_name_of_its_own_or_a_baseline_is_refused(change: dict
         LaserSpec.model_validate(LASER | change)
 
 
+def test_a_laser_may_stand_anywhere_but_at_the_pinhole() -> None:
+    anywhere = {key: value for key, value in LASER.items() if key != "axis"}
+    assert LaserSpec.model_validate(anywhere | {"y_mm": {"value": 25.0, "sd": 0.2}}).axis is None
+    with pytest.raises(ValidationError, match="baseline"):
+        LaserSpec.model_validate(anywhere | {"x_mm": {"value": 0.0, "sd": 0.2}})
+
+
+@pytest.mark.parametrize(
+    ("change", "good"),
+    [({}, False), ({"tx": {"value": 0.01, "sd": 0.0}}, True), ({"y_mm": {"value": 1.0, "sd": 0.2}}, True)],
+)
+def test_two_lasers_do_not_have_the_same_beam(change: dict[str, Any], good: bool) -> None:
+    data = thesis_rig().model_dump(exclude_unset=True) | {"lasers": [LASER, LASER | {"id": "L2"} | change]}
+    if good:
+        assert Rig.model_validate(data).laser_ids == ("L1", "L2")
+        return
+    with pytest.raises(ValidationError, match="L1 and L2 with the same beam"):
+        Rig.model_validate(data)
+
+
+def test_beams_of_one_emitter_share_an_output_of_the_controller() -> None:
+    beams = [
+        LASER | {"id": i, "emitter": e, "ty": {"value": 0.01 * n, "sd": 0.0}}
+        for n, (i, e) in enumerate([("A", "g"), ("B", None), ("C", "g"), ("g", None)])
+    ]
+    rig = Rig.model_validate(thesis_rig().model_dump(exclude_unset=True) | {"lasers": beams})
+    assert [[laser.id for laser in group] for group in rig.emitters] == [["A", "C"], ["B"], ["g"]]
+    assert rig.laser_lines == (0, 1, 0, 2)
+
+
 @pytest.mark.parametrize("reach_mm", [(500.0, 500.0), (500.0, 100.0), (0.0, 100.0), (100.0, 1.1e6)])
 def test_the_reach_of_a_bench_is_from_near_to_far(reach_mm: tuple[float, float]) -> None:
     with pytest.raises(ValidationError) as caught:
@@ -290,7 +320,7 @@ def test_a_head_is_beside_the_camera(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     head = HEAD.replace("LASER", '"1"').replace("REACH", "[-40, 30]")
     path.write_text(vertical.replace("COEFFICIENTS", "  k1: {value: 0.0, sd: 0.1}") + head)
-    with pytest.raises(BadInputError, match="expected a laser with axis u, beside the camera; 1 has axis v"):
+    with pytest.raises(BadInputError, match="expected a laser beside the camera, got 1, which is above or below it"):
         load_rig(path)
 
 

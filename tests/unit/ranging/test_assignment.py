@@ -13,6 +13,7 @@ from tests.support.rangers import IDS, X_MM, positions, ranger_in
 from tests.support.rigs import World, thesis_rig
 from workbench.model.arrays import FloatArray
 from workbench.ranging.assignment import LaserSpotPairs, assign, pair_up
+from workbench.ranging.assignment_kernels import assignments
 from workbench.ranging.ranger import Ranger
 from workbench.sensor.range_model import RangeEstimates
 
@@ -146,6 +147,29 @@ def test_where_spots_are_missing_three_lie_on_an_even_surface(
 
 
 @pytest.mark.parametrize(("lasers", "assigned"), [(6, True), (7, False)])
-def test_six_lasers_are_told_apart_at_most(lasers: int, assigned: bool) -> None:
+def test_six_lasers_on_one_line_are_told_apart_at_most(lasers: int, assigned: bool) -> None:
+    """With the spots of an even surface, and all others far from even."""
+    inverse_depth = np.outer(2.0 ** np.arange(lasers), 3.0 ** np.arange(lasers))
+    np.fill_diagonal(inverse_depth, 1.0)
+    expected = tuple(range(lasers)) if assigned else None
+    assert lasers_of(np.zeros((lasers, lasers)), inverse_depth) == expected
+
+
+@pytest.mark.parametrize("lasers", [7, 15])
+def test_any_number_of_lasers_is_told_apart_by_their_lines(lasers: int) -> None:
     misfit = np.where(np.eye(lasers, dtype=bool), 0.0, np.inf)
-    assert lasers_of(misfit, np.ones((lasers, lasers))) == (tuple(range(lasers)) if assigned else None)
+    assert lasers_of(misfit, np.ones((lasers, lasers))) == tuple(range(lasers))
+
+
+@pytest.mark.parametrize(("lasers", "spots"), [(1, 1), (4, 4), (4, 2), (6, 5)])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_assignments_are_the_permutations_of_possible_pairs(lasers: int, spots: int, seed: int) -> None:
+    possible = np.random.default_rng(seed).random((lasers, spots)) < 0.7
+    expected = [
+        one
+        for one in permutations(range(lasers), spots)
+        if all(possible[laser, n] for n, laser in enumerate(one))
+    ]
+    found = assignments(possible, 720)
+    assert [tuple(one) for one in found.tolist()] == expected
+    assert len(assignments(possible, 1)) == min(len(expected), 2)

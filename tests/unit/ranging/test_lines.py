@@ -10,7 +10,7 @@ import pytest
 from tests.support.rangers import IDS, X_MM, positions, ranger_in
 from tests.support.rigs import World, thesis_rig
 from tests.support.surfaces import X, flat, incline, seen
-from workbench.model.rig import ImageAxis
+from workbench.optics.rows import Row
 from workbench.ranging.lines import LineShape, fit_line, mean_of_lines
 from workbench.ranging.ranger import Ranger
 from workbench.ranging.shape import fit_shape
@@ -59,17 +59,17 @@ def test_angle_and_closest_range_lie_where_stated_whatever_the_calibration() -> 
         assert abs(z.mean()) < 3.5 / np.sqrt(len(z))
 
 
-AXES: tuple[ImageAxis, ImageAxis] = ("u", "v")
+HORIZONTAL, VERTICAL = Row((0, 1, 2, 3), 0), Row((4, 5, 6, 7), 90)
 
 
-def line(axis: ImageAxis, range_mm: float, spot_sd_mm: float, by_parameter: float) -> LineShape:
+def line(row: Row, range_mm: float, spot_sd_mm: float, by_parameter: float) -> LineShape:
     """A line whose closest range rests on one spot and one parameter of the calibration."""
     shape = replace(fit_shape(seen(X, flat(range_mm)(X))), closest_sigma_mm=spot_sd_mm)
-    return LineShape(axis, shape, (0,), np.array([by_parameter]), np.array([spot_sd_mm]))
+    return LineShape(row, shape, (0,), np.array([by_parameter]), np.array([spot_sd_mm]))
 
 
 def test_lines_are_weighted_by_information_or_by_pixels() -> None:
-    lines, variance = [line("u", 500.0, 1.0, 1.0), line("v", 506.0, 2.0, 1.0)], np.zeros((1, 1))
+    lines, variance = [line(HORIZONTAL, 500.0, 1.0, 1.0), line(VERTICAL, 506.0, 2.0, 1.0)], np.zeros((1, 1))
     near, far = (one.shape.closest_mm for one in lines)
     mean, sigma = mean_of_lines(lines, variance, "information", (640, 480))
     assert mean == pytest.approx((near + far / 4) / 1.25)
@@ -82,14 +82,15 @@ def test_lines_are_weighted_by_information_or_by_pixels() -> None:
 @pytest.mark.parametrize(("other", "expected"), [(1.0, 3.0), (-1.0, 0.0)])
 def test_an_error_of_the_calibration_is_common_to_the_lines(other: float, expected: float) -> None:
     """It stays in the mean where it has the same sign in both, and goes where it has not."""
-    lines = [line("u", 500.0, 1e-9, 1.0), line("v", 500.0, 1e-9, other)]
+    lines = [line(HORIZONTAL, 500.0, 1e-9, 1.0), line(VERTICAL, 500.0, 1e-9, other)]
     _, sigma = mean_of_lines(lines, np.array([[9.0]]), "information", (640, 480))
     assert sigma == pytest.approx(expected, abs=1e-6)
 
 
 def test_the_uncertainty_of_a_shape_is_that_of_its_line() -> None:
     """What neither spots nor calibration explain is averaged over two lines."""
-    lines = [replace(line(axis, 500.0, 3.0, 0.0), closest_spot_sd_mm=np.zeros(1)) for axis in AXES]
+    rows = (HORIZONTAL, VERTICAL)
+    lines = [replace(line(row, 500.0, 3.0, 0.0), closest_spot_sd_mm=np.zeros(1)) for row in rows]
     _, sigma = mean_of_lines(lines, np.zeros((1, 1)), "information", (640, 480))
     assert sigma == pytest.approx(3.0 / np.sqrt(2.0))
 
@@ -105,7 +106,7 @@ def test_derivatives_of_the_closest_range_by_the_calibration_are_those_of_differ
     value, step = ranger.calibration.geometry()[name], {"f_px": 1e-2}.get(name, 1e-4)
 
     def closest(moved: CalibratedSensor) -> LineShape:
-        return fit_line(moved, "u", IDS, moved.ranges(IDS, pixels, sd), range(4))
+        return fit_line(moved, moved.rows[0], IDS, moved.ranges(IDS, pixels, sd), range(4))
 
     ahead, back = (
         closest(CalibratedSensor(ranger.calibration, {name: value + sign * step})).shape.closest_mm

@@ -33,7 +33,7 @@ def test_a_flat(ranger: Ranger) -> None:
     assert reading.flat_sigma_mm < min(laser.sigma_mm for laser in reading.lasers)
     assert reading.flat_sigma_mm == pytest.approx(reading.sigma_mm, rel=0.1)
     (line,) = reading.lines
-    assert (line.axis, line.shape.kind) == ("u", "flat")
+    assert (line.row.name, line.shape.kind) == ("horizontal", "flat")
     assert reading.mean_mm == reading.closest_mm
 
 

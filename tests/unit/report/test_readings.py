@@ -22,7 +22,7 @@ def reading(scene: str, status: str = "done", notes: tuple[str, ...] = ()) -> Re
         closest_mm=1002.34,
         sigma_mm=1.2,
         interval_mm=(1000.0, 1004.7),
-        lines=[SimpleNamespace(shape=shape)],
+        shapes=[SimpleNamespace(shape=shape)],
         lasers=lasers,
         notes=notes,
     )

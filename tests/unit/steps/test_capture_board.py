@@ -47,8 +47,10 @@ def test_captures_are_frames_in_room_light_and_pairs_of_each_laser() -> None:
     assert step.gives == "captures"
 
 
-def test_the_board_stands_upright_for_lasers_above_and_below_the_camera_alone() -> None:
-    both = ideal_rig(laser("L1", 60.0), laser("L2", 0.0, 60.0))
-    for rig, roll_deg in ((ideal_rig(laser("L2", 0.0, 60.0)), 90.0), (both, 0.0), (two_laser_rig(), 0.0)):
+def test_the_band_of_the_board_lies_along_the_row_of_lasers_where_there_is_one() -> None:
+    beside, above = laser("L1", 60.0), laser("L2", 0.0, 60.0)
+    upright, diagonal = ideal_rig(above), ideal_rig(beside, above)
+    cross = ideal_rig(beside, above, laser("L3", -60.0), laser("L4", 0.0, -60.0))
+    for rig, roll_deg in ((upright, 90.0), (diagonal, 135.0), (cross, 0.0), (two_laser_rig(), 0.0)):
         rolls = {placement.target.roll_deg for placement in parse_step(TEXT).placements("p.1", rig)}
         assert rolls == {roll_deg}

@@ -16,9 +16,9 @@ from workbench.model.calibration import Calibration
 from workbench.model.errors import BadInputError
 from workbench.model.event import CaptureTaken, ReadingTaken
 from workbench.model.target import Placement
-from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.calibrated import CalibratedSensor, X, Y
 from workbench.trials.readings import reading_taken, session_ranger, take_readings
-from workbench.trials.reference import AXES, laser_places
+from workbench.trials.reference import laser_places
 
 PLACEMENT = Placement(key="p.1/500mm", standoff_mm=500.0)
 
@@ -29,7 +29,7 @@ def mean_place_mm(calibration: Calibration, taken: ReadingTaken) -> tuple[float,
     px = np.array([[np.nan if p is None else p for p in (one.u_px, one.v_px)] for one in taken.lasers])
     ranges = sensor.ranges(ids, px, np.full_like(px, np.nan))
     weight = ranges.spot_sd_mm**-2 / (ranges.spot_sd_mm**-2).sum()
-    x, y = (float(weight @ sensor.places(ids, axis, ranges)[0]) for axis in AXES)
+    x, y = (float(weight @ sensor.places(ids, axis, ranges)[0]) for axis in (X, Y))
     return x, y
 
 

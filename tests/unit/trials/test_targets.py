@@ -19,7 +19,7 @@ from workbench.trials.targets import (
     CylinderSpec,
     FlatTargetSpec,
     InclineSpec,
-    front_axis,
+    front_angle_deg,
     target_placement,
     true_values,
 )
@@ -81,7 +81,7 @@ def test_a_measured_common_tilt_brings_an_end_of_a_flat_target_nearer(yaw_deg: f
 
 def test_an_incline_about_the_horizontal_axis_needs_lasers_above_each_other() -> None:
     spec = InclineSpec(kind="incline", angle_deg=30.0, axis="horizontal")
-    assert front_axis(spec) == "v"
+    assert front_angle_deg(spec) == 90
     with pytest.raises(BadInputError, match="horizontal") as caught:
         target_placement(spec, "k", 300.0, RIG)
     assert caught.value.exit_code == 2

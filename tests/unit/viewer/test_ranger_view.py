@@ -77,7 +77,7 @@ def test_intervals_and_contour_lie_in_the_plan_view_at_any_range(ranger: Ranger,
         assert PLAN_HEIGHT / 2 > near > far > -PLAN_HEIGHT / 2
         assert near - far == pytest.approx(depths.scale * 4 * one.sigma_mm, rel=0.2)
     (line,) = reading.lines
-    points = np.array(contour(line, ranger.sensor.front_mm(line.axis), depths))
+    points = np.array(contour(line, ranger.sensor.front_mm(line.row, 0.0), depths))
     assert len(points) > 10
     assert (np.abs(points[:, 1]) < PLAN_HEIGHT / 2).all()
 
@@ -86,7 +86,7 @@ def test_a_plan_of_a_narrow_depth_is_true_to_scale(ranger: Ranger) -> None:
     """The slope of the drawn contour is that of the incline."""
     reading = reading_at(ranger, **INCLINE_MM)
     (line,) = reading.lines
-    (x0, y0), *_, (x1, y1) = contour(line, ranger.sensor.front_mm(line.axis), Depths.of(reading))
+    (x0, y0), *_, (x1, y1) = contour(line, ranger.sensor.front_mm(line.row, 0.0), Depths.of(reading))
     assert line.shape.angle_rad is not None
     assert (y0 - y1) / (x1 - x0) == pytest.approx(np.tan(line.shape.angle_rad), rel=0.02)
 

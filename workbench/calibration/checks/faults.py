@@ -16,6 +16,8 @@ from workbench.calibration.data.observations import Observation, RejectedObserva
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.model.fit_event import CrossValidatedPlacement, Fault
 from workbench.model.stats import chi2_sf
+from workbench.optics.image import extent_px
+from workbench.optics.rows import axes_of, rays_of_rig
 
 SUSPECT_P = 1e-3
 """P value below which the captures of a placement are searched for target motion."""
@@ -241,12 +243,13 @@ def _all_far(fit: CalibrationFit) -> Iterator[Fault]:
 def _travel(fit: CalibrationFit, laser: int) -> float | None:
     """Share of the image between a laser's nearest spot and its vanishing point; None below 2 standoffs."""
     cells, camera = fit.cells, fit.rig.camera
-    axis = "uv".index(fit.rig.lasers[laser].axis)
-    own = np.flatnonzero((cells.laser == laser) & np.isfinite(cells.position_px[:, axis]))
+    (axis,) = axes_of(rays_of_rig(fit.rig)[[laser]])
+    measured = np.isfinite(cells.position_px)
+    own = np.flatnonzero((cells.laser == laser) & measured[:, np.abs(axis).argmax()])
     standoff = np.array([cells.placements[n].standoff_mm for n in cells.placement[own]])
     if len(np.unique(standoff)) < 2:
         return None
     near = own[np.argmin(standoff)]
-    infinity = fit.curves.spots(np.array([laser]), np.zeros(1))[0, axis]
-    distance = cells.position_px[near, axis] - fit.residual_px[near, axis] - infinity
-    return float(abs(distance) / (camera.width_px, camera.height_px)[axis])
+    (infinity,) = fit.curves.spots(np.array([laser]), np.zeros(1))
+    moved = np.where(measured[near], cells.position_px[near] - fit.residual_px[near] - infinity, 0.0)
+    return float(abs(moved @ axis) / extent_px(axis, (camera.width_px, camera.height_px)))

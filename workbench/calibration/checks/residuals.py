@@ -34,6 +34,7 @@ from workbench.calibration.estimation.refit import Refit, measured, optimum_of, 
 from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.fit_event import ResidualTest
 from workbench.model.stats import chi2_sf, gamma_cdf, gamma_sf, norm_cdf
+from workbench.optics.rows import axes_of, rays_of_rig
 
 FALSE_ALARM = 0.01
 """Probability that any residual test of a sound fit raises an alarm."""
@@ -113,7 +114,7 @@ class _Spots:
     axis: IndexArray
     """(n,) 0 for u, 1 for v."""
     outward: FloatArray
-    """(n,) 1 or -1 along the laser's axis, in the direction of its baseline; 0 across."""
+    """(n,) share of the coordinate in the direction of the laser's baseline: 1 or -1 along it, 0 across."""
     distance: FloatArray
     """(n,) logarithm of the standoff, scaled to -1 to 1."""
     place: FloatArray
@@ -128,17 +129,16 @@ class _Spots:
         own = whole.jacobian[rows]
         laser, axis = cells.laser[rows // 2], rows % 2
         standoff = np.array([p.standoff_mm for p in cells.placements])[cells.placement]
-        along = np.array(["uv".index(one.axis) for one in fit.rig.lasers])
-        sign = np.array(
-            [np.sign((one.x_mm if one.axis == "u" else one.y_mm).value) for one in fit.rig.lasers]
-        )
+        rays = rays_of_rig(fit.rig)
+        axes = axes_of(rays)
+        outward = axes * np.sign((axes * rays[:, :2]).sum(axis=1))[:, None]
         return cls(
             residual=whole.residual[rows],
             covariance=np.eye(len(rows)) - own @ whole.covariance @ own.T,
             sd_px=cells.sd_px.ravel()[rows],
             laser=laser,
             axis=axis,
-            outward=np.where(along[laser] == axis, sign[laser], 0.0),
+            outward=outward[laser, axis],
             distance=_spread(np.log(standoff))[rows // 2],
             place=(2 * whole.predicted_px / size - 1)[rows // 2],
         )

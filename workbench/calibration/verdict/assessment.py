@@ -26,6 +26,7 @@ from workbench.model.calibration import DeterminedBy
 from workbench.model.fit_event import CrossValidatedPlacement, Fault, ResidualTest
 from workbench.model.number_text import counted
 from workbench.model.stats import chi2_isf
+from workbench.optics.rows import axes_of, rays_of_rig
 
 WARNED_P = 0.01
 """P value of the placement errors below which their scatter is a warning."""
@@ -177,15 +178,15 @@ def _derive_one(fit: CalibrationFit, index: int) -> Derived:
     product[origin] = fit.values[0] * fit.values[origin] / baseline
 
     this, infinity = np.array([index]), np.zeros(1)
-    axis = "uv".index(laser.axis)
+    (axis,) = axes_of(rays_of_rig(fit.rig)[[index]])
     own = fit.layout.own(index)
     vanishing = np.zeros(len(fit.values))
-    vanishing[own] = fit.curves.gradients(this, infinity)[0, axis, : len(own)]
+    vanishing[own] = axis @ fit.curves.gradients(this, infinity)[0, :, : len(own)]
     return Derived(
         laser_id=laser.id,
         f_b_px_mm=float(fit.values[0]) * baseline,
         f_b_sd=_sd(fit, product),
-        infinity_px=float(fit.curves.spots(this, infinity)[0, axis]),
+        infinity_px=float(axis @ fit.curves.spots(this, infinity)[0]),
         infinity_sd=_sd(fit, vanishing),
     )
 

@@ -128,22 +128,19 @@ def _numbers(calibration: Calibration) -> tuple[object, ...]:
 
 def _spots(sensor: CalibratedSensor, pairs: RangesByLaser) -> FloatArray:
     """(n,) predicted positions of the spots along each laser's axis, px."""
-    return np.concatenate([sensor.spot_px(i, r)[:, _axis(sensor, i)] for i, r in pairs])
+    return np.concatenate([sensor.spot_px(i, r) @ sensor.axis(i) for i, r in pairs])
 
 
 def _spot_gradient(sensor: CalibratedSensor, pairs: RangesByLaser) -> FloatArray:
     """(n, P) derivatives of `_spots` by the parameters."""
-    return np.concatenate([sensor.spot_gradient(i, r)[:, _axis(sensor, i)] for i, r in pairs])
+    gradients = [(sensor.axis(i), sensor.spot_gradient(i, r)) for i, r in pairs]
+    return np.concatenate([np.einsum("k,nkp->np", axis, gradient) for axis, gradient in gradients])
 
 
 def _spot_covariance(sensor: CalibratedSensor, pairs: RangesByLaser) -> FloatArray:
     """(n, n) covariance of `_spots` by that of the calibration, px^2."""
     gradient = _spot_gradient(sensor, pairs)
     return gradient @ sensor.calibration.laser_ranger.parameters.covariance_array @ gradient.T
-
-
-def _axis(sensor: CalibratedSensor, laser_id: str) -> int:
-    return "uv".index(sensor.calibration.laser_ranger.lasers[sensor.ids.index(laser_id)].axis)
 
 
 def _differences(a: CalibratedSensor, b: CalibratedSensor, pairs: RangesByLaser) -> tuple[Difference, ...]:

@@ -28,6 +28,7 @@ from workbench.model.calibration import (
     Validity,
 )
 from workbench.model.errors import LimitFailedError
+from workbench.model.rig import nearest_image_axis
 from workbench.sensor.calibrated import CalibratedSensor
 from workbench.session.files import write_output
 
@@ -108,7 +109,7 @@ def _calibration(
             lasers=tuple(
                 LaserRay(
                     id=laser.id,
-                    axis=laser.axis,
+                    axis=nearest_image_axis(laser),
                     origin_mm=(values[f"{laser.id}.x_mm"], values[f"{laser.id}.y_mm"], 0.0),
                     direction=(values[f"{laser.id}.tx"], values[f"{laser.id}.ty"], 1.0),
                 )

@@ -10,6 +10,7 @@ from math import atan, degrees, hypot
 from workbench.calibration.model.parameters import DRIFT, PRINT
 from workbench.model.lens import COEFFICIENTS, PINHOLE
 from workbench.model.rig import TARGET_TILT, Rig
+from workbench.optics.rows import axes_of, rays_of_rig
 
 LEAST_PART = 0.3
 """Least effect on the spots, as a share of the strongest, for a parameter to be part of the text."""
@@ -17,6 +18,8 @@ LEAST_EFFECT = 0.5
 """Effect on all spots together, in standard deviations, below which no test of the data sees it."""
 OTHERS = 3
 """Largest number of kinds beside the pivot's in one text."""
+LEAST_SHARE = 0.25
+"""Least share of a coordinate in the direction of the baseline to be named after it."""
 BASELINE = "baseline"
 ACROSS = "position across the baseline"
 POINTING = {"tx": "pointing along u", "ty": "pointing along v"}
@@ -112,10 +115,15 @@ def parameter_change(rig: Rig, name: str, value: float, change: float, effect: f
     elif own in POINTING:
         kind = POINTING[own]
     else:
-        along = "x_mm" if rig.lasers[rig.laser_ids.index(laser)].axis == "u" else "y_mm"
-        kind = BASELINE if own == along else ACROSS
+        kind = BASELINE if own in _along(rig, laser) else ACROSS
     shown, unit = _shown(kind, value, change)
     return ParameterChange(name, kind, laser, shown, unit, effect)
+
+
+def _along(rig: Rig, laser_id: str) -> list[str]:
+    """Coordinates of a laser's origin along its baseline."""
+    (axis,) = axes_of(rays_of_rig(rig)[[rig.laser_ids.index(laser_id)]])
+    return [name for name, share in zip(("x_mm", "y_mm"), axis, strict=True) if abs(share) >= LEAST_SHARE]
 
 
 def group_by_kind(parts: Iterable[ParameterChange]) -> tuple[ParameterGroup, ...]:

@@ -6,7 +6,7 @@ import hashlib
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from workbench.calibration.data.spot_rows import prior_scanline
@@ -44,6 +44,10 @@ class PairSource:
     """Exposure of the present placement, if it was set."""
     _dark: Image | None = None
     """Last frame at the present placement with all lasers off."""
+    _last: tuple[Image, Image, ev.CaptureTaken] | None = None
+    """Last pair from the bench."""
+    _taken_for: set[str] = field(default_factory=set)
+    """Lasers whose capture it is: several where they are on together."""
 
     def set_exposure(self, key: str, begin: Callable[[str], None]) -> ev.ExposureSet | None:
         """Set the exposure for a placement by trial exposures; a replay takes it from the journal.
@@ -142,7 +146,12 @@ class PairSource:
         left_off: Sequence[str],
     ) -> tuple[Image, Image, ev.CaptureTaken]:
         self._refuse_unsafe()
-        lit = [i for i in laser_ids if i not in left_off]
+        if scene is None and (shared := self._shared_pair(laser_ids, placement, repeat)) is not None:
+            on_image, off_image, taken = shared
+            return on_image, off_image, taken.model_copy(update={"key": key, "laser_id": laser_ids[0]})
+        asked = set(laser_ids).difference(left_off)
+        groups = [[laser.id for laser in group] for group in self.rig.emitters]
+        lit = [laser_id for group in groups if asked.intersection(group) for laser_id in group]
         on, clock_ns, lit_s = within_lease(lambda: self._grab_lit(key, lit))
         frames = FrameStore(self.session_dir)
         with ThreadPoolExecutor(1) as beside:  # the lit frame is stored while the dark one is exposed
@@ -169,7 +178,26 @@ class PairSource:
             part=self.part,
             head_deg=placement.head_deg,
         )
+        self._last = on.image, off.image, taken
+        self._taken_for = {taken.laser_id}
         return on.image, off.image, taken
+
+    def _shared_pair(
+        self, laser_ids: Sequence[str], placement: Placement, repeat: int
+    ) -> tuple[Image, Image, ev.CaptureTaken] | None:
+        """Last capture, if it shows a laser that was on with those of the same emitter; each laser once."""
+        if self._last is None or len(laser_ids) != 1 or laser_ids[0] in self._taken_for:
+            return None
+        last, (laser_id,) = self._last[2], laser_ids
+        together = next(
+            {laser.id for laser in group}
+            for group in self.rig.emitters
+            if laser_id in {laser.id for laser in group}
+        )
+        if last.laser_id not in together or (last.placement_key, last.repeat) != (placement.key, repeat):
+            return None
+        self._taken_for.add(laser_id)
+        return self._last
 
     def _grab_lit(self, key: str, laser_ids: Sequence[str]) -> tuple[Frame, int, float]:
         """Frame with lasers on, the bench's time, and how long they were on, s."""

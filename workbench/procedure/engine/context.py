@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from workbench.calibration.data.spot_rows import own_spots, sought
 from workbench.devices.protocols import Bench, Operator, StreamingCamera
 from workbench.model import event as ev
 from workbench.model.arrays import Image
@@ -61,6 +62,8 @@ class Context:
     readings: list[ev.ReadingTaken] = field(default_factory=list)
     """Readings of all trials so far, for steps that compare trials."""
     pairs: PairSource = field(init=False)
+    _found: tuple[tuple[object, ...], Finding] | None = field(default=None, init=False)
+    """Last search (frame, bands, number of spots) and its result, which lasers that are on together share."""
 
     def __post_init__(self) -> None:
         parts = [capture.part for capture in self.recorder.complete_captures]
@@ -118,18 +121,31 @@ class Context:
         self.begin(key)
         on, off, taken = self.pairs.pair(key, laser_ids, placement, repeat, scene, left_off)
         self.emit(taken)
-        finding = find_spots(
-            on,
-            off,
-            scanlines=scanlines,
-            expected=len(laser_ids),
-            speckle_sd_px=self._speckle_sd_px(scene),
-        )
+        finding = self._find(on, off, taken, laser_ids, scanlines)
         self.emit(spots_found(key, finding, laser_ids))
         self.pairs.check_dark(key, off, finding, scanlines)
         self.captures.append(taken)
         self.findings[key] = finding
         return finding
+
+    def _find(
+        self,
+        on: Image,
+        off: Image,
+        taken: ev.CaptureTaken,
+        laser_ids: Sequence[str],
+        scanlines: Sequence[Scanline],
+    ) -> Finding:
+        """Spots of a capture; of one laser in a calibration, its own."""
+        alone = taken.scene is None and len(laser_ids) == 1
+        laser = self.rig.lasers[self.rig.laser_ids.index(laser_ids[0])] if alone else None
+        expected = len(laser_ids) if laser is None else sought(self.rig, laser)[1]
+        search = taken.on.path, taken.on.sha256, tuple(scanlines), expected
+        if self._found is None or self._found[0] != search:
+            speckle_sd_px = self._speckle_sd_px(taken.scene)
+            found = find_spots(on, off, scanlines=scanlines, expected=expected, speckle_sd_px=speckle_sd_px)
+            self._found = search, found
+        return self._found[1] if laser is None else own_spots(self.rig, laser, self._found[1])
 
     def _speckle_sd_px(self, scene: str | None) -> float:
         """Deviation of a centre by speckle, as stated for a capture.

@@ -108,7 +108,7 @@ def _sensitivities(
         nearest.closest_by_parameter,
         float(np.linalg.norm(nearest.closest_spot_sd_mm)),
         share,
-        reference.at_near_end(front_ends(sensor)),
+        reference.at_near_end(front_ends(sensor, reading.lasers[0].range_mm)),
         sqrt(shape_variance(nearest, sensor.covariance)),
     )
     return {CLOSEST: closest, MEAN: mean, **lasers}

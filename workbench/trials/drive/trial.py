@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.model.event import ReadingTaken, TrialProgress, TrueValues, VehicleMoved
 from workbench.model.number_text import counted
-from workbench.model.rig import LARGEST, ImageAxis
+from workbench.model.rig import LARGEST
 from workbench.model.target import Placement, WorldTarget
 from workbench.model.trial_event import SensorAnswer
 from workbench.model.world import Pose
@@ -97,10 +97,10 @@ def _move(context: Context, placed: Placement, pose: Pose) -> None:
 def _read(trial: _Trial, placed: Placement, number: int, truth: StepTruth) -> ReadingTaken:
     """Take a reading of the closest range; before several bodies without an interval, which is of one."""
     context, ranger = trial.context, trial.ranger
-    axis: ImageAxis = "u" if len(ranger.sensor.lasers_on("u")) else "v"
+    row = max(ranger.sensor.rows, key=lambda one: len(one.members))
     front_mm = truth.front_mm if isfinite(truth.front_mm) else LARGEST
     true = TrueValues(range_mm=front_mm, range_sd_mm=truth.front_sd_mm)
-    closest = ClosestRange(true, ranger.sensor.front_mm(axis), axis)
+    closest = ClosestRange(true, ranger.sensor.front_mm(row, front_mm), row)
     scene = f"{placed.key}/{number:03d}"
     found = acquire(ranger, scene, capture_of(context, ranger, placed, scene, number))
     taken = reading_taken(context.rig, ranger.sensor, trial.name, placed, number, found, closest)

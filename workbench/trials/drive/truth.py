@@ -13,16 +13,15 @@ from math import radians
 import numpy as np
 
 from workbench.model.arrays import FloatArray
-from workbench.model.rig import ImageAxis
 from workbench.model.world import Pose, Vehicle
-from workbench.sensor.calibrated import CalibratedSensor
+from workbench.optics.rows import FLATNESS
+from workbench.sensor.calibrated import FAR_MM, CalibratedSensor
 from workbench.trials.drive.surroundings import Clearance, Surroundings, world_rays
 
 EDGE_MM = 8.0
 """Distance around a beam's axis within which another body makes an edge; beams are narrower."""
 FRONT_RAYS = 61
-"""Rays over the front of one line of lasers."""
-AXES: tuple[ImageAxis, ...] = ("u", "v")
+"""Rays over the front of one row of lasers."""
 BESIDE = EDGE_MM * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
 
 
@@ -45,7 +44,7 @@ class StepTruth:
     clearance: Clearance
     lasers: dict[str, TrueRange]
     front_mm: float
-    """Smallest range over the front, between the outer lasers of a line."""
+    """Smallest range over the front, between the outer lasers of a row."""
     front_sd_mm: float
     front_is_one: bool
     """Whether one body lies before the whole front."""
@@ -68,11 +67,7 @@ class TruthSource:
         start, end = (sensor.positions_mm(sensor.ids, np.full(count, mm)).T for mm in (0.0, 1000.0))
         origins = np.column_stack([start, np.zeros(count)])
         directions = np.column_stack([(end - start) / 1000.0, np.ones(count)])
-        fronts = [
-            _front(origins[own], directions[own], n)
-            for n, axis in enumerate(AXES)
-            if len(own := sensor.lasers_on(axis))
-        ]
+        fronts = [_front(origins[row.lasers], directions[row.lasers], row.direction) for row in sensor.rows]
         self._beams = count * len(BESIDE)
         self._origins = np.vstack([(origins[:, None] + BESIDE).reshape(-1, 3), *(one for one, _ in fronts)])
         self._directions = np.vstack(
@@ -109,12 +104,21 @@ class TruthSource:
         )
 
 
-def _front(origins: FloatArray, directions: FloatArray, along: int) -> tuple[FloatArray, FloatArray]:
-    """Rays over the front of one line of lasers, interpolated between theirs; `along` is its coordinate."""
-    order = np.argsort(origins[:, along])
-    at = np.linspace(origins[order[0], along], origins[order[-1], along], FRONT_RAYS)
+def _front(origins: FloatArray, directions: FloatArray, along: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rays over the front of one row of lasers, interpolated between theirs.
+
+    Args:
+        origins: (n, 3) of the row's beams.
+        directions: (n, 3) likewise.
+        along: (2,) direction of the row.
+    """
+    places = origins[:, :2] @ along
+    if np.ptp(places) <= FLATNESS * np.ptp(places + directions[:, :2] @ along * FAR_MM):
+        places = directions[:, :2] @ along  # all beams leave the sensor at one point
+    order = np.argsort(places)
+    at = np.linspace(places[order[0]], places[order[-1]], FRONT_RAYS)
     rays = (
-        np.column_stack([np.interp(at, origins[order, along], values[order, k]) for k in range(3)])
+        np.column_stack([np.interp(at, places[order], values[order, k]) for k in range(3)])
         for values in (origins, directions)
     )
     origin, direction = rays

@@ -80,7 +80,8 @@ class MissingSpotsTrialStep(TrialStepModel):
         """One placement per range.
 
         Raises:
-            BadInputError: no laser would be on, or the rig's lasers cannot see the target.
+            BadInputError: no laser would be on, beams of one emitter are to be left off, or the rig's lasers
+                cannot see the target.
         """
         for key, numbers in {"missing": self.missing, "blocked": self.blocked}.items():
             if max(numbers, default=0) >= len(rig.lasers):
@@ -88,6 +89,11 @@ class MissingSpotsTrialStep(TrialStepModel):
                     f"{name}: {key}: expected at most {len(rig.lasers) - 1} of the rig's {len(rig.lasers)}"
                     f" lasers, got {max(numbers)}"
                 )
+        if self.missing and any(len(group) > 1 for group in rig.emitters):
+            raise BadInputError(
+                f"{name}: missing: expected lasers that are switched one by one, got beams of one emitter;"
+                " block them instead (blocked)"
+            )
         return [
             target_placement(self.target, f"{name}/{range_mm:.12g}mm", range_mm, rig)
             for range_mm in self.ranges_mm

@@ -17,6 +17,7 @@ from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.errors import BadInputError
 from workbench.model.lens import COEFFICIENTS
 from workbench.model.rig import Rig
+from workbench.optics.rows import rows_of_rig
 from workbench.trials.thesis.schema import LineName, SimulatedScene
 
 BEAM_EXIT_MM = 1.5
@@ -80,14 +81,14 @@ def line_of(rig: Rig, name: LineName) -> LaserLine:
     """
     along: Literal["u", "v"] = "u" if name == "horizontal" else "v"
     camera = rig.camera
+    rows = [row for row in rows_of_rig(rig) if row.name == name]
     lasers = sorted(
-        (laser for laser in rig.lasers if laser.axis == along),
+        (rig.lasers[n] for n in max((row.members for row in rows), key=len, default=())),
         key=lambda laser: laser.x_mm.value if along == "u" else laser.y_mm.value,
     )
     if len(lasers) < FEWEST_LASERS:
         raise BadInputError(
-            f"rig {rig.rig}: expected at least {FEWEST_LASERS} lasers with axis: {along} for a {name} line,"
-            f" got {len(lasers)}"
+            f"rig {rig.rig}: expected at least {FEWEST_LASERS} lasers in a {name} row, got {len(lasers)}"
         )
     if camera.lens != "plumb_bob":
         raise BadInputError(f"rig {rig.rig}: expected camera.lens plumb_bob, a pinhole, got {camera.lens}")

@@ -27,7 +27,7 @@ class Cause:
 
 def _near_end_mm(readings: Sequence[ReadingTaken], rig: Rig) -> float:
     """Lead of the near end of a flat target by its tilt (k = 2), at the arm of the outermost laser."""
-    arm_mm = max(abs((one.x_mm if one.axis == "u" else one.y_mm).value) for one in rig.lasers)
+    arm_mm = max(hypot(one.x_mm.value, one.y_mm.value) for one in rig.lasers)
     tilt_deg = hypot(rig.bench.tilt_sd_deg, rig.bench.target_tilt_sd_deg)
     return EXPANSION * radians(tilt_deg) * arm_mm
 

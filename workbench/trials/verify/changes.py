@@ -113,7 +113,8 @@ def _candidates(sensor: CalibratedSensor) -> list[_Candidate]:
         _Candidate("camera turned about the horizontal", ("cy_px",), MRAD / f_px, "mrad"),
     ]
     for laser in sensor.calibration.laser_ranger.lasers:
-        turn, origin = ("tx", "x_mm") if laser.axis == "u" else ("ty", "y_mm")
+        along = int(np.abs(sensor.axis(laser.id)).argmax())
+        turn, origin = ("tx", "ty")[along], ("x_mm", "y_mm")[along]
         found.append(_Candidate(f"{laser.id} turned", (f"{laser.id}.{turn}",), MRAD, "mrad"))
         found.append(_Candidate(f"{laser.id} displaced", (f"{laser.id}.{origin}",), 1.0, "mm"))
     return found

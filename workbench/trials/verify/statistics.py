@@ -10,7 +10,7 @@ import numpy as np
 
 from workbench.model.arrays import FloatArray
 from workbench.model.event import LaserRange, ReadingTaken
-from workbench.sensor.calibrated import CalibratedSensor
+from workbench.sensor.calibrated import CalibratedSensor, X, Y
 from workbench.trials.errors import EXPANSION
 from workbench.trials.reference import true_ranges_mm
 from workbench.trials.target_check import Points, fit_plane
@@ -104,7 +104,7 @@ def check_placement(
         ranges.range_mm,
         ranges.by_parameter,
         ranges.spot_sd_mm,
-        np.column_stack([sensor.places(ids, axis, ranges)[0] for axis in ("u", "v")]),
+        np.column_stack([sensor.places(ids, axis, ranges)[0] for axis in (X, Y)]),
         None if points is None else fit_plane(points).probability,
         missing,
     )

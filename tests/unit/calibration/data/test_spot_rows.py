@@ -15,7 +15,9 @@ from workbench.calibration.data.spot_rows import (
     BEAM_HALF_WIDTH_PX,
     PRIOR_REACH_SD,
     observations_of_rows,
+    own_spots,
     prior_scanline,
+    sought,
 )
 from workbench.calibration.estimation.fit import fit
 from workbench.calibration.verdict.export import calibrate
@@ -23,9 +25,11 @@ from workbench.model.acceptance import Acceptance
 from workbench.model.arrays import Image
 from workbench.model.board import Board
 from workbench.model.captures import CaptureRow
+from workbench.model.errors import BadInputError
 from workbench.model.fit_event import Rejected
 from workbench.model.rig import Rig
 from workbench.ranging.ranger import SCANLINE_HALF_WIDTH_PX, Ranger
+from workbench.spots import Failure, Finding, Spot
 from workbench.spots.strip import distance_px
 
 
@@ -77,6 +81,60 @@ def test_a_band_is_wider_by_what_is_uncertain_across_the_baseline(baseline_mm: t
     sd_px = np.sqrt(normal @ np.diag(np.array([4.0, 1.0]) ** 2 + by_pointing**2) @ normal)
     line = prior_scanline(rig.model_copy(update={"camera": camera}), laser)
     assert line.half_width_px == pytest.approx(BEAM_HALF_WIDTH_PX + PRIOR_REACH_SD * sd_px)
+
+
+def grating(count: int, along_baseline: bool = False) -> Rig:
+    """A rig whose lasers are beams of one emitter 60 mm beside the camera, the last in the file first."""
+    rig = thesis_rig()
+    slopes = [0.1 * (n - count // 2) for n in reversed(range(count))]
+    lasers = tuple(
+        rig.lasers[0].model_copy(
+            update={
+                "id": f"G{n}",
+                "emitter": "g",
+                "x_mm": prior(60.0, 0.2),
+                "tx" if along_baseline else "ty": prior(slope, 0.005),
+            }
+        )
+        for n, slope in enumerate(slopes)
+    )
+    return rig.model_copy(update={"lasers": lasers})
+
+
+@pytest.mark.parametrize("along_baseline", [False, True])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_spots_of_one_emitter_are_assigned_by_their_order_in_the_row(along_baseline: bool, seed: int) -> None:
+    """The fan across the baseline or along it, by OpenCV's projection of rays that a seed draws."""
+    rig = grating(5, along_baseline)
+    world = World(rig, seed)
+    for standoff_mm in (150.0, 600.0, 4000.0):
+        exact = {laser.id: world.pixel(laser.id, standoff_mm) for laser in rig.lasers}
+        shuffled = np.random.default_rng(seed).permutation(list(exact.values())).tolist()
+        finding = Finding(tuple(Spot(u, v, 0.03, 0.03, 1e4, 1.5, 150.0) for u, v in shuffled))
+        for laser in rig.lasers:
+            (own,) = own_spots(rig, laser, finding).spots
+            assert (own.u_px, own.v_px) == pytest.approx(tuple(exact[laser.id]))
+
+
+def test_without_all_spots_of_an_emitter_none_is_assigned() -> None:
+    rig = grating(5)
+    spots = tuple(Spot(300.0, 100.0 + 20 * n, 0.03, 0.03, 1e4, 1.5, 150.0) for n in range(4))
+    assert own_spots(rig, rig.lasers[0], Finding(spots, (Failure.TOO_FEW,))) == Finding(
+        (), (Failure.TOO_FEW,)
+    )
+    alone = thesis_rig()
+    assert own_spots(alone, alone.lasers[0], Finding(spots)) == Finding(spots)
+    assert sought(rig, rig.lasers[0])[1] == 5
+    assert sought(alone, alone.lasers[0]) == ([prior_scanline(alone, alone.lasers[0])], 1)
+
+
+def test_beams_of_an_emitter_in_no_row_are_refused() -> None:
+    rig = grating(5)
+    astray = rig.lasers[1].model_copy(update={"tx": prior(0.3, 0.005)})
+    rig = rig.model_copy(update={"lasers": (rig.lasers[0], astray, *rig.lasers[2:])})
+    with pytest.raises(BadInputError, match="emitter g in one row") as caught:
+        sought(rig, rig.lasers[0])
+    assert caught.value.exit_code == 2
 
 
 def row(number: int, laser_id: str, standoff_mm: float | None, **cells: Any) -> CaptureRow:

@@ -61,7 +61,7 @@ def test_a_change_is_shown_in_the_unit_of_its_kind(
 
 
 def test_the_baseline_of_a_laser_above_is_along_v() -> None:
-    upright = RIG.lasers[0].model_copy(update={"axis": "v", "y_mm": prior(45.0, 0.2)})
+    upright = RIG.lasers[0].model_copy(update={"x_mm": prior(0.0, 0.2), "y_mm": prior(45.0, 0.2)})
     rig = RIG.model_copy(update={"lasers": (upright, *RIG.lasers[1:])})
     kinds = [parameter_change(rig, f"L1.{name}", 45.0, 1.0, 1.0).kind for name in ("x_mm", "y_mm")]
     assert kinds == [ACROSS, BASELINE]

@@ -39,3 +39,13 @@ def test_all_lasers_are_read_too() -> None:
     step = parse_step(f"{STEP}, missing: [1, 3]")
     assert step.captures(four_laser_rig()) == 2 * 3 * 4
     assert (step.needs, step.gives) == ("calibration", "readings")
+
+
+def test_beams_of_one_emitter_cannot_be_left_off_but_blocked() -> None:
+    rig = four_laser_rig()
+    together = tuple(laser.model_copy(update={"emitter": "grating"}) for laser in rig.lasers)
+    rig = rig.model_copy(update={"lasers": together})
+    with pytest.raises(BadInputError, match="emitter") as caught:
+        parse_step(f"{STEP}, missing: [1]").placements("m", rig)
+    assert caught.value.exit_code == 2
+    assert parse_step(f"{STEP}, blocked: [1]").placements("m", rig)

@@ -42,5 +42,5 @@ def test_a_rig_has_to_be_ideal(rig: Rig) -> None:
     bent = rig.camera.model_copy(update={"k1": rig.camera.f_px})
     with pytest.raises(BadInputError, match="set to 0: k1"):
         scenes.line_of(rig.model_copy(update={"camera": bent}), "horizontal")
-    with pytest.raises(BadInputError, match="at least 2 lasers with axis: v"):
+    with pytest.raises(BadInputError, match="at least 2 lasers in a vertical row"):
         scenes.line_of(load_rig(ROOT / "rigs/thesis-emulated.yaml"), "vertical")

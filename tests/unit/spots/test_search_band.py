@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from workbench.model.rig import ImageAxis
-from workbench.ranging.search_band import band
 from workbench.spots import Scanline
+from workbench.spots.search_band import band
 
 
 @pytest.mark.parametrize("axis", ["u", "v"])
-def test_one_band_holds_the_scanlines_of_a_line(axis: ImageAxis) -> None:
+def test_one_band_holds_the_scanlines_of_a_line(axis: str) -> None:
     rng = np.random.default_rng(3)
     lines = []
     for along in (-200.0, -90.0, 100.0, 210.0):
@@ -20,7 +19,7 @@ def test_one_band_holds_the_scanlines_of_a_line(axis: ImageAxis) -> None:
         if axis == "v":
             far, near = far[::-1], near[::-1]
         lines.append(Scanline(*far, near[0] - far[0], near[1] - far[1], 8.0))
-    found = band(lines, axis)
+    found = band(lines)
     assert found.half_width_px < 8.0 + 8.0
     for line in lines:
         for share in (0.0, 0.5, 1.0):
@@ -32,7 +31,7 @@ def test_one_band_holds_the_scanlines_of_a_line(axis: ImageAxis) -> None:
 
 def test_the_band_of_one_line_is_that_line() -> None:
     line = Scanline(320.0, 240.0, -180.0, 9.0, 8.0)
-    found = band([line, line], "u")
+    found = band([line, line])
     assert found.half_width_px == pytest.approx(8.0)
     assert (found.u0_px, found.du) == (0.0, 1.0)
     assert found.dv == pytest.approx(-0.05)
@@ -41,6 +40,6 @@ def test_the_band_of_one_line_is_that_line() -> None:
 
 def test_parallel_lines_widen_the_band_by_half_their_distance() -> None:
     lines = [Scanline(240.0 + aside, 320.0, 0.0, 100.0, 5.0) for aside in (-3.0, 3.0)]
-    found = band(lines, "v")
+    found = band(lines)
     assert (found.u0_px, found.du, found.dv) == pytest.approx((240.0, 0.0, 1.0))
     assert found.half_width_px == pytest.approx(8.0)
