@@ -320,7 +320,9 @@ def test_a_head_is_beside_the_camera(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     head = HEAD.replace("LASER", '"1"').replace("REACH", "[-40, 30]")
     path.write_text(vertical.replace("COEFFICIENTS", "  k1: {value: 0.0, sd: 0.1}") + head)
-    with pytest.raises(BadInputError, match="expected a laser beside the camera, got 1, which is above or below it"):
+    with pytest.raises(
+        BadInputError, match="expected a laser beside the camera, got 1, which is above or below it"
+    ):
         load_rig(path)
 
 
