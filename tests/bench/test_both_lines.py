@@ -124,7 +124,7 @@ def test_a_cylinder_is_round_across_and_straight_along(both: Setup) -> None:
 
 def test_the_thesis_s_weights_are_the_pixels_along_each_line(both: Setup) -> None:
     by_pixels, by_information = (both.read(FlatTarget(), 1500.0, w) for w in ("pixels", "information"))
-    u, v = (shapes(by_pixels)[axis].closest_mm for axis in "uv")
+    u, v = (shapes(by_pixels)[name].closest_mm for name in ("horizontal", "vertical"))
     assert by_pixels.mean_mm == pytest.approx((640 * u + 480 * v) / 1120)
     assert by_information.mean_sigma_mm is not None
     assert by_pixels.mean_sigma_mm is not None

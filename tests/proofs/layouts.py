@@ -1,22 +1,19 @@
 """Layouts of lasers compared: `python -m tests.proofs.layouts`. Field of view, resolution, missed obstacles.
 
 Field of view and rods are those of the rig as designed, by a pinhole and straight beams. The resolution is
-that of simulated calibrations of drawn sensors. The drives are those of `tests.proofs.worlds`, with frames.
+that of simulated calibrations of drawn sensors.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from tests.bench.sensors import calibration_of
-from tests.proofs.worlds import HEADING as WORLDS_HEADING
-from tests.proofs.worlds import drives_of, table
 from tests.support.stored_output import store
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig, load_rig
@@ -33,9 +30,6 @@ FRONT_MM = ((-90.0, 90.0), (-60.0, 40.0))
 ROD_MM = 20.0
 RODS = 20_000
 SENSORS = 3
-DRIVEN = ("thesis", "diagonal", "three-lines", "ring")
-DRIVES = 26
-"""Drives of each of these, half of them in each world."""
 KINDS = ("vertical", "horizontal", "any direction")
 
 
@@ -127,7 +121,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Compute and store the tables."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--sensors", type=int, default=SENSORS)
-    parser.add_argument("--drives", type=int, default=DRIVES)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args(arguments)
     rigs = {name: load_rig(ROOT / f"rigs/{name}-emulated.yaml") for name in RIGS}
@@ -145,15 +138,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "rig | vertical | at most | horizontal | at most | any direction | at most",
         *(missed_line(name, rig, given.seed) for name, rig in rigs.items()),
         "",
-        "drives",
-        WORLDS_HEADING,
     ]
-    with tempfile.TemporaryDirectory() as folder:
-        for name in DRIVEN:
-            rig_name = f"{name}-emulated"
-            lines += table(rig_name, drives_of(rig_name, given.drives, given.seed, Path(folder)))
-    lines.append("")
-    options = f"--sensors {given.sensors} --drives {given.drives} --seed {given.seed}"
+    options = f"--sensors {given.sensors} --seed {given.seed}"
     store("layouts", "Layouts of lasers compared", f"python -m tests.proofs.layouts {options}", lines)
     return 0
 

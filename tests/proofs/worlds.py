@@ -49,12 +49,6 @@ class Course:
     aside_mm: float
 
 
-HEADING = (
-    "rig | world | drives | courses | met | missed nearest spot | missed closest | missed sonar |"
-    " at most | unmet missed nearest spot | unmet missed sonar | false nearest spot | false closest |"
-    " false sonar | least at rest"
-)
-"""Of the rows of `table`."""
 LEGS = [f"{name}/leg-{n}" for name in ("chair-1", "chair-3") for n in (1, 2, 3, 4)]
 UPRIGHTS = [f"shelf-1/upright-{n}" for n in (1, 2, 3, 4)]
 COURSES = (
@@ -149,6 +143,11 @@ def main() -> int:
     parser.add_argument("--drives", type=int, default=DRIVES)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
+    heading = (
+        "rig | world | drives | courses | met | missed nearest spot | missed closest | missed sonar |"
+        " at most | unmet missed nearest spot | unmet missed sonar | false nearest spot | false closest |"
+        " false sonar | least at rest"
+    )
     lines, errors, missed = [], [], 0
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
@@ -164,7 +163,7 @@ def main() -> int:
     out = [
         "",
         "drives",
-        HEADING,
+        heading,
         *lines,
         "",
         "errors of lasers on faces",

@@ -58,7 +58,6 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "layouts-view": of_proofs.layouts_view,
     "layouts-resolution": of_proofs.layouts_resolution,
     "layouts-missed": of_proofs.layouts_missed,
-    "layouts-drives": of_proofs.layouts_drives,
     "worlds": of_proofs.worlds,
     "worlds-errors": of_proofs.worlds_errors,
 }

@@ -269,27 +269,6 @@ def layouts_resolution() -> str:
     return markdown_table(("rig", *names, "per px"), rows)
 
 
-def layouts_drives() -> str:
-    """Missed obstacles in drives of layouts: `tests.proofs.layouts`."""
-    heading = (
-        "rig",
-        "world",
-        "drives",
-        "courses",
-        "met",
-        "missed",
-        "at most",
-        "not met, missed",
-        "false stops",
-    )
-    rows = []
-    for line in newest("layouts").section("drives")[1:]:
-        cells = line.split(" | ")
-        at_most = f"{float(cells[8]):.1%}"
-        rows.append((cells[0].removesuffix("-emulated"), *cells[1:6], at_most, cells[9], cells[11]))
-    return markdown_table(heading, rows, numbers_from=2)
-
-
 def layouts_missed() -> str:
     """Thin rods that no beam of a layout meets: `tests.proofs.layouts`."""
     rows = []
