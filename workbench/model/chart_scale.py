@@ -17,6 +17,8 @@ LEAST_DIGITS, MOST_DIGITS = 4, 12
 """Numbers of digits in the label of a tick."""
 MOST_LABELLED = 30
 """Largest number of distinct x values that each get a tick; with more, ticks are round numbers."""
+SAME_PLACE = 0.003
+"""Values of x that are closer than this share of the axis, a few pixels, have one tick."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def x_ticks(chart: Chart, scale: Scale, least_distance: float) -> tuple[list[flo
     Neighbours in a row are at least `least_distance` apart (a share of the axis). The first row contains the
     first and the last value; the second row, below it, contains values that do not fit into the first.
     """
-    own = [x for x in chart.x_values() if 0 <= scale.share(x) <= 1]
+    own = _thinned([x for x in chart.x_values() if 0 <= scale.share(x) <= 1], scale, SAME_PLACE)
     if not 0 < len(own) <= MOST_LABELLED:
         return _thinned(scale.round_ticks(), scale, least_distance), []
     first = _thinned(own, scale, least_distance)

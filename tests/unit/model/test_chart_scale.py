@@ -59,6 +59,14 @@ def test_standoffs_without_room_are_labelled_in_a_second_row(scale: Literal["lin
     assert below == [210.0, 1950.0]
 
 
+def test_values_of_two_rows_at_nearly_one_place_leave_room_for_their_neighbours() -> None:
+    """True ranges of two inclines at each standoff, as in the thesis's trials."""
+    pairs = (124.6, 124.8, 599.6, 599.8, 699.6, 699.8, 799.6, 799.8, 999.6, 999.8)
+    one = chart(pairs, pairs, "log")
+    above, below = x_ticks(one, x_scale(one), 0.07)
+    assert sorted([*above, *below]) == [124.6, 599.6, 699.6, 799.6, 999.8]
+
+
 def test_many_values_have_round_ticks() -> None:
     x = tuple(np.linspace(45.3, 4987.1, 100).tolist())
     one = chart(x, x)
