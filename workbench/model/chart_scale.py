@@ -17,6 +17,8 @@ LEAST_DIGITS, MOST_DIGITS = 4, 12
 """Numbers of digits in the label of a tick."""
 MOST_LABELLED = 30
 """Largest number of distinct x values that each get a tick; with more, ticks are round numbers."""
+ROUNDING = 1e-12
+"""Relative difference of values that are one."""
 SAME_PLACE = 0.003
 """Values of x that are closer than this share of the axis, a few pixels, have one tick."""
 
@@ -98,8 +100,8 @@ def _scale(axis: Axis, values: Sequence[float]) -> Scale:
 
 
 def _padded(low: float, high: float, least_half: float) -> tuple[float, float]:
-    """Ends with margin; a single value gets `least_half` on each side."""
-    if high == low:
+    """Ends with margin; a single value gets `least_half` on each side, as do values that differ by rounding."""
+    if high - low <= ROUNDING * max(abs(low), abs(high)):
         return low - least_half, high + least_half
     margin = MARGIN * (high - low) / (1 - 2 * MARGIN)
     return low - margin, high + margin

@@ -82,6 +82,11 @@ def test_the_first_and_the_last_value_keep_the_margin(scale: Literal["linear", "
     assert x.share(1000.0) == pytest.approx(1.0 - MARGIN)
 
 
+def test_values_that_differ_by_rounding_stand_in_the_middle() -> None:
+    x = x_scale(chart((10.0, np.nextafter(10.0, 11.0)), (1.0, 2.0)))
+    assert x.share(10.0) == pytest.approx(0.5)
+
+
 def test_a_single_value_stands_in_the_middle() -> None:
     for scale in ("linear", "log"):
         assert x_scale(chart((700.0,), (1.0,), scale)).share(700.0) == pytest.approx(0.5)
