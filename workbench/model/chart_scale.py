@@ -100,7 +100,7 @@ def _scale(axis: Axis, values: Sequence[float]) -> Scale:
 
 
 def _padded(low: float, high: float, least_half: float) -> tuple[float, float]:
-    """Ends with margin; a single value gets `least_half` on each side, as do values that differ by rounding."""
+    """Ends with margin; one value, or several that differ by rounding, get `least_half` on each side."""
     if high - low <= ROUNDING * max(abs(low), abs(high)):
         return low - least_half, high + least_half
     margin = MARGIN * (high - low) / (1 - 2 * MARGIN)
