@@ -7,7 +7,9 @@ bit-identical with the whole. `sharded` has the largest difference of a program 
 
 from __future__ import annotations
 
+import inspect
 import json
+from typing import Any
 from unittest.mock import patch
 
 import jax
@@ -27,17 +29,17 @@ FIELDS = ("values", "sensor_covariance", "placement_covariance", "noise_scale", 
 
 def main() -> None:
     """Fit the same sensors in three ways."""
-    calls: list[tuple[object, ...]] = []
-    solve, fit, fits = batch._solve_chunk, batch.fit_batch, []
+    calls: list[tuple[Any, ...]] = []
+    solve, fit, fits = batch._solve_chunk, batch.fit_batch, list[tuple[Any, ...]]()
     used: list[list[int]] = []
 
-    def recorded(*arguments: object) -> tuple[Array, ...]:
+    def recorded(*arguments: Any) -> tuple[Array, ...]:
         calls.append(arguments)
         found = solve(*arguments)
         used[-1] += [device.id for device in found[0].devices()]
         return found
 
-    def by_halves(*arguments: object) -> BatchFit:
+    def by_halves(*arguments: Any) -> BatchFit:
         fits.append(arguments)
         return fit(*arguments)
 
@@ -64,11 +66,11 @@ def main() -> None:
     print(json.dumps({"used": [sorted(set(one)) for one in used], "equal": equal, "sharded": sharded(first)}))
 
 
-def sharded(arguments: tuple[object, ...]) -> dict[str, object]:
+def sharded(arguments: tuple[Any, ...]) -> dict[str, object]:
     """One chunk of fits, sharded over the sensors of both devices, and the same on one device."""
     shared, fits, static = arguments[:3], arguments[3:6], arguments[6:]
-    program = jax.jit(batch._solve_chunk.__wrapped__, static_argnums=(6, 7))
-    over_sensors = NamedSharding(Mesh(np.array(jax.devices()), ("sensor",)), PartitionSpec("sensor"))
+    program = jax.jit(inspect.unwrap(batch._solve_chunk), static_argnums=(6, 7))
+    over_sensors = NamedSharding(Mesh(np.array(jax.devices()), ("sensor",)), PartitionSpec("sensor"))  # type: ignore[no-untyped-call]
     ours = program(*shared, *(jax.device_put(one, over_sensors) for one in fits), *static)
     theirs = program(*shared, *fits, *static)
     sd = np.sqrt(np.diagonal(np.asarray(theirs[1]), axis1=1, axis2=2))
