@@ -39,6 +39,7 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "shapes-calibrated": partial(of_proofs.shapes, "Calibration with the stated errors"),
     "shapes-flat": partial(of_proofs.shapes, "Flats, calibration exact"),
     "campaigns": of_proofs.campaigns,
+    "campaign-archive": of_proofs.campaign_archive,
     "campaign-kills": of_proofs.campaign_kills,
     "speed": of_proofs.speed,
     "speckle": of_proofs.speckle,
