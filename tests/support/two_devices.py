@@ -7,6 +7,7 @@ bit-identical with the whole. `sharded` has the largest difference of a program 
 
 from __future__ import annotations
 
+import inspect
 import json
 from typing import Any
 from unittest.mock import patch
@@ -29,8 +30,7 @@ FIELDS = ("values", "sensor_covariance", "placement_covariance", "noise_scale", 
 def main() -> None:
     """Fit the same sensors in three ways."""
     calls: list[tuple[Any, ...]] = []
-    fits: list[tuple[Any, ...]] = []
-    solve, fit = batch._solve_chunk, batch.fit_batch
+    solve, fit, fits = batch._solve_chunk, batch.fit_batch, list[tuple[Any, ...]]()
     used: list[list[int]] = []
 
     def recorded(*arguments: Any) -> tuple[Array, ...]:
@@ -69,8 +69,7 @@ def main() -> None:
 def sharded(arguments: tuple[Any, ...]) -> dict[str, object]:
     """One chunk of fits, sharded over the sensors of both devices, and the same on one device."""
     shared, fits, static = arguments[:3], arguments[3:6], arguments[6:]
-    traced: Any = batch._solve_chunk
-    program = jax.jit(traced.__wrapped__, static_argnums=(6, 7))
+    program = jax.jit(inspect.unwrap(batch._solve_chunk), static_argnums=(6, 7))
     over_sensors = NamedSharding(Mesh(np.array(jax.devices()), ("sensor",)), PartitionSpec("sensor"))  # type: ignore[no-untyped-call]
     ours = program(*shared, *(jax.device_put(one, over_sensors) for one in fits), *static)
     theirs = program(*shared, *fits, *static)

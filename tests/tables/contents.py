@@ -45,6 +45,7 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "campaigns": of_proofs.campaigns,
     "budget": budget.budget,
     "budget-others": budget.others,
+    "campaign-archive": of_proofs.campaign_archive,
     "campaign-kills": of_proofs.campaign_kills,
     "speed": of_proofs.speed,
     "speckle": of_proofs.speckle,

@@ -56,6 +56,11 @@ def campaigns() -> str:
     return code_block("\n".join(newest("campaigns").lines))
 
 
+def campaign_archive() -> str:
+    """Time of an archive that is fitted again, as printed by `tests.benchmarks.campaigns`."""
+    return code_block("\n".join(newest("campaign-archive").lines[2:]))
+
+
 def campaign_kills() -> str:
     """Results of a campaign with and without kills, as printed by `tests.crash.campaign_long`."""
     return code_block("\n".join(newest("campaign-kills").lines))

@@ -16,9 +16,9 @@ from workbench.campaign.sessions import SESSIONS
 from workbench.model.calibration import load_calibration
 from workbench.model.errors import BadInputError, RigNotReadyError
 from workbench.model.event import FitFinished, SessionFinished
+from workbench.procedure.engine import run as engine
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.plan import Plan
-from workbench.procedure.engine.run import run_steps
 from workbench.session.journal import read_journal
 from workbench.session.manifest import load_manifest
 from workbench.session.state import session_status
@@ -103,14 +103,14 @@ def test_a_refused_session_has_the_reason(tmp_path: Path) -> None:
 
 
 def test_a_session_on_a_busy_computer_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    ended: list[Path] = []
+    steps, ended = engine.run_steps, list[Path]()
 
     def disturbed(plan: Plan, context: Context) -> None:
         if not ended:
             ended.append(context.session_dir)
             context.emit(SessionFinished(exit_code=4, message="the lease ended"))
             raise RigNotReadyError("the lease ended")
-        run_steps(plan, context)
+        steps(plan, context)
 
     monkeypatch.setattr("workbench.procedure.engine.run.run_steps", disturbed)
     campaign = campaign_of(tmp_path, TEXT.replace("sensors: 2", "sensors: 1"))
