@@ -14,8 +14,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+END = "<!-- end of table -->"
 BLOCK = re.compile(
-    r"(<!-- table: (?P<name>[\w-]+) -->\n\n)(?P<text>.*?)(\n\n<!-- end of table -->)", re.DOTALL
+    rf"(<!-- table: (?P<name>[\w-]+) -->)\n\n(?:(?P<text>(?:(?!<!-- ).)+?)\n\n)?{END}", re.DOTALL
 )
 MARK = re.compile(r"<!-- (?:table: |end of table)")
 
@@ -30,7 +31,7 @@ def blocks(page: str) -> dict[str, str]:
     names = [block["name"] for block in found]
     if len(MARK.findall(page)) != 2 * len(found) or len(set(names)) != len(names):
         raise ValueError("expected pairs of <!-- table: NAME --> and <!-- end of table -->, each name once")
-    return {block["name"]: block["text"] for block in found}
+    return {block["name"]: block["text"] or "" for block in found}
 
 
 def with_contents(page: str, contents: Mapping[str, str]) -> str:
@@ -39,7 +40,7 @@ def with_contents(page: str, contents: Mapping[str, str]) -> str:
     Raises:
         LookupError: a block has a name that is not in `contents`.
     """
-    return BLOCK.sub(lambda block: f"{block[1]}{contents[block['name']]}{block[4]}", page)
+    return BLOCK.sub(lambda block: f"{block[1]}\n\n{contents[block['name']]}\n\n{END}", page)
 
 
 def without_blocks(page: str) -> str:

@@ -55,6 +55,14 @@ def test_contents_are_replaced_between_the_marks() -> None:
     assert with_contents(page, {"one": r"\1"}) == page.replace("old", r"\1")
 
 
+def test_a_new_block_is_filled_and_ends_at_its_own_mark() -> None:
+    new, old = "<!-- table: one -->\n\n", "<!-- table: two -->\n\nc\n\n"
+    page = f"{new}<!-- end of table -->\n\nb\n\n{old}<!-- end of table -->\n"
+    assert blocks(page) == {"one": "", "two": "c"}
+    assert blocks(with_contents(page, {"one": "a", "two": "d"})) == {"one": "a", "two": "d"}
+    assert "\n\nb\n\n" in with_contents(page, {"one": "a", "two": "d"})
+
+
 @pytest.mark.parametrize(
     "page",
     [
