@@ -9,6 +9,7 @@ import pytest
 from tests.support.stored_output import FOLDER, ROOT, newest
 from tests.tables.blocks import blocks, with_contents, without_blocks
 from tests.tables.contents import PAGES, TABLES
+from tests.tables.markdown import markdown_table
 
 MARKED = {name: page for page in PAGES for name in blocks((ROOT / page).read_text())}
 """Page of each table."""
@@ -53,6 +54,11 @@ def test_contents_are_replaced_between_the_marks() -> None:
     assert blocks(page) == {"one": "old"}
     assert with_contents(page, {"one": "new"}) == page.replace("old", "new")
     assert with_contents(page, {"one": r"\1"}) == page.replace("old", r"\1")
+
+
+def test_a_table_without_rows_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"rows for the table a \| b, got none"):
+        markdown_table(("a", "b"), [])
 
 
 def test_a_new_block_is_filled_and_ends_at_its_own_mark() -> None:
