@@ -64,7 +64,10 @@ def read_chunk(folder: Path, chunk: Chunk, identity: str) -> pd.DataFrame:
         raise BadInputError(f"{error.filename}: cannot be read: {error.strerror}") from None
     if stored != _hash_line(content, path):
         raise BadInputError(f"{path}: damaged: expected the hash in {hash_path(folder, chunk.index).name}")
-    table = pq.read_table(pa.BufferReader(content))
+    try:
+        table = pq.read_table(pa.BufferReader(content))
+    except pa.ArrowException as error:
+        raise BadInputError(f"{path}: expected a Parquet file, got other contents: {error}") from None
     found = table.schema.metadata or {}
     if (found.get(IDENTITY), found.get(CHUNK)) != (identity.encode(), str(chunk.index).encode()):
         raise BadInputError(f"{path}: expected chunk {chunk.index} of this campaign, got another one")

@@ -85,7 +85,7 @@ def open_folder(path: Path, campaign: Campaign) -> Iterator[CampaignFolder]:
             found = CampaignManifest(identity=identity, file=campaign.file, inputs=dict(campaign.inputs))
             write_atomically(manifest, found.model_dump_json(indent=2).encode())
         (path / CHUNKS).mkdir(exist_ok=True)
-        lock = os.open(manifest, os.O_RDONLY | os.O_CLOEXEC)
+        lock = os.open(manifest, os.O_RDWR | os.O_CLOEXEC)
     except OSError as error:
         raise BadInputError(f"{path}: cannot be used: {error.strerror or error}") from None
     try:
@@ -102,8 +102,10 @@ def open_folder(path: Path, campaign: Campaign) -> Iterator[CampaignFolder]:
 def _lock(handle: int, path: Path) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+    except BlockingIOError:
         raise BadInputError(f"{path}: another program is running this campaign") from None
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be locked: {error.strerror or error}") from None
 
 
 def _read_identity(manifest: Path) -> Identity:

@@ -86,8 +86,13 @@ class _Control:
 
     def _alternative(self) -> Seen:
         captures = [(laser_id, self._capture((laser_id,)).spots) for laser_id in self._ambiguous]
-        for laser_id, spots in zip(self._ambiguous, self._ranger.alone(captures), strict=True):
-            if len(spots) == 1:
+        on_line = dict(zip(self._ambiguous, self._ranger.alone(captures), strict=True))
+        single = [(laser_id, spots[0]) for laser_id, spots in on_line.items() if len(spots) == 1]
+        together = self._ranger.seen_twice(single)
+        for laser_id, spots in on_line.items():
+            if laser_id in together:
+                self._notes.append(f"{laser_id}: not on alone, its spot is also that of another laser")
+            elif len(spots) == 1:
                 self._known.append((laser_id, spots[0]))
             else:
                 self._notes.append(f"{laser_id}: on alone, {len(spots) or 'no'} spots on its line")

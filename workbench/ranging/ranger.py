@@ -26,6 +26,8 @@ from workbench.spots.search_band import band
 
 NOTHING_SEEN = "no spot was seen"
 Status = Literal["done", "not_enough_points", "no_points"]
+SAME_SPOT_SD = 5.0
+"""Difference of two spots or ranges, in standard deviations, up to which they are one."""
 MERGING_WIDTHS = 4.0
 """Distance of two spots, in widths, below which they may be found as one."""
 SCANLINE_HALF_WIDTH_PX = 8.0
@@ -322,6 +324,21 @@ class Ranger:
         possible = (ranges.range_mm > 0) & np.isfinite(ranges.range_mm)
         on_line = iter(((ranges.misfit_sd < MOST_MISFIT_SD) & possible).tolist())
         return [[spot for spot in spots if next(on_line)] for _, spots in captures]
+
+    def seen_twice(self, known: Sequence[tuple[str, Spot]]) -> frozenset[str]:
+        """Lasers whose spot is also that of another, at another range: they were on together, not alone.
+
+        Args:
+            known: lasers that were on alone, each with its only spot.
+        """
+        ids = [laser_id for laser_id, _ in known]
+        position, sd, speckle_sd = spot_arrays([spot for _, spot in known])
+        found = self.sensor.ranges(ids, position, sd, speckle_sd)
+        apart_px = np.abs(position[:, None] - position)
+        is_one_place = (apart_px <= SAME_SPOT_SD * np.hypot(sd[:, None], sd)).all(axis=-1)
+        apart_mm = np.abs(found.range_mm[:, None] - found.range_mm)
+        differ = apart_mm > SAME_SPOT_SD * np.hypot(found.spot_sd_mm[:, None], found.spot_sd_mm)
+        return frozenset(ids[i] for i in np.flatnonzero((is_one_place & differ).any(axis=1)))
 
     def _assignment_notes(
         self, pairs: LaserSpotPairs, spots: int, ambiguous: Sequence[Row]

@@ -87,7 +87,7 @@ class CalibratedHead:
         found = _derivatives(jnp.asarray(point), measured, self.values, self.calibration.distortion_model)
         by_measured, by_parameter, across_mm = (np.asarray(part) for part in found)
         reading_sd = np.full(len(readings), radians(self.calibration.reading_sd_deg))
-        own_sd = np.column_stack([sd_px, reading_sd])
+        own_sd = np.column_stack([sd_px, reading_sd]) * self.calibration.fit.noise_scale
         scaled = by_measured * own_sd[:, None, :]
         own = scaled @ scaled.transpose(0, 2, 1)
         covariance = own + by_parameter @ self.covariance @ by_parameter.transpose(0, 2, 1)

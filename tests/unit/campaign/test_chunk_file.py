@@ -53,6 +53,17 @@ def test_a_chunk_without_one_of_its_files_is_not_finished(tmp_path: Path, path_o
     assert not is_finished(tmp_path, CHUNK, "abc")
 
 
+def test_a_hash_of_other_contents_makes_no_chunk(tmp_path: Path) -> None:
+    write_chunk(tmp_path, CHUNK, "abc", FRAME)
+    path = chunk_path(tmp_path, 3)
+    path.write_bytes(path.read_bytes()[:100])
+    found = subprocess.run(["sha256sum", path.name], cwd=tmp_path, check=True, capture_output=True)
+    hash_path(tmp_path, 3).write_bytes(found.stdout)
+    assert not is_finished(tmp_path, CHUNK, "abc")
+    with pytest.raises(BadInputError, match="expected a Parquet file"):
+        read_chunk(tmp_path, CHUNK, "abc")
+
+
 def test_a_chunk_of_another_campaign_is_not_finished(tmp_path: Path) -> None:
     write_chunk(tmp_path, CHUNK, "abc", FRAME)
     with pytest.raises(BadInputError, match="expected chunk 3 of this campaign"):

@@ -108,6 +108,21 @@ def test_alternative_capture_fires_each_laser_alone(coplanar: Ranger) -> None:
     assert reading.flat_mm == pytest.approx(700.0)
 
 
+def test_a_spot_that_every_laser_shows_is_that_of_none(coplanar: Ranger) -> None:
+    """Beams of one emitter are on together: what remains of a row is the same spot in each capture."""
+    (one,) = spots(coplanar, {"L2": 700.0})
+
+    def shoot(ids: tuple[str, ...]) -> Finding:
+        return Finding((one, *spots(coplanar, {"L3": 700.0})) if len(ids) > 1 else (one,))
+
+    reading = acquire(coplanar, "s", shoot)
+    assert (reading.status, reading.lasers) == ("not_enough_points", ())
+    assert reading.notes[-4:] == (
+        *(f"{i}: not on alone, its spot is also that of another laser" for i in ("L1", "L2")),
+        *(f"{i}: on alone, no spots on its line" for i in ("L3", "L4")),  # on the other side of the camera
+    )
+
+
 @pytest.mark.parametrize(("alone", "words"), [(0, "no spots"), (2, "2 spots")])
 def test_alternative_capture_that_tells_nothing_says_what_was_seen(
     coplanar: Ranger, alone: int, words: str

@@ -59,6 +59,21 @@ def test_noise_of_spot_and_reading_is_as_stated(scanned: tuple[SimulatedHead, Ca
     np.testing.assert_allclose(correlation, expected, atol=0.03)
 
 
+def test_noise_is_scaled_as_the_calibration_scaled_it() -> None:
+    head = SimulatedHead.of(RIG, 11)
+    spots = head.spots((300.0, 900.0), (0.0, 10.0, -10.0, -20.0), 0.05, np.random.default_rng(1))
+    fit = fit_head(RIG, spots)
+    true = head.point("scan", head.plane("scan", 700.0), -10.0)
+    position, _ = head.seen(true[None], 0.0, np.random.default_rng(1))
+    plain, scaled = (
+        CalibratedHead(calibrated_head(replace(fit, noise_scale=scale), PROVENANCE))
+        .points(np.array([-10.0]), position, np.full_like(position, 0.05))
+        .own_covariance_mm2
+        for scale in (1.0, 3.0)
+    )
+    np.testing.assert_allclose(scaled, 9 * plain, rtol=1e-9)
+
+
 def test_uncertainty_of_the_calibration_is_that_of_its_parameters(
     scanned: tuple[SimulatedHead, CalibratedHead],
 ) -> None:
