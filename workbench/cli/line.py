@@ -13,7 +13,7 @@ from rich.console import Console
 
 from workbench.cli.console import print_message
 from workbench.cli.refusal import refused_fit
-from workbench.cli.report import certify
+from workbench.cli.report import DEFAULT_NAME, certify
 from workbench.cli.run import Screen, resume_session, run_procedures
 from workbench.cli.stopping import stop_at_once
 from workbench.cli.verdict import and_more, split_reason
@@ -91,9 +91,11 @@ class Line:
                 session = last.session
                 print_message(f"{serial}: its session {session.name} is continued")
                 resume_session(session, None, screen)
+            elif last is not None and last.verdict == PASSED and not (last.session / DEFAULT_NAME).exists():
+                session = last.session  # it was killed before the certificate
             else:
                 session = run_procedures(list(self.procedures), self._rig_file(serial), self.sessions, screen)
-            print_message(f"{certify(session)}: {session / 'certificate.html'}")
+            print_message(f"{certify(session)}: {session / DEFAULT_NAME}")
         except LimitFailedError:
             print_message(f"{serial} FAILED: no certificate")  # its verdict has been printed
         except (RigNotReadyError, BadInputError) as error:

@@ -76,6 +76,14 @@ def test_a_killed_session_is_continued_when_its_sensor_is_scanned(files: Path) -
         assert station.end() == 0
     (one,) = indexed_sessions(files / "s")
     assert one.status.state == "finished"
+    (one.status.session_dir / "certificate.html").unlink()  # as of a program killed before it
+    with at_terminal(files, *COMMAND) as station:
+        station.type("SN-1")
+        station.wait_for("certificate.html")
+        station.type("")
+        assert station.end() == 0
+    assert len(indexed_sessions(files / "s")) == 1
+    assert (one.status.session_dir / "certificate.html").is_file()
 
 
 def test_ctrl_c_ends_the_session_and_the_line(files: Path) -> None:
