@@ -63,4 +63,4 @@ class Figure:
         missed = "  MISSED" if self.is_missed else ""
         if self.is_missed and self.known is not None and not self.is_unjustified:
             missed += f": {self.known.reason}"
-        return f"{self.trial:<14}{self.quantity:<58}{self.value:>8.3f}  {expected} ({self.runs}){missed}"
+        return f"{self.trial:<14}{self.quantity:<88}{self.value:>8.3f}  {expected} ({self.runs}){missed}"

@@ -143,13 +143,13 @@ def trials() -> str:
 def verification() -> str:
     """Changes of a sensor that a verification finds and names, per cent."""
     found = {one.quantity: f"{100 * one.value:.0f}" for one in proof_figures() if _is_about_a_change(one)}
-    changes = [re.fullmatch("best test: (.+), own bench", quantity) for quantity in found]
+    changes = [re.fullmatch("best test: (.+), other bench", quantity) for quantity in found]
     rows = [
         (
             change,
             *(
                 found[f"{what}: {change}, {bench}"]
-                for bench in ("own bench", "same bench")
+                for bench in ("other bench", "same bench")
                 for what in ("refused", "best test", "named where refused")
             ),
         )
