@@ -33,6 +33,10 @@ steps:
     standoffs_mm: [800]
     readings: 1
 """
+CALIBRATION = PROCEDURE.replace("  - step: message\n    text: Begin.\n", "").partition(
+    "  - step: accuracy_trial"
+)[0]
+"""The same without a message and a trial."""
 GROUP = 2
 """Captures at one placement: the rig has two lasers."""
 

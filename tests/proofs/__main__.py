@@ -12,7 +12,8 @@ import numpy as np
 from tests.proofs import report, shape_scores, study
 from tests.proofs.solve import Solve, at_once, one_by_one
 from tests.support.stored_output import store
-from workbench.model.rig import Prior, Rig, load_rig
+from workbench.model.prior import Prior
+from workbench.model.rig import Rig, load_rig
 from workbench.procedure.engine.procedure_file import load_procedure
 from workbench.steps.capture_grid import CaptureGridStep
 

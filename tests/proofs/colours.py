@@ -28,6 +28,7 @@ from workbench.model.rig import Rig, load_rig
 from workbench.model.spot import Spot
 from workbench.model.target import Placement
 from workbench.ranging.acquire import acquire
+from workbench.ranging.alone import spots_on_line
 from workbench.ranging.ranger import Ranger, Reading, spot_arrays
 from workbench.spots import Finding, find_spots
 
@@ -229,7 +230,7 @@ def read_alone(ranger: Ranger, scene: Scene, found: Sequence[tuple[str, Sequence
     """Reading of spots whose lasers are known, where each has a single one on its line."""
     known = [
         (laser, spots[0])
-        for (laser, _), spots in zip(found, ranger.alone(found), strict=True)
+        for (laser, _), spots in zip(found, spots_on_line(ranger.sensor, found), strict=True)
         if len(spots) == 1
     ]
     ids = [laser for laser, _ in known]

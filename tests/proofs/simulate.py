@@ -12,7 +12,8 @@ import numpy as np
 
 from tests.support.rigs import opencv_pixels
 from workbench.model.arrays import BoolArray, FloatArray
-from workbench.model.rig import Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import Rig
 
 LENSES: dict[str, tuple[str, ...]] = {
     "plumb_bob": ("f_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"),

@@ -12,7 +12,8 @@ from workbench.calibration.data.observations import PlacementInfo
 from workbench.corners.board import BoardCorners
 from workbench.model.arrays import FloatArray
 from workbench.model.known_board import Chessboard
-from workbench.model.rig import BenchSpec, CameraSpec, Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import BenchSpec, CameraSpec, Rig
 
 BOARD = Chessboard(kind="chessboard", corners=(9, 6), square_mm=25.0)
 RIG = Rig(

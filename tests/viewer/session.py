@@ -13,8 +13,9 @@ import numpy as np
 
 from workbench.model import event as ev
 from workbench.model.calibration import TermSummary
+from workbench.model.prior import Prior
 from workbench.model.reading_chart import error_chart
-from workbench.model.rig import CameraSpec, LaserSpec, Prior, Rig
+from workbench.model.rig import CameraSpec, LaserSpec, Rig
 from workbench.model.spot import Spot
 from workbench.model.target import FlatTarget, Placement
 from workbench.trials.accuracy.statistics import AccuracyRow

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from multiprocessing import resource_tracker
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from workbench.campaign.identity import ENVIRONMENT
 from workbench.model.errors import BadInputError
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
 Started = TypeVar("Started")
-Closed = TypeVar("Closed", bound="Closable")
 LOOPBACK = "127.0.0.1"
 MOST_DEATHS = 10
 """Number of workers that one chunk may take with it before it is given up: then the chunk is the cause."""
@@ -27,13 +26,6 @@ WATCHED_S = 2.0
 """Time between two looks for dead workers."""
 CONNECT_S = 10.0
 """Longest wait for a scheduler."""
-
-
-class Closable(Protocol):
-    """Object that ends by `close`."""
-
-    def close(self) -> object:
-        """End it."""
 
 
 @contextmanager
@@ -48,7 +40,7 @@ def local_client(workers: int) -> Iterator[Client]:
     """
     _require_distributed()
     import dask
-    from distributed import Client, LocalCluster, Security
+    from distributed import Client, Security
 
     settings = {
         "distributed.scheduler.allowed-failures": MOST_DEATHS,
@@ -62,8 +54,7 @@ def local_client(workers: int) -> Iterator[Client]:
     with (
         dask.config.set(settings),
         tempfile.TemporaryDirectory(prefix="workbench-campaign-") as scratch,
-        _closed_at_end(
-            LocalCluster,
+        _local_cluster(
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
@@ -82,13 +73,15 @@ def local_client(workers: int) -> Iterator[Client]:
 
 
 @contextmanager
-def _closed_at_end(start: Callable[..., Closed], **arguments: Any) -> Iterator[Closed]:
+def _local_cluster(**arguments: Any) -> Iterator[LocalCluster]:
     """Start a cluster, and close it at the end.
 
     Workers that do not end in Dask's time on a busy computer are no error: all chunks are on the disk, and
     the processes end with this one.
     """
-    cluster = _without_interrupts(start, **arguments)
+    from distributed import LocalCluster
+
+    cluster = _without_interrupts(LocalCluster, **arguments)
     try:
         yield cluster
     finally:

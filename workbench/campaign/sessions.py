@@ -72,7 +72,7 @@ class Sessions(Work):
         return (RIG, PROCEDURES)
 
     def read_input(self, key: str, base: Path) -> str:
-        """Text of the rig file, or texts of the procedure files by their names."""
+        """Text of the rig file, or texts of the procedure files, in their order."""
         if key == RIG:
             text = read_rig(base / self.rig)
             rig = rig_of(text)
@@ -85,7 +85,7 @@ class Sessions(Work):
                 )
             return text
         Plan.load(base / self.rig, [base / path for path in self.procedures])
-        return json.dumps({path.name: standalone_text(base / path, Procedure) for path in self.procedures})
+        return json.dumps([standalone_text(base / path, Procedure) for path in self.procedures])
 
     def count(self, inputs: Inputs) -> int:
         """Number of sessions."""
@@ -135,8 +135,8 @@ def _procedure_files(inputs: Inputs, folder: Path) -> list[Path]:
     """Copies of the procedure files in the folder of the campaign."""
     (folder / FILES).mkdir(exist_ok=True)
     found = []
-    for name, text in json.loads(inputs[PROCEDURES]).items():
-        found.append(folder / FILES / name)
+    for number, text in enumerate(json.loads(inputs[PROCEDURES]), start=1):
+        found.append(folder / FILES / f"procedure-{number}.yaml")
         write_atomically(found[-1], text.encode())
     return found
 

@@ -18,7 +18,8 @@ from workbench.model.arrays import Image
 from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import RigNotReadyError
 from workbench.model.exposure import WIDEST
-from workbench.model.rig import CameraSpec, Name, PositiveFloat, Rig
+from workbench.model.name import Name
+from workbench.model.rig import CameraSpec, PositiveFloat, Rig
 from workbench.spots.grey import JPEG_MARGIN_DN, to_grey
 
 SILENT_S = 1.5

@@ -82,9 +82,9 @@ class BenchScene:
         Raises:
             BadInputError: a flat target or the board is turned by 90 degrees or more.
         """
-        own = draw_placement_error(
-            self._rig, self._spec, placement.key, _turn_sds_deg(placement.target), placement.attempt
-        )
+        target = placement.target
+        turn_sds_deg = target.turn_sds_deg if isinstance(target, FlatTarget) else (None, None)
+        own = draw_placement_error(self._rig, self._spec, placement.key, turn_sds_deg, placement.attempt)
         error = replace(
             own,
             yaw_deg=own.yaw_deg + self._truth.target_yaw_deg,
@@ -208,14 +208,6 @@ def _speckle_key(placement: Placement) -> str:
     elif shift_mm := getattr(placement.target, "shift_mm", 0.0):
         key += f"/{shift_mm:g}mm"
     return f"{key}/{placement.head_deg!r}deg" if placement.head_deg else key
-
-
-def _turn_sds_deg(target: TargetShape) -> tuple[float | None, float | None]:
-    """Standard deviations of yaw and pitch that replace those of the rig: of the angle that was measured."""
-    if not isinstance(target, FlatTarget) or target.turn_sd_deg is None:
-        return None, None
-    about_vertical = abs(target.yaw_deg) >= abs(target.pitch_deg)
-    return (target.turn_sd_deg, None) if about_vertical else (None, target.turn_sd_deg)
 
 
 def _surfaces(

@@ -10,8 +10,9 @@ from pydantic import Field, ValidationError, ValidationInfo, field_validator
 from workbench.model.bounds import within
 from workbench.model.errors import BadInputError
 from workbench.model.lens import COEFFICIENTS
+from workbench.model.prior import LARGEST
 from workbench.model.problems import problems
-from workbench.model.rig import LARGEST, Rig, TiltAngle
+from workbench.model.rig import Rig, TiltAngle
 from workbench.model.yamlfile import FileModel
 
 MOST_PIXELS = 2**25

@@ -17,8 +17,10 @@ from workbench.emulator.keyed import generator
 from workbench.emulator.spec import EmulatorSpec, LaserTruth, PlacementTruth
 from workbench.model.board import BOW
 from workbench.model.errors import BadInputError
+from workbench.model.head_spec import HeadSpec
 from workbench.model.lens import COEFFICIENTS, LensName
-from workbench.model.rig import CameraSpec, HeadSpec, Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import CameraSpec, Rig
 from workbench.model.yamlfile import FileModel
 
 BOARD_SHIFT_SD_MM = 2.0

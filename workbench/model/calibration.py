@@ -14,7 +14,9 @@ from pydantic import Field, model_validator
 
 from workbench.model.arrays import FloatArray
 from workbench.model.lens import COEFFICIENTS, LensName
-from workbench.model.rig import LARGEST, MOST_PX, ImageAxis, LaserId, NonNegativeFloat
+from workbench.model.name import LaserId
+from workbench.model.prior import LARGEST
+from workbench.model.rig import MOST_PX, ImageAxis, NonNegativeFloat
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 DeterminedBy = Literal["data", "joint", "prior"]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from workbench.model.rig import LARGEST
+from workbench.model.prior import LARGEST
 
 Standoff = Annotated[float, Field(gt=0, le=LARGEST)]
 Standoffs = Annotated[tuple[Standoff, ...], Field(min_length=1)]

@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 
 from workbench.model.calibration import Noise, Parameters, Provenance
 from workbench.model.lens import LensName, lens_parameters
-from workbench.model.rig import MOST_PX, LaserId, NonNegativeFloat
+from workbench.model.name import LaserId
+from workbench.model.rig import MOST_PX, NonNegativeFloat
 from workbench.model.yamlfile import FileModel
 
 HEAD = (

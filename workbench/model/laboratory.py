@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
-from workbench.model.rig import Name
+from workbench.model.name import Name
 from workbench.model.text_length import length_error
 from workbench.model.yamlfile import FileModel, load_yaml_model
 

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from workbench.model.errors import BadInputError
-from workbench.model.rig import TARGET_TILT, Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import TARGET_TILT, Rig
 from workbench.model.yamlfile import FileModel
 
 TILTS = "tilts"

@@ -7,80 +7,32 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
-from ruamel.yaml.scalarint import ScalarInt
 
 from workbench.model.board import Board
 from workbench.model.bounds import applies, prior_within, within
 from workbench.model.device_block import DeviceBlock
 from workbench.model.errors import BadInputError
+from workbench.model.head_spec import HeadSpec
 from workbench.model.included_camera import include_camera
 from workbench.model.known_board import AnyBoard
 from workbench.model.lens import COEFFICIENTS, LensName, lens_parameters
+from workbench.model.name import LaserId, Name
+from workbench.model.prior import LARGEST, Baseline, Coefficient, Drift, Prior, Scale, Slope, exactly
 from workbench.model.yamlfile import Document, FileModel, load_yaml_model
 
 PositiveFloat = Annotated[float, Field(gt=0)]
 NonNegativeFloat = Annotated[float, Field(ge=0)]
 
 
-def _as_name(value: object) -> object:
-    """Text of a number: YAML reads `id: 1` as a number; to the workbench an id is a name."""
-    if not isinstance(value, int) or isinstance(value, bool):
-        return value
-    width, underscore = getattr(value, "_width", None), getattr(value, "_underscore", None)
-    plain = type(value) in (int, ScalarInt) and width in (None, len(str(int(value)))) and underscore is None
-    if not plain:  # its digits are lost, as of 01, 0x10 and 1_0
-        raise ValueError(
-            f"expected text; YAML reads this as the number {int(value)}: write the text in quotes"
-        )
-    return str(value)
-
-
-Name = Annotated[str, BeforeValidator(_as_name)]
-
 ImageAxis = Literal["u", "v"]
 """Axis of the image: u to the right, v down."""
-LaserId = Annotated[Name, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
-"""Laser id; part of file names, therefore of letters, digits, `_`, `.` and `-`."""
-LARGEST = 1e6
-"""Largest accepted number of millimetres or pixels."""
 FEWEST_PX = 16
 MOST_PX = 100_000
 """Smallest and largest accepted width or height of an image."""
 MOST_PIXELS = 2**28
 """Largest accepted product of width and height: no camera has more pixels."""
-SMALLEST_SD = 1e-9
-"""Smallest accepted standard deviation of a prior other than 0."""
 
 
-class Prior(FileModel):
-    """Gaussian prior of a parameter: mean and standard deviation (1 sigma).
-
-    `sd: 0` makes the parameter a constant of the fit.
-    """
-
-    value: Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-    sd: Annotated[float, Field(ge=0, le=LARGEST)]
-
-    @field_validator("sd")
-    @classmethod
-    def _is_zero_or_large_enough(cls, sd: float) -> float:
-        if 0 < sd < SMALLEST_SD:
-            raise ValueError(f"expected 0 (known exactly) or at least {SMALLEST_SD:g}")
-        return sd
-
-
-def exactly(value: float) -> Prior:
-    """Prior of a constant."""
-    return Prior(value=value, sd=0.0)
-
-
-Coefficient = Annotated[Prior, prior_within(-100, 100, 100, "no lens distorts so much")]
-Baseline = Annotated[Prior, prior_within(-10_000, 10_000, 1000, "millimetres from the camera")]
-Slope = Annotated[Prior, prior_within(-10, 10, 1, "tangent of the beam's angle to the optical axis")]
-Scale = Annotated[Prior, prior_within(-0.5, 0.5, 0.5, "relative: 0.001 is one millimetre in a metre")]
-Drift = Annotated[Prior, prior_within(-1000, 1000, 1000, "pixels over all captures")]
-STEEPEST_DEG = 80.0
-"""Largest angle of a turned beam to the optical axis; at 90 degrees the beam meets no target."""
 SpotSd = Annotated[float, Field(ge=1e-6), within(0, 100, "pixels; a spot is some pixels wide")]
 
 TARGET_TILT = ("target_slope_x", "target_slope_y")
@@ -192,42 +144,6 @@ class LaserSpec(FileModel):
         if self.axis is not None and along.value == 0:
             raise ValueError(f"a laser on axis {self.axis} needs a baseline: {name} must not be 0")
         return self
-
-
-class HeadSpec(FileModel):
-    """Scanning head: one laser that turns about an axis beside the camera; its angle is read by an encoder.
-
-    The laser's own entry states the axis: `x_mm`, `y_mm` its position at the height of the beam, `tx` the
-    beam's direction where the encoder reads 0, `ty` its inclination.
-    """
-
-    laser: LaserId
-    axis_z_mm: Baseline = exactly(0.0)
-    """Depth of the axis in the camera frame."""
-    axis_slope_x: Slope = exactly(0.0)
-    """Tilt of the axis: x per y."""
-    axis_slope_z: Slope = exactly(0.0)
-    """Tilt of the axis: z per y."""
-    beam_offset_mm: Baseline = exactly(0.0)
-    """Distance at which the beam passes the axis, positive to the right of the axis."""
-    scale: Scale = exactly(0.0)
-    """Relative error of the encoder's scale: angle turned = angle read x (1 + scale)."""
-    eccentricity_sd_deg: Annotated[float, within(0, 10, "degrees")] = 0.0
-    """Error of an encoder with an eccentric disc, a cos(reading) + b sin(reading): 1 sigma of a and of b."""
-    reading_sd_deg: Annotated[float, within(0, 10, "degrees")] = 0.0
-    """Noise of the encoder's reading and of the bearing, independent at every move."""
-    reach_deg: tuple[float, float] = (-45.0, 45.0)
-    """Smallest and largest reading that the head can be turned to."""
-
-    @field_validator("reach_deg")
-    @classmethod
-    def _is_an_arc(cls, reach_deg: tuple[float, float]) -> tuple[float, float]:
-        if not -STEEPEST_DEG <= reach_deg[0] < reach_deg[1] <= STEEPEST_DEG:
-            raise ValueError(
-                f"expected [smallest, largest] within {STEEPEST_DEG:g} deg of the laser's direction at 0, got"
-                f" {list(reach_deg)}"
-            )
-        return reach_deg
 
 
 def nearest_image_axis(laser: LaserSpec) -> ImageAxis:

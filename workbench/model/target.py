@@ -27,6 +27,12 @@ class FlatTarget(FileModel):
     turn_sd_deg: Annotated[float, Field(ge=0)] | None = None
     """Standard uncertainty of the larger of the two angles, as measured; None: the rig's `tilt_sd_deg`."""
 
+    @property
+    def turn_sds_deg(self) -> tuple[float | None, float | None]:
+        """Standard uncertainties of yaw and pitch as measured; None: the rig's `tilt_sd_deg`."""
+        about_vertical = abs(self.yaw_deg) >= abs(self.pitch_deg)
+        return (self.turn_sd_deg, None) if about_vertical else (None, self.turn_sd_deg)
+
 
 class BoardTarget(FileModel):
     """Printed board of the rig file: a plane like that of a flat target, with the spots on its band."""

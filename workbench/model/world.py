@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from workbench.model.bounds import within
-from workbench.model.rig import LARGEST
+from workbench.model.prior import LARGEST
 from workbench.model.yamlfile import FileModel, load_yaml_model
 
 Coordinate = Annotated[float, within(-LARGEST, LARGEST, "millimetres")]

@@ -171,6 +171,31 @@ def include_files(document: Document, model: type[BaseModel]) -> bool:
     return issubclass(model, FileModel) and isinstance(document.data, dict) and model.include_files(document)
 
 
+def include_content(document: Document, key: str, model: type[BaseModel], what: str) -> bool:
+    """Replace the path at a key, relative to the document, by the file's content; whether there was a path.
+
+    Args:
+        document: document with the key.
+        key: key at the top of the document.
+        model: expected model of the file.
+        what: words for the file in messages.
+
+    Raises:
+        BadInputError: the file is missing or wrong.
+    """
+    named = document.data.get(key)
+    if not isinstance(named, str):
+        return False
+    path = document.path.parent / Path(named)
+    try:
+        load_yaml_model(path, model)
+    except BadInputError as error:
+        where = f"{document.path}:{line_of(document.data, (key,))}: {key}"
+        raise BadInputError(f"{where}: the {what} {named} cannot be used\n{error}") from None
+    document.data[key] = read_document(path).data
+    return True
+
+
 def standalone_text(path: Path, model: type[BaseModel]) -> str:
     """Text of a YAML file that depends on no other file: verbatim, where it names none.
 

@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from workbench.ranging.alone import seen_twice, spots_on_line
 from workbench.ranging.ranger import Assignment, Ranger, Reading, spot_arrays
 from workbench.ranging.records import flag_notes
 from workbench.spots import Finding, Spot
@@ -86,9 +87,9 @@ class _Control:
 
     def _alternative(self) -> Seen:
         captures = [(laser_id, self._capture((laser_id,)).spots) for laser_id in self._ambiguous]
-        on_line = dict(zip(self._ambiguous, self._ranger.alone(captures), strict=True))
+        on_line = dict(zip(self._ambiguous, spots_on_line(self._ranger.sensor, captures), strict=True))
         single = [(laser_id, spots[0]) for laser_id, spots in on_line.items() if len(spots) == 1]
-        together = self._ranger.seen_twice(single)
+        together = seen_twice(self._ranger.sensor, single)
         for laser_id, spots in on_line.items():
             if laser_id in together:
                 self._notes.append(f"{laser_id}: not on alone, its spot is also that of another laser")

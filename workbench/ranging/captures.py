@@ -12,6 +12,7 @@ from workbench.calibration.estimation.noise_scale import significant_scale
 from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
 from workbench.model.errors import BadInputError
 from workbench.model.number_text import counted
+from workbench.ranging.alone import spots_on_line
 from workbench.ranging.ranger import KnownSpots, Ranger, Reading, spot_arrays
 from workbench.session.capture_spots import find_row_spots
 
@@ -139,7 +140,7 @@ def _spot(ranger: Ranger, row: CaptureRow) -> MeanSpot | None:
     index = ranger.sensor.ids.index(row.laser_id)
     lines = ranger.scanlines[index : index + 1]
     found = find_row_spots(row, ranger.size_px, lines, 1, ranger.speckle_sd_px).spots
-    (spots,) = ranger.alone([(row.laser_id, found)])
+    (spots,) = spots_on_line(ranger.sensor, [(row.laser_id, found)])
     if len(spots) != 1:
         return None
     position, sd, speckle_sd = (part[0].tolist() for part in spot_arrays(spots))

@@ -26,8 +26,6 @@ from workbench.spots.search_band import band
 
 NOTHING_SEEN = "no spot was seen"
 Status = Literal["done", "not_enough_points", "no_points"]
-SAME_SPOT_SD = 5.0
-"""Difference of two spots or ranges, in standard deviations, up to which they are one."""
 MERGING_WIDTHS = 4.0
 """Distance of two spots, in widths, below which they may be found as one."""
 SCANLINE_HALF_WIDTH_PX = 8.0
@@ -312,33 +310,6 @@ class Ranger:
             distance_px = np.hypot(*(expected[:, None] - position).T).min(axis=1, initial=np.inf)
             hidden += [(laser, int(n)) for n in np.flatnonzero(distance_px < near_px)]
         return hidden
-
-    def alone(self, captures: Sequence[tuple[str, Sequence[Spot]]]) -> list[list[Spot]]:
-        """Spots on the lines of lasers that were on alone; a single one is that of the laser.
-
-        Args:
-            captures: each laser with the spots of its capture.
-        """
-        ids = [laser_id for laser_id, spots in captures for _ in spots]
-        ranges = self.sensor.ranges(ids, *spot_arrays([spot for _, spots in captures for spot in spots]))
-        possible = (ranges.range_mm > 0) & np.isfinite(ranges.range_mm)
-        on_line = iter(((ranges.misfit_sd < MOST_MISFIT_SD) & possible).tolist())
-        return [[spot for spot in spots if next(on_line)] for _, spots in captures]
-
-    def seen_twice(self, known: Sequence[tuple[str, Spot]]) -> frozenset[str]:
-        """Lasers whose spot is also that of another, at another range: they were on together, not alone.
-
-        Args:
-            known: lasers that were on alone, each with its only spot.
-        """
-        ids = [laser_id for laser_id, _ in known]
-        position, sd, speckle_sd = spot_arrays([spot for _, spot in known])
-        found = self.sensor.ranges(ids, position, sd, speckle_sd)
-        apart_px = np.abs(position[:, None] - position)
-        is_one_place = (apart_px <= SAME_SPOT_SD * np.hypot(sd[:, None], sd)).all(axis=-1)
-        apart_mm = np.abs(found.range_mm[:, None] - found.range_mm)
-        differ = apart_mm > SAME_SPOT_SD * np.hypot(found.spot_sd_mm[:, None], found.spot_sd_mm)
-        return frozenset(ids[i] for i in np.flatnonzero((is_one_place & differ).any(axis=1)))
 
     def _assignment_notes(
         self, pairs: LaserSpotPairs, spots: int, ambiguous: Sequence[Row]

@@ -16,7 +16,8 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 
 from workbench.model.bounds import RECORDED
 from workbench.model.errors import BadInputError
-from workbench.model.rig import Name, Rig
+from workbench.model.name import Name
+from workbench.model.rig import Rig
 from workbench.model.yamlfile import FileModel, load_yaml_model, parse_yaml_model, standalone_text
 from workbench.session.files import write_record
 

@@ -14,7 +14,8 @@ from pydantic import AfterValidator, Field
 
 from workbench.model.errors import BadInputError
 from workbench.model.event import TrueValues
-from workbench.model.rig import LARGEST, BenchSpec, NonNegativeFloat, Rig
+from workbench.model.prior import LARGEST
+from workbench.model.rig import BenchSpec, NonNegativeFloat, Rig
 from workbench.model.target import CylinderTarget, FlatTarget, Placement
 from workbench.model.yamlfile import FileModel
 from workbench.optics.rows import Row, rays_of_rig, rows_of

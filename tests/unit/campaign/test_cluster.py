@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from workbench.campaign.cluster import _closed_at_end, _without_interrupts, local_client, remote_client
+from workbench.campaign.cluster import _local_cluster, _without_interrupts, local_client, remote_client
 from workbench.model.errors import BadInputError
 
 
@@ -36,9 +36,6 @@ def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPat
 def test_threads_that_start_workers_do_not_get_interrupts() -> None:
     masks: list[set[int]] = []
 
-    def keep_mask() -> None:
-        masks.append({*signal.pthread_sigmask(signal.SIG_BLOCK, ())})
-
     def start() -> None:
         thread = threading.Thread(
             target=lambda: masks.append({*signal.pthread_sigmask(signal.SIG_BLOCK, ())})
@@ -51,7 +48,7 @@ def test_threads_that_start_workers_do_not_get_interrupts() -> None:
     assert [signal.SIGINT in mask for mask in masks] == [True, False]
 
 
-def test_workers_that_do_not_end_in_time_are_no_error() -> None:
+def test_workers_that_do_not_end_in_time_are_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
     closed: list[bool] = []
 
     class Busy:
@@ -59,6 +56,7 @@ def test_workers_that_do_not_end_in_time_are_no_error() -> None:
             closed.append(True)
             raise TimeoutError
 
-    with _closed_at_end(Busy):
+    monkeypatch.setattr("distributed.LocalCluster", Busy)
+    with _local_cluster():
         assert not closed
     assert closed

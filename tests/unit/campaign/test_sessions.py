@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.crash.short import ROOT, write_files
+from tests.crash.short import CALIBRATION, ROOT, write_files
 from tests.support.campaigns import frames_of, write_campaign
 from workbench.campaign.campaign_file import Campaign, load_campaign
 from workbench.campaign.folder import open_folder
@@ -34,20 +34,9 @@ work:
   sensors: 2
   chunk: 2
 """
-PROCEDURE = """format: 1
-procedure: short
-title: Short
-steps:
-  - step: capture_grid
-    standoffs_mm: [300, 600, 1500]
-    repeats: 1
-  - step: fit
-    limits: {max_relative_range_sd: 0.5}
-  - step: export
-"""
 
 
-def campaign_of(folder: Path, text: str = TEXT, procedure: str = PROCEDURE) -> Campaign:
+def campaign_of(folder: Path, text: str = TEXT, procedure: str = CALIBRATION) -> Campaign:
     folder.mkdir(exist_ok=True)
     write_files(folder, procedure)
     return load_campaign(write_campaign(folder, text))
@@ -90,7 +79,7 @@ def test_a_refused_session_has_the_reason(tmp_path: Path) -> None:
     campaign = campaign_of(
         tmp_path,
         TEXT.replace("sensors: 2", "sensors: 1"),
-        PROCEDURE.replace("max_relative_range_sd: 0.5", "max_rms_px: 0.0001"),
+        CALIBRATION.replace("max_relative_range_sd: 0.5", "max_rms_px: 0.0001"),
     )
     (rows,) = frames_of(campaign, tmp_path)
     records = read_journal(tmp_path / SESSIONS / "000000-short")
@@ -121,11 +110,13 @@ def test_a_session_on_a_busy_computer_is_resumed(tmp_path: Path, monkeypatch: py
 
 def test_parts_of_sessions_are_removed(tmp_path: Path) -> None:
     campaign = campaign_of(tmp_path)
-    with open_folder(tmp_path / "out", campaign) as folder:
-        left = folder.path / SESSIONS / ".000000-short-0" / "000000-short"
-        left.mkdir(parents=True)
+    left = tmp_path / "out" / SESSIONS / ".000000-short-0" / "000000-short"
     with open_folder(tmp_path / "out", campaign):
-        assert not list((tmp_path / "out" / SESSIONS).iterdir())
+        left.mkdir(parents=True)
+    assert not list((tmp_path / "out" / SESSIONS).iterdir()), "at the end"
+    left.mkdir(parents=True)  # as of a client that was killed
+    with open_folder(tmp_path / "out", campaign):
+        assert not list((tmp_path / "out" / SESSIONS).iterdir()), "at the beginning"
 
 
 def test_real_lasers_are_refused(tmp_path: Path) -> None:
@@ -138,4 +129,4 @@ def test_real_lasers_are_refused(tmp_path: Path) -> None:
 
 def test_a_wrong_procedure_is_named_before_the_run(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=r"campaign\.yaml:8: work\.procedures: .*frames: is missing"):
-        campaign_of(tmp_path, procedure=PROCEDURE.replace("capture_grid", "warm_up"))
+        campaign_of(tmp_path, procedure=CALIBRATION.replace("capture_grid", "warm_up"))

@@ -4,32 +4,21 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 from pathlib import Path
 
 import pytest
 
-from tests.crash.short import write_files
+from tests.crash.short import CALIBRATION, write_files
+from tests.support.killed_session import wait_for_capture
 from tests.support.terminal import at_terminal, plain_lines
 from workbench.session.index import indexed_sessions
 
-PROCEDURE = """format: 1
-procedure: short
-title: Short
-steps:
-  - step: capture_grid
-    standoffs_mm: [300, 600, 1500]
-    repeats: 1
-  - step: fit
-    limits: {max_relative_range_sd: 0.5}
-  - step: export
-"""
 COMMAND = ("line", "p.yaml", "--rig", "rig.yaml", "--sessions", "s")
 
 
 @pytest.fixture
 def files(tmp_path: Path) -> Path:
-    write_files(tmp_path, PROCEDURE)
+    write_files(tmp_path, CALIBRATION)
     return tmp_path
 
 
@@ -41,7 +30,7 @@ def test_sensors_pass_and_fail_one_after_another(files: Path) -> None:
         station.type("SN-1")
         station.wait_for("1 sensor: 1 passed, 0 failed, yield 100.0 %")
         procedure = files / "p.yaml"
-        procedure.write_text(PROCEDURE.replace("max_relative_range_sd: 0.5", "max_rms_px: 0.0001"))
+        procedure.write_text(CALIBRATION.replace("max_relative_range_sd: 0.5", "max_rms_px: 0.0001"))
         station.type("SN-2")
         station.wait_for("End the session here, with its calibration refused?")
         station.type("yes")
@@ -65,7 +54,7 @@ def test_sensors_pass_and_fail_one_after_another(files: Path) -> None:
 def test_a_killed_session_is_continued_when_its_sensor_is_scanned(files: Path) -> None:
     with at_terminal(files, *COMMAND) as station:
         station.type("SN-1")
-        _wait_for_a_frame(files / "s")
+        wait_for_capture(files / "s", "short.1", station.process)
         station.process.kill()
     with at_terminal(files, *COMMAND) as station:
         station.wait_for("0 sensors: 0 passed, 0 failed; 1 unfinished")
@@ -89,7 +78,7 @@ def test_a_killed_session_is_continued_when_its_sensor_is_scanned(files: Path) -
 def test_ctrl_c_ends_the_session_and_the_line(files: Path) -> None:
     with at_terminal(files, *COMMAND) as station:
         station.type("SN-1")
-        _wait_for_a_frame(files / "s")
+        wait_for_capture(files / "s", "short.1", station.process)
         os.kill(station.process.pid, signal.SIGINT)
         assert station.end() == 5
     lines = plain_lines(station.text)
@@ -104,10 +93,3 @@ def test_ctrl_c_at_the_question_ends_the_line(files: Path) -> None:
         os.kill(station.process.pid, signal.SIGINT)
         assert station.end() == 5
     assert "stopped by Ctrl-C" in plain_lines(station.text)
-
-
-def _wait_for_a_frame(sessions: Path) -> None:
-    end_s = time.monotonic() + 60
-    while not list(sessions.glob("*/frames/*/*/*/*.png")):
-        assert time.monotonic() < end_s
-        time.sleep(0.02)

@@ -21,7 +21,8 @@ from workbench.devices.placed_by_hand import PlacedByHand
 from workbench.devices.protocols import Bench, Frame, StreamingCamera
 from workbench.model.arrays import Image
 from workbench.model.errors import RigNotReadyError
-from workbench.model.rig import CameraSpec, Rig, exactly
+from workbench.model.prior import exactly
+from workbench.model.rig import CameraSpec, Rig
 from workbench.procedure.capture.exposure import set_exposure
 
 WIDTH, HEIGHT = 160, 120

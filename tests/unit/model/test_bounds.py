@@ -9,7 +9,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from workbench.model.bounds import RECORDED, prior_within, within
-from workbench.model.rig import Prior
+from workbench.model.prior import Prior
 
 LOW, HIGH, MOST_SD = -2.0, 5.0, 3.0
 NUMBER = TypeAdapter(Annotated[float, within(LOW, HIGH, "metres")])

@@ -13,7 +13,8 @@ from pydantic import ValidationError
 from tests.support.rigs import thesis_rig
 from workbench.model.errors import BadInputError
 from workbench.model.nested import fix_parameters
-from workbench.model.rig import BenchSpec, CameraSpec, LaserSpec, Prior, Rig, load_rig
+from workbench.model.prior import Prior
+from workbench.model.rig import BenchSpec, CameraSpec, LaserSpec, Rig, load_rig
 
 RIG = """\
 format: 1

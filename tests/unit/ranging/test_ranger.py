@@ -10,6 +10,7 @@ import pytest
 from pydantic import BaseModel
 
 from tests.support.rangers import IDS, positions, spot_at, spots
+from workbench.ranging.alone import spots_on_line
 from workbench.ranging.ranger import KnownSpots, Ranger
 
 
@@ -101,16 +102,18 @@ def test_lasers_of_one_line_are_searched_for_in_one_band_and_one_alone_on_its_ow
 
 def test_of_a_laser_fired_alone_only_spots_on_its_line_are_kept(ranger: Ranger) -> None:
     (own,) = spots(ranger, {"L1": 800.0})
-    assert ranger.alone([("L1", [spot_at(own.u_px, own.v_px + 40.0), own])]) == [[own]]
-    assert ranger.alone([("L1", [])]) == [[]]
-    assert ranger.alone([("L1", [own]), ("L2", []), ("L1", [spot_at(own.u_px, own.v_px + 40.0)])]) == [
+    assert spots_on_line(ranger.sensor, [("L1", [spot_at(own.u_px, own.v_px + 40.0), own])]) == [[own]]
+    assert spots_on_line(ranger.sensor, [("L1", [])]) == [[]]
+    assert spots_on_line(
+        ranger.sensor, [("L1", [own]), ("L2", []), ("L1", [spot_at(own.u_px, own.v_px + 40.0)])]
+    ) == [
         [own],
         [],
         [],
     ]
     # Beyond the image of the laser's point at infinity no target can lie.
     (u, v) = ranger.sensor.spot_px("L1", np.array([np.inf]))[0]
-    assert ranger.alone([("L1", [spot_at(u + 5.0, v), own])]) == [[own]]
+    assert spots_on_line(ranger.sensor, [("L1", [spot_at(u + 5.0, v), own])]) == [[own]]
 
 
 def known_spots(ranger: Ranger, scenes: int, seed: int) -> list[KnownSpots]:

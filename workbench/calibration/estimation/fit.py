@@ -39,7 +39,8 @@ from workbench.model.arrays import FloatArray, IndexArray
 from workbench.model.calibration import TermSummary
 from workbench.model.errors import BadInputError, LimitFailedError
 from workbench.model.fit_event import Rejected
-from workbench.model.rig import Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import Rig
 from workbench.sensor.curves import SpotCurves
 
 POSE_SD = {"slope_x": 1.0, "slope_y": 1.0, "board_x_mm": 100.0, "board_y_mm": 100.0, "board_roll_rad": 1.0}

@@ -11,7 +11,8 @@ import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.board import BOW
-from workbench.model.rig import TARGET_TILT, Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import TARGET_TILT, Rig
 from workbench.optics.rays import RAY
 
 DRIFT = ("drift_u_px", "drift_v_px")

@@ -97,8 +97,9 @@ def fit_head(rig: Rig, spots: HeadSpots) -> HeadFit:
         raise BadInputError("scanning head: no spot is left to fit; check exposure, angles and standoffs")
     table = _table(rig, spots.placements)
     problem = _Problem.of(rig, table, spots)
-    scale = 1.0
+    wanted = 1.0
     for _ in range(MAX_SCALE_ROUNDS):
+        scale = wanted
         y, jacobian, chi2 = problem.solve(scale)
         information = jacobian.T @ jacobian
         covariance = np.linalg.inv(information + np.eye(len(information)))
@@ -106,7 +107,6 @@ def fit_head(rig: Rig, spots: HeadSpots) -> HeadFit:
         wanted = float(significant_scale(chi2, freedom))
         if not wanted > scale * SCALE_TOLERANCE:
             break
-        scale = wanted
     residual, residual_sd = problem.residuals(y)
     return HeadFit(
         rig=rig,

@@ -26,7 +26,8 @@ from workbench.calibration.model.parameters import (
 from workbench.calibration.model.prediction import predict_cell
 from workbench.model.head_calibration import HEAD
 from workbench.model.lens import LensName
-from workbench.model.rig import Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import Rig
 from workbench.optics.head import Head, turned_ray
 from workbench.optics.rays import Ray
 
@@ -71,7 +72,7 @@ def head_table(rig: Rig, placements: Sequence[str]) -> ParameterTable:
     """
     laser, head = rig.head_laser, rig.scanning_head
     eccentricity = Prior(value=0.0, sd=radians(head.eccentricity_sd_deg))
-    priors = {name: getattr(head, name, eccentricity) for name in HEAD}
+    priors = {name: eccentricity if name.startswith("eccentricity") else getattr(head, name) for name in HEAD}
     alone = rig.model_copy(update={"lasers": (laser,)})
     own: tuple[Parameter, ...] = tuple(sensor_parameter(f"head.{name}", priors[name]) for name in HEAD)
     return ParameterTable((*sensor_parameters(alone), *own, *placement_parameters(rig, placements)))

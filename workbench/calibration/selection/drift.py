@@ -26,7 +26,8 @@ from workbench.calibration.model.layout import Layout
 from workbench.calibration.model.parameters import DRIFT, DRIFT_SD_PX, fits_drift
 from workbench.model.arrays import FloatArray
 from workbench.model.fit_event import Rejected
-from workbench.model.rig import Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import Rig
 from workbench.model.stats import chi2_sf
 
 SHOWN_P = 0.003

@@ -10,7 +10,8 @@ import numpy as np
 from workbench.calibration.estimation.fit import CalibrationFit, table_of
 from workbench.calibration.estimation.problem import LeastSquaresProblem
 from workbench.model.calibration import TermSummary
-from workbench.model.rig import Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import Rig
 from workbench.model.stats import chi2_sf
 from workbench.optics.lens_models import lens_model
 

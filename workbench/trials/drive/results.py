@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from workbench.model.chart import Axis, Chart, LimitLine, Series
-from workbench.model.rig import LARGEST
+from workbench.model.prior import LARGEST
 from workbench.model.table import Cell, Column, Table
 from workbench.model.trial_event import COVERAGE_FACTOR
 from workbench.trials.drive.outcome import NEAREST, SENSORS, SONAR, DriveRecord, Outcome, StepRecord

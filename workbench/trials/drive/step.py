@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -16,8 +15,8 @@ from workbench.model.number_text import counted
 from workbench.model.prompt import Prompt
 from workbench.model.rig import PositiveFloat, Rig
 from workbench.model.target import Placement, WorldTarget
-from workbench.model.world import Pose, Vehicle, World, load_world
-from workbench.model.yamlfile import Document, line_of, read_document
+from workbench.model.world import Pose, Vehicle, World
+from workbench.model.yamlfile import Document, include_content
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.limits import result_limit_prompts
 from workbench.procedure.engine.registry import register
@@ -67,17 +66,7 @@ class DriveStep(StepModel):
     @classmethod
     def include_files(cls, document: Document) -> bool:
         """Replace the path of the world file by its content."""
-        named = document.data.get(WORLD)
-        if not isinstance(named, str):
-            return False
-        path = document.path.parent / Path(named)
-        try:
-            load_world(path)
-        except BadInputError as error:
-            where = f"{document.path}:{line_of(document.data, (WORLD,))}: {WORLD}"
-            raise BadInputError(f"{where}: the world file {named} cannot be used\n{error}") from None
-        document.data[WORLD] = read_document(path).data
-        return True
+        return include_content(document, WORLD, World, "world file")
 
     @field_validator("world", mode="before")
     @classmethod

@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.model.event import ReadingTaken, TrialProgress, TrueValues, VehicleMoved
 from workbench.model.number_text import counted
-from workbench.model.rig import LARGEST
+from workbench.model.prior import LARGEST
 from workbench.model.target import Placement, WorldTarget
 from workbench.model.trial_event import SensorAnswer
 from workbench.model.world import Pose

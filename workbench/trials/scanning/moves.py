@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.data.spot_rows import prior_scanline
-from workbench.model.errors import BadInputError
+from workbench.model.errors import BadInputError, RigNotReadyError
 from workbench.model.fit_event import Rejected
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
@@ -56,8 +56,12 @@ def sweep(
         for repeat in range(repeats):
             context.capture(f"{scene}/{repeat:02d}", [laser.id], at, repeat, [scanline], scene)
             taken = context.captures[-1]
-            reading = angle_deg if taken.head_deg is None else taken.head_deg
-            found.append(HeadCapture(reading, observe_capture(context, taken)))
+            if taken.head_deg is None:
+                raise RigNotReadyError(
+                    f"placement {placed.key}: expected the reading of the head's encoder from the target's"
+                    " driver, got none; its `place` must return head_deg"
+                )
+            found.append(HeadCapture(taken.head_deg, observe_capture(context, taken)))
         # A beam beyond the image or beside the target gives no spot: the target is as bright as before.
         if context.findings[taken.key].spots:
             follow_brightness(context)

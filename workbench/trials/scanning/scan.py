@@ -14,7 +14,7 @@ from workbench.model.chart import Axis, Chart, Series
 from workbench.model.errors import BadInputError
 from workbench.model.fit_event import Rejected
 from workbench.model.number_text import counted
-from workbench.model.table import Cell, Column, Table
+from workbench.model.table import PERCENT, Cell, Column, Table
 from workbench.model.target import Placement
 from workbench.model.trial_event import COVERAGE_FACTOR
 from workbench.procedure.engine.context import Context
@@ -27,7 +27,6 @@ from workbench.trials.scanning.surface import Deviations, deviations, outline
 
 OFF_BEAM_SD = 5.0
 """Distance of a spot from the beam, in standard deviations, beyond which it is not the head's."""
-PERCENT = 100.0
 
 
 @dataclass(frozen=True)

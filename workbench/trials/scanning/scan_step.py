@@ -8,8 +8,9 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from workbench.model.fields import Standoff
+from workbench.model.head_spec import STEEPEST_DEG
 from workbench.model.number_text import counted
-from workbench.model.rig import STEEPEST_DEG, Rig
+from workbench.model.rig import Rig
 from workbench.model.target import CylinderTarget, FlatTarget, Placement, PolynomialTarget
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register

@@ -30,19 +30,20 @@ def deviations(placed: Placement, bench: BenchSpec, position_mm: FloatArray) -> 
     """Deviations of points (N, 3): x, y, range from the reference plane.
 
     Raises:
-        TypeError: the target has no surface of its own.
+        TypeError: the target has no surface.
     """
-    x, y, _ = position_mm.T
     target = placed.target
     value, gradient = _implicit(placed, bench, position_mm)
     length = np.linalg.norm(gradient, axis=1)
     normal = gradient / length[:, None]
     along = hypot(standoff_sd_mm(placed, bench), bench.ruler_scale.sd * placed.standoff_mm) * normal[:, 2]
-    tilt = np.zeros_like(x)
+    tilt = np.zeros(len(position_mm))
     if isinstance(target, FlatTarget):
-        own_deg = bench.tilt_sd_deg if target.turn_sd_deg is None else target.turn_sd_deg
-        tilt_sd = radians(hypot(own_deg, bench.target_tilt_sd_deg)) * (1.0 + (gradient[:, 0]) ** 2)
-        tilt = tilt_sd * np.hypot(x, y) * normal[:, 2]
+        # z = standoff + x tan(yaw) + y tan(pitch); d tan(a) = (1 + tan^2 a) da.
+        by_angle = position_mm[:, :2] * (1.0 + gradient[:, :2] ** 2)
+        sds_deg = [bench.tilt_sd_deg if own_deg is None else own_deg for own_deg in target.turn_sds_deg]
+        sds = np.radians(np.hypot(sds_deg, bench.target_tilt_sd_deg))
+        tilt = np.linalg.norm(by_angle * sds, axis=1) * normal[:, 2]
     return Deviations(value / length, normal, np.hypot(along, tilt))
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from pydantic import field_validator
 
 from workbench.model.errors import BadInputError
 from workbench.model.head_calibration import HeadCalibration
-from workbench.model.yamlfile import Document, line_of, load_yaml_model, read_document
+from workbench.model.yamlfile import Document, include_content
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.registry import register
 from workbench.procedure.engine.step import StepModel
@@ -29,17 +28,7 @@ class UseHeadStep(StepModel):
     @classmethod
     def include_files(cls, document: Document) -> bool:
         """Replace the path of the head's file by its content."""
-        named = document.data.get(FILE)
-        if not isinstance(named, str):
-            return False
-        path = document.path.parent / Path(named)
-        try:
-            load_yaml_model(path, HeadCalibration)
-        except BadInputError as error:
-            where = f"{document.path}:{line_of(document.data, (FILE,))}: {FILE}"
-            raise BadInputError(f"{where}: the head's file {named} cannot be used\n{error}") from None
-        document.data[FILE] = read_document(path).data
-        return True
+        return include_content(document, FILE, HeadCalibration, "head's file")
 
     @field_validator("file", mode="before")
     @classmethod

@@ -16,7 +16,8 @@ from workbench.calibration.model.prediction import (
     predict_corners,
     predict_spots,
 )
-from workbench.model.rig import Prior, Rig
+from workbench.model.prior import Prior
+from workbench.model.rig import Rig
 
 LASER, PLACEMENT = np.array([0, 3, 1, 2]), np.array([0, 1, 1, 0])
 STANDOFF_MM = np.array([150.0, 900.0])

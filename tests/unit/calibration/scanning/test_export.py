@@ -49,9 +49,9 @@ def test_over_a_small_arc_scale_and_phase_are_not_determined(fit: HeadFit) -> No
     assert {"head.scale", "head.beam_offset_mm", "ruler_scale"} <= set(names)
     assert "k1" not in names
     assert eccentricity_deg(fit)[2] is None
-    told = "\n".join(warnings(fit))
-    assert "head.scale" in told
-    assert "the phase of the encoder's eccentricity is not determined" in told
+    text = "\n".join(warnings(fit))
+    assert "head.scale" in text
+    assert "the phase of the encoder's eccentricity is not determined" in text
 
 
 def test_a_well_known_eccentricity_has_amplitude_and_phase(fit: HeadFit) -> None:
@@ -71,5 +71,5 @@ def test_a_well_known_eccentricity_has_amplitude_and_phase(fit: HeadFit) -> None
     assert not any("phase" in one for one in warnings(replace(fit, values=values, covariance=covariance)))
 
 
-def test_scaled_noise_is_told(fit: HeadFit) -> None:
+def test_scaled_noise_is_a_warning(fit: HeadFit) -> None:
     assert "1.50 times as large as stated" in warnings(replace(fit, noise_scale=1.5))[0]

@@ -9,7 +9,7 @@ from tests.support.free_views import RIG, TRUTH, views
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.selection.camera_fit import fit_camera, with_scatter_of_views
 from workbench.model.errors import BadInputError
-from workbench.model.rig import Prior
+from workbench.model.prior import Prior
 
 SEEDS = (1, 2, 3, 4, 5)
 

@@ -9,7 +9,8 @@ from tests.support.fake_lasers import FakeLasers
 from tests.support.mjpeg import Picture, Stream
 from workbench.devices.opencv_camera import OpenCvBlock, OpenCvCamera
 from workbench.devices.protocols import Frame
-from workbench.model.rig import CameraSpec, Rig, exactly
+from workbench.model.prior import exactly
+from workbench.model.rig import CameraSpec, Rig
 from workbench.procedure.capture.automatic import AutomaticControl, find_automatic_control
 
 WIDTH, HEIGHT = 160, 120

@@ -19,7 +19,8 @@ from workbench.model import event as ev
 from workbench.model.errors import BadInputError, LimitFailedError, RigNotReadyError
 from workbench.model.event import TrialFinished
 from workbench.model.head_calibration import HeadCalibration
-from workbench.model.rig import Rig, exactly, load_rig
+from workbench.model.prior import exactly
+from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
 from workbench.model.yamlfile import load_yaml_model
 from workbench.trials.scanning.calibrate_step import CalibrateHeadStep

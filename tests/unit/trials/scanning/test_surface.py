@@ -7,7 +7,8 @@ from math import cos, radians, tan
 import numpy as np
 import pytest
 
-from workbench.model.rig import BenchSpec, Prior
+from workbench.model.prior import Prior
+from workbench.model.rig import BenchSpec
 from workbench.model.target import CylinderTarget, FlatTarget, NoTarget, Placement, PolynomialTarget
 from workbench.trials.scanning.surface import deviations, outline
 
@@ -37,6 +38,17 @@ def test_the_tilt_of_a_flat_counts_with_its_distance_from_the_axis() -> None:
     tilt_mm = radians(0.5) * 200.0
     assert found.reference_sd_mm[1] == pytest.approx(np.hypot(np.hypot(0.4, 0.5), tilt_mm), rel=1e-3)
     assert found.reference_sd_mm[0] == pytest.approx(np.hypot(0.4, 0.5), rel=1e-3)
+
+
+def test_only_the_measured_angle_of_a_turned_flat_has_the_uncertainty_of_its_measurement() -> None:
+    bench = BENCH.model_copy(update={"placement_sd_mm": 0.0, "tilt_sd_deg": 0.5})
+    exact = Prior(value=0.0, sd=0.0)
+    target = placed(FlatTarget(pitch_deg=20.0, turn_sd_deg=0.05))
+    points = np.array([[200.0, 0.0, 500.0], [0.0, 200.0, 500.0 + 200.0 * tan(radians(20.0))]])
+    found = deviations(target, bench.model_copy(update={"ruler_scale": exact}), points)
+    by_yaw, by_pitch = 200.0 * radians(0.5), 200.0 * radians(0.05) / cos(radians(20.0)) ** 2
+    expected = np.array([by_yaw, by_pitch]) * cos(radians(20.0))
+    np.testing.assert_allclose(found.reference_sd_mm, expected, rtol=1e-9)
 
 
 def test_a_cylinder_is_left_along_its_radius() -> None:
