@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,13 @@ def test_mutated_inputs_are_read_or_refused(door: Door, tmp_path: Path) -> None:
     outcome = fuzz(door, tmp_path, counts(INPUTS)[door.name], SEED)
     assert outcome.found == {}
     assert outcome.results["refused"] > 0
+
+
+@pytest.mark.parametrize("door", doors(), ids=lambda door: door.name)
+def test_every_good_input_can_be_edited(door: Door, tmp_path: Path) -> None:
+    for example in door.seeds:
+        outcome = fuzz(replace(door, seeds=(example,)), tmp_path, 10, SEED)
+        assert outcome.run >= 10
 
 
 def test_an_unexpected_error_is_found(tmp_path: Path) -> None:
