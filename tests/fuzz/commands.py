@@ -44,6 +44,7 @@ LIBRARIES = (
     "workbench.cli.design",
     "workbench.cli.trial",
     "workbench.cli.sessions",
+    "workbench.cli.check",
     "workbench.cli.plan",
     "optimistix",
     "pandas",

@@ -66,13 +66,3 @@ def load_campaign(path: Path) -> Campaign:
             line = line_of(read_document(path).data, ("work", key))
             raise BadInputError(f"{path}:{line}: work.{key}: {error}") from None
     return Campaign(file, inputs)
-
-
-def is_campaign(path: Path) -> bool:
-    """Whether a YAML file is a campaign, by its keys.
-
-    Raises:
-        BadInputError: the file cannot be read.
-    """
-    data = read_document(path).data
-    return isinstance(data, dict) and CampaignFile.kind_key in data

@@ -151,7 +151,7 @@ def sessions_(
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Procedure and rig files.")]) -> None:
     """Check procedure and rig files. Mistakes are printed with file and line."""
-    from workbench.cli.plan import check_files
+    from workbench.cli.check import check_files
 
     check_files(files)
 

@@ -1,4 +1,4 @@
-"""`workbench check` and `workbench plan`: checks and forecasts before a session."""
+"""`workbench plan`: forecast of a session."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from workbench.campaign.campaign_file import is_campaign, load_campaign
 from workbench.model.errors import BadInputError
 from workbench.model.number_text import duration
 from workbench.model.table import Column, Table
 from workbench.model.target import Placement
 from workbench.procedure.capture.exposure import LIT_FRAMES, MOST_TRIALS
 from workbench.procedure.capture.latency import LEASE_S
-from workbench.procedure.engine.check import check_file
 from workbench.procedure.engine.durations import StepDurations, learn_durations
 from workbench.procedure.engine.existing_calibration import GIVES
 from workbench.procedure.engine.plan import Plan, PlannedStep
@@ -27,33 +25,6 @@ if TYPE_CHECKING:
 
 MOST_LOST = 12
 """Largest number of placements with lost spots that are printed."""
-
-
-def check_files(files: list[Path]) -> None:
-    """Check files and print the notes on each; the mistakes of all files are one error.
-
-    Raises:
-        BadInputError: a file is wrong.
-    """
-    console = Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
-    mistakes: list[str] = []
-    for path in files:
-        try:
-            if is_campaign(path):
-                load_campaign(path)
-                console.print(f"{path}: good")
-                continue
-            result = check_file(path)
-        except BadInputError as error:
-            mistakes.append(str(error))
-            continue
-        for note in result.notes:
-            console.print(f"note: {note}")
-        if not result.mistakes:
-            console.print(f"{path}: good")
-        mistakes += result.mistakes
-    if mistakes:
-        raise BadInputError("\n".join(mistakes))
 
 
 def print_plan(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import atan, cos, radians, sin
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from workbench.emulator.keyed import generator
 from workbench.emulator.spec import EmulatorSpec
@@ -23,6 +22,8 @@ def turned(axis_ray: TrueRay, head: TrueHead, reading_deg: float) -> TrueRay:
 
     The beam is built at the angle 0 and turned, in this order, about the axis and with it.
     """
+    from scipy.spatial.transform import Rotation  # takes long to load; only a head needs it
+
     a, b = head.eccentricity_cos_deg, head.eccentricity_sin_deg
     at = radians(reading_deg)
     turn_deg = (1.0 + head.scale) * reading_deg + a * (cos(at) - 1.0) + b * sin(at)

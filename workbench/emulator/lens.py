@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 
 from workbench.emulator.truth import Truth
 from workbench.model.arrays import FloatArray
@@ -98,7 +97,7 @@ class Lens:
         uu, vv = np.meshgrid(u_px, v_px)
         nodes = self.back_project(uu.ravel(), vv.ravel())
         x, y, area = (
-            RectBivariateSpline(v_px, u_px, values.reshape(uu.shape))(samples_v, samples_u)
+            _spline(v_px, u_px, values.reshape(uu.shape))(samples_v, samples_u)
             for values in (nodes.x, nodes.y, nodes.area)
         )
         return LinesOfSight(x, y, area)
@@ -131,10 +130,16 @@ class SightMap:
         u, v = (np.linspace(-2, side + 1, side // SIGHT_STEP_PX + 2) for side in (width, height))
         uu, vv = np.meshgrid(u, v)
         nodes = lens.back_project(uu.ravel(), vv.ravel())
-        self._splines = [
-            RectBivariateSpline(v, u, values.reshape(uu.shape)) for values in (nodes.x, nodes.y, nodes.area)
-        ]
+        self._splines = [_spline(v, u, values.reshape(uu.shape)) for values in (nodes.x, nodes.y, nodes.area)]
 
     def grid(self, samples_u: FloatArray, samples_v: FloatArray) -> LinesOfSight:
         """Lines of sight (rows of v, columns of u) on a grid."""
         return LinesOfSight(*(spline(samples_v, samples_u) for spline in self._splines))
+
+
+def _spline(v_px: FloatArray, u_px: FloatArray, values: FloatArray) -> Callable[..., FloatArray]:
+    """Cubic spline through values (rows of v, columns of u) at the nodes of a grid."""
+    from scipy.interpolate import RectBivariateSpline  # takes long to load; a check renders nothing
+
+    spline: Callable[..., FloatArray] = RectBivariateSpline(v_px, u_px, values)
+    return spline
