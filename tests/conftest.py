@@ -110,7 +110,8 @@ SLOW = {
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests of these files, so that they can be chosen and left out.
 
-    Of a slow test of several seeds the first is for every run, the others are for `make thorough`.
+    Of a slow test of several seeds, and of one marked `long_cases`, the first case is for every run, the
+    others are for `make thorough`.
     """
     begun: dict[str, object] = {}
     for item in items:
@@ -121,7 +122,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("slow")
         if item.nodeid.startswith("tests/wheel/"):
             item.add_marker("wheel")
-        if isinstance(item, pytest.Function) and hasattr(item, "callspec") and file in SLOW:
-            seed = item.callspec.params.get("seed")
-            if begun.setdefault(f"{file}::{item.originalname}", seed) != seed:
+        if isinstance(item, pytest.Function) and hasattr(item, "callspec"):
+            test = item.nodeid.partition("[")[0]
+            if item.get_closest_marker("long_cases"):
+                case: object = item.callspec.id
+            elif file in SLOW:
+                case = item.callspec.params.get("seed")
+            else:
+                continue
+            if begun.setdefault(test, case) != case:
                 item.add_marker("thorough")

@@ -69,6 +69,7 @@ def angle_deg(shape: Shape) -> tuple[float, float]:
     return float(np.degrees(shape.angle_rad)), float(np.degrees(shape.angle_sigma_rad))
 
 
+@pytest.mark.long_cases
 def test_a_flat_before_both_lines(both: Setup) -> None:
     reading = both.read(FlatTarget(), 700.0)
     assert reading.status == "done"

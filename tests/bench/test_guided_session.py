@@ -263,6 +263,7 @@ def test_a_marginal_value_is_told_and_gone_on_from(tmp_path: Path) -> None:
 FIT = GRID + "  - step: fit\n    limits: {max_relative_range_sd: 0.5}\n"
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(("step", "quantity"), [("check_limits", "rms_px"), ("validate", "worst_z")])
 def test_a_fit_is_held_against_limits(tmp_path: Path, step: str, quantity: str) -> None:
     def with_limit(limit: str) -> str:
@@ -378,6 +379,7 @@ def test_latency_is_counted_whatever_the_exposure_was(tmp_path: Path, exposure_s
         assert bench.camera.exposure_s != exposure_s, "it saw nothing at first"
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("latency", [0, 1, 4])
 def test_latency_is_counted_whatever_the_driver_believes(tmp_path: Path, latency: int) -> None:
     rig_file, _ = write_files(tmp_path)
@@ -471,6 +473,7 @@ def test_frames_older_than_the_latency_are_lit_whenever_the_laser_is_switched(
     assert worst >= WHOLE
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("emulator", "bad"),
     [
@@ -541,6 +544,7 @@ def test_a_comment_is_no_change(tmp_path: Path) -> None:
     assert session_status(stopped).state == "finished"
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("file", "edit"),
     [

@@ -68,6 +68,7 @@ def truth_of(folder: Path) -> dict[str, Any]:
     return truth
 
 
+@pytest.mark.long_cases
 def test_the_calibration_agrees_with_the_truth(session: tuple[str, Path]) -> None:
     layout, folder = session
     calibration = load_calibration(folder / "calibration.yaml")

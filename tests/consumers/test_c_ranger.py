@@ -39,6 +39,7 @@ def drawn_spots(sensor: CalibratedSensor, seed: int) -> tuple[list[str], FloatAr
     return lasers, exact + sd * rng.normal(size=(500, 2)), sd
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("lens", RIGS)
 def test_ranges_of_spots_are_those_of_the_workbench(lens: str, program: Path, tmp_path: Path) -> None:
     calibration = calibration_with(lens)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.campaigns import RIG, ROOT, SIMULATE, simulated_campaign, write_campaign
-from workbench.campaign.campaign_file import CampaignFile, is_campaign, load_campaign
+from workbench.campaign.campaign_file import CampaignFile, load_campaign
 from workbench.model.errors import BadInputError
 
 SCHEMA = ROOT / "docs/campaign.schema.json"
@@ -43,11 +43,9 @@ def test_mistakes_are_named_with_file_and_line(
     assert str(raised.value).startswith(f"{path}:{line}: ")
 
 
-def test_a_file_of_another_kind_is_named(tmp_path: Path) -> None:
+def test_a_file_of_another_kind_is_named() -> None:
     with pytest.raises(BadInputError, match="expected a campaign, with the key campaign; this is a rig"):
         load_campaign(RIG)
-    assert not is_campaign(RIG)
-    assert is_campaign(write_campaign(tmp_path))
 
 
 @pytest.mark.parametrize("path", sorted(ROOT.glob("procedures/campaigns/*.yaml")), ids=lambda path: path.stem)

@@ -77,6 +77,7 @@ def test_rejected_rows_are_listed_with_their_reasons(workbench: Run, tmp_path: P
     assert "got 2" in rejected[1]["reason"]
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     "spelt",
     [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import errno
 import os
 import subprocess
@@ -22,18 +23,29 @@ HEAVY = (
 )
 
 
-def test_help_imports_nothing_heavy() -> None:
+def loaded(*arguments: object) -> tuple[list[str], str]:
+    """Libraries of HEAVY that a command loads, and its standard output."""
     code = (
-        "import sys, runpy\n"
-        "sys.argv = ['workbench', '--help']\n"
+        "import sys\n"
+        f"sys.argv = ['workbench', *{[str(one) for one in arguments]}]\n"
         "from workbench.cli.main import main\n"
         "try: main()\n"
         f"finally: print([m for m in {HEAVY} if m in sys.modules], file=sys.stderr)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr.strip() == "[]"
+    return ast.literal_eval(done.stderr.splitlines()[-1]), done.stdout
+
+
+def test_help_imports_nothing_heavy() -> None:
+    heavy, text = loaded("--help")
+    assert heavy == []
     for command in ("run", "fit", "range", "view"):
-        assert command in done.stdout
+        assert command in text
+
+
+def test_a_check_of_a_rig_loads_no_library_of_fits() -> None:
+    heavy, _ = loaded("check", ROOT / "rigs/thesis-emulated.yaml")
+    assert not {"jax", "pandas", "optimistix", "rerun"} & set(heavy)
 
 
 def test_the_command_is_installed() -> None:

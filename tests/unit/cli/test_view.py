@@ -42,6 +42,7 @@ def test_a_session_is_found_by_its_name(session: Path, tmp_path: Path) -> None:
     assert (session / "recording.rrd").is_file()
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("kept", [0.0, 0.5, 1.0])
 def test_an_incomplete_recording_is_made_again_and_a_complete_one_is_kept(
     session: Path, tmp_path: Path, kept: float

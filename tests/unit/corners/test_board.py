@@ -175,6 +175,7 @@ def test_a_hot_pixel_moves_no_corner(tmp_path: Path) -> None:
     assert np.abs(moved / before.sd_px[one]).max() < 1.0
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("view", [0, 1])
 @pytest.mark.parametrize("board", KNOWN, ids=lambda board: board.kind)
 def test_boards_of_others_are_found_where_they_are(board: KnownBoard, view: int) -> None:

@@ -102,6 +102,7 @@ def test_an_unknown_driver_names_the_installed_ones(lab: Path) -> None:
         check_driver(load_rig(robot))
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("driver", ["lab_broken", "lab_unloadable"])
 def test_a_driver_that_cannot_be_imported_is_bad_input(lab: Path, driver: str) -> None:
     path = write_rig(lab / "rig.yaml", [OPENCV, f"lasers: {{driver: {driver}}}"])
@@ -109,6 +110,7 @@ def test_a_driver_that_cannot_be_imported_is_bad_input(lab: Path, driver: str) -
     assert call("check", path).returncode == 2
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("wrong", "place", "line"),
     [

@@ -52,6 +52,7 @@ def test_a_fisheye_s_spot_gives_back_its_depth(z_mm: float, sign: float) -> None
     assert abs(float(found.across_sd)) < 1e-6
 
 
+@pytest.mark.long_cases
 @EACH_LENS
 def test_derivatives_of_the_depth_are_those_of_the_estimate(model: LensModel, lens: np.ndarray) -> None:
     u, v = (float(c) for c in spot_at_inverse_depth(model, lens, RAY, 1 / 750.0))
@@ -84,6 +85,7 @@ def test_the_range_s_deviation_is_r_squared_over_f_b(z_mm: float) -> None:
     assert float(found.z_sd_of_spot_mm) == pytest.approx(0.05 * z_mm**2 / (541.0 * 60.0), rel=1e-12)
 
 
+@pytest.mark.long_cases
 @EACH_LENS
 def test_the_stated_deviation_is_that_of_many_spots(model: LensModel, lens: np.ndarray) -> None:
     rng = np.random.default_rng(7)

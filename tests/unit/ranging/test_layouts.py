@@ -65,6 +65,7 @@ def read(layout: str, seed: int, range_mm: float, yaw_deg: float, pitch_deg: flo
     return ranger.read_lit("s", seen(world, range_mm, yaw_deg, pitch_deg, rng)), world
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("layout", RIGS)
 def test_spots_in_any_order_are_assigned_and_ranged_within_their_intervals(layout: str) -> None:
     """95 % of the intervals contain the truth; calibration errors are common to the ranges of one sensor."""

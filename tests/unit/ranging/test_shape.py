@@ -59,6 +59,7 @@ def test_the_angle_of_an_incline(angle_deg: float) -> None:
     assert shape.closest_x_mm == (X[0] if angle_deg > 0 else X[-1])
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("range_mm", [200.0, 1000.0, 4000.0])
 def test_at_most_one_of_a_hundred_flats_is_reported_as_another_shape(range_mm: float) -> None:
     shapes = [s for seed in SEEDS for s in readings(flat(range_mm), 1500, seed)]
@@ -72,6 +73,7 @@ def test_the_interval_of_a_flat_that_is_reported_as_another_shape_includes_it() 
     assert share(others, lambda s: holds(s, 4000.0)) > 0.9 - spread(0.9, len(others))
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("range_mm", [200.0, 1000.0, 4000.0, 8000.0])
 def test_the_closest_range_of_a_flat_is_covered(range_mm: float) -> None:
     shapes = [s for seed in SEEDS for s in readings(flat(range_mm), 1000, seed)]

@@ -73,6 +73,7 @@ def test_squares_have_their_size_and_place(board: Board) -> None:
     np.testing.assert_allclose(down, expected, atol=TRUE_SIZE_MM)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("board", BOARDS)
 def test_the_board_is_found_on_the_page_at_its_true_size(board: Board) -> None:
     # A lens blurs: edges sharper than a pixel do not say where in it they lie.

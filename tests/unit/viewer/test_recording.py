@@ -213,6 +213,7 @@ def _starts_trial(event: object) -> bool:
     return isinstance(event, ev.ProcedureStarted) and event.procedure == TRIAL
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("last", "front"),
     [
@@ -233,6 +234,7 @@ def test_the_screen_in_front_follows_the_session(
 FIT_TEXTS = ("/fit/verdict", "/fit/worst", "/fit/checks", "/fit/parameter_table")
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("timeline", TIMELINES)
 def test_nothing_of_a_fit_disappears_at_earlier_places(contents: Contents, timeline: str) -> None:
     for at in contents.positions(timeline):
@@ -335,6 +337,7 @@ def test_an_equal_state_of_a_lane_is_logged_once_a_standoff(contents: Contents) 
         assert [mm for mm, _ in logged if mm in STANDOFFS] == [mm for mm in STANDOFFS for _ in range(states)]
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(("least_s", "kind"), [(0.0, ev.SpotsFound), (float("inf"), ev.StepFinished)])
 def test_the_file_is_checked_now_and_then_and_at_the_end_of_each_step(
     recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, least_s: float, kind: type[ev.Event]

@@ -44,6 +44,7 @@ def the(faults: list[Fault], name: str) -> str:
 
 @pytest.mark.parametrize("seed", SEEDS)
 class TestFaults:
+    @pytest.mark.long_cases
     @pytest.mark.parametrize(("a", "b"), [("L1", "L2"), ("L1", "L4")])
     def test_two_lasers_exchanged(self, seed: int, a: str, b: str) -> None:
         message = the(named(exchanged(World(RIG, seed).observations(), a, b)), "lasers_swapped")
@@ -64,6 +65,7 @@ class TestFaults:
         assert angle_deg == pytest.approx(turn_deg, abs=2.0)
         assert "vertical" in message
 
+    @pytest.mark.long_cases
     @pytest.mark.parametrize(
         ("standoff_mm", "stated_mm", "slip"),
         [(600.0, 6000.0, "a digit too many"), (160.0, 1600.0, "too many"), (400.0, 40.0, "a digit too few")],
@@ -75,6 +77,7 @@ class TestFaults:
         assert slip in message
         assert fitted == pytest.approx(standoff_mm, abs=5 * RIG.bench.placement_sd_mm + 0.005 * standoff_mm)
 
+    @pytest.mark.long_cases
     @pytest.mark.parametrize("standoff_mm", [125.0, 400.0, 900.0])
     def test_a_standoff_ten_millimetres_off(self, seed: int, standoff_mm: float) -> None:
         message = the(
@@ -82,6 +85,7 @@ class TestFaults:
         )
         assert numbers(message)[0] == standoff_mm + 10
 
+    @pytest.mark.long_cases
     @pytest.mark.parametrize(
         ("standoff_mm", "after", "step_mm"),
         [(160.0, 8, 2.0), (400.0, 12, -5.0), (600.0, 7, 8.0), (900.0, 4, 20.0)],
@@ -96,6 +100,7 @@ class TestFaults:
         assert moved_mm == pytest.approx(step_mm, rel=0.2)
         assert message.index(of_it[after - 1]) < message.index(of_it[after])
 
+    @pytest.mark.long_cases
     @pytest.mark.parametrize("by_px", [2.0, -100.0])
     @pytest.mark.parametrize("repeats", [range(5), (1, 3), (1, 3, 4)])
     def test_a_reflection(self, seed: int, by_px: float, repeats: range | tuple[int, ...]) -> None:
@@ -128,6 +133,7 @@ class TestFaults:
         assert numbers(message)[0] == 1400.0
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("standoffs_mm", [(200.0,), (200.0, 200.0), (200.0, 230.0)])
 def test_few_standoffs_that_are_near_are_not_called_far(seed: int, standoffs_mm: tuple[float, ...]) -> None:
@@ -160,6 +166,7 @@ def test_a_camera_on_its_head_where_lasers_stand_above_and_below() -> None:
     the(named(observations, rig=rig), "upside_down")
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     "spoil",
     [
@@ -269,6 +276,7 @@ SHAPES: list[tuple[str, Rig, Rig, Callable[[World], list[Observation]]]] = [
 ]
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(
     ("assumed", "true", "seen"), [shape[1:] for shape in SHAPES], ids=[n for n, *_ in SHAPES]
@@ -286,6 +294,7 @@ def test_sound_data_of_any_shape_are_judged_without_a_fault(
     assert all(numbers(reason)[1] == Acceptance().min_standoffs for reason in assessment.reasons)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("off_mm", [0.0, 10.0])
 def test_a_boards_standoff_mistyped(seed: int, off_mm: float) -> None:

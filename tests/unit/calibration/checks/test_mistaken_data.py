@@ -51,6 +51,7 @@ def test_exchanged_columns_are_named_and_refused(seed: int) -> None:
     assert fault.refuses
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_standoffs_in_another_unit_are_named(seed: int, unit: str) -> None:

@@ -126,6 +126,7 @@ def drawn_tests(fitted: CalibrationFit, shift_px: FloatArray, runs: int) -> list
     return found
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("parts", [1, 2])
 def test_false_alarms_are_as_often_as_stated(parts: int) -> None:
     """Of 4000 at 0.3 and 5 %: 12 +- 3.5 and 200 +- 13.8; four standard deviations."""

@@ -122,6 +122,7 @@ def test_the_shift_of_a_range_is_that_of_two_fits(seed: int) -> None:
     assert stated == pytest.approx(np.concatenate(shifts).max(), rel=0.1)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("standoffs_mm", [(70.0, 125.0, 400.0, 2000.0), (125.0, 400.0, 2000.0)])
 def test_ranges_whose_spots_lie_outside_the_image_do_not_count(standoffs_mm: tuple[float, ...]) -> None:
     fitted = fit(thesis_rig(), World(thesis_rig(), 3).observations(standoffs_mm))

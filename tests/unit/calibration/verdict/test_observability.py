@@ -72,6 +72,7 @@ def test_a_pinhole_leaves_open_what_algebra_says(fitted: CalibrationFit) -> None
             assert change[f"L{i}.{pointing}"] == pytest.approx(-change[first] / f, rel=0.05)
 
 
+@pytest.mark.long_cases
 def test_a_named_direction_shows_in_no_spot(fitted: CalibrationFit) -> None:
     """By the model itself, not by its derivatives: all spots move by far less than one sd in all."""
     cells = fitted.cells

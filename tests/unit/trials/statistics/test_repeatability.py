@@ -60,6 +60,7 @@ def test_analysis_of_variance_of_gum_h5() -> None:
     assert found.between_placements == pytest.approx(43, abs=0.5)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(("placement_sd", "session_sd"), [(0.0, 0.0), (0.5, 0.0), (2.0, 0.0), (0.5, 0.8)])
 def test_intervals_cover_93_to_97_percent(placement_sd: float, session_sd: float) -> None:
     shape, trials = ((8, 4, 3) if session_sd else (1, 8, 3)), 1000
