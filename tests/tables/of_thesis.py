@@ -40,7 +40,7 @@ HEADLINES = {
     ("30 deg", "angle error, %", "500"): ("angle of an incline of 30 deg, error, %", "500"),
     ("60 deg", "angle error, %", "500"): ("angle of an incline of 60 deg, error, %", "500"),
     ("cylinder", "cylinder range error, %", "-"): (
-        "cylinder of 178 mm diameter, range by the fitted cylinder, error, %",
+        "cylinder of 178 mm diameter, error of its fitted range, %",
         "1000",
     ),
 }
