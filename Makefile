@@ -4,6 +4,8 @@ PYTHON ?= python3
 VENV := .venv$(if $(filter-out python3,$(PYTHON)),-$(notdir $(PYTHON)))
 # Our matrices are small: threads of the linear algebra wait for each other longer than they work.
 export OPENBLAS_NUM_THREADS ?= 1
+# Tests start hundreds of processes, which share the compiled modules.
+export PYTHONDONTWRITEBYTECODE :=
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 # The dependencies of the workbench alone, without those of its developers.
