@@ -243,6 +243,7 @@ def test_a_reader_written_from_the_format_s_description_ranges_alike(demo: Demo,
         assert float(range_mm) == pytest.approx(expected.range_mm[0], rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_the_recording_is_a_view_that_can_be_made_again(demo: Demo, tmp_path: Path) -> None:
     again = tmp_path / "again.rrd"
     rebuild(demo.folder, load_rig(demo.rig), read_journal(demo.folder), again)

@@ -165,6 +165,7 @@ def test_nothing_is_printed_over_the_shell_after_a_kill(tmp_path: Path) -> None:
     os.close(master)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("option", "why"), [([], "there is no terminal"), (["--no-input"], "--no-input was given")]
 )

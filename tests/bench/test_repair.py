@@ -146,6 +146,7 @@ def test_captures_whose_frames_are_gone_are_not_restored(copy: Path) -> None:
     assert (copy / "journal.jsonl").read_bytes() == before
 
 
+@pytest.mark.thorough
 def test_a_repair_of_a_drifting_bench_begins_another_part(tmp_path: Path) -> None:
     """Its drift begins again, as that of a sensor that has cooled."""
     rig, _ = write_files(tmp_path, PROCEDURE)
@@ -202,6 +203,7 @@ def test_a_standoff_is_added_to_a_finished_session(copy: Path) -> None:
     assert (sd[1] < sd[0]).any()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("copy", ["good"], indirect=True)
 def test_the_prompt_of_an_added_placement_is_answered_from_a_file(copy: Path) -> None:
     answers = copy.parent / "answers.yaml"

@@ -59,6 +59,7 @@ def test_a_square_flat_is_no_incline_whatever_tilt_was_stated(
     assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=spread(0.95, len(z)))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_an_unmeasured_tilt_of_one_degree_is_no_incline(seed: int) -> None:
     """Two deviations of its prior: the remaining tilt is within the interval; held at 0 it is not."""

@@ -33,6 +33,7 @@ def test_a_report_is_made_without_writing(session: wb.Session, tmp_path: Path) -
     assert files(tmp_path) - before <= {Path(".sessions.sqlite3")}
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("name", "begins"),
     [("a.html", b"<!"), ("a.json", b"{"), ("a.pdf", b"%PDF")],

@@ -57,6 +57,7 @@ def test_range_of_a_session_has_the_remark(workbench: Run, tmp_path: Path) -> No
     assert str(later) not in new.err
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("named", ["calibration.yaml", ""])
 def test_view_of_an_edited_calibration_has_a_remark(
     tmp_path: Path, named: str, capsys: pytest.CaptureFixture[str]

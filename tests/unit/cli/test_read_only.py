@@ -31,6 +31,7 @@ def read_only(tmp_path: Path) -> Iterator[Path]:
         subprocess.run(["umount", folder], check=True)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("line", "code"),
     [

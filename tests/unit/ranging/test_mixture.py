@@ -43,6 +43,7 @@ def brute_force(points: Points, n: int, seed: int) -> tuple[FloatArray, FloatArr
     return middle + lowest, weight / weight.sum(), components.degree[drawn].astype(np.float64)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("surface", [flat(4500.0), incline(4500.0, 20.0), parabola(4500.0)])
 def test_the_posterior_is_that_of_shapes_drawn_from_the_prior(surface: Surface) -> None:
     """Far away, where the prior matters and brute force has enough shapes that agree with the spots."""

@@ -93,6 +93,7 @@ def test_wide_tables_are_split_into_blocks_that_repeat_the_names_of_rows() -> No
     assert all(page.count(f"column {n}<") == 1 for n in range(2, 100))
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("many", [False, True])
 def test_nothing_is_cut_off_in_a_browser(many: bool, tmp_path: Path) -> None:
     """Many lasers are 100 columns, many placements 500 rows."""

@@ -20,6 +20,7 @@ def dark(rng: np.random.Generator, spots: list[Drawn]) -> np.ndarray:
     return draw(spots, rng, (480, 640), SENSOR)
 
 
+@pytest.mark.thorough
 def test_noise_is_taken_for_a_spot_now_and_then_and_never_for_a_light() -> None:
     rng = np.random.default_rng(1)
     spots, lights = 0, 0

@@ -54,6 +54,7 @@ RIG = Path(__file__).parents[3] / "rigs/thesis-emulated.yaml"
 GRID = "step: capture_grid, standoffs_mm: [300, 500, 800, 1200, 2000], repeats: 1"
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("skipped", "numbers"),
     [

@@ -146,6 +146,7 @@ def test_lasers_read_across_their_line_alone_are_not_called_far() -> None:
     assert find_faults(fit_without_outliers(RIG, observations), ()) == ()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", SEEDS)
 def test_two_standoffs_mistyped(seed: int) -> None:
     observations = stated_as(stated_as(World(RIG, seed).observations(), 600.0, 6000.0), 160.0, 170.0)
@@ -200,6 +201,7 @@ def test_sound_calibrations_name_no_fault_and_lose_no_spot() -> None:
         assert find_faults(fit, ()) == ()
 
 
+@pytest.mark.thorough
 def test_noise_that_nobody_stated_rightly_is_no_fault() -> None:
     """Noise and speckle three times the stated: the fit scales its deviations, and nothing is named."""
     for seed in range(2):

@@ -99,6 +99,7 @@ def interrupted() -> DriftProfile:
     )
 
 
+@pytest.mark.thorough
 def test_each_part_settles_anew_with_its_own_amplitude() -> None:
     """Intervals as above; a shift by 1 px when cold, and by 0.5 px after the interruption."""
     profile, time_constant = interrupted(), 0.1

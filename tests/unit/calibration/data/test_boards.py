@@ -80,6 +80,7 @@ def test_the_truth_lies_where_the_covariance_says() -> None:
     assert np.mean(corners) == pytest.approx(0.95, abs=0.05)
 
 
+@pytest.mark.thorough
 def test_the_print_s_scale_moves_lengths_and_not_the_lens() -> None:
     """1 % of print error, unknown to the fit: f stays, every length in mm follows the print."""
     rig = board_rig(prior(0.0, 0.0))
@@ -97,6 +98,7 @@ def test_the_print_s_scale_moves_lengths_and_not_the_lens() -> None:
     assert scales[1] == pytest.approx(1.01 * scales[0], rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_baselines_are_known_as_well_as_print_ruler_and_calliper_tell() -> None:
     result, _ = joint(board_rig(), 5)
     _, sd, share, by = of(result, "L1.x_mm")
@@ -108,6 +110,7 @@ def test_baselines_are_known_as_well_as_print_ruler_and_calliper_tell() -> None:
     assert 0.6 < (sd**2 - exact**2) / (60.0 * 0.0005) ** 2 < 1.0
 
 
+@pytest.mark.thorough
 def test_a_start_far_from_the_truth_ends_in_the_same_place() -> None:
     rig = board_rig()
     world = World(rig, 6)
@@ -118,6 +121,7 @@ def test_a_start_far_from_the_truth_ends_in_the_same_place() -> None:
     assert of(other, "f_px")[0] == pytest.approx(of(one, "f_px")[0], abs=0.1 * of(one, "f_px")[1])
 
 
+@pytest.mark.thorough
 def test_an_unsquare_board_upside_down() -> None:
     """Nothing is assumed of how the board is turned: after half a turn it has another roll."""
     rig = board_rig()
@@ -202,6 +206,7 @@ def test_a_board_left_out_is_ranged_by_all_lasers_together_alone(seed: int) -> N
         assert folds[key].sd_mm < 0.02 * folds[key].standoff_mm
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", SEEDS)
 def test_views_of_a_board_held_anywhere_give_the_lens_of_a_fit_of_spots(seed: int) -> None:
     rig = thesis_rig().model_copy(update={"board": BOARD})

@@ -60,6 +60,7 @@ def test_ranges_without_noise_invert_spots_of_another_program(simulated: Simulat
     assert np.abs(found.error_mm[seen]).max() < 1e-3
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("rig", [thesis_rig(), fisheye_rig()], ids=lambda rig: rig.camera.lens)
 def test_ranges_of_all_sensors_are_those_of_each_alone(rig: Rig) -> None:
     count = BLOCK + BLOCK // 3

@@ -35,6 +35,7 @@ def test_what_a_standoff_moves_is_its_difference() -> None:
     )
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("rig", [RIG, fisheye_rig()], ids=["plumb_bob", "equidistant"])
 def test_the_jacobian_is_the_difference_of_residuals(rig: Rig, seed: int) -> None:

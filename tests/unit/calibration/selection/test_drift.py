@@ -51,6 +51,7 @@ def test_the_estimate_lies_within_four_of_its_deviations(seed: int, u_px: float)
     assert np.all(found.sd_px < 0.08)
 
 
+@pytest.mark.thorough
 def test_p_values_are_even_without_a_drift() -> None:
     """12 sessions: not one below 0.003 (expected 0.04 sessions), and their median is ordinary."""
     p = [drift_test(fit(RIG, drifting(seed, 0.0))).p_value for seed in range(12)]

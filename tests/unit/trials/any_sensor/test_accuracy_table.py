@@ -42,6 +42,7 @@ def test_interval_of_the_mean_counts_placements_and_covers_95_percent() -> None:
     assert inside / trials == pytest.approx(0.95, abs=spread(0.95, trials))
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("design", "sds"),
     [((2, 8, 3), (0.5, 0.2, 0.1)), ((5, 4, 3), (0.5, 0.2, 0.1)), ((3, 8, 3), (0.3, 0.3, 0.3))],

@@ -117,6 +117,7 @@ def test_impossible_steps_are_refused(keys: dict[str, object], text: str) -> Non
         drive_step(**keys)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("name", ["world-obstacles", "world-office"])
 def test_procedures_of_the_repository_can_be_planned(name: str) -> None:
     procedure = load_procedure(PROCEDURES / f"{name}.yaml")

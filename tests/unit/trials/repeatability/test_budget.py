@@ -30,6 +30,7 @@ def test_columns_of_the_sources_are_uncertainties_in_mm() -> None:
     assert all((column.unit == "mm") == column.key.endswith("_mm") for column in COLUMNS)
 
 
+@pytest.mark.thorough
 def test_alarms_are_rare_with_complete_and_frequent_with_missing_sources() -> None:
     """Readings with noise 0.3 and placement 0.5 mm; the missing source equals the others together."""
     trials, complete, incomplete = 40, 0, 0

@@ -75,6 +75,7 @@ def test_components_with_an_interaction_follow_from_statsmodels_mean_squares(see
     assert found.interaction == pytest.approx(0.6, abs=0.3)
 
 
+@pytest.mark.long_cases
 @pytest.mark.parametrize("interaction", [0.0, 0.5])
 def test_interval_of_grr_covers_93_to_97_percent(interaction: float) -> None:
     random, trials = np.random.default_rng(12), 600
