@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from tests.crash.short import CALIBRATION, ROOT, write_files
 from tests.support.campaigns import as_worker, frames_of, write_campaign
 from workbench.campaign.campaign_file import Campaign, load_campaign
 from workbench.campaign.folder import MANIFEST, open_folder
-from workbench.campaign.sessions import MOST_RESUMED, SESSIONS
+from workbench.campaign.sessions import FILES, MOST_RESUMED, SESSION_ASIDE, SESSION_FILES, SESSIONS
 from workbench.campaign.worker import run_chunk
 from workbench.cli.exit import report
 from workbench.model.calibration import load_calibration
@@ -73,6 +74,7 @@ def test_each_session_is_whole_and_of_another_sensor(done: tuple[Path, Campaign,
         assert row.rms_px_now == calibration.fit.rms_px
         assert row.relative_sd_now == calibration.validity.max_relative_range_sd
     assert rows["serial"].nunique() == rows["rms_px_now"].nunique() == 2
+    assert all(re.fullmatch(SESSION_FILES, path.name) for path in (folder / FILES).iterdir())
 
 
 def test_a_repeated_chunk_has_the_same_rows(done: tuple[Path, Campaign, pd.DataFrame]) -> None:
@@ -112,6 +114,7 @@ class Disturbed:
         monkeypatch.setattr(resumption, "run_steps", self)
 
     def __call__(self, plan: Plan, context: Context) -> None:
+        assert SESSION_ASIDE.fullmatch(context.session_dir.parent.name), "its remains would stay"
         self.runs += 1
         if self.runs <= self.ends:
             context.emit(SessionFinished(exit_code=self.error.exit_code, message=str(self.error)))
