@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -75,7 +76,7 @@ def test_a_request_to_stop_during_the_fit_holds_for_the_question_after_it(
             reasons.append(self.stopping())
             raise StoppedError("stopped")
 
-    def fit(*arguments: object) -> object:
+    def fit(*arguments: Any) -> object:
         os.kill(os.getpid(), signal.SIGINT)
         return fit_calibration(*arguments)
 
