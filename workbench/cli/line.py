@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import select
 import shlex
 import sys
 import termios
@@ -22,6 +23,7 @@ from workbench.cli.refusal import refused_fit
 from workbench.cli.report import DEFAULT_NAME, certify
 from workbench.cli.run import Screen, resume_session, run_procedures
 from workbench.cli.stopping import StopAfterCapture, stop_at_once
+from workbench.cli.terminal_operator import LOOK_S
 from workbench.cli.verdict import and_more, split_reason
 from workbench.model import event as ev
 from workbench.model.contents import printable
@@ -297,11 +299,15 @@ def _began_ns(one: IndexedSession) -> int:
 
 def _ask_serial() -> str:
     """Serial number as scanned; empty at the end of the input. Input before the question is discarded."""
-    if sys.stdin.isatty():
+    is_terminal = sys.stdin.isatty()
+    if is_terminal:
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
     print_message("Scan or type the serial number of the next sensor; Enter alone ends.")
     print("> ", end="", file=sys.stderr, flush=True)
     try:
+        # A signal that comes just before a read that blocks has no effect until the next input.
+        while is_terminal and not select.select([sys.stdin], [], [], LOOK_S)[0]:
+            pass
         line = part = sys.stdin.readline(LONGEST_LINE)
         while len(part) == LONGEST_LINE and not part.endswith("\n"):
             part = sys.stdin.readline(LONGEST_LINE)  # the rest of the line is discarded

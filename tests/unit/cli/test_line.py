@@ -5,10 +5,13 @@ from __future__ import annotations
 import fcntl
 import io
 import os
+import pty
+import select
 import shlex
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,7 +21,9 @@ from tests.support.killed_session import wait_for_capture
 from tests.support.terminal import at_terminal, plain_lines
 from workbench.calibration.selection import model_terms
 from workbench.cli import line
+from workbench.cli.terminal_operator import LOOK_S
 from workbench.emulator.controller import Controller
+from workbench.model.errors import StoppedError
 from workbench.session.index import indexed_sessions
 from workbench.session.journal import JOURNAL
 
@@ -297,6 +302,26 @@ def test_damaged_sessions_are_counted_apart(files: Path, station: Station) -> No
         (one.status.session_dir / JOURNAL).write_text("damaged\n")
     text = "1 sensor: 1 passed, 0 failed, yield 100.0 %; 2 damaged sessions not counted"
     refused(station(), 0, f"line ended: {text}")
+
+
+def test_a_signal_just_before_the_read_ends_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A read that blocks would not notice it: the terminal has no input, as if no scanner were there."""
+    master, slave = pty.openpty()
+    waits, select_ = list[float](), select.select
+
+    def waiting(*arguments: Any) -> object:
+        waits.append(arguments[-1])
+        if len(waits) == 2:
+            raise StoppedError("stopped by SIGINT")
+        return select_(*arguments)
+
+    with open(slave, encoding="utf-8") as terminal:  # noqa: PTH123 - a handle
+        monkeypatch.setattr("sys.stdin", terminal)
+        monkeypatch.setattr("workbench.cli.line.select.select", waiting)
+        with pytest.raises(StoppedError):
+            line._ask_serial()
+    os.close(master)
+    assert waits == [LOOK_S] * 2, "the wait has an end, after which signals are handled"
 
 
 def test_ctrl_c_at_the_question_ends_the_line(files: Path) -> None:
