@@ -103,6 +103,21 @@ def test_a_killed_worker_leaves_no_part_of_a_session(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
+def test_a_session_that_does_not_finish_stops_the_campaign(tmp_path: Path) -> None:
+    """Its controller does not confirm that the virtual lasers are off."""
+    rig, _ = write_files(tmp_path, PROCEDURE)
+    rig.write_text(rig.read_text() + "  controller: {fault: ignores_off}\n")
+    out = tmp_path / "out"
+    process = start(write_campaign(tmp_path, SESSIONS_TEXT), out, "--workers", "1")
+    errors = process.communicate()[1]
+    assert process.returncode == 5, errors
+    assert "error: session 000000-short did not finish, and is no result: " in errors
+    assert errors.splitlines()[-1].startswith("resume:  workbench campaign ")
+    assert finished(out) == 0
+    assert not list((out / "sessions").glob("[0-9]*"))
+
+
+@pytest.mark.thorough
 def test_workers_killed_while_they_start_are_replaced() -> None:
     with local_client(2) as client:
         for wait_s in (0.1, 1.0, 2.0, 0.5):

@@ -18,6 +18,8 @@ from workbench.session.files import write_atomically
 
 IDENTITY, CHUNK = b"workbench_campaign", b"workbench_chunk"
 """Keys in the metadata of the Parquet file: hash of the identity, number of the chunk."""
+CHUNK_FILES = r"\d{6,}\.(parquet|sha256)"
+"""Pattern of the names of both files."""
 
 
 def chunk_path(folder: Path, index: int) -> Path:

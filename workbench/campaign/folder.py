@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
+import re
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,16 +13,18 @@ import pandas as pd
 from pydantic import ValidationError
 
 from workbench.campaign.campaign_file import Campaign, CampaignFile
-from workbench.campaign.chunk_file import is_finished, read_chunk
+from workbench.campaign.chunk_file import CHUNK_FILES, is_finished, read_chunk
 from workbench.campaign.identity import Identity, difference, identity_of
 from workbench.campaign.kind import Chunk
-from workbench.campaign.sessions import SESSIONS
+from workbench.campaign.lock import CLIENT, WRITERS, client_lock, no_writer
+from workbench.campaign.sessions import FILES, SESSION_ASIDE, SESSION_FILES, SESSIONS
 from workbench.model.contents import read_file
 from workbench.model.errors import BadInputError
 from workbench.model.yamlfile import FileModel
-from workbench.session.files import write_atomically
+from workbench.session.files import temporary_pattern, write_atomically
 
-MANIFEST, CHUNKS = "campaign.json", "chunks"
+MANIFEST, CHUNKS, TABLES, PAGE = "campaign.json", "chunks", "tables", "report.html"
+"""Names in the folder: manifest, results of chunks, tables of the results, and their page."""
 LARGEST_BYTES = 2**26
 """Largest manifest: it contains the inputs of the campaign."""
 
@@ -74,38 +75,39 @@ def open_folder(path: Path, campaign: Campaign) -> Iterator[CampaignFolder]:
             written.
     """
     identity = identity_of(campaign)
-    manifest = path / MANIFEST
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        if not manifest.exists():
-            if any(path.iterdir()):
-                raise BadInputError(
-                    f"{path}: expected a new or empty folder or one of a campaign, found other files"
-                )
-            found = CampaignManifest(identity=identity, file=campaign.file, inputs=dict(campaign.inputs))
-            write_atomically(manifest, found.model_dump_json(indent=2).encode())
-        (path / CHUNKS).mkdir(exist_ok=True)
-        lock = os.open(manifest, os.O_RDWR | os.O_CLOEXEC)
-    except OSError as error:
-        raise BadInputError(f"{path}: cannot be used: {error.strerror or error}") from None
-    try:
-        _lock(lock, path)
-        if differs := difference(_read_identity(manifest), identity):
+    with ExitStack() as stack:
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            _refuse_other_files(path)  # before a file is written into it
+            stack.enter_context(client_lock(path))
+            _make(path, campaign, identity)
+        except OSError as error:
+            raise BadInputError(f"{path}: cannot be used: {error.strerror or error}") from None
+        if differs := difference(_read_identity(path / MANIFEST), identity):
             raise BadInputError(f"{path}: {differs}. Name another folder with -o, or delete this one")
         _remove_remains(path)
         yield CampaignFolder(path, campaign, identity)
         _remove_remains(path)
-    finally:
-        os.close(lock)
 
 
-def _lock(handle: int, path: Path) -> None:
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise BadInputError(f"{path}: another program is running this campaign") from None
-    except OSError as error:
-        raise BadInputError(f"{path}: cannot be locked: {error.strerror or error}") from None
+def _refuse_other_files(path: Path) -> None:
+    names = [one.name for one in path.iterdir()]
+    own = temporary_pattern(re.escape(MANIFEST))
+    others = [name for name in names if name not in {CLIENT, WRITERS} and not own.fullmatch(name)]
+    if others and MANIFEST not in names:
+        raise BadInputError(
+            f"{path}: expected a new or empty folder or one of a campaign, found other files, such as"
+            f" {min(others)}"
+        )
+
+
+def _make(path: Path, campaign: Campaign, identity: Identity) -> None:
+    """Write what the folder lacks."""
+    if not (path / MANIFEST).exists():
+        manifest = CampaignManifest(identity=identity, file=campaign.file, inputs=dict(campaign.inputs))
+        write_atomically(path / MANIFEST, manifest.model_dump_json(indent=2).encode())
+    (path / CHUNKS).mkdir(exist_ok=True)
+    (path / WRITERS).touch()
 
 
 def _read_identity(manifest: Path) -> Identity:
@@ -119,9 +121,32 @@ def _read_identity(manifest: Path) -> Identity:
         ) from None
 
 
+REMAINS = {
+    "": temporary_pattern("|".join(map(re.escape, (MANIFEST, PAGE)))),
+    CHUNKS: temporary_pattern(CHUNK_FILES),
+    FILES: temporary_pattern(SESSION_FILES),
+    TABLES: temporary_pattern(r"[\w-]+\.(csv|parquet)"),
+}
+"""Names of temporary files by their folder in that of the campaign."""
+
+
 def _remove_remains(path: Path) -> None:
-    """Remove files and sessions that a killed worker did not finish; their names begin with a dot."""
-    for remains in (path / CHUNKS).glob(".*"):
-        remains.unlink(missing_ok=True)
-    for remains in (path / SESSIONS).glob(".*/"):
-        shutil.rmtree(remains)
+    """Remove what killed programs did not finish: temporary files, and parts of sessions.
+
+    While a worker writes, such as one of an earlier program at the same scheduler, nothing is removed. Files
+    with other names than the campaign's own stay.
+    """
+    with suppress(OSError), no_writer(path) as is_quiet:
+        if not is_quiet:
+            return
+        for folder, own in REMAINS.items():
+            for remains in _named(path / folder, own):
+                with suppress(OSError):
+                    remains.unlink()
+        for remains in _named(path / SESSIONS, SESSION_ASIDE):
+            shutil.rmtree(remains, ignore_errors=True)
+
+
+def _named(folder: Path, own: re.Pattern[str]) -> list[Path]:
+    """Entries of a folder with names of a pattern; none if there is no such folder."""
+    return [one for one in folder.glob(".*") if own.fullmatch(one.name)]

@@ -90,7 +90,8 @@ class Work(FileModel, ABC):
             folder: folder of the campaign, for a kind that keeps more than rows.
 
         Raises:
-            BadInputError: the work cannot be done for any item.
+            BadInputError: the work cannot be done.
+            StoppedError: an external cause stopped an item; the chunk is not finished.
         """
 
     @abstractmethod

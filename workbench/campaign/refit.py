@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -42,7 +43,7 @@ from workbench.session.capture_table import CALIBRATION_TABLE
 from workbench.session.capture_table_check import check_captures
 from workbench.session.index import SessionSelection, indexed_sessions
 from workbench.session.index import Verdict as FitVerdict
-from workbench.session.manifest import load_session_rig
+from workbench.session.manifest import MANIFEST, load_session_rig
 
 SESSIONS, RIG = "sessions", "rig"
 
@@ -92,9 +93,18 @@ class Refit(Work):
         return len(_paths(inputs))
 
     def run(self, inputs: Inputs, chunk: Chunk, folder: Path) -> pd.DataFrame:
-        """One row per session: its calibration before and now, and their largest difference."""
+        """One row per session: its calibration before and now, and their largest difference.
+
+        Raises:
+            BadInputError: this worker does not see a session; that is no result of the session.
+        """
         rig = None if self.rig is None else rig_of(inputs[RIG])
         paths = _paths(inputs)[chunk.items.start : chunk.items.stop]
+        if missing := [path for path in paths if not (path / MANIFEST).is_file()]:
+            raise BadInputError(
+                f"worker {os.uname().nodename}: {missing[0]}: expected a session, found none; share the"
+                " folder of sessions with all workers under this path"
+            )
         rows = [self._row(path, rig) for path in paths]
         return pd.DataFrame(rows).astype(TYPES)
 

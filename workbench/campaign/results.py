@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from workbench.campaign.folder import CampaignFolder
+from workbench.campaign.folder import PAGE, TABLES, CampaignFolder
 from workbench.campaign.kind import Summary
 from workbench.model.errors import BadInputError
 from workbench.report.document import Document, Fact, Section, Verdict
 from workbench.report.document_files import write_document
 from workbench.report.frames import frame_of_table
 from workbench.session.files import write_atomically
-
-TABLES, PAGE = "tables", "report.html"
 
 
 def summarise(folder: CampaignFolder) -> Summary:

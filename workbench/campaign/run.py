@@ -36,8 +36,8 @@ def run_chunks(
 
     Raises:
         BadInputError: a worker runs another version, or the work cannot be done.
-        StoppedError: a file cannot be written, every worker that computes some chunk dies, or the scheduler
-            ends.
+        StoppedError: a file cannot be written, an external cause stopped an item, every worker
+            that computes some chunk dies, or the scheduler ends.
     """
     from distributed import KilledWorker, as_completed
     from distributed.client import FutureCancelledError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections import Counter
 from collections.abc import Iterable
@@ -29,7 +30,15 @@ from workbench.campaign.session_rows import (
 from workbench.devices.registry import check_driver, whole_bench
 from workbench.model.arrays import FloatArray
 from workbench.model.chart import Axis, Chart, Series
-from workbench.model.errors import BadInputError, RigNotReadyError, StoppedError, WorkbenchError
+from workbench.model.errors import (
+    BadInputError,
+    LimitFailedError,
+    RigNotReadyError,
+    StoppedError,
+    WorkbenchError,
+)
+from workbench.model.event import SessionFinished
+from workbench.model.number_text import counted
 from workbench.model.rig_text import rig_text_of
 from workbench.model.table import PERCENT
 from workbench.model.yamlfile import standalone_text
@@ -40,14 +49,22 @@ from workbench.procedure.engine.run import Invocation, run
 from workbench.report.certificate.session_record import read_session
 from workbench.session.caller import now
 from workbench.session.files import write_atomically
+from workbench.session.manifest import MANIFEST
 
 RIG, PROCEDURES = "rig", "procedures"
 SESSIONS, FILES = "sessions", "files"
 """Folders in that of the campaign: the sessions, and the files that they were run with."""
+SESSION_FILES = r"(rig-\d{6,}|procedure-\d+)\.yaml"
+"""Pattern of the names of these files."""
+SESSION_ASIDE = re.compile(r"\.\d{6,}-[A-Za-z0-9_-]+-[0-9a-f]{32}")
+"""Names of folders in which sessions run."""
 BLOCK, SEED = "emulator", "seed"
 """Block and key of a rig file that draw the virtual sensor."""
 MOST_RESUMED = 5
-"""Largest number of times that a session is resumed whose lasers ended their lease: the computer was busy."""
+"""Largest number of times that a session is resumed after a device did not answer in time, as on a busy
+computer."""
+RESULTS = (0, LimitFailedError.exit_code)
+"""Exit codes of sessions that are results: finished, or ended by a limit on the sensor."""
 SHARES = 101
 """Number of points of a chart of shares."""
 
@@ -146,45 +163,68 @@ def _run_aside(plan: Plan, session: Path) -> None:
 
     It needs no process of its own: the guardian of the virtual lasers is one, the bench answers its own
     prompts, and signals are left to the worker.
-    """
-    aside = session.parent / f".{session.name}-{uuid4().hex}"
-    caller = Invocation(operator="campaign", command="workbench campaign", created=now())
-    own = aside / session.name
-    try:
-        run(plan, own, (), caller, _not_stopped)
-    except WorkbenchError as error:
-        _resumed(own, caller, error)
-    try:
-        own.rename(session)
-    except OSError:
-        if not session.exists():  # another worker was faster, with the same result
-            raise
-    shutil.rmtree(aside)
-
-
-def _resumed(session: Path, caller: Invocation, error: WorkbenchError) -> None:
-    """Resume a session while the lasers' lease ends, as on a busy computer; other ends are results.
 
     Raises:
-        StoppedError: a file cannot be written.
+        StoppedError: the session did not finish; nothing of it is kept.
+        BadInputError: the procedures cannot be run.
     """
-    for _ in range(MOST_RESUMED):
-        if isinstance(error, StoppedError):
-            raise error
-        if not isinstance(error, RigNotReadyError):
-            return
+    aside = session.parent / f".{session.name}-{uuid4().hex}"
+    own = aside / session.name
+    try:
+        _finish(plan, own)
         try:
-            resume(session, (), caller, _not_stopped)
-        except WorkbenchError as again:
-            error = again
+            own.rename(session)
+        except OSError:
+            if not session.exists():  # another worker was faster, with the same result
+                raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _finish(plan: Plan, session: Path) -> None:
+    """Run a session to its end; it is resumed while its devices do not answer in time.
+
+    Raises:
+        StoppedError: the session did not finish, by an external cause.
+        BadInputError: the procedures cannot be run.
+    """
+    caller = Invocation(operator="campaign", command="workbench campaign", created=now())
+    why = ""
+    for resumed in range(MOST_RESUMED + 1):
+        try:
+            if (session / MANIFEST).exists():
+                resume(session, (), caller, _not_stopped)
+            else:
+                run(plan, session, (), caller, _not_stopped)
+        except LimitFailedError:
+            return  # a result of the sensor
+        except BadInputError as error:
+            raise BadInputError(f"session {session.name}: {error}") from None
+        except WorkbenchError as error:
+            times = f", resumed {counted(resumed, 'time')}," if resumed else ""
+            why = f"session {session.name}{times} did not finish, and is no result: {error}"
+            if not isinstance(error, RigNotReadyError):
+                break
         else:
             return
+    # Not from the error: virtual lasers that may be on must not end the command as real ones do.
+    raise StoppedError(why)
 
 
 def _result(session: Path) -> dict[str, object]:
-    """Row of a session that has ended."""
+    """Row of a session that has finished, or has failed a limit.
+
+    Raises:
+        BadInputError: it has not, or is damaged.
+    """
     row = row_of(session.name)
     found = read_session(session)
+    ends = [one.event for one in found.records[-1:] if isinstance(one.event, SessionFinished)]
+    if not ends or ends[0].exit_code not in RESULTS:
+        raise BadInputError(
+            f"{session}: expected a session that finished or failed a limit, got one that is"
+            f" {found.status.state}: {found.status.why}; delete this folder, and the session runs again"
+        )
     row["serial"] = found.rig.serial
     if found.fit is not None:
         row |= {"now": found.fit.verdict, "rms_px_now": found.fit.rms_px}

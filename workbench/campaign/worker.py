@@ -9,6 +9,7 @@ from workbench.campaign.campaign_file import Campaign
 from workbench.campaign.chunk_file import is_finished, write_chunk
 from workbench.campaign.folder import CHUNKS, CampaignManifest
 from workbench.campaign.identity import Identity, check_environment, difference, identity_of
+from workbench.campaign.lock import writer_lock
 from workbench.model.errors import BadInputError
 
 
@@ -24,16 +25,19 @@ def run_chunk(manifest: str, folder: str, index: int) -> int:
         `index`.
 
     Raises:
-        BadInputError: this worker runs another version or with several threads, or the work cannot be done.
+        BadInputError: this worker runs another version or with several threads, does not see the folder, or
+            the work cannot be done.
+        StoppedError: an external cause stopped the work, which is not finished.
         OSError: the file could not be written.
     """
     check_environment()
     campaign, identity = _read(manifest)
     chunks = Path(folder) / CHUNKS
     chunk = campaign.chunk_at(index)
-    if not is_finished(chunks, chunk, identity.sha256):
-        frame = campaign.file.work.run(campaign.inputs, chunk, Path(folder))
-        write_chunk(chunks, chunk, identity.sha256, frame)
+    with writer_lock(Path(folder)):
+        if not is_finished(chunks, chunk, identity.sha256):
+            frame = campaign.file.work.run(campaign.inputs, chunk, Path(folder))
+            write_chunk(chunks, chunk, identity.sha256, frame)
     return index
 
 

@@ -31,7 +31,7 @@ from workbench.cli.option_types import (
 )
 from workbench.cli.record_commands import export, history, report_, use
 from workbench.cli.repair import repair
-from workbench.cli.stdio import fill_closed_streams
+from workbench.cli.stdio import accept_any_bytes, fill_closed_streams
 from workbench.cli.stopping import ignore_signals, stop_at_once
 
 app = typer.Typer(
@@ -388,6 +388,7 @@ def main() -> None:
     # Before numpy loads: for the small matrices of a fit a second thread costs more than it gains.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     fill_closed_streams()
+    accept_any_bytes()
     stop_at_once()
     print_warnings_as_notes()
     try:

@@ -62,6 +62,8 @@ class Screen:
     """Whether to print the tables of fits, and all notes."""
     operator: str | None = None
     """Name of the person at the bench, for the record; None: the account."""
+    stop: StopAfterCapture | None = None
+    """Stop requests of a command that has work after the session; None: those of the session alone."""
 
 
 @dataclass(frozen=True)
@@ -147,28 +149,29 @@ def _repairable(
     added_mm: Sequence[float] = (),
 ) -> Iterator[SessionInterface]:
     """`session_interface`, then the verdict; lets a person repair a refused calibration at once."""
+    stop = screen.stop or StopAfterCapture()
     try:
-        with session_interface(session_dir, plan, screen, kept, added_mm) as ui:
+        with session_interface(session_dir, plan, screen, stop, kept, added_mm) as ui:
             yield ui
     except LimitFailedError as refused:
         show_verdict(session_verdict(session_dir, refused))
-        if not _repaired(session_dir, screen):
+        if not _repaired(session_dir, screen, stop):
             raise VerdictShownError(str(refused)) from refused
         return
     show_verdict(session_verdict(session_dir, None))
 
 
-def _repaired(session_dir: Path, screen: Screen) -> bool:
+def _repaired(session_dir: Path, screen: Screen, stop: StopAfterCapture) -> bool:
     """Whether a person has chosen a repair, which has then been done."""
     fit = refused_fit(session_dir)
     if fit is None:
         return False
-    stop, console = StopAfterCapture(), Console(stderr=True, markup=False)
+    console = Console(stderr=True, markup=False)
     person = choose_operator(screen.no_input, console, lambda: stop.reason, nullcontext)
     repair = ask_for_repair(fit, person)
     if repair is None:
         return False
-    resume_session(session_dir, None, screen, repair)
+    resume_session(session_dir, None, replace(screen, stop=stop), repair)
     return True
 
 
@@ -177,6 +180,7 @@ def session_interface(
     session_dir: Path,
     plan: Plan,
     screen: Screen,
+    stop: StopAfterCapture,
     kept: Mapping[str, int] = NONE_KEPT,
     added_mm: Sequence[float] = (),
 ) -> Iterator[SessionInterface]:
@@ -186,6 +190,7 @@ def session_interface(
         session_dir: folder of the session.
         plan: rig and procedures.
         screen: options.
+        stop: stop requests.
         kept: numbers of captures of the placements that are not captured again, by key.
         added_mm: standoffs that repairs have added, for the prompts of an answers file.
     """
@@ -193,7 +198,6 @@ def session_interface(
     if watched is not None:
         viewer_executable()  # missing, it is named before the bench is opened
     console = Console(stderr=True, markup=False)
-    stop = StopAfterCapture()
     script = None
     if screen.answers is not None:
         script = ScriptedOperator.load(screen.answers, plan.prompts(added_mm), NO_OPERATOR)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import stat
 from contextlib import suppress
 from pathlib import Path
 
 from workbench.model.errors import BadInputError, StoppedError
+
+RANDOM_BYTES = 4
+"""Random part of the name of a temporary file."""
 
 
 def write_output(path: Path, content: bytes) -> None:
@@ -61,7 +65,7 @@ def write_atomically(path: Path, content: bytes) -> None:
     Raises:
         OSError: the file could not be written and `path` is unchanged, or its folder could not be synced.
     """
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(RANDOM_BYTES)}")
     # As any program creates a file: its mode follows from the umask.
     handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
     try:
@@ -76,6 +80,15 @@ def write_atomically(path: Path, content: bytes) -> None:
         temporary.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def temporary_pattern(names: str) -> re.Pattern[str]:
+    """Pattern of the temporary files of `write_atomically`, which a kill leaves.
+
+    Args:
+        names: pattern of the names of the files that were written.
+    """
+    return re.compile(rf"\.(?:{names})\.[0-9a-f]{{{2 * RANDOM_BYTES}}}")
 
 
 def sync_folder(folder: Path) -> None:

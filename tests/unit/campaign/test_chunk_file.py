@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from workbench.campaign.chunk_file import chunk_path, hash_path, is_finished, read_chunk, write_chunk
+from workbench.campaign.chunk_file import (
+    CHUNK_FILES,
+    chunk_path,
+    hash_path,
+    is_finished,
+    read_chunk,
+    write_chunk,
+)
 from workbench.campaign.kind import Chunk
 from workbench.model.errors import BadInputError
 
@@ -20,6 +29,14 @@ def test_a_chunk_reads_back_equal(tmp_path: Path) -> None:
     write_chunk(tmp_path, CHUNK, "abc", FRAME)
     pd.testing.assert_frame_equal(read_chunk(tmp_path, CHUNK, "abc"), FRAME, check_exact=True)
     assert is_finished(tmp_path, CHUNK, "abc")
+
+
+@pytest.mark.parametrize("path_of", [chunk_path, hash_path])
+@pytest.mark.parametrize("index", [0, 9_999_999])
+def test_names_have_the_pattern_by_which_remains_are_found(
+    path_of: Callable[[Path, int], Path], index: int
+) -> None:
+    assert re.fullmatch(CHUNK_FILES, path_of(Path(), index).name)
 
 
 def test_equal_results_give_equal_files(tmp_path: Path) -> None:

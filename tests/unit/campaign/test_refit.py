@@ -92,6 +92,14 @@ def test_a_session_that_was_edited_is_not_fitted_and_named(tmp_path: Path, edite
     assert pd.isna(row["rms_px_now"])
 
 
+def test_a_worker_that_does_not_see_the_sessions_has_no_result(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "data/sessions" / UNFITTED, tmp_path / "sessions" / UNFITTED)
+    campaign = campaign_of(tmp_path)
+    (tmp_path / "sessions").rename(tmp_path / "elsewhere")
+    with pytest.raises(BadInputError, match=rf"worker .*sessions/{UNFITTED}: expected a session, found none"):
+        frames_of(campaign)
+
+
 def test_a_query_without_sessions_is_refused(archive: Path) -> None:
     with pytest.raises(BadInputError, match=r"campaign\.yaml:6: work\.sessions: .*none is selected"):
         campaign_of(archive, "  until: 2020-01-01\n")

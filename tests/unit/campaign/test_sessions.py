@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -9,13 +10,23 @@ import pandas as pd
 import pytest
 
 from tests.crash.short import CALIBRATION, ROOT, write_files
-from tests.support.campaigns import frames_of, write_campaign
+from tests.support.campaigns import as_worker, frames_of, write_campaign
 from workbench.campaign.campaign_file import Campaign, load_campaign
-from workbench.campaign.folder import open_folder
-from workbench.campaign.sessions import SESSIONS
+from workbench.campaign.folder import MANIFEST, open_folder
+from workbench.campaign.sessions import FILES, MOST_RESUMED, SESSION_ASIDE, SESSION_FILES, SESSIONS
+from workbench.campaign.worker import run_chunk
+from workbench.cli.exit import report
 from workbench.model.calibration import load_calibration
-from workbench.model.errors import BadInputError, RigNotReadyError
+from workbench.model.errors import (
+    AnswerNeededError,
+    BadInputError,
+    LaserOffNotConfirmedError,
+    LeaseEndedError,
+    StoppedError,
+    WorkbenchError,
+)
 from workbench.model.event import FitFinished, SessionFinished
+from workbench.procedure.engine import resume as resumption
 from workbench.procedure.engine import run as engine
 from workbench.procedure.engine.context import Context
 from workbench.procedure.engine.plan import Plan
@@ -34,6 +45,7 @@ work:
   sensors: 2
   chunk: 2
 """
+ONE = TEXT.replace("sensors: 2", "sensors: 1")
 
 
 def campaign_of(folder: Path, text: str = TEXT, procedure: str = CALIBRATION) -> Campaign:
@@ -62,6 +74,7 @@ def test_each_session_is_whole_and_of_another_sensor(done: tuple[Path, Campaign,
         assert row.rms_px_now == calibration.fit.rms_px
         assert row.relative_sd_now == calibration.validity.max_relative_range_sd
     assert rows["serial"].nunique() == rows["rms_px_now"].nunique() == 2
+    assert all(re.fullmatch(SESSION_FILES, path.name) for path in (folder / FILES).iterdir())
 
 
 def test_a_repeated_chunk_has_the_same_rows(done: tuple[Path, Campaign, pd.DataFrame]) -> None:
@@ -78,7 +91,7 @@ def test_a_repeated_chunk_has_the_same_rows(done: tuple[Path, Campaign, pd.DataF
 def test_a_refused_session_has_the_reason(tmp_path: Path) -> None:
     campaign = campaign_of(
         tmp_path,
-        TEXT.replace("sensors: 2", "sensors: 1"),
+        ONE,
         CALIBRATION.replace("max_relative_range_sd: 0.5", "max_rms_px: 0.0001"),
     )
     (rows,) = frames_of(campaign, tmp_path)
@@ -91,32 +104,87 @@ def test_a_refused_session_has_the_reason(tmp_path: Path) -> None:
     assert summary.tables[1].records()[0]["reason"] == rows["reason"][0]
 
 
+class Disturbed:
+    """Steps of sessions of which the first ones end with an error, as the engine journals it."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, error: WorkbenchError, ends: int) -> None:
+        self.error, self.ends, self.runs = error, ends, 0
+        self.steps = engine.run_steps
+        monkeypatch.setattr(engine, "run_steps", self)
+        monkeypatch.setattr(resumption, "run_steps", self)
+
+    def __call__(self, plan: Plan, context: Context) -> None:
+        assert SESSION_ASIDE.fullmatch(context.session_dir.parent.name), "its remains would stay"
+        self.runs += 1
+        if self.runs <= self.ends:
+            context.emit(SessionFinished(exit_code=self.error.exit_code, message=str(self.error)))
+            raise self.error
+        self.steps(plan, context)
+
+
 def test_a_session_on_a_busy_computer_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    steps, ended = engine.run_steps, list[Path]()
-
-    def disturbed(plan: Plan, context: Context) -> None:
-        if not ended:
-            ended.append(context.session_dir)
-            context.emit(SessionFinished(exit_code=4, message="the lease ended"))
-            raise RigNotReadyError("the lease ended")
-        steps(plan, context)
-
-    monkeypatch.setattr("workbench.procedure.engine.run.run_steps", disturbed)
-    campaign = campaign_of(tmp_path, TEXT.replace("sensors: 2", "sensors: 1"))
+    disturbed = Disturbed(monkeypatch, LeaseEndedError("the lease ended"), MOST_RESUMED)
+    campaign = campaign_of(tmp_path, ONE)
     (rows,) = frames_of(campaign, tmp_path)
-    assert len(ended) == 1
+    assert disturbed.runs == MOST_RESUMED + 1
     assert rows["now"].tolist() == ["accepted"]
 
 
-def test_parts_of_sessions_are_removed(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("error", "ends", "expected", "words"),
+    [
+        (
+            LeaseEndedError("lease over"),
+            MOST_RESUMED + 1,
+            StoppedError,
+            "5 times, did not finish.*lease over",
+        ),
+        (
+            StoppedError("no space left"),
+            1,
+            StoppedError,
+            "000000-short did not finish.*no space left",
+        ),
+        (LaserOffNotConfirmedError("off?"), 1, StoppedError, "000000-short did not finish.*off"),
+        (AnswerNeededError("which card"), 1, StoppedError, "000000-short did not finish.*which card"),
+        (BadInputError("no captures"), 1, BadInputError, "session 000000-short: no captures"),
+    ],
+)
+def test_a_session_that_did_not_finish_is_no_result(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    done: tuple[Path, Campaign, pd.DataFrame],
+    error: WorkbenchError,
+    ends: int,
+    expected: type[WorkbenchError],
+    words: str,
+) -> None:
+    """The chunk is not written, nothing of the session is kept, and the next run does it again."""
+    disturbed = Disturbed(monkeypatch, error, ends)
     campaign = campaign_of(tmp_path)
-    left = tmp_path / "out" / SESSIONS / ".000000-short-0" / "000000-short"
-    with open_folder(tmp_path / "out", campaign):
-        left.mkdir(parents=True)
-    assert not list((tmp_path / "out" / SESSIONS).iterdir()), "at the end"
-    left.mkdir(parents=True)  # as of a client that was killed
-    with open_folder(tmp_path / "out", campaign):
-        assert not list((tmp_path / "out" / SESSIONS).iterdir()), "at the beginning"
+    as_worker(monkeypatch)
+    with open_folder(tmp_path / "out", campaign) as folder:
+        manifest = (folder.path / MANIFEST).read_text()
+        with pytest.raises(expected, match=words) as caught:
+            run_chunk(manifest, str(folder.path), 0)
+        assert report(caught.value) == expected.exit_code, "virtual lasers that may be on are no danger"
+        assert folder.missing() == campaign.chunks
+        assert not list((folder.path / SESSIONS).iterdir())
+        run_chunk(manifest, str(folder.path), 0)
+        (rows,) = folder.frames()
+    assert disturbed.runs == ends + 2
+    pd.testing.assert_frame_equal(rows, done[2])
+
+
+def test_a_folder_of_an_unfinished_session_is_no_result(
+    tmp_path: Path, done: tuple[Path, Campaign, pd.DataFrame]
+) -> None:
+    folder, campaign, _ = done
+    shutil.copytree(folder / SESSIONS, tmp_path / SESSIONS)
+    journal = tmp_path / SESSIONS / "000001-short" / "journal.jsonl"
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:-1]))
+    with pytest.raises(BadInputError, match=r"000001-short: expected .* got one that is interrupted"):
+        frames_of(campaign, tmp_path)
 
 
 def test_real_lasers_are_refused(tmp_path: Path) -> None:

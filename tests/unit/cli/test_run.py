@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from tests.crash.short import CALIBRATION, write_files
 from tests.support.command_line import Run, refused
 from tests.support.reference_session import REFERENCE
+from workbench.calibration.selection import model_terms
 from workbench.cli.run import replay_text
+from workbench.model.errors import StoppedError
+from workbench.model.prompt import Answer, Prompt
 from workbench.procedure.engine.repair import Repair, kept_captures
 from workbench.procedure.engine.resume import files_now, plan_of
 from workbench.report.certificate.identity import operators
@@ -49,6 +57,35 @@ def test_a_name_that_is_none_is_refused(workbench: Run, tmp_path: Path, name: st
     outcome = workbench("run", procedure, "--rig", WEBCAM_RIG, "--operator", name, "--sessions", tmp_path)
     refused(outcome, 2, "--operator")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_request_to_stop_during_the_fit_holds_for_the_question_after_it(
+    workbench: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The fit is refused; a person would be asked for a repair, and is not."""
+    rig, procedure = write_files(
+        tmp_path, CALIBRATION.replace("max_relative_range_sd: 0.5", "max_rms_px: 0.0001")
+    )
+    reasons = list[str | None]()
+
+    class Person:
+        def __init__(self, stopping: Callable[[], str | None]) -> None:
+            self.stopping = stopping
+
+        def ask(self, prompt: Prompt) -> Answer:
+            reasons.append(self.stopping())
+            raise StoppedError("stopped")
+
+    def fit(*arguments: Any) -> object:
+        os.kill(os.getpid(), signal.SIGINT)
+        return fit_calibration(*arguments)
+
+    fit_calibration = model_terms.fit_calibration
+    monkeypatch.setattr(model_terms, "fit_calibration", fit)
+    monkeypatch.setattr("workbench.cli.run.choose_operator", lambda *given: Person(given[2]))
+    outcome = workbench("run", procedure, "--rig", rig, "--sessions", tmp_path / "s", "--no-view")
+    assert outcome.code == 3
+    assert reasons == ["stopped by SIGINT"]
 
 
 def test_a_replay_counts_the_captures_that_are_kept() -> None:

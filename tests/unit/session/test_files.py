@@ -9,7 +9,13 @@ from pathlib import Path
 import pytest
 
 from workbench.model.errors import BadInputError, StoppedError
-from workbench.session.files import check_output, write_atomically, write_output, write_record
+from workbench.session.files import (
+    check_output,
+    temporary_pattern,
+    write_atomically,
+    write_output,
+    write_record,
+)
 
 
 def test_an_interrupted_write_leaves_the_old_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -23,6 +29,24 @@ def test_an_interrupted_write_leaves_the_old_content(tmp_path: Path, monkeypatch
     with pytest.raises(KeyboardInterrupt):
         write_atomically(path, b"new")
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == {"a": b"old"}
+
+
+def test_the_pattern_of_temporary_files_is_that_of_their_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace, names = Path.replace, list[str]()
+
+    def replaced(self: Path, target: Path) -> Path:
+        names.append(self.name)
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", replaced)
+    write_atomically(tmp_path / "7.csv", b"")
+    (name,) = names
+    assert temporary_pattern(r"\d\.csv").fullmatch(name)
+    assert temporary_pattern(r"8\.xml|7\.csv").fullmatch(name)
+    assert not temporary_pattern(r"\d\.parquet").fullmatch(name)
+    assert not temporary_pattern(r"\d\.csv").fullmatch("7.csv")
 
 
 def test_an_existing_file_is_replaced_whole_and_readable_by_all(tmp_path: Path) -> None:

@@ -33,6 +33,16 @@ from workbench.session.manifest import (
 )
 
 
+class ChangedFilesError(BadInputError):
+    """Rig, procedures or versions have changed since the session began, and no reason accepts it."""
+
+    def __init__(self, session_dir: Path, changes: Sequence[str]) -> None:
+        self.session_dir = session_dir
+        self.changes = tuple(f"{session_dir}: {change}" for change in changes)
+        advice = 'undo the changes, or add --accept-changes "reason why they are harmless"'
+        super().__init__("\n".join((*self.changes, advice)))
+
+
 def resume(
     session_dir: Path,
     consumers: Sequence[ev.Consumer],
@@ -57,18 +67,16 @@ def resume(
         repair: decisions about placements, which are journalled first; a finished session can be repaired.
 
     Raises:
-        BadInputError: `session_dir` is no session; the session is finished or running. Files or versions have
-            changed, the repair names no placement of the session, or frames to restore are missing.
+        ChangedFilesError: files or versions have changed.
+        BadInputError: `session_dir` is no session; the session is finished or running. The repair names no
+            placement of the session, or frames to restore are missing.
         WorkbenchError: see `run`.
     """
     began_with = load_manifest(session_dir)
     _check_unfinished(session_dir, finished_too=repair is not None)
     now, changes = files_now(session_dir, began_with)
     if changes and accepted_because is None:
-        raise BadInputError(
-            "\n".join(f"{session_dir}: {change}" for change in changes)
-            + '\nundo the changes, or add --accept-changes "reason why they are harmless"'
-        )
+        raise ChangedFilesError(session_dir, changes)
     plan = plan_of(session_dir, now)
     with ExitStack() as stack:
         journal, before = Journal.reopen(session_dir)
