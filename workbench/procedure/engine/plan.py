@@ -11,6 +11,7 @@ from workbench.devices.registry import check_driver, load_bench_rig
 from workbench.model.errors import BadInputError
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
+from workbench.optics.emitters import emitter_problems
 from workbench.procedure.engine.existing_calibration import GIVES, ExistingCalibration
 from workbench.procedure.engine.procedure_file import Procedure, load_procedure
 from workbench.procedure.engine.prompts import safety_prompt
@@ -66,7 +67,8 @@ class Plan:
 
         Raises:
             BadInputError: a step lacks what it needs or exports a calibration beside an existing one, two
-                procedures have the same name, or the driver is unknown.
+                procedures have the same name, the driver is unknown, or spots of an emitter cannot be
+                assigned.
         """
         names = [p.procedure for p in procedures]
         for path, name in zip(procedure_paths, names, strict=True):
@@ -80,6 +82,8 @@ class Plan:
         _check_order(procedures, procedure_paths, set() if calibration is None else {GIVES})
         _check_placements(rig, procedures, procedure_paths)
         check_driver(rig)
+        if (found := next(emitter_problems(rig), None)) is not None:
+            raise found[1]
         return cls(rig, rig_path, tuple(procedures), tuple(procedure_paths), calibration)
 
     def new_session(self, sessions: Path) -> Path:
