@@ -94,10 +94,26 @@ def _in_picture(rig: Rig, observation: Observation) -> Observation | Rejected:
     return observation
 
 
-def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
-    """Band of the image in which the laser's spots lie, by the rig file: along the image of its baseline."""
+def prior_scanlines(rig: Rig, head_deg: float = 0.0) -> list[Scanline]:
+    """Bands of all lasers of a rig, see `prior_scanline`."""
+    return [prior_scanline(rig, laser, head_deg) for laser in rig.lasers]
+
+
+def prior_scanline(rig: Rig, laser: LaserSpec, head_deg: float = 0.0) -> Scanline:
+    """Band of the image in which the laser's spots lie, by the rig file: along the image of its baseline.
+
+    Args:
+        rig: rig file.
+        laser: one of its lasers.
+        head_deg: reading of the scanning head, if it turns the laser.
+    """
     from workbench.spots import Scanline
 
+    if rig.head is not None and laser.id == rig.head.laser:
+        # Imported here: rigs without a head do not need it.
+        from workbench.optics.turned_laser import turned_laser
+
+        laser = turned_laser(rig, head_deg)
     camera = rig.camera
     x, y = laser.x_mm.value, laser.y_mm.value
     du, dv = x / (x**2 + y**2) ** 0.5, y / (x**2 + y**2) ** 0.5

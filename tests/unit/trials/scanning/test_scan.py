@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,8 @@ from scipy.stats import chi2
 
 from tests.support.rigs import thesis_rig
 from tests.support.running import running
-from tests.support.scanned_head import SimulatedHead
+from tests.support.scanned_head import SimulatedHead, inclined_rig
+from workbench.calibration.data.observations import Observation
 from workbench.devices.placed_by_hand import ByHandBlock, PlacedByHand
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError, LimitFailedError, RigNotReadyError
@@ -23,7 +24,9 @@ from workbench.model.prior import exactly
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
 from workbench.model.yamlfile import load_yaml_model
+from workbench.session.state import PlacementCaptures
 from workbench.trials.scanning.calibrate_step import CalibrateHeadStep
+from workbench.trials.scanning.moves import sweep
 from workbench.trials.scanning.scan_step import ScanStep
 from workbench.trials.scanning.use_step import UseHeadStep
 
@@ -172,6 +175,39 @@ def test_a_session_that_goes_on_has_the_same_results(done: Done, tmp_path: Path)
         SCAN.run(session.context, "c.2")
     assert files(tmp_path / "s") == files(done.folder / "s")
     assert finished(tuple(session.records)) == finished(done.records)
+
+
+def test_spots_of_an_inclined_beam_are_searched_where_the_head_is_turned(tmp_path: Path) -> None:
+    """Turned by 30 degrees they are beyond the band of the reading 0; the same in a replay."""
+    rig, angles_deg = inclined_rig(load_rig(RIG)), (0.0, -30.0)
+    placed = Placement(key="c.1/400mm", standoff_mm=400.0, head_deg=0.0)
+    with running(tmp_path, rig) as session:
+        context = session.context
+        context.confirm_safety()
+        context.bench.target.place(placed)
+        context.pairs.set_exposure(placed, lambda key: None)
+        captures = sweep(context, placed, angles_deg, 1)
+        assert [isinstance(one.found, Observation) for one in captures] == [True, True]
+        taken = {one.key: one for one in context.captures}
+        context.pairs.replayed = PlacementCaptures(ev.TargetPlaced(placement=placed), None, taken)
+        assert sweep(context, placed, angles_deg, 1) == captures
+
+
+def test_a_driver_without_an_encoder_is_named(tmp_path: Path) -> None:
+    placed = Placement(key="c.1/400mm", standoff_mm=400.0, head_deg=0.0)
+    with running(tmp_path, low_rig()) as session:
+        context = session.context
+
+        class NoEncoder:
+            def place(self, placement: Placement) -> Placement:
+                return placement.model_copy(update={"head_deg": None})
+
+            def close(self) -> None:
+                pass
+
+        context.bench = replace(context.bench, target=NoEncoder())
+        with pytest.raises(RigNotReadyError, match="must return head_deg"):
+            sweep(context, placed, (0.0,), 1)
 
 
 def test_a_scan_with_the_head_of_an_earlier_session(done: Done, tmp_path: Path) -> None:
