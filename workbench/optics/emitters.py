@@ -1,8 +1,8 @@
 """Beams of one emitter, which are on together: their order along their row assigns their spots.
 
-With (x, y) the origin of a beam and (tx, ty) its direction, its spot on a wall at the depth z is
-(x, y) + z (tx, ty), and its undistorted image is that divided by z. The distance of two spots along the row
-is linear in z. Where it has the same sign at both ends of a reach, it has this sign everywhere between, on
+A beam with the origin (x, y) and the direction (tx, ty) has its spot on a wall at the depth z at
+(x, y) + z (tx, ty). The undistorted image is that divided by z. The distance of two spots along the row is
+linear in z. Where it has the same sign at both ends of a reach, it has this sign everywhere between, on
 the wall and in the image.
 """
 

@@ -67,8 +67,8 @@ class Plan:
 
         Raises:
             BadInputError: a step lacks what it needs or exports a calibration beside an existing one, two
-                procedures have the same name, the driver is unknown, or spots of an emitter cannot be
-                assigned.
+                procedures have the same name, two steps write the same file, the driver is unknown, or
+                spots of an emitter cannot be assigned.
         """
         names = [p.procedure for p in procedures]
         for path, name in zip(procedure_paths, names, strict=True):
@@ -81,6 +81,7 @@ class Plan:
             calibration.refuse_export(procedures, procedure_paths)
         _check_order(procedures, procedure_paths, set() if calibration is None else {GIVES})
         _check_placements(rig, procedures, procedure_paths)
+        _check_written(procedures, procedure_paths)
         check_driver(rig)
         if (found := next(emitter_problems(rig), None)) is not None:
             raise found[1]
@@ -146,6 +147,21 @@ def _check_placements(rig: Rig, procedures: Sequence[Procedure], paths: Sequence
                 raise BadInputError(
                     f"{path}: steps[{index - 1}]: {step.step}: expected distinct placements, got"
                     f" {doubled[0].rpartition('/')[2]} more than once; take more readings there instead"
+                )
+
+
+def _check_written(procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:
+    """Refuse a step that would overwrite a file of an earlier step."""
+    writers: dict[str, str] = {}
+    for path, procedure in zip(paths, procedures, strict=True):
+        for index, step in enumerate(procedure.steps):
+            if (file := step.writes) is None:
+                continue
+            where = f"{path}: steps[{index}]: {step.step}"
+            if (first := writers.setdefault(file, where)) != where:
+                raise BadInputError(
+                    f"{where}: file: expected a file of its own, got {file}, which is that of {first};"
+                    " name another file"
                 )
 
 

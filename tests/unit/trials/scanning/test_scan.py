@@ -37,6 +37,7 @@ CALIBRATE = CalibrateHeadStep.model_validate(
         "standoffs_mm": [300, 600],
         "angles_deg": [0, 6, -6, -14, -22, -30, 40],
         "repeats": 2,
+        "file": "head-low.yaml",
     }
 )
 SCAN = ScanStep.model_validate(
@@ -67,7 +68,7 @@ class Done:
 
 def files(session: Path) -> dict[str, bytes]:
     """Results of a session."""
-    return {path.name: path.read_bytes() for path in (*session.glob("*.csv"), session / "head.yaml")}
+    return {path.name: path.read_bytes() for path in (*session.glob("*.csv"), session / "head-low.yaml")}
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +105,7 @@ def test_every_capture_has_the_reading_of_the_encoder(done: Done) -> None:
 
 
 def test_the_file_is_that_of_the_session(done: Done) -> None:
-    assert load_yaml_model(done.folder / "s/head.yaml", HeadCalibration) == done.head
+    assert load_yaml_model(done.folder / "s/head-low.yaml", HeadCalibration) == done.head
     assert done.head.scanning_head.fit.noise_scale < 1.5
     moves = rows(done.folder / "s/c.1-moves.csv")
     assert len(moves) == done.head.scanning_head.fit.moves >= 10
@@ -131,7 +132,7 @@ def test_a_fit_beyond_its_limits_calibrates_no_head(done: Done, tmp_path: Path) 
         with pytest.raises(LimitFailedError, match=r"rms_px: expected at most 0\.001"):
             strict.run(session.context, "c.1")
         assert session.context.head is None
-    assert not (tmp_path / "s/head.yaml").exists()
+    assert not (tmp_path / "s/head-low.yaml").exists()
     assert (tmp_path / "s/c.1-parameters.csv").exists()
 
 
