@@ -66,9 +66,9 @@ class Plan:
         """Check a rig and procedures.
 
         Raises:
-            BadInputError: a step lacks what it needs or exports a calibration beside an existing one, two
-                procedures have the same name, two steps write the same file, the driver is unknown, or
-                spots of an emitter cannot be assigned.
+            BadInputError: a step lacks what it needs, exports a calibration beside an existing one, or writes
+                another's file. Or two procedures have the same name, the driver is unknown, or spots of an
+                emitter cannot be assigned.
         """
         names = [p.procedure for p in procedures]
         for path, name in zip(procedure_paths, names, strict=True):
