@@ -36,7 +36,8 @@ class Deviations:
     @property
     def reference_sd_mm(self) -> FloatArray:
         """(N,) standard uncertainty of the surface along its normal."""
-        return np.hypot(self.own_sd_mm, np.linalg.norm(self.by_shared * self.shared_sd, axis=1))
+        shared_mm = np.linalg.norm(self.by_shared * self.shared_sd, axis=1)
+        return np.asarray(np.hypot(self.own_sd_mm, shared_mm))
 
     def sd_mm(self, points: ScanPoints, shared_covariance: FloatArray) -> FloatArray:
         """(N,) standard uncertainties of the deviations: of point and surface, which share errors.
