@@ -175,13 +175,17 @@ def test_a_beam_in_the_dark_frame_is_refused(source: PairSource) -> None:
 
 
 @pytest.mark.parametrize("reading_deg", [0.0, -30.0])
-def test_a_stuck_beam_of_a_turned_head_is_found_at_its_reading(tmp_path: Path, reading_deg: float) -> None:
+def test_a_turned_head_is_exposed_and_its_stuck_beam_found_at_its_reading(
+    tmp_path: Path, reading_deg: float
+) -> None:
     rig = inclined_rig(load_rig(HEAD_RIG))
     turned = PLACEMENT.model_copy(update={"head_deg": reading_deg})
     with plain_bench(rig, tmp_path) as bench:
         bench.target.place(turned)
         source = PairSource(tmp_path, rig, bench, may_emit=True)
-        source.set_exposure(turned, lambda key: None)
+        found = source.set_exposure(turned, lambda key: None)
+        assert found is not None
+        assert found.verdict == "good"
         source.pair(KEY, ("S",), turned, 0, "scene")
         source.bench = replace(bench, camera=Stuck(bench, "S"))
         stuck = source.bench.camera.grab().image
