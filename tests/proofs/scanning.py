@@ -36,7 +36,12 @@ BOUNDS = (0.93, 0.97)
 SPOT_SD_PX = 0.05
 """Noise of a mean spot, with speckle."""
 SCANNED_MM = (300.0, 600.0, 1500.0)
-SCANNED = ("x", "range", "deviation from a flat")
+SCANNED = {
+    "x": "x of points",
+    "range": "range of points",
+    "deviation from a flat": "deviation from a flat",
+}
+"""Quantities of a point at one angle, and of all points."""
 CYLINDER_MM = 500.0
 CYLINDER = CylinderTarget(diameter_mm=178.0, diameter_sd_mm=0.5)
 CYLINDER_DEG = (-19.0, -17.0, -15.0, -13.0, -11.0, -9.0, -7.0, -5.0, -3.0, -1.0)
@@ -147,8 +152,8 @@ def figures(rig: Rig, outcome: Outcome) -> list[Figure]:
             found.append(Figure("scan", quantity, _coverage(z), BOUNDS, int(np.isfinite(z).sum())))
     count = len(outcome.parameter)
     found.append(Figure("together", "parameters", _coverage(outcome.parameter[:, free]), BOUNDS, count))
-    for k, what in enumerate(SCANNED):
-        found.append(Figure("together", f"{what} of points", _coverage(outcome.point[..., k]), BOUNDS, count))
+    for k, what in enumerate(SCANNED.values()):
+        found.append(Figure("together", what, _coverage(outcome.point[..., k]), BOUNDS, count))
     found.append(Figure("together", "deviation from a cylinder", _coverage(outcome.cylinder), BOUNDS, count))
     return found
 

@@ -31,7 +31,7 @@ def test_few_heads_are_as_good_as_they_state() -> None:
         "parameters",
         "x of points",
         "range of points",
-        "deviation from a flat of points",
+        "deviation from a flat",
         "deviation from a cylinder",
     }
     assert all(one.value > 0.8 for one in together.values())
