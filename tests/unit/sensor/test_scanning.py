@@ -130,7 +130,8 @@ def test_a_point_behind_the_reference_plane_is_none(
             Head(*(values[f"head.{name}"] for name in HEAD)),
             np.radians(-10.0),
         )
-        point = (float(ray.x_mm + ray.tx * depth_mm), float(ray.y_mm + ray.ty * depth_mm), depth_mm)
+        x_mm, y_mm, tx, ty = (float(np.asarray(part)) for part in ray)
+        point = (x_mm + tx * depth_mm, y_mm + ty * depth_mm, depth_mm)
         # Without distortion, so that a spot far outside the image has a position.
         sensor.values[[names.index("k1"), names.index("k2")]] = 0.0
         f_px, cx_px, cy_px = (values[name] for name in ("f_px", "cx_px", "cy_px"))

@@ -369,7 +369,8 @@ def test_rebuilt_recording_has_the_same_data(recorded: Recorded, tmp_path: Path)
 
 def test_a_frame_that_lasers_share_is_logged_once(recorded: Recorded, tmp_path: Path) -> None:
     """As of beams of one emitter; captures 1 to 3 are made to show the frame of the first."""
-    records, shared = [], {}
+    records: list[ev.Record] = []
+    shared: dict[int, ev.CaptureTaken] = {}
     for number, record in enumerate(recorded.records):
         event = record.event
         if isinstance(event, ev.CaptureTaken) and len(shared) < 3:
