@@ -23,10 +23,12 @@ from workbench.calibration.scanning.fit import fit_head
 from workbench.calibration.scanning.prediction import head_table
 from workbench.model.arrays import FloatArray
 from workbench.model.rig import Rig, load_rig
+from workbench.model.target import CylinderTarget, Placement
 from workbench.model.trial_event import COVERAGE_FACTOR
 from workbench.procedure.engine.procedure_file import load_procedure
-from workbench.sensor.scanning import CalibratedHead
+from workbench.sensor.scanning import CalibratedHead, ScanPoints
 from workbench.trials.scanning.calibrate_step import CalibrateHeadStep
+from workbench.trials.scanning.surface import SHARED, deviations
 
 ROOT = Path(__file__).parents[2]
 HEADS = 400
@@ -34,6 +36,16 @@ BOUNDS = (0.93, 0.97)
 SPOT_SD_PX = 0.05
 """Noise of a mean spot, with speckle."""
 SCANNED_MM = (300.0, 600.0, 1500.0)
+SCANNED = {
+    "x": "x of points",
+    "range": "range of points",
+    "deviation from a flat": "deviation from a flat",
+}
+"""Quantities of a point at one angle, and of all points."""
+CYLINDER_MM = 500.0
+CYLINDER = CylinderTarget(diameter_mm=178.0, diameter_sd_mm=0.5)
+CYLINDER_DEG = (-19.0, -17.0, -15.0, -13.0, -11.0, -9.0, -7.0, -5.0, -3.0, -1.0)
+"""From one limb to the other."""
 SCANNED_DEG = (-33.0, -27.0, -21.0, -15.0, -9.0, -3.0, 3.0, 9.0, 15.0)
 
 
@@ -44,7 +56,10 @@ class Outcome:
     parameter: FloatArray
     """(n, S); NaN for constants."""
     point: FloatArray
-    """(n, standoffs, angles, 2) x and range of scanned points; NaN outside the image."""
+    """(n, standoffs, angles, 3) x and range of scanned points, and their deviation from the stated flat; NaN
+    outside the image."""
+    cylinder: FloatArray
+    """(n, angles) deviations of scanned points from the stated cylinder; NaN where the beam misses it."""
     range_sd: FloatArray
     """(n, standoffs, angles) stated relative standard deviation of a range."""
     noise_scaled: int
@@ -57,7 +72,7 @@ def run(rig: Rig, heads: int, seed: int, known: Rig | None = None) -> Outcome:
     """Draw heads from the priors of `rig` and calibrate each, by the rig `known` if it differs."""
     procedure = load_procedure(ROOT / "procedures/scan-calibrate.yaml")
     step = next(one for one in procedure.steps if isinstance(one, CalibrateHeadStep))
-    parameter, point, range_sd, scaled, phases = [], [], [], 0, 0
+    parameter, point, cylinder, range_sd, scaled, phases = [], [], [], [], 0, 0
     for number in range(heads):
         random = np.random.default_rng([seed, number])
         head = SimulatedHead.of(rig, 100_000 * seed + number)
@@ -68,16 +83,19 @@ def run(rig: Rig, heads: int, seed: int, known: Rig | None = None) -> Outcome:
         sensor = CalibratedHead(calibrated_head(fit, PROVENANCE))
         z, relative = _scan(head, sensor, random)
         point.append(z)
+        cylinder.append(_scan_cylinder(head, sensor, random))
         range_sd.append(relative)
         scaled += fit.noise_scale > 1
         phases += eccentricity_deg(fit)[2] is not None
-    return Outcome(np.array(parameter), np.array(point), np.array(range_sd), scaled, phases)
+    return Outcome(
+        np.array(parameter), np.array(point), np.array(cylinder), np.array(range_sd), scaled, phases
+    )
 
 
 def _scan(
     head: SimulatedHead, sensor: CalibratedHead, random: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Errors of scanned points (standoffs, angles, 2) in their deviations; relative sd of ranges."""
+    """Errors of scanned points (standoffs, angles, 3) in their deviations; relative sd of ranges."""
     readings = np.array(SCANNED_DEG)
     errors, relative = [], []
     for standoff_mm in SCANNED_MM:
@@ -88,9 +106,27 @@ def _scan(
         found = sensor.points(readings, position, np.full_like(position, SPOT_SD_PX))
         true[:, 2] -= head.truth.offset_mm
         z = (found.position_mm - true) / found.sd_mm
-        errors.append(np.where(inside[:, None], z[:, [0, 2]], np.nan))
+        z[:, 1] = _deviation_z(head, sensor, Placement(key=key, standoff_mm=standoff_mm), found)
+        errors.append(np.where(inside[:, None], z[:, [0, 2, 1]], np.nan))
         relative.append(np.where(inside, found.sd_mm[:, 2] / true[:, 2], np.nan))
     return np.array(errors), np.array(relative)
+
+
+def _scan_cylinder(head: SimulatedHead, sensor: CalibratedHead, random: np.random.Generator) -> FloatArray:
+    """Deviations of scanned points (angles,) from the stated cylinder, in their stated deviations."""
+    placed = Placement(key="cylinder", standoff_mm=CYLINDER_MM, target=CYLINDER)
+    surface = head.cylinder(placed.key, placed.standoff_mm, CYLINDER, random)
+    true = np.array([head.point(placed.key, surface, reading) for reading in CYLINDER_DEG])
+    position, inside = head.seen(true, SPOT_SD_PX, random)
+    points = sensor.points(np.array(CYLINDER_DEG), position, np.full_like(position, SPOT_SD_PX))
+    return np.where(inside, _deviation_z(head, sensor, placed, points), np.nan)
+
+
+def _deviation_z(
+    head: SimulatedHead, sensor: CalibratedHead, placed: Placement, points: ScanPoints
+) -> FloatArray:
+    found = deviations(placed, head.rig.bench, points.position_mm)
+    return np.asarray(found.mm / found.sd_mm(points, sensor.covariance_with(SHARED)))
 
 
 def figures(rig: Rig, outcome: Outcome) -> list[Figure]:
@@ -103,16 +139,22 @@ def figures(rig: Rig, outcome: Outcome) -> list[Figure]:
         if free[n]
     ]
     for n, standoff_mm in enumerate(SCANNED_MM):
-        for k, what in enumerate(("x", "range")):
+        for k, what in enumerate(SCANNED):
             for m, reading in enumerate(SCANNED_DEG):
                 z = outcome.point[:, n, m, k]
                 if np.isfinite(z).sum() > len(z) / 2:
                     quantity = f"{what} at {standoff_mm:g} mm, {reading:g} deg"
                     found.append(Figure("scan", quantity, _coverage(z), BOUNDS, int(np.isfinite(z).sum())))
+    for m, reading in enumerate(CYLINDER_DEG):
+        z = outcome.cylinder[:, m]
+        if np.isfinite(z).sum() > len(z) / 2:
+            quantity = f"deviation from a cylinder, {reading:g} deg"
+            found.append(Figure("scan", quantity, _coverage(z), BOUNDS, int(np.isfinite(z).sum())))
     count = len(outcome.parameter)
     found.append(Figure("together", "parameters", _coverage(outcome.parameter[:, free]), BOUNDS, count))
-    for k, what in enumerate(("x of points", "range of points")):
+    for k, what in enumerate(SCANNED.values()):
         found.append(Figure("together", what, _coverage(outcome.point[..., k]), BOUNDS, count))
+    found.append(Figure("together", "deviation from a cylinder", _coverage(outcome.cylinder), BOUNDS, count))
     return found
 
 

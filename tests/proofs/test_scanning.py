@@ -22,12 +22,18 @@ RIG = load_rig(Path(__file__).parents[2] / "rigs/scanning-head-emulated.yaml")
 
 def test_few_heads_are_as_good_as_they_state() -> None:
     outcome = run(RIG, 8, 5)
-    assert outcome.point.shape == (8, len(SCANNED_MM), len(SCANNED_DEG), 2)
+    assert outcome.point.shape == (8, len(SCANNED_MM), len(SCANNED_DEG), 3)
     seen = np.isfinite(outcome.parameter)
     # Some 20 parameters of eight heads, each with a z of 1 sigma.
     assert np.sqrt((outcome.parameter[seen] ** 2).mean()) < 1 + 4 / np.sqrt(2 * seen.sum())
     together = {one.quantity: one for one in figures(RIG, outcome) if one.trial == "together"}
-    assert set(together) == {"parameters", "x of points", "range of points"}
+    assert set(together) == {
+        "parameters",
+        "x of points",
+        "range of points",
+        "deviation from a flat",
+        "deviation from a cylinder",
+    }
     assert all(one.value > 0.8 for one in together.values())
     assert HEADS >= 200
 

@@ -15,11 +15,13 @@ from workbench.calibration.scanning.prediction import head_table
 from workbench.emulator.head import reading_error_deg, turned
 from workbench.emulator.lens import STEADY, Lens
 from workbench.emulator.spec import EmulatorSpec, emulator_spec
-from workbench.emulator.surfaces import PlaneSurface
+from workbench.emulator.surfaces import CylinderSurface, PlaneSurface, Surface
 from workbench.emulator.truth import TrueRay, Truth, draw_placement_error, draw_truth
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.model.head_calibration import HEAD
+from workbench.model.prior import Prior, exactly
 from workbench.model.rig import Rig
+from workbench.model.target import CylinderTarget
 
 MARGIN_PX = 3.0
 
@@ -67,11 +69,20 @@ class SimulatedHead:
             1.0,
         )
 
-    def point(self, key: str, plane: PlaneSurface, reading_deg: float) -> FloatArray:
-        """(3,) true point of the beam on a plane, camera frame."""
+    def cylinder(
+        self, key: str, standoff_mm: float, target: CylinderTarget, random: np.random.Generator
+    ) -> CylinderSurface:
+        """The cylinder at a placement, with errors along z and x, and of its diameter."""
+        nearest_mm = self.plane(key, standoff_mm).z0_mm
+        aside_mm = target.shift_mm + self.rig.bench.placement_sd_mm * random.standard_normal()
+        diameter_mm = target.diameter_mm + (target.diameter_sd_mm or 0.0) * random.standard_normal()
+        return CylinderSurface(aside_mm, nearest_mm + diameter_mm / 2, diameter_mm / 2, 1.0)
+
+    def point(self, key: str, surface: Surface, reading_deg: float) -> FloatArray:
+        """(3,) true point of the beam on a surface, camera frame; NaN if it misses."""
         ray = self.ray(key, reading_deg)
         origin, direction = np.array([ray.x_mm, ray.y_mm, 0.0]), np.array([[ray.tx, ray.ty, 1.0]])
-        return np.asarray(origin + plane.depth(origin, direction)[0] * direction[0])
+        return np.asarray(origin + surface.depth(origin, direction)[0] * direction[0])
 
     def seen(
         self, points: FloatArray, sd_px: float, random: np.random.Generator
@@ -104,6 +115,21 @@ class SimulatedHead:
             position[inside],
             np.full_like(position[inside], sd_px),
         )
+
+
+def inclined_rig(rig: Rig) -> Rig:
+    """A rig of a head, well known, whose beam is inclined: turned by 30 degrees its spots are 26 px lower."""
+    camera = {
+        "height_px": 240,
+        "f_px": Prior(value=533.0, sd=1.0),
+        "cx_px": Prior(value=319.5, sd=0.5),
+        "cy_px": Prior(value=19.5, sd=0.5),
+        "k1": exactly(0.0),
+        "k2": exactly(0.0),
+    }
+    lasers = (rig.head_laser.model_copy(update={"ty": Prior(value=0.3, sd=0.0005)}),)
+    own = {"camera": rig.camera.model_copy(update=camera), "lasers": lasers, "emulator": {"seed": 3}}
+    return rig.model_copy(update=own)
 
 
 def _of_head(head: object, name: str) -> float:

@@ -169,7 +169,7 @@ def scanning() -> str:
     """Coverage of calibrated scanning heads: `python -m tests.proofs.scanning`."""
     found = list(proof_figures("scanning"))
     rows = []
-    for trial, one in (("parameter", "a parameter"), ("scan", "a point at one angle, x or range")):
+    for trial, one in (("parameter", "a parameter"), ("scan", "a point at one angle: x, range, deviation")):
         single = [figure.value for figure in found if figure.trial == trial]
         share = f"{100 * min(single):.1f} to {100 * max(single):.1f} %"
         rows.append((f"{one}: smallest and largest of {len(single)}", share))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from workbench.calibration.data.spot_rows import own_spots, prior_scanline, sought
+from workbench.calibration.data.spot_rows import own_spots, prior_scanlines, sought
 from workbench.calibration.design.expected_spot import expected_spot
 from workbench.devices.protocols import Bench
 from workbench.model.arrays import FloatArray, Image
@@ -190,5 +190,4 @@ class Aim:
     def _lights(self, dark: Image | None = None) -> Sequence[Spot]:
         """Lights on the lasers' lines in a frame with all lasers off; None: the next one."""
         frame = self.bench.camera.grab().image if dark is None else dark
-        lines = [prior_scanline(self.rig, laser) for laser in self.rig.lasers]
-        return find_spots(frame, scanlines=lines).spots
+        return find_spots(frame, scanlines=prior_scanlines(self.rig)).spots

@@ -7,6 +7,7 @@ not used; its distance from the beam is a check.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import radians
@@ -30,7 +31,7 @@ POINT = ("x_mm", "y_mm", "range_mm")
 
 @dataclass(frozen=True)
 class ScanPoints:
-    """N points; NaN where the line of sight does not meet the beam in front of the camera."""
+    """N points; NaN where the line of sight does not meet the beam in front of camera and reference plane."""
 
     position_mm: FloatArray
     """(N, 3) POINT."""
@@ -60,11 +61,17 @@ class CalibratedHead:
         self.values = np.array(parameters.values)[at]
         """(P,) lens, offset, ray and head."""
         self.covariance = parameters.covariance_array[np.ix_(at, at)]
+        self._at = at
 
     @property
     def offset_mm(self) -> float:
         """Distance of the pinhole behind the reference plane."""
         return float(self.values[len(self.model.parameters)])
+
+    def covariance_with(self, names: Sequence[str]) -> FloatArray:
+        """(K, P) covariance of K further parameters of the calibration with those of the sensor."""
+        parameters = self.calibration.parameters
+        return parameters.covariance_array[np.ix_([parameters.names.index(name) for name in names], self._at)]
 
     def points(self, readings_deg: FloatArray, position_px: FloatArray, sd_px: FloatArray) -> ScanPoints:
         """Points of N spots.
@@ -81,7 +88,7 @@ class CalibratedHead:
         sight = undistort(self.model, lens, position_px)
         with np.errstate(divide="ignore", invalid="ignore"):
             z = np.asarray(ray.x_mm) / (sight[:, 0] - np.asarray(ray.tx))
-        z = np.where(z > 0, z, np.nan)
+        z = np.where(z > max(self.offset_mm, 0.0), z, np.nan)
         point = np.column_stack([sight * z[:, None], z])
         measured = np.column_stack([position_px, readings])
         found = _derivatives(jnp.asarray(point), measured, self.values, self.calibration.distortion_model)

@@ -59,6 +59,8 @@ class OpenRecording:
         self._captures = CaptureLog()
         self._exposure = Moment(0, 0, 0)
         self._frames: tuple[Image, Image | None] | None = None
+        self._shown: tuple[str, str] | None = None
+        """Path and checksum of the lit frame that the recording shows."""
         self._spots: tuple[Spot, ...] = ()
         self._title = ""
         self._step = ""
@@ -356,10 +358,16 @@ class OpenRecording:
         frame.log_scanlines(self.stream, lines, self._colors)
 
     def _show_frame(self, event: ev.CaptureTaken) -> None:
-        """Log the lit frame of a capture; a row of a captures file may state positions without any."""
+        """Log the lit frame of a capture, once where several lasers share it.
+
+        A row of a captures file may state positions without any frame.
+        """
         if not event.on.path:
-            self._frames = None
+            self._frames = self._shown = None
             return
+        if (shown := (event.on.path, event.on.sha256)) == self._shown:
+            return
+        self._shown = shown
         png, on = self._stored.image(event.on)
         off = None if event.off is None else self._stored.pixels(event.off)
         self._frames = on, off

@@ -12,7 +12,10 @@ from tests.support.rigs import PROVENANCE
 from tests.support.scanned_head import SimulatedHead
 from workbench.calibration.scanning.export import calibrated_head
 from workbench.calibration.scanning.fit import fit_head
+from workbench.model.head_calibration import HEAD
 from workbench.model.rig import load_rig
+from workbench.optics.head import Head, turned_ray
+from workbench.optics.rays import RAY, Ray
 from workbench.sensor.scanning import CalibratedHead
 
 RIG = load_rig(Path(__file__).parents[3] / "rigs/scanning-head-emulated.yaml")
@@ -110,6 +113,36 @@ def test_a_spot_beside_the_beam_is_many_deviations_across(
     position, _ = head.seen(true[None], 0.0, np.random.default_rng(1))
     points = sensor.points(np.zeros(1), position + np.array([0.0, 15.0]), np.full((1, 2), 0.05))
     assert abs(points.across_sd[0]) > 10
+
+
+@pytest.mark.parametrize("depth_mm", [5.0, 39.0, 41.0, 300.0])
+def test_a_point_behind_the_reference_plane_is_none(
+    scanned: tuple[SimulatedHead, CalibratedHead], depth_mm: float
+) -> None:
+    """As of a light on the beam nearer than the plane from which ranges count, 40 mm before the pinhole."""
+    _, sensor = scanned
+    names = sensor.calibration.names
+    values = dict(zip(names, sensor.values.tolist(), strict=True)) | {"offset_mm": 40.0}
+    own, sensor.values = sensor.values, np.array([values[name] for name in names])
+    try:
+        ray = turned_ray(
+            Ray(*(values[f"S.{name}"] for name in RAY)),
+            Head(*(values[f"head.{name}"] for name in HEAD)),
+            np.radians(-10.0),
+        )
+        x_mm, y_mm, tx, ty = (float(np.asarray(part)) for part in ray)
+        point = (x_mm + tx * depth_mm, y_mm + ty * depth_mm, depth_mm)
+        # Without distortion, so that a spot far outside the image has a position.
+        sensor.values[[names.index("k1"), names.index("k2")]] = 0.0
+        f_px, cx_px, cy_px = (values[name] for name in ("f_px", "cx_px", "cy_px"))
+        position = np.array([[cx_px + f_px * point[0] / point[2], cy_px + f_px * point[1] / point[2]]])
+        found = sensor.points(np.array([-10.0]), position, np.full((1, 2), 0.05)).position_mm[0]
+    finally:
+        sensor.values = own
+    if depth_mm < 40.0:
+        assert np.isnan(found).all()
+    else:
+        np.testing.assert_allclose(found, [point[0], point[1], depth_mm - 40.0], atol=1e-6)
 
 
 def test_a_sight_that_does_not_meet_the_beam_has_no_point(

@@ -370,6 +370,24 @@ def test_rebuilt_recording_has_the_same_data(recorded: Recorded, tmp_path: Path)
     assert list(tmp_path.iterdir()) == [out]
 
 
+def test_a_frame_that_lasers_share_is_logged_once(recorded: Recorded, tmp_path: Path) -> None:
+    """As of beams of one emitter; captures 1 to 3 are made to show the frame of the first."""
+    records: list[ev.Record] = []
+    shared: dict[int, ev.CaptureTaken] = {}
+    for number, record in enumerate(recorded.records):
+        event = record.event
+        if isinstance(event, ev.CaptureTaken) and len(shared) < 3:
+            first = next(iter(shared.values()), event)
+            event = event.model_copy(update={"on": first.on, "off": first.off})
+            shared[number] = event
+        records.append(record.model_copy(update={"event": event}))
+    out = tmp_path / "shared.rrd"
+    rebuild(recorded.folder, recorded.rig, records, out)
+    contents = Contents(out)
+    assert [number for number, _ in contents.values(IMAGE, FRAME)] == [1, *range(4, CAPTURES + 1)]
+    assert [number for number, _ in contents.values("/spots/record", "u_px")][:4] == [1, 2, 3, 4]
+
+
 def test_missing_frame_is_named_and_the_old_recording_stays(recorded: Recorded, tmp_path: Path) -> None:
     out = tmp_path / "again.rrd"
     out.write_bytes(b"an older recording")

@@ -16,13 +16,12 @@ import numpy as np
 from workbench.calibration.data.boards import BoardView, on_boards, see_board
 from workbench.calibration.data.observations import Observation, PlacementInfo, RejectedObservation
 from workbench.model.captures import ALL_LASERS, BOARD, CaptureRow
-from workbench.model.errors import BadInputError
 from workbench.model.fit_event import Rejected
 from workbench.model.rig import LaserSpec, Rig
+from workbench.optics.emitters import beams_in_order, beams_together, depths_mm
 from workbench.optics.image import bend_px
 from workbench.optics.lens_models import lens_model
 from workbench.optics.rays import RAY
-from workbench.optics.rows import rays_of_rig, rows_of
 
 if TYPE_CHECKING:
     from workbench.spots import Finding, Scanline
@@ -31,10 +30,6 @@ NO_STANDOFF = "standoff_mm is empty: a calibration needs known standoffs"
 PRIOR_REACH_SD = 4.0
 """Half width of the search band, in standard deviations of the rig file's priors."""
 BEAM_HALF_WIDTH_PX = 8.0
-WALL_MM = 1000.0
-"""Depth of the wall on which the beams of one emitter are ordered."""
-LEAST_DEPTH_MM = 1.0
-"""Least depth of a target in front of the pinhole."""
 
 
 def observations_of_rows(
@@ -99,10 +94,26 @@ def _in_picture(rig: Rig, observation: Observation) -> Observation | Rejected:
     return observation
 
 
-def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
-    """Band of the image in which the laser's spots lie, by the rig file: along the image of its baseline."""
+def prior_scanlines(rig: Rig, head_deg: float = 0.0) -> list[Scanline]:
+    """Bands of all lasers of a rig, see `prior_scanline`."""
+    return [prior_scanline(rig, laser, head_deg) for laser in rig.lasers]
+
+
+def prior_scanline(rig: Rig, laser: LaserSpec, head_deg: float = 0.0) -> Scanline:
+    """Band of the image in which the laser's spots lie, by the rig file: along the image of its baseline.
+
+    Args:
+        rig: rig file.
+        laser: one of its lasers.
+        head_deg: reading of the scanning head, if it turns the laser.
+    """
     from workbench.spots import Scanline
 
+    if rig.head is not None and laser.id == rig.head.laser:
+        # Imported here: rigs without a head do not need it.
+        from workbench.optics.turned_laser import turned_laser
+
+        laser = turned_laser(rig, head_deg)
     camera = rig.camera
     x, y = laser.x_mm.value, laser.y_mm.value
     du, dv = x / (x**2 + y**2) ** 0.5, y / (x**2 + y**2) ** 0.5
@@ -120,7 +131,7 @@ def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
         lens_model(camera.lens),
         np.array([p.value for p in camera.lens_priors.values()]),
         np.array([getattr(laser, name).value for name in RAY]),
-        max(rig.bench.reach_mm[0] + rig.bench.offset_mm.value, LEAST_DEPTH_MM),
+        depths_mm(rig)[0],
         (camera.width_px, camera.height_px),
         ((u, v), (du, dv)),
     )
@@ -128,49 +139,40 @@ def prior_scanline(rig: Rig, laser: LaserSpec) -> Scanline:
 
 
 def sought(rig: Rig, laser: LaserSpec) -> tuple[list[Scanline], int]:
-    """Bands and number of the spots in a capture of one laser: of all that are on with it."""
+    """Bands and number of the spots in a capture of one laser: of all that are on with it.
+
+    Raises:
+        BadInputError: see `beams_in_order`.
+    """
     from workbench.spots.search_band import band
 
-    together = _together(rig, laser)
-    lines = [prior_scanline(rig, one) for one in together]
-    return (lines, 1) if len(lines) == 1 else ([band(lines)], len(lines))
+    together = beams_together(rig, laser)
+    if len(together) == 1:
+        return [prior_scanline(rig, laser)], 1
+    beams_in_order(rig, together)
+    return [band([prior_scanline(rig, one) for one in together])], len(together)
 
 
 def own_spots(rig: Rig, laser: LaserSpec, finding: Finding) -> Finding:
     """Finding with the spots of one laser alone.
 
-    Where others are on with it, all their spots must be seen: the order along the row is that of the beams on
-    a wall. Otherwise no spot is the laser's.
+    Where others are on with it, all their spots must be seen: their order along the row is that of the beams.
+    Otherwise no spot is the laser's.
+
+    Raises:
+        BadInputError: see `beams_in_order`.
     """
     from workbench.spots import Finding
 
-    together = _together(rig, laser)
+    together = beams_together(rig, laser)
     if len(together) == 1:
         return finding
     if len(finding.spots) != len(together):
         return Finding((), finding.failures)
-    rays = rays_of_rig(rig.model_copy(update={"lasers": together}))
-    row = rows_of(rays)[0]
-    place = np.argsort((rays[:, :2] + WALL_MM * rays[:, 2:]) @ row.direction).tolist()
-    u, v = row.direction.tolist()
-    in_order = sorted(finding.spots, key=lambda spot: spot.u_px * u + spot.v_px * v)
-    return Finding((in_order[place.index(together.index(laser))],), finding.failures)
-
-
-def _together(rig: Rig, laser: LaserSpec) -> tuple[LaserSpec, ...]:
-    """Lasers that are on with a laser, with itself.
-
-    Raises:
-        BadInputError: they are not in a row, so that their order is not known.
-    """
-    (together,) = [group for group in rig.emitters if laser in group]
-    rows = rows_of(rays_of_rig(rig.model_copy(update={"lasers": together})))
-    if len(rows) > 1:
-        raise BadInputError(
-            f"rig {rig.rig}: expected the beams of emitter {laser.emitter} in one row, got {len(rows)} rows;"
-            " correct their x_mm, y_mm, tx and ty, or give lasers that fire alone no emitter"
-        )
-    return together
+    in_order, direction = beams_in_order(rig, together)
+    u, v = direction.tolist()
+    spots = sorted(finding.spots, key=lambda spot: spot.u_px * u + spot.v_px * v)
+    return Finding((spots[in_order.index(laser)],), finding.failures)
 
 
 def _see_boards(rig: Rig, rows: Sequence[CaptureRow]) -> dict[str, BoardView | Rejected]:

@@ -7,7 +7,6 @@ then those of the placements.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import radians
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -26,10 +25,10 @@ from workbench.calibration.model.parameters import (
 from workbench.calibration.model.prediction import predict_cell
 from workbench.model.head_calibration import HEAD
 from workbench.model.lens import LensName
-from workbench.model.prior import Prior
 from workbench.model.rig import Rig
 from workbench.optics.head import Head, turned_ray
 from workbench.optics.rays import Ray
+from workbench.optics.turned_laser import head_priors
 
 
 class HeadLayout(NamedTuple):
@@ -70,11 +69,10 @@ def head_table(rig: Rig, placements: Sequence[str]) -> ParameterTable:
     Raises:
         BadInputError: the rig has no head.
     """
-    laser, head = rig.head_laser, rig.scanning_head
-    eccentricity = Prior(value=0.0, sd=radians(head.eccentricity_sd_deg))
-    priors = {name: eccentricity if name.startswith("eccentricity") else getattr(head, name) for name in HEAD}
-    alone = rig.model_copy(update={"lasers": (laser,)})
-    own: tuple[Parameter, ...] = tuple(sensor_parameter(f"head.{name}", priors[name]) for name in HEAD)
+    alone = rig.model_copy(update={"lasers": (rig.head_laser,)})
+    own: tuple[Parameter, ...] = tuple(
+        sensor_parameter(f"head.{name}", prior) for name, prior in head_priors(rig).items()
+    )
     return ParameterTable((*sensor_parameters(alone), *own, *placement_parameters(rig, placements)))
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.calibration.data.spot_rows import prior_scanline
+from workbench.calibration.data.spot_rows import prior_scanlines
 from workbench.model.arrays import BoolArray, Image
 from workbench.model.rig import Rig
 from workbench.spots.strip import distance_px
@@ -35,10 +35,15 @@ class Brightness:
     """Standard deviation of `lit`."""
 
 
-def searched_pixels(rig: Rig) -> BoolArray:
-    """Mask (height, width) of pixels near the scanlines of the rig's lasers; all pixels if there are none."""
+def searched_pixels(rig: Rig, head_deg: float = 0.0) -> BoolArray:
+    """Mask (height, width) of pixels near the scanlines of the rig's lasers; all pixels if there are none.
+
+    Args:
+        rig: rig with the lasers.
+        head_deg: reading of its scanning head.
+    """
     v, u = np.mgrid[0 : rig.camera.height_px, 0 : rig.camera.width_px].astype(float)
-    lines = [prior_scanline(rig, laser) for laser in rig.lasers]
+    lines = prior_scanlines(rig, head_deg)
     on_a_line = np.logical_or.reduce([distance_px(line, u, v) <= line.half_width_px for line in lines])
     return on_a_line if on_a_line.any() else np.ones_like(on_a_line)
 

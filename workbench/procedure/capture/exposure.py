@@ -64,7 +64,7 @@ class ExposureTrial:
 
 
 def set_exposure(
-    bench: Bench, rig: Rig, placement_key: str, begin: Callable[[str], None]
+    bench: Bench, rig: Rig, placement_key: str, begin: Callable[[str], None], head_deg: float = 0.0
 ) -> ExposureSet | None:
     """Set the camera's exposure for all lasers of the rig and the present placement of the target.
 
@@ -76,6 +76,7 @@ def set_exposure(
         rig: rig with the lasers, their scanlines and the camera's full scale.
         placement_key: key of the placement.
         begin: called before each trial exposure with its key.
+        head_deg: reading of the rig's scanning head.
 
     Returns:
         The exposure that was set; None if the camera's exposure cannot or must not be set.
@@ -87,7 +88,7 @@ def set_exposure(
     if (found := settable(bench.camera)) is None:
         return None
     camera, limits = found
-    searched = searched_pixels(rig)
+    searched = searched_pixels(rig, head_deg)
 
     def look(exposure: float, number: int) -> ExposureTrial:
         taken = camera.set_exposure(exposure)

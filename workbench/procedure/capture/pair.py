@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from workbench.calibration.data.spot_rows import prior_scanline
+from workbench.calibration.data.spot_rows import prior_scanlines
 from workbench.devices.attempts import within_lease
 from workbench.devices.protocols import Bench, Frame, settable
 from workbench.model import event as ev
@@ -49,11 +49,11 @@ class PairSource:
     _taken_for: set[str] = field(default_factory=set)
     """Lasers whose capture it is: several where they are on together."""
 
-    def set_exposure(self, key: str, begin: Callable[[str], None]) -> ev.ExposureSet | None:
+    def set_exposure(self, placed: Placement, begin: Callable[[str], None]) -> ev.ExposureSet | None:
         """Set the exposure for a placement by trial exposures; a replay takes it from the journal.
 
         Args:
-            key: key of the placement.
+            placed: the placement.
             begin: called before each trial exposure with its key.
 
         Returns:
@@ -65,7 +65,7 @@ class PairSource:
         """
         if self.replayed is None:
             self._refuse_unsafe()
-            found = set_exposure(self.bench, self.rig, key, begin)
+            found = set_exposure(self.bench, self.rig, placed.key, begin, placed.head_deg or 0.0)
         else:  # no further captures at this placement: the camera is left unchanged
             found = self.replayed.exposure
         self._exposure = found
@@ -134,7 +134,8 @@ class PairSource:
         """
         dark, self._dark = self._dark, None
         if dark is not None:
-            self._search(key, dark, [prior_scanline(self.rig, laser) for laser in self.rig.lasers])
+            head_deg = None if self._last is None else self._last[2].head_deg
+            self._search(key, dark, prior_scanlines(self.rig, head_deg or 0.0))
 
     def _capture(
         self,

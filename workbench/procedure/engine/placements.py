@@ -125,7 +125,7 @@ def _exposed(context: Context, work: Callable[[Placement], T]) -> Callable[[Plac
     """Work preceded by setting the camera's exposure."""
 
     def do(placed: Placement) -> T:
-        if (found := context.pairs.set_exposure(placed.key, context.begin)) is not None:
+        if (found := context.pairs.set_exposure(placed, context.begin)) is not None:
             context.emit(found)
         return work(placed)
 

@@ -11,6 +11,7 @@ from workbench.devices.registry import check_driver, load_bench_rig
 from workbench.model.errors import BadInputError
 from workbench.model.prompt import Prompt
 from workbench.model.rig import Rig
+from workbench.optics.emitters import emitter_problems
 from workbench.procedure.engine.existing_calibration import GIVES, ExistingCalibration
 from workbench.procedure.engine.procedure_file import Procedure, load_procedure
 from workbench.procedure.engine.prompts import safety_prompt
@@ -65,8 +66,9 @@ class Plan:
         """Check a rig and procedures.
 
         Raises:
-            BadInputError: a step lacks what it needs or exports a calibration beside an existing one, two
-                procedures have the same name, or the driver is unknown.
+            BadInputError: a step lacks what it needs, exports a calibration beside an existing one, or writes
+                another's file. Or two procedures have the same name, the driver is unknown, or spots of an
+                emitter cannot be assigned.
         """
         names = [p.procedure for p in procedures]
         for path, name in zip(procedure_paths, names, strict=True):
@@ -79,7 +81,10 @@ class Plan:
             calibration.refuse_export(procedures, procedure_paths)
         _check_order(procedures, procedure_paths, set() if calibration is None else {GIVES})
         _check_placements(rig, procedures, procedure_paths)
+        _check_written(procedures, procedure_paths)
         check_driver(rig)
+        if (found := next(emitter_problems(rig), None)) is not None:
+            raise found[1]
         return cls(rig, rig_path, tuple(procedures), tuple(procedure_paths), calibration)
 
     def new_session(self, sessions: Path) -> Path:
@@ -142,6 +147,21 @@ def _check_placements(rig: Rig, procedures: Sequence[Procedure], paths: Sequence
                 raise BadInputError(
                     f"{path}: steps[{index - 1}]: {step.step}: expected distinct placements, got"
                     f" {doubled[0].rpartition('/')[2]} more than once; take more readings there instead"
+                )
+
+
+def _check_written(procedures: Sequence[Procedure], paths: Sequence[Path]) -> None:
+    """Refuse a step that would overwrite a file of an earlier step."""
+    writers: dict[str, str] = {}
+    for path, procedure in zip(paths, procedures, strict=True):
+        for index, step in enumerate(procedure.steps):
+            if (file := step.writes) is None:
+                continue
+            where = f"{path}: steps[{index}]: {step.step}"
+            if (first := writers.setdefault(file, where)) != where:
+                raise BadInputError(
+                    f"{where}: file: expected a file of its own, got {file}, which is that of {first};"
+                    " name another file"
                 )
 
 

@@ -31,6 +31,10 @@ class Step(Protocol):
     """Result for later steps."""
 
     @property
+    def writes(self) -> str | None:
+        """File in the session folder that no other step may write; None: no such file."""
+
+    @property
     def step(self) -> str:
         """Kind of the step: the tag in the file."""
 
@@ -67,6 +71,11 @@ class StepModel(FileModel):
 
     needs: ClassVar[str | None] = None
     gives: ClassVar[str | None] = None
+
+    @property
+    def writes(self) -> str | None:
+        """None; see `Step`."""
+        return None
 
     def placements(self, name: str, rig: Rig) -> Sequence[Placement]:
         """None; see `Step`."""

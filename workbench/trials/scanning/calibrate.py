@@ -1,4 +1,4 @@
-"""Execution of `calibrate_head`: captures, fit, `head.yaml`, tables and charts."""
+"""Execution of `calibrate_head`: captures, fit, file of the head, tables and charts."""
 
 from __future__ import annotations
 
@@ -23,8 +23,6 @@ from workbench.trials.limits import Result, check_results, skipped_results
 from workbench.trials.results import finish_trial
 from workbench.trials.scanning.calibrate_step import CalibrateHeadStep
 from workbench.trials.scanning.moves import HeadCapture, sweep
-
-FILE = "head.yaml"
 
 
 def calibrate(context: Context, name: str, step: CalibrateHeadStep, placements: Sequence[Placement]) -> str:
@@ -60,8 +58,8 @@ def calibrate(context: Context, name: str, step: CalibrateHeadStep, placements: 
     ]
     check_results(context, name, results, step.limits)
     context.head = head
-    write_record(context.session_dir / FILE, render(head).encode())
-    return f"{counted(len(spots.placement), 'move')} of the head, rms {rms_px:.3f} px, {FILE} written"
+    write_record(context.session_dir / step.file, render(head).encode())
+    return f"{counted(len(spots.placement), 'move')} of the head, rms {rms_px:.3f} px, {step.file} written"
 
 
 def parameter_table(name: str, head: HeadCalibration, fit: HeadFit) -> Table:

@@ -24,7 +24,7 @@ Angles = Annotated[tuple[float, ...], Field(min_length=2)]
 
 
 class HeadLimits(ResultLimits):
-    """Limits on the fit of a head; without a fit that keeps them there is no `head.yaml`."""
+    """Limits on the fit of a head; without a fit that keeps them there is no file of the head."""
 
     rms_px: Limit | None = None
     """Root mean square of the residuals of both coordinates."""
@@ -34,7 +34,7 @@ class HeadLimits(ResultLimits):
 
 @register
 class CalibrateHeadStep(StepModel):
-    """Turn the head to each angle at each standoff of a flat, fit axis and encoder, write `head.yaml`."""
+    """Turn the head to each angle at each standoff of a flat, fit axis and encoder, write the head's file."""
 
     gives: ClassVar[str | None] = "head"
     step: Literal["calibrate_head"]
@@ -42,6 +42,8 @@ class CalibrateHeadStep(StepModel):
     angles_deg: Angles
     """Readings of the encoder, in the order of the moves; begin near 0, where every spot is in the image."""
     repeats: Count = 3
+    file: Annotated[str, Field(pattern=r"^head[A-Za-z0-9_.-]*\.yaml$")] = "head.yaml"
+    """File of the calibrated head in the session folder; each such step of a session needs its own."""
     limits: HeadLimits = HeadLimits()
 
     @model_validator(mode="after")
@@ -50,6 +52,11 @@ class CalibrateHeadStep(StepModel):
         if doubled := [angle for angle in self.angles_deg if self.angles_deg.count(angle) > 1]:
             raise ValueError(f"angles_deg: expected each angle once, got {doubled[0]:g} deg more than once")
         return self
+
+    @property
+    def writes(self) -> str | None:
+        """The file of the head."""
+        return self.file
 
     @property
     def title(self) -> str:

@@ -48,27 +48,30 @@ def sweep(
         RigNotReadyError: a device does not answer.
     """
     laser = context.rig.head_laser
-    scanline = prior_scanline(context.rig, laser)
     found = []
     for number, angle_deg in enumerate(angles_deg):
-        at = _turned(context, placed, angle_deg)
         scene = f"{placed.key}/{number:03d}"
+        at = _turned(context, placed, angle_deg, f"{scene}/00")
+        if at.head_deg is None:
+            raise RigNotReadyError(
+                f"placement {placed.key}: expected the reading of the head's encoder from the target's"
+                " driver, got none; its `place` must return head_deg"
+            )
+        scanline = prior_scanline(context.rig, laser, at.head_deg)
         for repeat in range(repeats):
             context.capture(f"{scene}/{repeat:02d}", [laser.id], at, repeat, [scanline], scene)
             taken = context.captures[-1]
-            if taken.head_deg is None:
-                raise RigNotReadyError(
-                    f"placement {placed.key}: expected the reading of the head's encoder from the target's"
-                    " driver, got none; its `place` must return head_deg"
-                )
-            found.append(HeadCapture(taken.head_deg, observe_capture(context, taken)))
+            found.append(HeadCapture(at.head_deg, observe_capture(context, taken)))
         # A beam beyond the image or beside the target gives no spot: the target is as bright as before.
         if context.findings[taken.key].spots:
             follow_brightness(context)
     return found
 
 
-def _turned(context: Context, placed: Placement, angle_deg: float) -> Placement:
-    """Turn the head; a placement that is replayed from disk moves nothing."""
+def _turned(context: Context, placed: Placement, angle_deg: float, key: str) -> Placement:
+    """Turn the head; a placement that is replayed from disk has the reading of its capture `key`."""
     wanted = placed.model_copy(update={"head_deg": angle_deg})
-    return wanted if context.pairs.replayed is not None else context.bench.target.place(wanted)
+    if context.pairs.replayed is None:
+        return context.bench.target.place(wanted)
+    kept = context.pairs.replayed.captures.get(key)
+    return wanted if kept is None else wanted.model_copy(update={"head_deg": kept.head_deg})

@@ -23,7 +23,7 @@ from workbench.sensor.scanning import CalibratedHead, ScanPoints
 from workbench.trials.results import finish_trial
 from workbench.trials.scanning.moves import HeadCapture, sweep
 from workbench.trials.scanning.scan_step import ScanStep
-from workbench.trials.scanning.surface import Deviations, deviations, outline
+from workbench.trials.scanning.surface import SHARED, Deviations, deviations, outline
 
 OFF_BEAM_SD = 5.0
 """Distance of a spot from the beam, in standard deviations, beyond which it is not the head's."""
@@ -40,6 +40,8 @@ class Scan:
     """(N, 2)"""
     points: ScanPoints
     deviations: Deviations
+    deviation_sd_mm: FloatArray
+    """(N,) standard uncertainty of the deviations: of point and stated surface."""
     missing: tuple[tuple[float, str], ...]
     """Readings without a point, each with the cause."""
     offset_mm: float
@@ -57,13 +59,6 @@ class Scan:
         with np.errstate(divide="ignore"):
             far = np.where(half < 1, depth / np.maximum(1 - half, 0.0), np.inf)
         return depth / (1 + half) - self.offset_mm, far - self.offset_mm
-
-    @property
-    def deviation_sd_mm(self) -> FloatArray:
-        """(N,) standard uncertainty of the deviations: of point and stated surface."""
-        normal, covariance = self.deviations.normal, self.points.covariance_mm2
-        of_point = np.einsum("ni,nij,nj->n", normal, covariance, normal)
-        return np.asarray(np.sqrt(of_point + self.deviations.reference_sd_mm**2))
 
 
 def scan(context: Context, name: str, step: ScanStep, placements: Sequence[Placement]) -> str:
@@ -110,7 +105,10 @@ def scan_of(
     with np.errstate(invalid="ignore"):
         good = np.isfinite(points.position_mm).all(axis=1) & (np.abs(points.across_sd) < OFF_BEAM_SD)
     missing += [
-        (float(readings[n]), f"the spot at u = {u:.1f}, v = {v:.1f} px is not on the beam")
+        (
+            float(readings[n]),
+            f"the spot at u = {u:.1f}, v = {v:.1f} px is not on the beam in front of the sensor",
+        )
         for n, (u, v) in zip(np.flatnonzero(~good).tolist(), position[~good].tolist(), strict=True)
     ]
     kept = ScanPoints(
@@ -120,12 +118,14 @@ def scan_of(
         points.own_covariance_mm2[good],
         points.across_sd[good],
     )
+    found = deviations(placed, context.rig.bench, kept.position_mm)
     return Scan(
         placed=placed,
         readings_deg=readings[good],
         position_px=position[good],
         points=kept,
-        deviations=deviations(placed, context.rig.bench, kept.position_mm),
+        deviations=found,
+        deviation_sd_mm=found.sd_mm(kept, head.covariance_with(SHARED)),
         missing=tuple(sorted(missing)),
         offset_mm=head.offset_mm,
     )

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, radians, tan
+from math import radians, tan
 
 import numpy as np
 
 from workbench.model.arrays import FloatArray
-from workbench.model.rig import BenchSpec
+from workbench.model.rig import TARGET_TILT, BenchSpec
 from workbench.model.target import CylinderTarget, FlatTarget, Placement, PolynomialTarget
+from workbench.sensor.scanning import ScanPoints
 from workbench.trials.reference import standoff_sd_mm
 
 OUTLINE_POINTS = 201
+SHARED = ("ruler_scale", *TARGET_TILT)
+"""Parameters of the bench that calibration and stated surface share: ruler, and tilt of all flats."""
 
 
 @dataclass(frozen=True)
@@ -22,12 +25,42 @@ class Deviations:
     mm: FloatArray
     normal: FloatArray
     """(N, 3) unit normals (x, y, range), away from the sensor."""
-    reference_sd_mm: FloatArray
-    """(N,) standard uncertainty of the surface along its normal: of standoff, ruler and tilt."""
+    own_sd_mm: FloatArray
+    """(N,) standard uncertainty of the surface along its normal, of this placement: of its position, tilt and
+    diameter."""
+    by_shared: FloatArray
+    """(N, 3) derivatives of the surface along its normal by SHARED."""
+    shared_sd: FloatArray
+    """(3,) standard deviations of SHARED before the calibration."""
+
+    @property
+    def reference_sd_mm(self) -> FloatArray:
+        """(N,) standard uncertainty of the surface along its normal."""
+        shared_mm = np.linalg.norm(self.by_shared * self.shared_sd, axis=1)
+        return np.asarray(np.hypot(self.own_sd_mm, shared_mm))
+
+    def sd_mm(self, points: ScanPoints, shared_covariance: FloatArray) -> FloatArray:
+        """(N,) standard uncertainties of the deviations: of point and surface, which share errors.
+
+        With p the calibration's parameters and s those of SHARED: the error of an estimate is independent of
+        the estimates. So the covariance of (estimate of p) - p with s is minus that of p and s in the
+        posterior.
+
+        Args:
+            points: N points.
+            shared_covariance: (3, P) covariance of SHARED and the parameters in the posterior.
+        """
+        of_point = np.einsum("ni,nij,nj->n", self.normal, points.covariance_mm2, self.normal)
+        by_parameter = np.einsum("ni,nip->np", self.normal, points.common)
+        common = np.einsum("nk,kp,np->n", self.by_shared, shared_covariance, by_parameter)
+        return np.asarray(np.sqrt(of_point + self.reference_sd_mm**2 - 2.0 * common))
 
 
 def deviations(placed: Placement, bench: BenchSpec, position_mm: FloatArray) -> Deviations:
     """Deviations of points (N, 3): x, y, range from the reference plane.
+
+    A cylinder or a polynomial is placed along x as accurately as along z. A larger diameter, at the same
+    standoff, moves the side of a cylinder outwards by half of that times 1 - n_z, with n the normal.
 
     Raises:
         TypeError: the target has no surface.
@@ -36,15 +69,22 @@ def deviations(placed: Placement, bench: BenchSpec, position_mm: FloatArray) -> 
     value, gradient = _implicit(placed, bench, position_mm)
     length = np.linalg.norm(gradient, axis=1)
     normal = gradient / length[:, None]
-    along = hypot(standoff_sd_mm(placed, bench), bench.ruler_scale.sd * placed.standoff_mm) * normal[:, 2]
-    tilt = np.zeros(len(position_mm))
+    placement_sd_mm = standoff_sd_mm(placed, bench)
+    by_shared = np.zeros((len(position_mm), len(SHARED)))
+    by_shared[:, 0] = placed.standoff_mm * normal[:, 2]
     if isinstance(target, FlatTarget):
         # z = standoff + x tan(yaw) + y tan(pitch); d tan(a) = (1 + tan^2 a) da.
-        by_angle = position_mm[:, :2] * (1.0 + gradient[:, :2] ** 2)
+        by_angle = position_mm[:, :2] * (1.0 + gradient[:, :2] ** 2) * normal[:, 2:]
         sds_deg = [bench.tilt_sd_deg if own_deg is None else own_deg for own_deg in target.turn_sds_deg]
-        sds = np.radians(np.hypot(sds_deg, bench.target_tilt_sd_deg))
-        tilt = np.linalg.norm(by_angle * sds, axis=1) * normal[:, 2]
-    return Deviations(value / length, normal, np.hypot(along, tilt))
+        own = np.hypot(placement_sd_mm * normal[:, 2], np.linalg.norm(by_angle * np.radians(sds_deg), axis=1))
+        common = np.array([bench.target_slope_x.value, bench.target_slope_y.value])
+        by_shared[:, 1:] = by_angle / (1.0 + common**2)
+    else:
+        own = placement_sd_mm * np.hypot(normal[:, 0], normal[:, 2])
+        if isinstance(target, CylinderTarget):
+            own = np.hypot(own, (target.diameter_sd_mm or 0.0) / 2 * (1.0 - normal[:, 2]))
+    shared_sd = np.array([bench.ruler_scale.sd, bench.target_slope_x.sd, bench.target_slope_y.sd])
+    return Deviations(value / length, normal, own, by_shared, shared_sd)
 
 
 def outline(placed: Placement, bench: BenchSpec, x_mm: tuple[float, float]) -> tuple[FloatArray, FloatArray]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support.rigs import FISHEYE_STANDOFFS_MM, PROVENANCE, World, fisheye_rig, prior, thesis_rig
+from tests.support.scanned_head import SimulatedHead, inclined_rig
 from workbench.calibration.data import spot_rows
 from workbench.calibration.data.observations import PlacementInfo
 from workbench.calibration.data.spot_rows import (
@@ -17,6 +18,7 @@ from workbench.calibration.data.spot_rows import (
     observations_of_rows,
     own_spots,
     prior_scanline,
+    prior_scanlines,
     sought,
 )
 from workbench.calibration.estimation.fit import fit
@@ -27,10 +29,12 @@ from workbench.model.board import Board
 from workbench.model.captures import CaptureRow
 from workbench.model.errors import BadInputError
 from workbench.model.fit_event import Rejected
-from workbench.model.rig import Rig
+from workbench.model.rig import Rig, load_rig
 from workbench.ranging.ranger import SCANLINE_HALF_WIDTH_PX, Ranger
 from workbench.spots import Failure, Finding, Spot
 from workbench.spots.strip import distance_px
+
+HEAD_RIG = Path(__file__).parents[4] / "rigs/scanning-head-emulated.yaml"
 
 
 def tilted(ty: float) -> Rig:
@@ -81,6 +85,23 @@ def test_a_band_is_wider_by_what_is_uncertain_across_the_baseline(baseline_mm: t
     sd_px = np.sqrt(normal @ np.diag(np.array([4.0, 1.0]) ** 2 + by_pointing**2) @ normal)
     line = prior_scanline(rig.model_copy(update={"camera": camera}), laser)
     assert line.half_width_px == pytest.approx(BEAM_HALF_WIDTH_PX + PRIOR_REACH_SD * sd_px)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_band_of_a_turned_head_holds_its_spots_at_that_reading_alone(seed: int) -> None:
+    """Spots by the virtual bench's geometry, of heads that a seed draws from the priors."""
+    rig = inclined_rig(load_rig(HEAD_RIG))
+    head = SimulatedHead.of(rig, seed)
+    plane = head.plane("p", 400.0)
+    points = np.array([head.point("p", plane, reading) for reading in (-30.0, 0.0, 5.0)])
+    spots, inside = head.seen(points, 0.0, np.random.default_rng(seed))
+    assert inside.all()
+    for reading, spot in zip((-30.0, 0.0, 5.0), spots, strict=True):
+        line = prior_scanline(rig, rig.head_laser, reading)
+        assert distance_px(line, *spot) < line.half_width_px
+    at_zero = prior_scanline(rig, rig.head_laser)
+    assert distance_px(at_zero, *spots[0]) > at_zero.half_width_px
+    assert prior_scanlines(rig, 5.0) == [line]
 
 
 def grating(count: int, along_baseline: bool = False) -> Rig:

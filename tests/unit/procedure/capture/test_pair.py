@@ -12,10 +12,12 @@ import pytest
 
 from tests.support.plain_bench import plain_bench
 from tests.support.running import two_laser_rig
+from tests.support.scanned_head import inclined_rig
 from workbench.calibration.data.spot_rows import prior_scanline
-from workbench.devices.protocols import ExposableCamera, Frame
+from workbench.devices.protocols import Bench, ExposableCamera, Frame
 from workbench.model.errors import BadInputError, LaserOffNotConfirmedError
 from workbench.model.event import CaptureTaken, ExposureSet, TargetPlaced
+from workbench.model.rig import load_rig
 from workbench.model.target import Placement
 from workbench.procedure.capture.pair import PairSource, spots_found
 from workbench.session.state import PlacementCaptures
@@ -23,6 +25,7 @@ from workbench.spots import Failure, Finding, find_spots
 
 PLACEMENT = Placement(key="p.1/500mm", standoff_mm=500.0, standoff_sd_mm=1.5)
 KEY = "p.1/500mm/L1/00"
+HEAD_RIG = Path(__file__).parents[4] / "rigs/scanning-head-emulated.yaml"
 SET = ExposureSet(key=PLACEMENT.key, exposure=20.0, unit="us", peak=0.6, verdict="good", trials=3)
 
 
@@ -40,7 +43,7 @@ def take(source: PairSource, *ids: str, scene: str | None = None) -> CaptureTake
 
 
 def test_a_pair_is_stored_with_placement_and_exposure(source: PairSource) -> None:
-    found = source.set_exposure(PLACEMENT.key, lambda key: None)
+    found = source.set_exposure(PLACEMENT, lambda key: None)
     assert found is not None
     taken = take(source)
     assert (taken.laser_id, taken.placement_key) == ("L1", PLACEMENT.key)
@@ -53,7 +56,7 @@ def test_a_pair_is_stored_with_placement_and_exposure(source: PairSource) -> Non
 
 
 def test_the_exposure_may_follow_the_brightness_within_its_limits(source: PairSource) -> None:
-    found = source.set_exposure(PLACEMENT.key, lambda key: None)
+    found = source.set_exposure(PLACEMENT, lambda key: None)
     assert found is not None
     source.change_exposure(found.exposure / 2)
     assert take(source).exposure == found.exposure / 2
@@ -64,7 +67,7 @@ def test_the_exposure_may_follow_the_brightness_within_its_limits(source: PairSo
 
 
 def test_a_replay_changes_no_exposure(source: PairSource) -> None:
-    source.set_exposure(PLACEMENT.key, lambda key: None)
+    source.set_exposure(PLACEMENT, lambda key: None)
     before = take(source).exposure
     source.replayed = PlacementCaptures(TargetPlaced(placement=PLACEMENT), SET)
     source.change_exposure(1.0)
@@ -74,7 +77,7 @@ def test_a_replay_changes_no_exposure(source: PairSource) -> None:
 
 def test_every_trial_exposure_is_named_before_it_is_taken(source: PairSource) -> None:
     named: list[str] = []
-    found = source.set_exposure(PLACEMENT.key, named.append)
+    found = source.set_exposure(PLACEMENT, named.append)
     assert found is not None
     assert named == [f"{PLACEMENT.key}/exposure/{n:02d}" for n in range(found.trials)]
 
@@ -88,7 +91,7 @@ def test_a_frame_in_room_light_has_no_dark_frame_and_needs_no_confirmation(sourc
 
 def test_nothing_fires_before_the_beams_are_confirmed_to_be_safe(source: PairSource) -> None:
     source.may_emit = False
-    for fire in (lambda: take(source), lambda: source.set_exposure(PLACEMENT.key, lambda key: None)):
+    for fire in (lambda: take(source), lambda: source.set_exposure(PLACEMENT, lambda key: None)):
         with pytest.raises(RuntimeError):
             fire()
 
@@ -120,7 +123,7 @@ def test_a_whole_placement_is_served_from_disk(source: PairSource) -> None:
     on, off, taken = source.pair(KEY, ("L1",), PLACEMENT, 0, None)
     source.replayed = PlacementCaptures(TargetPlaced(placement=PLACEMENT), SET, {KEY: taken}, complete=True)
     source.may_emit = False
-    assert source.set_exposure(PLACEMENT.key, lambda key: None) == SET
+    assert source.set_exposure(PLACEMENT, lambda key: None) == SET
     again_on, again_off, again = source.pair(KEY, ("L1",), PLACEMENT, 0, None)
     assert again == taken
     np.testing.assert_array_equal(again_on, on)
@@ -140,6 +143,22 @@ def test_a_frame_that_changed_on_disk_is_refused(source: PairSource) -> None:
     assert caught.value.exit_code == 2
 
 
+class Stuck:
+    """The camera of a bench in front of a beam that stays on."""
+
+    def __init__(self, bench: Bench, laser_id: str) -> None:
+        self.bench, self.laser_id = bench, laser_id
+
+    def grab(self) -> Frame:
+        with self.bench.lasers.lit([self.laser_id], for_s=2.0):
+            return self.bench.camera.grab()
+
+    grab_ambient = grab
+
+    def close(self) -> None:
+        self.bench.camera.close()
+
+
 def test_a_beam_in_the_dark_frame_is_refused(source: PairSource) -> None:
     """Of a laser that no pair of its own shows: it burns in both frames of the others."""
     rig = source.rig
@@ -147,26 +166,33 @@ def test_a_beam_in_the_dark_frame_is_refused(source: PairSource) -> None:
         stuck = source.bench.camera.grab().image
     line = prior_scanline(rig, rig.lasers[0])
     source.check_dark(KEY, stuck, find_spots(stuck, scanlines=[line], expected=1), [line])
-    camera = source.bench.camera
-
-    class Stuck:
-        """The camera in front of a beam that stays on."""
-
-        def grab(self) -> Frame:
-            with source.bench.lasers.lit(["L2"], for_s=2.0):
-                return camera.grab()
-
-        grab_ambient = grab
-
-        def close(self) -> None:
-            camera.close()
-
-    source.bench = replace(source.bench, camera=Stuck())
+    source.bench = replace(source.bench, camera=Stuck(source.bench, "L2"))
     with pytest.raises(LaserOffNotConfirmedError, match=KEY) as caught:
         source.check_stuck_beam(KEY)
     assert caught.value.exit_code == 7
     assert "measure_latency" in str(caught.value)
     source.check_stuck_beam(KEY)  # the frame was looked at: nothing is left
+
+
+@pytest.mark.parametrize("reading_deg", [0.0, -30.0])
+def test_a_turned_head_is_exposed_and_its_stuck_beam_found_at_its_reading(
+    tmp_path: Path, reading_deg: float
+) -> None:
+    rig = inclined_rig(load_rig(HEAD_RIG))
+    turned = PLACEMENT.model_copy(update={"head_deg": reading_deg})
+    with plain_bench(rig, tmp_path) as bench:
+        bench.target.place(turned)
+        source = PairSource(tmp_path, rig, bench, may_emit=True)
+        found = source.set_exposure(turned, lambda key: None)
+        assert found is not None
+        assert found.verdict == "good"
+        source.pair(KEY, ("S",), turned, 0, "scene")
+        source.bench = replace(bench, camera=Stuck(bench, "S"))
+        stuck = source.bench.camera.grab().image
+        line = prior_scanline(rig, rig.head_laser, reading_deg)
+        source.check_dark(KEY, stuck, find_spots(stuck, scanlines=[line], expected=1), [line])
+        with pytest.raises(LaserOffNotConfirmedError):
+            source.check_stuck_beam(KEY)
 
 
 def test_one_spot_of_a_laser_alone_is_the_lasers(source: PairSource) -> None:

@@ -106,6 +106,32 @@ def test_mistakes_of_a_rig_do_not_hide_those_of_its_driver(tmp_path: Path) -> No
     assert [key for _, key in mistakes(tmp_path, text)] == ["driver", "lasers[0].axis"]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "wanted"),
+    [
+        ("ty: {value: -0.19882", "ty: {value: 0.3", None),
+        ("tx: {value: 0.0, sd: 0.019}", "tx: {value: 0.2, sd: 0.019}", "grating in one row"),
+        (
+            "y_mm: {value: 0.0, sd: 0.77}\n    tx: {value: 0.0, sd: 0.019}\n    ty: {value: -0.23363",
+            "y_mm: {value: 10.0, sd: 0.77}\n    tx: {value: 0.0, sd: 0.019}\n    ty: {value: -0.23363",
+            "got G03 and G01, which do",
+        ),
+    ],
+)
+def test_beams_of_one_emitter_are_checked_with_the_rig(
+    tmp_path: Path, old: str, new: str, wanted: str | None
+) -> None:
+    rig = (ROOT / "rigs/mars-rover-emulated.yaml").read_text()
+    path = tmp_path / "f.yaml"
+    path.write_text(changed(rig, old, new))
+    found = check_file(path).mistakes
+    if wanted is None:
+        assert not found
+    else:
+        assert [place(path, one) for one in found] == [(26, "lasers[0].emitter")]
+        assert wanted in found[0]
+
+
 def test_a_device_block_is_checked_by_its_driver(tmp_path: Path) -> None:
     block = "devices:\n  camera: {source: 0, gain: loud}\n  lasers: {port: /dev/ttyACM0}\n"
     text = changed(RIG, "driver: emulated", "driver: opencv+serial") + block

@@ -11,6 +11,7 @@ import pytest
 
 from tests.support.procedures import RIG, plan_of
 from workbench.model.errors import BadInputError
+from workbench.model.prior import Prior
 from workbench.model.rig import Rig
 from workbench.model.target import Placement
 from workbench.procedure.engine.context import Context
@@ -37,6 +38,17 @@ def test_a_step_finds_what_an_earlier_procedure_gives(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=r"a\.yaml: steps\[1\]: export .*fit"):
         plan_of(tmp_path, a=CAPTURE + "  - {step: export}\n")
     assert len(plan_of(tmp_path, a=calibrate, b=TRIAL).procedures) == 2
+
+
+def test_beams_whose_spots_cannot_be_assigned_are_refused_before_the_session(tmp_path: Path) -> None:
+    plan = plan_of(tmp_path, a=CAPTURE)
+    beams = tuple(
+        laser.model_copy(update={"emitter": "g", "tx": Prior(value=-laser.x_mm.value / 1000, sd=0.0)})
+        for laser in plan.rig.lasers
+    )
+    rig = plan.rig.model_copy(update={"lasers": beams})
+    with pytest.raises(BadInputError, match="emitter g that do not cross within 100 to 5000 mm"):
+        Plan.of(rig, plan.rig_path, plan.procedures, plan.procedure_paths)
 
 
 @register

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,8 @@ from scipy.stats import chi2
 
 from tests.support.rigs import thesis_rig
 from tests.support.running import running
-from tests.support.scanned_head import SimulatedHead
+from tests.support.scanned_head import SimulatedHead, inclined_rig
+from workbench.calibration.data.observations import Observation
 from workbench.devices.placed_by_hand import ByHandBlock, PlacedByHand
 from workbench.model import event as ev
 from workbench.model.errors import BadInputError, LimitFailedError, RigNotReadyError
@@ -23,7 +24,9 @@ from workbench.model.prior import exactly
 from workbench.model.rig import Rig, load_rig
 from workbench.model.target import Placement
 from workbench.model.yamlfile import load_yaml_model
+from workbench.session.state import PlacementCaptures
 from workbench.trials.scanning.calibrate_step import CalibrateHeadStep
+from workbench.trials.scanning.moves import sweep
 from workbench.trials.scanning.scan_step import ScanStep
 from workbench.trials.scanning.use_step import UseHeadStep
 
@@ -34,6 +37,7 @@ CALIBRATE = CalibrateHeadStep.model_validate(
         "standoffs_mm": [300, 600],
         "angles_deg": [0, 6, -6, -14, -22, -30, 40],
         "repeats": 2,
+        "file": "head-low.yaml",
     }
 )
 SCAN = ScanStep.model_validate(
@@ -64,7 +68,7 @@ class Done:
 
 def files(session: Path) -> dict[str, bytes]:
     """Results of a session."""
-    return {path.name: path.read_bytes() for path in (*session.glob("*.csv"), session / "head.yaml")}
+    return {path.name: path.read_bytes() for path in (*session.glob("*.csv"), session / "head-low.yaml")}
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +105,7 @@ def test_every_capture_has_the_reading_of_the_encoder(done: Done) -> None:
 
 
 def test_the_file_is_that_of_the_session(done: Done) -> None:
-    assert load_yaml_model(done.folder / "s/head.yaml", HeadCalibration) == done.head
+    assert load_yaml_model(done.folder / "s/head-low.yaml", HeadCalibration) == done.head
     assert done.head.scanning_head.fit.noise_scale < 1.5
     moves = rows(done.folder / "s/c.1-moves.csv")
     assert len(moves) == done.head.scanning_head.fit.moves >= 10
@@ -128,7 +132,7 @@ def test_a_fit_beyond_its_limits_calibrates_no_head(done: Done, tmp_path: Path) 
         with pytest.raises(LimitFailedError, match=r"rms_px: expected at most 0\.001"):
             strict.run(session.context, "c.1")
         assert session.context.head is None
-    assert not (tmp_path / "s/head.yaml").exists()
+    assert not (tmp_path / "s/head-low.yaml").exists()
     assert (tmp_path / "s/c.1-parameters.csv").exists()
 
 
@@ -172,6 +176,39 @@ def test_a_session_that_goes_on_has_the_same_results(done: Done, tmp_path: Path)
         SCAN.run(session.context, "c.2")
     assert files(tmp_path / "s") == files(done.folder / "s")
     assert finished(tuple(session.records)) == finished(done.records)
+
+
+def test_spots_of_an_inclined_beam_are_searched_where_the_head_is_turned(tmp_path: Path) -> None:
+    """Turned by 30 degrees they are beyond the band of the reading 0; the same in a replay."""
+    rig, angles_deg = inclined_rig(load_rig(RIG)), (0.0, -30.0)
+    placed = Placement(key="c.1/400mm", standoff_mm=400.0, head_deg=0.0)
+    with running(tmp_path, rig) as session:
+        context = session.context
+        context.confirm_safety()
+        context.bench.target.place(placed)
+        context.pairs.set_exposure(placed, lambda key: None)
+        captures = sweep(context, placed, angles_deg, 1)
+        assert [isinstance(one.found, Observation) for one in captures] == [True, True]
+        taken = {one.key: one for one in context.captures}
+        context.pairs.replayed = PlacementCaptures(ev.TargetPlaced(placement=placed), None, taken)
+        assert sweep(context, placed, angles_deg, 1) == captures
+
+
+def test_a_driver_without_an_encoder_is_named(tmp_path: Path) -> None:
+    placed = Placement(key="c.1/400mm", standoff_mm=400.0, head_deg=0.0)
+    with running(tmp_path, low_rig()) as session:
+        context = session.context
+
+        class NoEncoder:
+            def place(self, placement: Placement) -> Placement:
+                return placement.model_copy(update={"head_deg": None})
+
+            def close(self) -> None:
+                pass
+
+        context.bench = replace(context.bench, target=NoEncoder())
+        with pytest.raises(RigNotReadyError, match="must return head_deg"):
+            sweep(context, placed, (0.0,), 1)
 
 
 def test_a_scan_with_the_head_of_an_earlier_session(done: Done, tmp_path: Path) -> None:

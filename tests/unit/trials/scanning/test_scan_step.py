@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from tests.support.procedures import plan_of
+from workbench.model.errors import BadInputError
 from workbench.model.rig import load_rig
 from workbench.procedure.engine.procedure_file import load_procedure
 from workbench.trials.scanning.calibrate_step import CalibrateHeadStep
@@ -16,6 +18,17 @@ from workbench.trials.scanning.scan_step import ScanStep
 ROOT = Path(__file__).parents[4]
 SCAN: dict[str, Any] = {"step": "scan", "standoff_mm": 500, "from_deg": -1, "to_deg": 1, "step_deg": 0.1}
 CALIBRATE: dict[str, Any] = {"step": "calibrate_head", "standoffs_mm": [300], "angles_deg": [0, 5]}
+
+
+def test_two_calibrations_of_one_session_need_files_of_their_own(tmp_path: Path) -> None:
+    """The second one would overwrite the head of the first."""
+    rig = ROOT / "rigs/scanning-head-emulated.yaml"
+    calibrate = "  - {step: calibrate_head, standoffs_mm: [300], angles_deg: [0, 5]%s}\n"
+    with pytest.raises(BadInputError, match=r"b\.yaml: steps\[0\]: .* got head\.yaml, .*a\.yaml: steps\[0\]"):
+        plan_of(tmp_path, rig, a=calibrate % "", b=calibrate % "")
+    with pytest.raises(BadInputError, match=r"a\.yaml: steps\[1\]: .* got head-2\.yaml"):
+        plan_of(tmp_path, rig, a=2 * (calibrate % ", file: head-2.yaml"))
+    assert len(plan_of(tmp_path, rig, a=calibrate % "", b=calibrate % ", file: head-2.yaml").procedures) == 2
 
 
 def test_an_arc_has_both_its_ends() -> None:
@@ -52,6 +65,8 @@ def test_impossible_scans_are_refused(keys: dict[str, Any], message: str) -> Non
         ({"angles_deg": [0, 5, 0]}, "angles_deg: expected each angle once, got 0 deg more than once"),
         ({"standoffs_mm": [300, 300]}, "expected each standoff once"),
         ({"angles_deg": [0]}, "at least 2 items"),
+        ({"file": "../head.yaml"}, "match pattern"),
+        ({"file": "calibration.yaml"}, "match pattern"),
     ],
 )
 def test_impossible_calibrations_are_refused(keys: dict[str, Any], message: str) -> None:
