@@ -2,10 +2,15 @@ import os
 import shutil
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 # As the command line does. Two workers with two threads each on two cores spend most of their time waiting.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# No test asserts a time: hypothesis would assert 200 ms for each example.
+hypothesis.settings.register_profile("workbench", deadline=None)
+hypothesis.settings.load_profile("workbench")
 
 MEMORY = Path("/dev/shm")  # noqa: S108  # only a place for pytest's own temporary folders
 ROOM_BYTES = 6 * 2**30

@@ -90,7 +90,7 @@ def requests() -> st.SearchStrategy[bytes]:
 events = st.lists(requests() | st.integers(0, 2000) | st.booleans(), max_size=12)
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 @given(events)
 def test_the_same_bytes_get_the_same_answers_and_light(
     library: ctypes.CDLL, happenings: list[bytes | int | bool]

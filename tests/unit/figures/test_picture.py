@@ -45,7 +45,7 @@ def reddish(drawn: Picture) -> NDArray[np.bool_]:
     return np.asarray(red - np.maximum(green, blue) > 15)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(
     xs=st.lists(st.floats(50.0, 5000.0), min_size=1, max_size=12, unique_by=lambda x: round(x, 1)),
     scale=st.sampled_from(["linear", "log"]),

@@ -110,7 +110,7 @@ def test_no_file(tmp_path: Path) -> None:
         load_captures(tmp_path / "nowhere.csv")
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(body=st.binary(max_size=200))
 def test_any_bytes_are_read_or_refused_by_name(tmp_path: Path, body: bytes) -> None:
     path = tmp_path / "c.csv"

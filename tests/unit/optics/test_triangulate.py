@@ -22,7 +22,7 @@ EACH_LENS = pytest.mark.parametrize(("model", "lens"), LENSES, ids=[model.name f
 RAY = Ray(-60.1, 0.3, 0.004, -0.002)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     z_mm=st.floats(130.0, 20000.0),
     x_mm=st.floats(20.0, 80.0),

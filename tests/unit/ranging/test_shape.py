@@ -260,7 +260,7 @@ def test_the_front_may_be_wider_than_the_lasers() -> None:
     assert shape.closest_x_mm == -120.0
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(
     st.lists(st.floats(30.0, 10_000.0), min_size=1, max_size=6),
     st.floats(1e-4, 0.2),

@@ -57,7 +57,7 @@ def check(finding: Finding) -> None:
     assert finding.spots or Failure.NO_SPOT in finding.failures
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(KINDS, SHAPES, DTYPES, st.integers(0, 2**31), LINES, st.none() | KINDS, st.none() | st.integers(0, 5))
 def test_no_image_breaks_the_search(
     kind: str,
@@ -72,7 +72,7 @@ def test_no_image_breaks_the_search(
     check(find_spots(image(kind, shape, dtype, seed), dark, scanlines=lines, expected=expected))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(st.integers(0, 5), min_size=0, max_size=4),
     st.sampled_from(["uint8", "uint16", "float32", "int32", "bool"]),
