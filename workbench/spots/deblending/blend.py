@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray
@@ -18,7 +17,7 @@ from workbench.spots.deblending.joint_fit import JointFit, f_statistic, fit_join
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.acceptance import without_outliers
 from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U
-from workbench.spots.kernels.windows import half_for, mark_discs, mark_strip
+from workbench.spots.kernels.windows import exclude_light, half_for, mark_strip
 from workbench.spots.measure import FittedSpot, spot_flags
 from workbench.spots.noise import PixelNoise
 from workbench.spots.pair import PairSignal
@@ -40,6 +39,7 @@ _MAX_HIDDEN = 4
 # Fits before the last one, each with the noise and the outliers of the one before.
 _ROUNDS = 2
 _NO_MASK = np.zeros((0, 0), bool)
+_ONLY = np.array([0])
 
 
 class Blend:
@@ -68,22 +68,22 @@ class Blend:
             np.array([contrast2]),
             self.scene.pair.stated_contrast2,
         )
-        points = np.array([t.params[U:LN_SU] for t in group])
         reach = reach_px or max(t.reach_px for t in group)
-        u, v = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        half = half_for(reach) + int(np.ceil(0.5 * np.ptp(points, axis=0).max()))
+        u, v = [t.spot.u_px for t in group], [t.spot.v_px for t in group]
+        extent = max(max(u) - min(u), max(v) - min(v))
+        half = half_for(reach) + math.ceil(0.5 * extent)
         self.is_within_limit = half <= _MAX_HALF_PX
         half = min(half, _MAX_HALF_PX)
-        self.row0, self.col0 = round(float(v)) - half, round(float(u)) - half
-        centre = np.array([self.row0 + half], float), np.array([self.col0 + half], float)
-        win = self.scene.pair.cut(*centre, np.array([0]), half)
-        elsewhere = ~self._light_of(others, win.shape)
-        self.allowed: BoolArray = self._in_a_strip(scenes, win.shape) & elsewhere
-        # Light off the scanline does not come from spots on it.
-        size = 2 * int(np.ceil(TAIL_WIDTHS * reach)) + 1
-        near = cv2.dilate(self.allowed.astype(np.uint8), np.ones((size, size), np.uint8)).astype(bool)
-        self.win = win._replace(usable=(near & elsewhere)[None] & win.usable)
+        row, col = round(0.5 * (min(v) + max(v))), round(0.5 * (min(u) + max(u)))
+        self.row0, self.col0 = row - half, col - half
+        self.win = self.scene.pair.cut(np.array([float(row)]), np.array([float(col)]), _ONLY, half)
         """(1, height, width): window around all spots of the cluster."""
+        self.allowed: BoolArray = self._in_a_strip(scenes)
+        # Light off the scanline does not come from spots on it.
+        lights = [(t.spot.u_px, t.spot.v_px, TAIL_WIDTHS * t.reach_px) for t in others]
+        discs = np.array(lights).reshape(-1, 3)
+        near = math.ceil(TAIL_WIDTHS * reach)
+        exclude_light(self.row0, self.col0, discs, near, self.allowed, self.win.usable[0])
 
     def start_of(self, fits: Sequence[FittedSpot]) -> FloatArray:
         """(n, 6) parameters of fitted spots, in pixels of the window."""
@@ -118,17 +118,9 @@ class Blend:
             fits.append(FittedSpot(spot, params, slope, contrast2, reach, flux / float(sd[0]), self.scene))
         return fits
 
-    def _light_of(self, fits: Sequence[FittedSpot], shape: tuple[int, int]) -> BoolArray:
-        """(height, width): pixels within `TAIL_WIDTHS` of these spots."""
-        found = np.zeros(shape, bool)
-        if fits:
-            lights = np.array([(t.spot.u_px, t.spot.v_px, TAIL_WIDTHS * t.reach_px) for t in fits])
-            mark_discs(self.row0, self.col0, lights, found)
-        return found
-
-    def _in_a_strip(self, scenes: Sequence[PairSignal], shape: tuple[int, int]) -> BoolArray:
+    def _in_a_strip(self, scenes: Sequence[PairSignal]) -> BoolArray:
         """(height, width): pixels where a scanline allows a spot."""
-        found = np.zeros(shape, bool)
+        found = np.zeros(self.win.shape, bool)
         for strip in (scene.strip for scene in scenes):
             rows, cols = (strip.rows.start, strip.rows.stop), (strip.cols.start, strip.cols.stop)
             mask = _NO_MASK if strip.mask is None else strip.mask
@@ -249,7 +241,7 @@ def with_hidden_spots(
         return group
     best = fit_joint(blend.win, blend.start_of(group), blend.noise)
     while len(best.params) < len(group) + _MAX_HIDDEN:
-        hidden = hidden_spot(best, blend.win, blend.allowed)
+        hidden = hidden_spot(best, blend.allowed)
         if hidden is None:
             break
         more = _fit_without_outliers(blend.win, np.vstack([best.params, hidden]), blend.noise)
