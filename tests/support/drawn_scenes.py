@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from zlib import crc32
@@ -13,7 +13,7 @@ from tests.benchmarks.render import Sensor, spot
 from workbench.model.arrays import FloatArray, Image
 from workbench.ranging.acquire import acquire
 from workbench.ranging.ranger import Ranger, Reading
-from workbench.spots import Finding, Spot, SpotFinder
+from workbench.spots import Finding, SpotFinder
 
 KINDS = ("flat", "far", "incline", "cylinder", "steps", "one lost", "two lost", "dim", "clipped", "stray")
 SHAPE = (480, 640)
@@ -106,33 +106,69 @@ def dark_frame(number: int) -> Image:
     return SENSOR.expose(np.full(SHAPE, AMBIENT_ELECTRONS), np.random.default_rng(number))
 
 
-def numbers_of(scene: DrawnScene) -> Iterator[float]:
-    """Numbers of a scene's spots and of its reading.
+NUMBERS = (
+    "spots",
+    "flags",
+    *COLUMNS,
+    "status",
+    "notes",
+    "closest_mm",
+    "sigma_mm",
+    "low_mm",
+    "high_mm",
+    "mean_mm",
+    "mean_sigma_mm",
+    "flat_mm",
+    "flat_sigma_mm",
+    "flat_spot_sd_mm",
+    "flat_at_mm",
+    "ranges_mm",
+    "sigmas_mm",
+    "angle_rad",
+    "probabilities",
+    "p_values",
+)
+"""Names of the numbers of a scene."""
 
-    Spots enter by weighted sums over all captures, texts by a checksum.
+
+def numbers_of(scene: DrawnScene) -> list[float]:
+    """Numbers of a scene's spots and of its reading, in the order of `NUMBERS`; NaN where there is none.
+
+    Spots of all captures, ranges and probabilities enter by weighted sums, texts by a checksum.
     """
     reading = scene.read()
     spots = [spot for finding in scene.captured for spot in finding.spots]
-    yield float(len(spots))
-    yield float(crc32(repr([sorted(flag.value for flag in one.flags) for one in spots]).encode()))
-    for name in COLUMNS:
-        yield sum(n * (_of(one, name)) for n, one in enumerate(spots, 1))
-    yield float(crc32(repr((reading.status, *(line.shape.kind for line in reading.lines))).encode()))
-    yield float(crc32(repr(reading.notes).encode()))
-    for value in (reading.closest_mm, reading.sigma_mm, *(reading.interval_mm or (None, None))):
-        yield np.nan if value is None else value
-    for value in (reading.mean_mm, reading.mean_sigma_mm, reading.flat_mm, reading.flat_sigma_mm):
-        yield np.nan if value is None else value
-    yield np.nan if reading.flat_spot_sd_mm is None else reading.flat_spot_sd_mm
-    yield sum(reading.flat_at_mm)
-    yield sum(n * one.range_mm for n, one in enumerate(reading.lasers, 1))
-    yield sum(n * one.sigma_mm for n, one in enumerate(reading.lasers, 1))
     shapes = [line.shape for line in reading.lines]
-    yield sum(shape.angle_rad or 0.0 for shape in shapes)
-    yield sum(n * p for shape in shapes for n, p in enumerate(shape.probabilities.values(), 1))
-    yield sum(n * (test.probability or 0.0) for shape in shapes for n, test in enumerate(shape.tried, 1))
+    optional = (
+        reading.closest_mm,
+        reading.sigma_mm,
+        *(reading.interval_mm or (None, None)),
+        reading.mean_mm,
+        reading.mean_sigma_mm,
+        reading.flat_mm,
+        reading.flat_sigma_mm,
+        reading.flat_spot_sd_mm,
+    )
+    return [
+        float(len(spots)),
+        _checksum([sorted(flag.value for flag in one.flags) for one in spots]),
+        *(_weighted(getattr(one, name) or 0.0 for one in spots) for name in COLUMNS),
+        _checksum((reading.status, *(shape.kind for shape in shapes))),
+        _checksum(reading.notes),
+        *(np.nan if value is None else float(value) for value in optional),
+        sum(reading.flat_at_mm),
+        _weighted(one.range_mm for one in reading.lasers),
+        _weighted(one.sigma_mm for one in reading.lasers),
+        sum(shape.angle_rad or 0.0 for shape in shapes),
+        sum(_weighted(shape.probabilities.values()) for shape in shapes),
+        sum(_weighted(test.probability or 0.0 for test in shape.tried) for shape in shapes),
+    ]
 
 
-def _of(spot: Spot, name: str) -> float:
-    value = getattr(spot, name)
-    return 0.0 if value is None else float(value)
+def _weighted(values: Iterable[float]) -> float:
+    """Sum in which every value has another weight."""
+    return float(sum(n * value for n, value in enumerate(values, 1)))
+
+
+def _checksum(texts: object) -> float:
+    return float(crc32(repr(texts).encode()))
