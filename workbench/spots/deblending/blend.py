@@ -93,29 +93,30 @@ class Blend:
         """Spots of a joint fit, in pixels of the image."""
         absolute = joint.params + np.array([0, 0, self.col0, self.row0, 0, 0])
         fits = []
-        own = zip(absolute, joint.sd, joint.speckle_sd, spot_flags(self.scene, absolute), strict=True)
-        for i, (params, sd, speckle_sd, flags) in enumerate(own):
-            _, flux, u, v, ln_su, ln_sv = params.tolist()
-            reach = math.exp(max(ln_su, ln_sv))
-            others = np.delete(absolute, i, axis=0)[:, U:LN_SU]
-            if (np.hypot(*(others - params[U:LN_SU]).T) < _OVERLAP_WIDTHS * reach).any():
+        rows, centres = absolute.tolist(), absolute[:, U:LN_SU].tolist()
+        slope, contrast2 = joint.noise.slope_dn.item(), joint.noise.contrast2.item()
+        own = zip(rows, joint.sd.tolist(), joint.speckle_sd.tolist(), strict=True)
+        all_flags = spot_flags(self.scene, absolute)
+        for i, ((_, flux, u, v, ln_su, ln_sv), sd, speckle_sd) in enumerate(own):
+            reach, flags = math.exp(max(ln_su, ln_sv)), all_flags[i]
+            others = (*centres[:i], *centres[i + 1 :])
+            if any(math.dist((u, v), other) < _OVERLAP_WIDTHS * reach for other in others):
                 flags |= {Failure.MERGED}
             width = math.exp(0.5 * (ln_su + ln_sv))
             peak = flux / (2.0 * math.pi * (width**2 + 1.0 / 12.0))
             spot = Spot(
                 u_px=u,
                 v_px=v,
-                u_sd_px=float(sd[1]),
-                v_sd_px=float(sd[2]),
+                u_sd_px=sd[1],
+                v_sd_px=sd[2],
                 flux_dn=flux,
                 width_px=width,
                 peak_dn=peak,
                 flags=flags,
-                u_speckle_sd_px=float(speckle_sd[0]),
-                v_speckle_sd_px=float(speckle_sd[1]),
+                u_speckle_sd_px=speckle_sd[0],
+                v_speckle_sd_px=speckle_sd[1],
             )
-            slope, contrast2 = float(joint.noise.slope_dn[0]), float(joint.noise.contrast2[0])
-            fits.append(FittedSpot(spot, params, slope, contrast2, reach, flux / float(sd[0]), self.scene))
+            fits.append(FittedSpot(spot, absolute[i], slope, contrast2, reach, flux / sd[0], self.scene))
         return fits
 
     def _in_a_strip(self, scenes: Sequence[PairSignal]) -> BoolArray:

@@ -40,16 +40,15 @@ def _exponential(r: float) -> float:
     total = total * r / 4.0 + 1.0
     total = total * r / 3.0 + 1.0
     total = total * r / 2.0 + 1.0
-    total = total * r / 1.0 + 1.0
-    return total
+    return total * r + 1.0
 
 
 @compiled
 def _scaled_tail(x: float) -> float:
     """(1 + 2 x) exp(x^2) erfc(x) for x from 0.
 
-    Polynomial in t = (x - 3.75) / (x + 3.75), as in M. M. Shepherd and J. G. Laframboise, Math. Comp. 36 (1981)
-    249. It interpolates scipy's `erfcx` at 23 Chebyshev nodes.
+    Polynomial in t = (x - 3.75) / (x + 3.75), as in M. M. Shepherd and J. G. Laframboise, Math. Comp. 36
+    (1981) 249. It interpolates scipy's `erfcx` at 23 Chebyshev nodes.
     """
     t = (x - _MAPPING) / (x + _MAPPING)
     total = -8.240180171054342e-09 * t - 2.080291185690009e-09
@@ -73,8 +72,7 @@ def _scaled_tail(x: float) -> float:
     total = total * t + 0.08227673849010635
     total = total * t + 0.003585415485161031
     total = total * t - 0.14024059858554708
-    total = total * t + 1.2375126308378281
-    return total
+    return total * t + 1.2375126308378281
 
 
 @compiled

@@ -18,11 +18,12 @@ _LEAST_INFORMATION: Final = 1e-12
 @compiled
 def _gaussian(width_px: float) -> FloatArray:
     """(n,) weights of a sampled Gaussian with the sum 1, n odd."""
-    half = int(round(2.0 * _FILTER_WIDTHS * width_px + 1.0)) // 2
+    half = round(2.0 * _FILTER_WIDTHS * width_px + 1.0) // 2
     taps = np.empty(2 * half + 1)
     for i in range(taps.size):
         taps[i] = math.exp(-0.5 * ((i - half) / width_px) ** 2)
-    return taps / taps.sum()
+    taps /= taps.sum()
+    return taps
 
 
 @compiled

@@ -34,7 +34,7 @@ def test_the_most_significant_place_is_that_of_filters_of_opencv(
     narrow = cv2.GaussianBlur(weight, (0, 0), sigmaX=su / 2**0.5, sigmaY=sv / 2**0.5, borderType=constant)
     information = narrow / (4.0 * np.pi * su * sv)
     significance = np.where(allowed, matched / np.sqrt(information), 0.0)
-    row, col = np.unravel_index(int(significance.argmax()), shape)
+    row, col = divmod(int(significance.argmax()), shape[1])
     found = most_significant(residual, weight, allowed, su, sv)
     assert found[1:3] == (row, col)
     assert found[0] == pytest.approx(significance[row, col], rel=1e-12)
