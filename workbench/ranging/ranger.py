@@ -30,6 +30,7 @@ MERGING_WIDTHS = 4.0
 """Distance of two spots, in widths, below which they may be found as one."""
 SCANLINE_HALF_WIDTH_PX = 8.0
 """Half width of the search band: a beam of 1.5 mm at the sensor's front spans some 8 px on either side."""
+_NONE = np.empty(0, np.intp)
 
 
 @dataclass(frozen=True)
@@ -235,7 +236,7 @@ class Ranger:
             return Reading(scene, "no_points", notes=(NOTHING_SEEN,))
         ids = [self.sensor.ids[i] for i in assignment.lasers]
         assigned = [spots[i] for i in assignment.spots.tolist()]
-        position, _, _ = spot_arrays(assigned)
+        position = positions(assigned)
         notes = (*assignment.notes, *flag_notes(ids, assigned))
         without_spot = [i for i in self.sensor.ids if i not in ids and i not in assignment.ambiguous]
         failed = failed_checks(position, assignment.ranges, self.size_px)
@@ -254,21 +255,24 @@ class Ranger:
         pairs = pair_up(self.sensor, *spot_arrays(spots))
         rows = self.sensor.rows
         found = [assign(pairs, row.lasers) for row in rows]
-        claimed = np.concatenate([np.empty(0, np.intp), *(f[1] for f in found if f is not None)])
-        twice = {i for i in claimed if (claimed == i).sum() > 1}
+        claimed = [n for f in found if f is not None for n in f[1].tolist()]
+        twice = {n for n in claimed if claimed.count(n) > 1}
         clear = [None if f is None or not twice.isdisjoint(f[1].tolist()) else f for f in found]
-        lasers = np.concatenate([np.empty(0, np.intp), *(f[0] for f in clear if f is not None)])
-        assigned = np.concatenate([np.empty(0, np.intp), *(f[1] for f in clear if f is not None)])
+        lasers, assigned = (
+            np.concatenate([_NONE, *(f[of] for f in clear if f is not None)]) for of in range(2)
+        )
         hidden = [
             pair
             for row, f in zip(rows, clear, strict=True)
             if f is not None
             for pair in self._hidden(spots, pairs, *f, row.lasers)
         ]
-        single = ~np.isin(assigned, [spot for _, spot in hidden])
         unclear = [row for row, f in zip(rows, clear, strict=True) if f is None]
         ambiguous = {int(i) for row in unclear for i in row.lasers}
-        ambiguous |= {laser for laser, _ in hidden} | set(lasers[~single].tolist())
+        if hidden:
+            single = ~np.isin(assigned, [spot for _, spot in hidden])
+            ambiguous |= {laser for laser, _ in hidden} | set(lasers[~single].tolist())
+            lasers, assigned = lasers[single], assigned[single]
         notes = self._assignment_notes(pairs, len(spots), unclear)
         notes += tuple(
             f"{self.sensor.ids[laser]}: its spot may be merged with that at u = {spots[spot].u_px:.0f},"
@@ -276,7 +280,6 @@ class Ranger:
             for laser, spot in hidden
         )
         ids = tuple(i for n, i in enumerate(self.sensor.ids) if n in ambiguous)
-        lasers, assigned = lasers[single], assigned[single]
         return Assignment(lasers, assigned, pairs.chosen(lasers, assigned), ids, notes)
 
     def _hidden(
@@ -302,10 +305,10 @@ class Ranger:
             return []
         range_mm = pairs.chosen(seen, assigned).range_mm
         range_mm = range_mm[np.isfinite(range_mm)]
-        position, _, _ = spot_arrays(spots)
+        position = positions(spots)
         near_px = MERGING_WIDTHS * np.array([spot.width_px for spot in spots])
         hidden = []
-        for laser in np.setdiff1d(lasers, seen).tolist():
+        for laser in sorted(set(lasers.tolist()).difference(seen.tolist())):
             expected = self.sensor.spot_px(self.sensor.ids[laser], range_mm)
             distance_px = np.hypot(*(expected[:, None] - position).T).min(axis=1, initial=np.inf)
             hidden += [(laser, int(n)) for n in np.flatnonzero(distance_px < near_px)]
@@ -381,9 +384,13 @@ class Ranger:
         return Scanline(far[0], far[1], du, dv, SCANLINE_HALF_WIDTH_PX + bend)
 
 
+def positions(spots: Sequence[Spot]) -> FloatArray:
+    """(n, 2) u, v of spots."""
+    return np.array([(s.u_px, s.v_px) for s in spots]).reshape(-1, 2)
+
+
 def spot_arrays(spots: Sequence[Spot]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(n, 2) positions, standard deviations by noise, and by speckle (NaN: not known)."""
-    position = np.array([(s.u_px, s.v_px) for s in spots]).reshape(-1, 2)
     sd = np.array([(s.u_sd_px, s.v_sd_px) for s in spots]).reshape(-1, 2)
     speckle_sd = np.array([(s.u_speckle_sd_px, s.v_speckle_sd_px) for s in spots], float).reshape(-1, 2)
-    return position, sd, speckle_sd
+    return positions(spots), sd, speckle_sd

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 
 import numpy as np
 
@@ -29,13 +30,16 @@ def failed_checks(
         ranges: range estimates of the spots.
         size_px: (width, height) of the image.
     """
-    failed: list[str | None] = [None] * len(position_px)
-    bound = MOST_RELATIVE_SIGMA * ranges.range_mm
-    good = (ranges.misfit_sd < MOST_MISFIT_SD) & (ranges.sigma_mm < bound) & np.isfinite(ranges.range_mm)
-    good &= in_picture(position_px, size_px)
-    for n in np.flatnonzero(~good).tolist():
-        range_mm, sigma_mm, misfit_sd = ranges.range_mm[n], ranges.sigma_mm[n], ranges.misfit_sd[n]
-        failed[n] = _failed_check(position_px[n], range_mm, sigma_mm, misfit_sd, np.array(size_px, float))
+    failed: list[str | None] = []
+    size = np.array(size_px, float)
+    of_range = ranges.range_mm.tolist(), ranges.sigma_mm.tolist(), ranges.misfit_sd.tolist()
+    inside = in_picture(position_px, size).tolist()
+    for n, (range_mm, sigma_mm, misfit_sd) in enumerate(zip(*of_range, strict=True)):
+        is_range = misfit_sd < MOST_MISFIT_SD and sigma_mm < MOST_RELATIVE_SIGMA * range_mm < inf
+        if is_range and inside[n]:
+            failed.append(None)
+        else:
+            failed.append(_failed_check(position_px[n], range_mm, sigma_mm, misfit_sd, size))
     return failed
 
 

@@ -252,16 +252,15 @@ class CalibratedSensor:
         return np.asarray(self.typical_ranges(laser_id, range_mm).sigma_mm / range_mm)
 
     def typical_ranges(self, laser_id: str, range_mm: FloatArray) -> RangeEstimates:
-        """Estimates at ranges (n,), for spots with the noise in the calibration."""
-        typical = np.full((len(range_mm), 2), np.nan)
-        return self.ranges([laser_id] * len(range_mm), self.spot_px(laser_id, range_mm), typical)
+        """Estimates for spots exactly at ranges (n,), with the noise in the calibration."""
+        laser = np.full(len(range_mm), self._index_of[laser_id], np.intp)
+        typical_sd = self._total_sd(np.full((len(range_mm), 2), np.nan), None)
+        return self._range_model.expected(laser, np.asarray(range_mm, float), typical_sd)
 
     def in_frame(self, laser_id: str, range_mm: FloatArray) -> BoolArray:
         """(n,) whether the laser's spot lies in the image and before the fold of the lens model."""
         inside = in_picture(self.spot_px(laser_id, range_mm), self._size_px)
-        laser, w = self._points(laser_id, range_mm)
-        x, y, tx, ty = self._rays[laser].T
-        return inside & self._model.is_unfolded(self._lens, tx + x * w, ty + y * w)
+        return inside & self._curves.is_unfolded(*self._points(laser_id, range_mm))
 
     def bend_px(self, laser_id: str, nearest_mm: float, point_px: FloatArray, direction: FloatArray) -> float:
         """Largest distance of a laser's spots from a straight line; see `workbench.optics.image.bend_px`.

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from workbench.model.arrays import FloatArray, IndexArray
+from workbench.model.arrays import BoolArray, FloatArray, IndexArray
 from workbench.model.lens import PINHOLE
 from workbench.optics.lens import LensModel
 from workbench.optics.rays import RAY, Ray, spot_at_inverse_depth
@@ -67,12 +67,13 @@ class SpotCurves:
             raise ValueError(f"lens {model.name}: no interpolation in inverse depth with up to {terms} terms")
         position = table[:, :, :2]
         self._position_and_slope = np.concatenate((position, self._by.derivative(position)), axis=2)
-        self._derivatives = table[:, :, 2:]
+        self._derivatives = np.ascontiguousarray(table[:, :, 2:])
         fold = model.unfolded_radius(np.moveaxis(lens, -1, 0)[len(PINHOLE) :])
         self._unfolded = self._unfolded_between(rays, fold)
         """(L, 2) ends of s before the fold of the lens model."""
         self._starts = self._by.starts
-        self._start_px = (self._by.basis(self._starts) @ self._position_and_slope)[:, :, :2]
+        start = self._by.basis(self._starts) @ self._position_and_slope
+        self._start_px = np.ascontiguousarray(start[:, :, :2])
         lower, upper = self._unfolded.T[:, :, None]
         self._may_start = (self._starts > lower) & (self._starts < upper)
         """(L, G) whether the start lies before the fold of the lens model."""
@@ -92,55 +93,38 @@ class SpotCurves:
     def invert(self, laser: IndexArray, position_px: FloatArray, inverse_sd: FloatArray) -> InvertedSpots:
         """Maximum-likelihood inverse depths of n spots, by Gauss-Newton from the nearest start.
 
-        The loop is hot: it solves all spots of a reading together, one unknown each, in microseconds. A spot
-        that has converged stays, so that its depth does not depend on the other spots.
+        The loop is compiled: a reading solves a few spots, one unknown each, in microseconds. A spot does not
+        depend on the others.
 
         Args:
             laser: (n,) index of each spot's laser.
             position_px: (n, 2) finite.
             inverse_sd: (n, 2) 1 / sigma; 0 for a coordinate that was not measured.
         """
-        s = self._start(laser, position_px, inverse_sd)
-        measured = position_px * inverse_sd
-        # In standard deviations: position and slope of the curve.
-        curve = self._position_and_slope[laser] * np.concatenate((inverse_sd, inverse_sd), axis=1)[:, None]
-        searching = np.ones(len(s), bool)
-        for _ in range(ITERATIONS):
-            seen = self._at(curve, s)
-            slope = seen[:, 2:]
-            step = np.vecdot(slope, seen[:, :2] - measured) / np.vecdot(slope, slope)
-            s = np.where(searching, self._by.within(s - step), s)
-            searching &= np.abs(step) > CONVERGED
-            if not searching.any():
-                break
-        # Derivatives are evaluated once, here; the residual that is left is that across the line.
-        seen, own = self._at(curve, s), self._at(self._derivatives[laser], s)
-        residual, slope = seen[:, :2] - measured, seen[:, 2:]
-        information = np.vecdot(slope, slope)
-        by = own.reshape(len(s), 2, self._columns) * inverse_sd[:, :, None]
-        lower, upper = self._unfolded[laser].T
-        found = ~searching & (s > lower) & (s < upper)
-        unit = self._unit[laser]
-        w = np.where(found, (self._by.argument(s) - self._at_infinity[laser]) * unit, np.nan)
-        root = np.sqrt(information)
-        dz_ds = unit * self._by.argument_slope(s) / w**2
-        along = slope * (dz_ds / information)[:, None]
-        across = np.stack((-slope[:, 1], slope[:, 0]), axis=1) / root[:, None]
-        return InvertedSpots(
-            w,
-            np.vecdot(across, residual),
-            dz_ds / root,
-            (along[:, :, None] * by).sum(axis=1),
-            (across[:, :, None] * by).sum(axis=1),
-        )
+        from workbench.sensor.inversion_kernels import invert_spots  # loads the compiler
 
-    def _start(self, laser: IndexArray, position_px: FloatArray, inverse_sd: FloatArray) -> FloatArray:
-        """(n,) s of the start nearest to each spot."""
-        if len(self._starts) == 1:
-            return np.zeros(len(laser))
-        away = (self._start_px[laser] - position_px[:, None]) * inverse_sd[:, None]
-        away2 = np.where(self._may_start[laser], (away**2).sum(axis=2), np.inf)
-        return np.asarray(self._starts[away2.argmin(axis=1)])
+        found = invert_spots(
+            np.ascontiguousarray(laser),
+            np.ascontiguousarray(position_px),
+            np.ascontiguousarray(inverse_sd),
+            self._position_and_slope,
+            self._derivatives,
+            self._unit,
+            self._at_infinity,
+            self._unfolded,
+            self._starts,
+            self._start_px,
+            self._may_start,
+            self._by.is_series,
+            ITERATIONS,
+            CONVERGED,
+        )
+        return InvertedSpots(*found)
+
+    def is_unfolded(self, laser: IndexArray, inverse_depth_per_mm: FloatArray) -> BoolArray:
+        """(n,) whether points at inverse depths (n,) lie before the fold of the lens model."""
+        s, (lower, upper) = self._variable(laser, inverse_depth_per_mm), self._unfolded[laser].T
+        return np.asarray((s > lower) & (s < upper))
 
     def _variable(self, laser: IndexArray, inverse_depth_per_mm: FloatArray) -> FloatArray:
         return self._by.variable(inverse_depth_per_mm / self._unit[laser] + self._at_infinity[laser])

@@ -49,6 +49,8 @@ class Interpolation(Protocol):
     """Interpolation of functions of t from values at nodes, in a variable s in which they are smooth."""
 
     terms: int
+    is_series: bool
+    """Chebyshev series in an angle, or powers: of the terms, and of the limits of s (-1 to 1, or none)."""
 
     def scale(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(L,) unit of inverse depth, 1/mm, and (L,) t at infinity, for rays (L, 4)."""
@@ -84,10 +86,6 @@ class Interpolation(Protocol):
         """Table (L, terms, m) of the derivatives by s of the functions of a table (L, terms, m)."""
         ...
 
-    def within(self, s: FloatArray) -> FloatArray:
-        """(n,) s, limited to the domain of the table."""
-        ...
-
     @property
     def starts(self) -> FloatArray:
         """(G,) starting values of an inversion, in rising order."""
@@ -100,6 +98,8 @@ class PolynomialInterpolation:
     t is the inverse depth times the laser's baseline: for a beam parallel to the axis, the tangent of the
     angle between beam and line of sight. Few images show spots beyond t = 1.
     """
+
+    is_series = False
 
     def __init__(self, terms: int) -> None:
         self.terms = terms
@@ -142,10 +142,6 @@ class PolynomialInterpolation:
         slope[:, :-1] = table[:, 1:] * np.arange(1, self.terms)[:, None]
         return slope
 
-    def within(self, s: FloatArray) -> FloatArray:
-        """See `Interpolation`."""
-        return s
-
     @property
     def starts(self) -> FloatArray:
         """See `Interpolation`. From infinity the first step is exact for a pinhole."""
@@ -160,6 +156,8 @@ class AngleSeries:
     angle it is nearly straight up to depth 0 (s = 1), for any tilt of the beam. Series of analytic functions
     converge geometrically (L. N. Trefethen, "Approximation Theory and Approximation Practice" (2013), ch. 8).
     """
+
+    is_series = True
 
     def __init__(self, terms: int) -> None:
         self.terms = terms
@@ -204,10 +202,6 @@ class AngleSeries:
         slope = np.zeros_like(table)
         slope[:, :-1] = chebder(table, axis=1)
         return slope
-
-    def within(self, s: FloatArray) -> FloatArray:
-        """See `Interpolation`."""
-        return np.clip(s, -1.0, 1.0)
 
     @property
     def starts(self) -> FloatArray:

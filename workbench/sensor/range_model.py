@@ -76,20 +76,34 @@ class RangeModel:
             position_px: (n, 2) u, v; NaN where a coordinate was not measured.
             sd_px: (n, 2) 1 sigma by noise and speckle.
         """
+        from workbench.sensor.inversion_kernels import propagate  # loads the compiler
+
         measured = np.isfinite(position_px)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # no range, or infinite
             found = self.curves.invert(laser, np.where(measured, position_px, 0.0), measured / sd_px)
             w = found.inverse_depth_per_mm
             range_mm = np.where(w <= 0, np.inf, 1.0 / w) - self.offset_mm
-        gradient = self.by_parameter(laser, found.dz)
-        gradient[:, self.offset] = -1.0
-        line = self.by_parameter(laser, found.dacross)
-        line_variance = ((line @ self.covariance) * line).sum(axis=1)
-        misfit_sd = np.abs(found.across_sd) / np.sqrt(1 + line_variance)
+        gradient, misfit_sd = propagate(
+            laser, found.dz, found.across_sd, found.dacross, self.own, self.offset, self.covariance
+        )
         return RangeEstimates(range_mm, found.z_sd_of_spot_mm, gradient, self.covariance, misfit_sd)
 
-    def by_parameter(self, laser: IndexArray, own: FloatArray) -> FloatArray:
-        """(n, P) derivatives from those by the lens and the laser's own ray (n, C); 0 by other rays."""
+    def expected(self, laser: IndexArray, range_mm: FloatArray, sd_px: FloatArray) -> RangeEstimates:
+        """Estimates for spots exactly at n ranges, without a search for these; not finite beyond the fold.
+
+        Args:
+            laser: (n,) index of each spot's laser.
+            range_mm: (n,) from the reference plane.
+            sd_px: (n, 2) 1 sigma of the spots by noise and speckle.
+        """
+        w = 1.0 / (range_mm + self.offset_mm)
+        gradients = self.curves.gradients(laser, w) / sd_px[:, :, None]
+        by, slope = gradients[:, :, :-1], gradients[:, :, -1]
+        information = np.where(self.curves.is_unfolded(laser, w), np.vecdot(slope, slope), np.nan)
+        # At a fixed spot dw = -(slope . by) / information, and z = 1 / w.
+        dz = (slope[:, :, None] * by).sum(axis=1) / (information * w**2)[:, None]
         gradient = np.zeros((len(laser), len(self.covariance)))
-        gradient[np.arange(len(laser))[:, None], self.own[laser]] = own
-        return gradient
+        gradient[np.arange(len(laser))[:, None], self.own[laser]] = dz
+        gradient[:, self.offset] = -1.0
+        spot_sd_mm = 1.0 / (w**2 * np.sqrt(information))
+        return RangeEstimates(range_mm, spot_sd_mm, gradient, self.covariance, np.zeros(len(laser)))

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from workbench.model.arrays import Float32Array, FloatArray
-from workbench.spots.kernels.photon_transfer import measure_variance, shared_grains
+from workbench.spots.kernels.photon_transfer import shared_grains
 from workbench.spots.kernels.strip_pixels import level_of
 
 _SAMPLES = 1200
@@ -54,40 +54,3 @@ def stated_contrast2(speckle_sd_px: float) -> float:
     for _ in range(_INVERSION_STEPS):  # each divides the error by four or more
         contrast2 = area / shared_grains(contrast2)
     return contrast2
-
-
-def measure_noise(
-    signal: FloatArray,
-    mean_square: FloatArray,
-    residual: FloatArray,
-    weight: FloatArray,
-    leverage: FloatArray,
-    noise: PixelNoise,
-) -> PixelNoise:
-    """Slope and contrast measured from the residuals of all spots of a frame.
-
-    The expected squared residual is V (1 - h), with V = floor + slope * signal + contrast2 * mean_square and
-    h the leverage. Weighted moments give slope and contrast. The assumed slope counts as a quarter of a
-    pixel, in the logarithm; a stated contrast as four. One that is not stated counts where it is significant.
-
-    Args:
-        signal: (n, height, width) expected signal, DN.
-        mean_square: (n, height, width) mean square of the light on a pixel, DN^2.
-        residual: (n, height, width), DN.
-        weight: (n, height, width) inverse variance, 0 where unused.
-        leverage: (n, height, width) variance of the fitted value, DN^2.
-        noise: Floor, the assumed slope, a first guess of the contrast, and the stated one.
-    """
-    measured = noise.copy()
-    measure_variance(
-        signal,
-        mean_square,
-        residual,
-        weight,
-        leverage,
-        measured.floor_dn2,
-        measured.slope_dn,
-        measured.contrast2,
-        measured.stated_contrast2,
-    )
-    return measured

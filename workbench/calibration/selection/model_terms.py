@@ -171,7 +171,7 @@ def _range_gradients(fitted: CalibrationFit) -> tuple[FloatArray, FloatArray]:
     own = np.array([layout.own(n) for n in range(layout.lasers)])
     offset = layout.offset
     model = RangeModel(fitted.curves, float(fitted.values[offset]), own, offset, fitted.covariance)
-    found = model.ranges(laser, spots, np.full(spots.shape, spot_px))
+    found = model.expected(laser, range_mm, np.full(spots.shape, spot_px))
     size = fitted.rig.camera.width_px, fitted.rig.camera.height_px
     seen = in_picture(spots, size) & np.isfinite(found.spot_sd_mm)
     return found.by_parameter[seen] / range_mm[seen, None], found.spot_sd_mm[seen] / range_mm[seen]

@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray
@@ -18,7 +17,7 @@ from workbench.spots.deblending.joint_fit import JointFit, f_statistic, fit_join
 from workbench.spots.fit import Windows, fit_spots
 from workbench.spots.kernels.acceptance import without_outliers
 from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U
-from workbench.spots.kernels.windows import half_for, mark_discs, mark_strip
+from workbench.spots.kernels.windows import exclude_light, half_for, mark_strip
 from workbench.spots.measure import FittedSpot, spot_flags
 from workbench.spots.noise import PixelNoise
 from workbench.spots.pair import PairSignal
@@ -40,6 +39,7 @@ _MAX_HIDDEN = 4
 # Fits before the last one, each with the noise and the outliers of the one before.
 _ROUNDS = 2
 _NO_MASK = np.zeros((0, 0), bool)
+_ONLY = np.array([0])
 
 
 class Blend:
@@ -68,22 +68,22 @@ class Blend:
             np.array([contrast2]),
             self.scene.pair.stated_contrast2,
         )
-        points = np.array([t.params[U:LN_SU] for t in group])
         reach = reach_px or max(t.reach_px for t in group)
-        u, v = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        half = half_for(reach) + int(np.ceil(0.5 * np.ptp(points, axis=0).max()))
+        u, v = [t.spot.u_px for t in group], [t.spot.v_px for t in group]
+        extent = max(max(u) - min(u), max(v) - min(v))
+        half = half_for(reach) + math.ceil(0.5 * extent)
         self.is_within_limit = half <= _MAX_HALF_PX
         half = min(half, _MAX_HALF_PX)
-        self.row0, self.col0 = round(float(v)) - half, round(float(u)) - half
-        centre = np.array([self.row0 + half], float), np.array([self.col0 + half], float)
-        win = self.scene.pair.cut(*centre, np.array([0]), half)
-        elsewhere = ~self._light_of(others, win.shape)
-        self.allowed: BoolArray = self._in_a_strip(scenes, win.shape) & elsewhere
-        # Light off the scanline does not come from spots on it.
-        size = 2 * int(np.ceil(TAIL_WIDTHS * reach)) + 1
-        near = cv2.dilate(self.allowed.astype(np.uint8), np.ones((size, size), np.uint8)).astype(bool)
-        self.win = win._replace(usable=(near & elsewhere)[None] & win.usable)
+        row, col = round(0.5 * (min(v) + max(v))), round(0.5 * (min(u) + max(u)))
+        self.row0, self.col0 = row - half, col - half
+        self.win = self.scene.pair.cut(np.array([float(row)]), np.array([float(col)]), _ONLY, half)
         """(1, height, width): window around all spots of the cluster."""
+        self.allowed: BoolArray = self._in_a_strip(scenes)
+        # Light off the scanline does not come from spots on it.
+        lights = [(t.spot.u_px, t.spot.v_px, TAIL_WIDTHS * t.reach_px) for t in others]
+        discs = np.array(lights).reshape(-1, 3)
+        near = math.ceil(TAIL_WIDTHS * reach)
+        exclude_light(self.row0, self.col0, discs, near, self.allowed, self.win.usable[0])
 
     def start_of(self, fits: Sequence[FittedSpot]) -> FloatArray:
         """(n, 6) parameters of fitted spots, in pixels of the window."""
@@ -93,42 +93,35 @@ class Blend:
         """Spots of a joint fit, in pixels of the image."""
         absolute = joint.params + np.array([0, 0, self.col0, self.row0, 0, 0])
         fits = []
-        own = zip(absolute, joint.sd, joint.speckle_sd, spot_flags(self.scene, absolute), strict=True)
-        for i, (params, sd, speckle_sd, flags) in enumerate(own):
-            _, flux, u, v, ln_su, ln_sv = params.tolist()
-            reach = math.exp(max(ln_su, ln_sv))
-            others = np.delete(absolute, i, axis=0)[:, U:LN_SU]
-            if (np.hypot(*(others - params[U:LN_SU]).T) < _OVERLAP_WIDTHS * reach).any():
+        rows, centres = absolute.tolist(), absolute[:, U:LN_SU].tolist()
+        slope, contrast2 = joint.noise.slope_dn.item(), joint.noise.contrast2.item()
+        own = zip(rows, joint.sd.tolist(), joint.speckle_sd.tolist(), strict=True)
+        all_flags = spot_flags(self.scene, absolute)
+        for i, ((_, flux, u, v, ln_su, ln_sv), sd, speckle_sd) in enumerate(own):
+            reach, flags = math.exp(max(ln_su, ln_sv)), all_flags[i]
+            others = (*centres[:i], *centres[i + 1 :])
+            if any(math.dist((u, v), other) < _OVERLAP_WIDTHS * reach for other in others):
                 flags |= {Failure.MERGED}
             width = math.exp(0.5 * (ln_su + ln_sv))
             peak = flux / (2.0 * math.pi * (width**2 + 1.0 / 12.0))
             spot = Spot(
                 u_px=u,
                 v_px=v,
-                u_sd_px=float(sd[1]),
-                v_sd_px=float(sd[2]),
+                u_sd_px=sd[1],
+                v_sd_px=sd[2],
                 flux_dn=flux,
                 width_px=width,
                 peak_dn=peak,
                 flags=flags,
-                u_speckle_sd_px=float(speckle_sd[0]),
-                v_speckle_sd_px=float(speckle_sd[1]),
+                u_speckle_sd_px=speckle_sd[0],
+                v_speckle_sd_px=speckle_sd[1],
             )
-            slope, contrast2 = float(joint.noise.slope_dn[0]), float(joint.noise.contrast2[0])
-            fits.append(FittedSpot(spot, params, slope, contrast2, reach, flux / float(sd[0]), self.scene))
+            fits.append(FittedSpot(spot, absolute[i], slope, contrast2, reach, flux / sd[0], self.scene))
         return fits
 
-    def _light_of(self, fits: Sequence[FittedSpot], shape: tuple[int, int]) -> BoolArray:
-        """(height, width): pixels within `TAIL_WIDTHS` of these spots."""
-        found = np.zeros(shape, bool)
-        if fits:
-            lights = np.array([(t.spot.u_px, t.spot.v_px, TAIL_WIDTHS * t.reach_px) for t in fits])
-            mark_discs(self.row0, self.col0, lights, found)
-        return found
-
-    def _in_a_strip(self, scenes: Sequence[PairSignal], shape: tuple[int, int]) -> BoolArray:
+    def _in_a_strip(self, scenes: Sequence[PairSignal]) -> BoolArray:
         """(height, width): pixels where a scanline allows a spot."""
-        found = np.zeros(shape, bool)
+        found = np.zeros(self.win.shape, bool)
         for strip in (scene.strip for scene in scenes):
             rows, cols = (strip.rows.start, strip.rows.stop), (strip.cols.start, strip.cols.stop)
             mask = _NO_MASK if strip.mask is None else strip.mask
@@ -249,7 +242,7 @@ def with_hidden_spots(
         return group
     best = fit_joint(blend.win, blend.start_of(group), blend.noise)
     while len(best.params) < len(group) + _MAX_HIDDEN:
-        hidden = hidden_spot(best, blend.win, blend.allowed)
+        hidden = hidden_spot(best, blend.allowed)
         if hidden is None:
             break
         more = _fit_without_outliers(blend.win, np.vstack([best.params, hidden]), blend.noise)

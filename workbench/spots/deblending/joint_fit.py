@@ -4,23 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from workbench.model.arrays import BoolArray, FloatArray
 from workbench.spots.fit import Windows
 from workbench.spots.kernels.columns import FLUX, LN_SU, SHEAR, U, V
-from workbench.spots.kernels.joint import joint_fisher_scoring
-from workbench.spots.kernels.joint_sums import OWN, SHARED
-from workbench.spots.kernels.photon_transfer import shared_grains
-from workbench.spots.kernels.single import LEAST_NOISE_SHARE
-from workbench.spots.noise import PixelNoise, measure_noise
+from workbench.spots.kernels.hidden import most_significant
+from workbench.spots.kernels.joint_window import fit_window
+from workbench.spots.noise import PixelNoise
 from workbench.spots.psf import principal_axes
 
 _HIDDEN_SD = 5.0
-_NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
-# As in `kernels.acceptance`; smaller, because all spots together determine the widths (docs/spots.md).
-_SECOND_ORDER = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,59 +56,25 @@ def fit_joint(
         weight: (height, width) fixed weights; None: those that the model predicts.
         assumed: Noise that the measured one is averaged with; None: `noise`.
     """
-    params, m = start.copy(), SHARED + OWN * len(start)
-    cov, used = np.empty((m, m)), np.empty(win.shape) if weight is None else weight
-    signal, mean_square, residual, leverage = (np.empty(win.shape) for _ in range(4))
-    by_noise = np.zeros((len(start), 2))
-    contrast2 = float(noise.contrast2[0])
-    converged = joint_fisher_scoring(
+    params, used = start.copy(), np.empty(win.shape) if weight is None else weight
+    of_window, prior = _values(noise), _values(assumed or noise)
+    sd, speckle_sd, signal, residual, chi2, slope, contrast2, converged = fit_window(
         win.data[0],
         win.usable[0],
-        float(noise.floor_dn2[0]),
-        float(noise.slope_dn[0]),
-        contrast2,
+        of_window,
+        prior[1:],
+        noise.stated_contrast2,
         weight is not None,
         params,
-        cov,
-        by_noise,
-        signal,
-        mean_square,
-        residual,
         used,
-        leverage,
     )
-    variance = np.maximum(np.diag(cov)[SHARED:], 0.0).reshape(-1, OWN)
-    widened = _second_order(variance[:, 1:], np.exp(params[:, LN_SU:SHEAR]))
-    if weight is None:
-        noise = measure_noise(
-            signal[None], mean_square[None], residual[None], used[None], leverage[None], assumed or noise
-        )
-    else:
-        by_noise = variance[:, 1:]
-    by_noise = np.clip(by_noise, LEAST_NOISE_SHARE * variance[:, 1:], variance[:, 1:])  # against rounding
-    by_speckle = (variance[:, 1:] - by_noise) * shared_grains(contrast2)
-    return JointFit(
-        params,
-        np.column_stack([np.sqrt(variance[:, 0]), np.sqrt(by_noise) * widened]),
-        np.sqrt(by_speckle) * widened,
-        float(np.vdot(used, residual**2)),
-        signal,
-        residual,
-        used,
-        noise,
-        converged,
-    )
+    measured = PixelNoise(noise.floor_dn2, np.array([slope]), np.array([contrast2]), noise.stated_contrast2)
+    return JointFit(params, sd, speckle_sd, chi2, signal, residual, used, measured, converged)
 
 
-def _second_order(variance_px2: FloatArray, width_px: FloatArray) -> FloatArray:
-    """(k, 2) factor on the standard deviations of u and v by the second term of their series in 1 / A.
-
-    A is the information on the amplitude as in `kernels.acceptance`. It is taken from the variance of each
-    coordinate, which is 2 width^2 / A for an isolated spot in white noise; an overlapping neighbour lowers
-    it.
-    """
-    factor: FloatArray = np.sqrt(1.0 + 0.5 * _SECOND_ORDER * variance_px2 / width_px**2)
-    return factor
+def _values(noise: PixelNoise) -> tuple[float, float, float]:
+    """Floor, slope and squared contrast of the only window."""
+    return noise.floor_dn2.item(), noise.slope_dn.item(), noise.contrast2.item()
 
 
 def pair_guess(params: FloatArray) -> FloatArray:
@@ -138,22 +98,12 @@ def f_statistic(one: float, two: float, pixels: int, parameters: int) -> float:
     return (one - two) / 3.0 / max(left, 1e-12)
 
 
-def hidden_spot(joint: JointFit, win: Windows, allowed: BoolArray) -> FloatArray | None:
+def hidden_spot(joint: JointFit, allowed: BoolArray) -> FloatArray | None:
     """(6,) first guess of a further spot by a matched filter of the residuals; None below 5 sd."""
-    su, sv = np.exp(joint.params[0, LN_SU:SHEAR])
-    weight, residual = joint.weight, joint.residual
-    # A pixel far above all its neighbours is hot: it is limited to the highest of them.
-    excess = weight * np.minimum(residual, cv2.dilate(residual, _NEIGHBOURS))
-    matched = cv2.GaussianBlur(excess, (0, 0), sigmaX=su, sigmaY=sv, borderType=cv2.BORDER_CONSTANT)
-    # The square of a Gaussian is a Gaussian narrower by sqrt(2), with the sum 1 / (4 pi su sv).
-    information = cv2.GaussianBlur(
-        weight, (0, 0), sigmaX=su / 2**0.5, sigmaY=sv / 2**0.5, borderType=cv2.BORDER_CONSTANT
-    )
-    information = np.maximum(information / (4.0 * np.pi * su * sv), 1e-12)
-    height = np.where(allowed, matched / np.sqrt(information), 0.0)
-    row, col = np.unravel_index(int(height.argmax()), win.shape)
-    if height[row, col] < _HIDDEN_SD:
+    su, sv = np.exp(joint.params[0, LN_SU:SHEAR]).tolist()
+    height, row, col, flux = most_significant(joint.residual, joint.weight, allowed, su, sv)
+    if height < _HIDDEN_SD:
         return None
     hidden: FloatArray = joint.params[0].copy()
-    hidden[FLUX], hidden[U], hidden[V] = matched[row, col] / information[row, col], col, row
+    hidden[FLUX], hidden[U], hidden[V] = flux, col, row
     return hidden

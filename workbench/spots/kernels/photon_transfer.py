@@ -184,7 +184,23 @@ def measure_variance(
     contrast2: FloatArray,
     stated_contrast2: float,
 ) -> None:
-    """See `noise.measure_noise`; replaces the assumed `slope` and `contrast2` (n,) by the measured ones."""
+    """Replace the assumed `slope` and `contrast2` (n,) by those of the residuals of all spots of a frame.
+
+    The expected squared residual is V (1 - h), with V = floor + slope * signal + contrast2 * mean_square and
+    h the leverage. Weighted moments give slope and contrast. The assumed slope counts as a quarter of a
+    pixel, in the logarithm; a stated contrast as four. One that is not stated counts where it is significant.
+
+    Args:
+        signal: (n, height, width) expected signal, DN.
+        mean_square: (n, height, width) mean square of the light on a pixel, DN^2.
+        residual: (n, height, width), DN.
+        weight: (n, height, width) inverse variance, 0 where unused.
+        leverage: (n, height, width) variance of the fitted value, DN^2.
+        floor: (n,) variance without signal, DN^2.
+        slope: (n,) as assumed, changed.
+        contrast2: (n,) first guess, changed.
+        stated_contrast2: as stated; 0: not known.
+    """
     n = len(signal)
     assumed_slope = slope.copy()
     moments, pool, consistent = np.empty((n, _MOMENTS)), np.zeros(_MOMENTS), np.ones(n, np.bool_)

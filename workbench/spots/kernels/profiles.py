@@ -13,8 +13,8 @@ import numpy as np
 from workbench.model.arrays import FloatArray
 from workbench.spots.kernels.columns import LN_SU, LN_SV, SHEAR, U, V
 from workbench.spots.kernels.compiled import compiled
+from workbench.spots.kernels.gaussian import fill_gaussian
 
-_INV_SQRT_2: Final = 1.0 / math.sqrt(2.0)
 _INV_SQRT_2PI: Final = 1.0 / math.sqrt(2.0 * math.pi)
 # Three Gauss-Legendre nodes integrate a pixel of the narrowest spot to 1e-4 of its peak.
 _NODES: Final = 0.5 * np.polynomial.legendre.leggauss(3)[0]
@@ -28,18 +28,16 @@ ALONG_U: Final = np.array([3, 0, 1, 0, 2, 0])
 @compiled
 def profile(centre: float, ln_sd: float, out: FloatArray) -> None:
     """Fill (4, n): share of a unit Gaussian in each of n pixels, by centre, by ln of its width, and ones."""
-    sd = math.exp(ln_sd)
-    z = (-0.5 - centre) / sd
-    below, density = 0.5 * math.erf(z * _INV_SQRT_2), _INV_SQRT_2PI * math.exp(-0.5 * z * z)
-    for i in range(out.shape[1]):
-        next_z = (i + 0.5 - centre) / sd
-        next_below = 0.5 * math.erf(next_z * _INV_SQRT_2)
-        next_density = _INV_SQRT_2PI * math.exp(-0.5 * next_z * next_z)
-        out[0, i] = next_below - below
-        out[1, i] = (density - next_density) / sd
-        out[2, i] = z * density - next_z * next_density
+    n, inverse = out.shape[1], math.exp(-ln_sd)
+    z, density, below = np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)
+    for i in range(n + 1):
+        z[i] = (i - 0.5 - centre) * inverse
+    fill_gaussian(z, density, below)
+    for i in range(n):
+        out[0, i] = below[i + 1] - below[i]
+        out[1, i] = (density[i] - density[i + 1]) * inverse
+        out[2, i] = z[i] * density[i] - z[i + 1] * density[i + 1]
         out[3, i] = 1.0
-        z, below, density = next_z, next_below, next_density
 
 
 @compiled
@@ -61,21 +59,31 @@ def sheared_rows(params: FloatArray, rows: FloatArray) -> None:
 
     Rows are integrated by quadrature, columns exactly.
     """
-    sd_v, shear = math.exp(params[LN_SV]), params[SHEAR]
-    along_u = np.empty((4, rows.shape[2]))
+    sd_v, shear, inverse_u = math.exp(params[LN_SV]), params[SHEAR], math.exp(-params[LN_SU])
+    width = rows.shape[2]
+    edges = width + 1
+    z, density, below = np.empty(3 * edges), np.empty(3 * edges), np.empty(3 * edges)
     rows[:] = 0.0
     rows[0] = 1.0
     for y in range(rows.shape[1]):
         for node in range(3):
+            centre = params[U] + shear * (y + _NODES[node] - params[V])
+            for x in range(edges):
+                z[node * edges + x] = (x - 0.5 - centre) * inverse_u
+        fill_gaussian(z, density, below)
+        for node in range(3):
             dv = y + _NODES[node] - params[V]
-            z = dv / sd_v
-            mass = _NODE_WEIGHTS[node] * _INV_SQRT_2PI / sd_v * math.exp(-0.5 * z * z)
-            profile(params[U] + shear * dv, params[LN_SU], along_u)
-            for x in range(rows.shape[2]):
-                share, by_u = mass * along_u[0, x], mass * along_u[1, x]
+            of_v = dv / sd_v
+            mass = _NODE_WEIGHTS[node] * _INV_SQRT_2PI / sd_v * math.exp(-0.5 * of_v * of_v)
+            for x in range(width):
+                i = node * edges + x
+                share, by_u = (
+                    mass * (below[i + 1] - below[i]),
+                    mass * (density[i] - density[i + 1]) * inverse_u,
+                )
                 rows[1, y, x] += share
                 rows[2, y, x] += by_u
-                rows[3, y, x] += z / sd_v * share - shear * by_u
-                rows[4, y, x] += mass * along_u[2, x]
-                rows[5, y, x] += (z * z - 1.0) * share
+                rows[3, y, x] += of_v / sd_v * share - shear * by_u
+                rows[4, y, x] += mass * (z[i] * density[i] - z[i + 1] * density[i + 1])
+                rows[5, y, x] += (of_v * of_v - 1.0) * share
                 rows[6, y, x] += dv * by_u

@@ -179,3 +179,39 @@ def mark_strip(
         for x in range(max(cols[0] - col0, 0), min(cols[1] - col0, out.shape[1])):
             if mask.size == 0 or mask[y + row0 - rows[0], x + col0 - cols[0]]:
                 out[y, x] = True
+
+
+@compiled
+def _spread(marks: BoolArray, reach: int, out: BoolArray) -> None:
+    """Mark pixels (height, width) within `reach` of a marked one, along rows and along columns."""
+    height, width = marks.shape
+    along = np.zeros((height, width), np.bool_)
+    for y in range(height):
+        for x in range(width):
+            if marks[y, x]:
+                along[y, max(x - reach, 0) : x + reach + 1] = True
+    out[:] = False
+    for y in range(height):
+        for near in range(max(y - reach, 0), min(y + reach + 1, height)):
+            out[near] |= along[y]
+
+
+@compiled
+def exclude_light(
+    row0: int, col0: int, lights: FloatArray, reach: int, allowed: BoolArray, usable: BoolArray
+) -> None:
+    """Limit a window (height, width) to pixels without the light of other spots, near where a spot may lie.
+
+    Args:
+        row0: The window's first row in the image.
+        col0: Its first column.
+        lights: (n, 3) u, v and radius of the other spots' light in the image.
+        reach: Distance from `allowed` up to which a pixel is used, px along rows and columns.
+        allowed: (height, width) pixels in a strip; those with other light are unmarked.
+        usable: (height, width) pixels to use; changed.
+    """
+    lit, near = np.zeros(allowed.shape, np.bool_), np.empty(allowed.shape, np.bool_)
+    mark_discs(row0, col0, lights, lit)
+    allowed &= ~lit
+    _spread(allowed, reach, near)
+    usable &= near & ~lit

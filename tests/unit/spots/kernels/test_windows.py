@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from workbench.spots.kernels.columns import FLUX, LN_SU, LN_SV, U, V
 from workbench.spots.kernels.windows import (
     HALVES_PX,
     cut_windows,
+    exclude_light,
     flag_codes,
     half_for,
     halves_for,
@@ -132,3 +134,17 @@ def test_marks_of_a_strip_are_those_of_numpy(masked: bool) -> None:
     image = np.zeros((200, 200), bool)
     image[40:52, 80:140] = mask if masked else True
     np.testing.assert_array_equal(marked, image[45:65, 95:125])
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_pixels_near_a_strip_and_without_other_light_are_used(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    allowed, usable = rng.random((31, 31)) < 0.02, rng.random((31, 31)) < 0.9
+    lights = np.column_stack([rng.uniform(90, 130, 3), rng.uniform(40, 80, 3), rng.uniform(2, 6, 3)])
+    lit = np.zeros((31, 31), bool)
+    mark_discs(45, 95, lights, lit)
+    near = cv2.dilate((allowed & ~lit).astype(np.uint8), np.ones((9, 9), np.uint8)).astype(bool)
+    expected = allowed & ~lit, usable & near & ~lit
+    exclude_light(45, 95, lights, 4, allowed, usable)
+    np.testing.assert_array_equal(allowed, expected[0])
+    np.testing.assert_array_equal(usable, expected[1])
