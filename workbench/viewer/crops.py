@@ -291,8 +291,8 @@ def _crop(
     square = np.zeros((SIDE_PX, SIDE_PX))
     height, width = on.shape
     rows, columns = (
-        slice(max(top, 0), min(top + SIDE_PX, height)),
-        slice(max(left, 0), min(left + SIDE_PX, width)),
+        slice(max(top, 0), max(min(top + SIDE_PX, height), 0)),
+        slice(max(left, 0), max(min(left + SIDE_PX, width), 0)),
     )
     inside = on[rows, columns].astype(np.float64)
     if off is not None:

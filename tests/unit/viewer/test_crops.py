@@ -228,9 +228,11 @@ def test_spots_of_no_laser_are_not_those_of_one_of_several(tmp_path: Path) -> No
     assert (found["L1"], found["L2"]) == ("L1 no spot", "L2 no spot")
 
 
-def test_a_place_expected_far_outside_the_frame_is_black(tmp_path: Path) -> None:
+@pytest.mark.parametrize("u_px", [-900.0, -60.0, 300.0, 700.0, 5000.0])
+@pytest.mark.parametrize("v_px", [-900.0, -60.0, 520.0, 5000.0])
+def test_a_place_expected_outside_the_frame_is_black(tmp_path: Path, u_px: float, v_px: float) -> None:
     on = np.full((480, 640), 9, np.uint8)
-    shown, _ = squares(picture(taken(tmp_path, on, None, L2=np.array([-900.0, 5000.0]))), "L2")
+    shown, _ = squares(picture(taken(tmp_path, on, None, L2=np.array([u_px, v_px]))), "L2")
     assert not shown.any()
 
 
