@@ -42,7 +42,7 @@ SEEDS = (2001,)
 def workbench(*arguments: object) -> str:
     done = subprocess.run([SCRIPT, *map(str, arguments)], capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0, done.stderr
-    return done.stderr
+    return done.stdout
 
 
 @pytest.fixture(scope="module", params=SEEDS)

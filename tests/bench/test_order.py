@@ -117,7 +117,7 @@ def test_a_plan_prints_every_step_with_captures_emission_and_time(
     steps = "  - {step: warm_up, frames: 100}\n" + GRID + "  - step: fit\n"
     rig, procedure = write_files(tmp_path, HEAD + steps)
     print_plan([procedure], rig, tmp_path / "sessions")
-    printed = capsys.readouterr().err
+    printed = capsys.readouterr().out
     assert max(map(len, printed.splitlines())) <= 80
     step_rows = [re.split(r"\s{2,}", line) for line in printed.splitlines() if line.startswith("p.")]
     # Three placings of 64 s, 12 captures of a second, 2 s of lease each.
@@ -131,7 +131,7 @@ def test_a_plan_prints_every_step_with_captures_emission_and_time(
     assert "no session of" in " ".join(printed.split())
     session(tmp_path, steps.replace("  - step: fit\n", ""), Says())
     print_plan([procedure], rig, tmp_path)
-    printed = " ".join(capsys.readouterr().err.split())
+    printed = " ".join(capsys.readouterr().out.split())
     assert "the last session of" in printed
     assert "at most" not in printed.partition("trial exposures")[0].partition("If ")[0], (
         "emission as it was measured"

@@ -207,7 +207,7 @@ def test_check_accepts_the_kinds_and_names_a_mistake_with_its_line(bench: Bench,
 
 def test_plan_counts_placements_and_captures(bench: Bench) -> None:
     procedure, rig = bench.files
-    plan = bench.call("plan", procedure, "--rig", rig, "--sessions", bench.folder / "none").stderr
+    plan = bench.call("plan", procedure, "--rig", rig, "--sessions", bench.folder / "none").stdout
     own = {"own.4": {"own.4": (2, 6)}, "own.5": {"own.4": (1, 2), "own.5": (1, 3)}}[bench.trial]
     for name, (placements, captures) in own.items():
         (line,) = [line for line in plan.splitlines() if name in line]

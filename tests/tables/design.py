@@ -51,7 +51,7 @@ def main() -> None:
         check=True,
     )
     lines = [
-        *done.stderr.rstrip().splitlines(),
+        *done.stdout.rstrip().splitlines(),
         "",
         f"{'standoffs':30}{'worst %':>8}{'alone %':>8}{f'L1 {NEAR_MM:g}':>8}",
         *comparison(),

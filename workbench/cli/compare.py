@@ -6,10 +6,9 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
-
 from workbench.calibration.verdict.comparison import Comparison, compare
 from workbench.calibration.verdict.tables import difference_table
+from workbench.cli.console import result_console
 from workbench.model.calibration import load_calibration
 from workbench.model.number_text import probability
 from workbench.report.terminal_table import TerminalTable
@@ -24,7 +23,7 @@ def compare_calibrations(a: Path, b: Path, as_json: bool) -> None:
     result = compare(load_calibration(a), load_calibration(b))
     if as_json:
         print(json.dumps(asdict(result)))
-    console = Console(stderr=True, markup=False)
+    console = result_console(as_json)
     console.print(TerminalTable(difference_table(result.differences)))
     console.print(verdict(result), highlight=False)
     for note in result.notes:

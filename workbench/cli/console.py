@@ -1,4 +1,4 @@
-"""Messages on standard error."""
+"""Messages on standard error, results on standard output."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ import sys
 import textwrap
 import warnings
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 import typer
 
 from workbench.model.contents import printable
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def print_message(message: str, red: bool = False) -> None:
@@ -19,6 +23,13 @@ def print_message(message: str, red: bool = False) -> None:
         shown = printable(message)
         text = wrapped(shown, columns()) if sys.stderr.isatty() else shown
         typer.secho(text, err=True, fg="red" if red else None, bold=red or None)
+
+
+def result_console(as_json: bool = False) -> Console:
+    """Console for the tables of a result: standard output, or standard error where JSON is printed there."""
+    from rich.console import Console  # `--help` does without
+
+    return Console(stderr=as_json, markup=False)
 
 
 def print_warnings_as_notes() -> None:

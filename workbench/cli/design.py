@@ -6,12 +6,11 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
-
 from workbench.calibration.design.forecast import CalibrationForecast, forecast
 from workbench.calibration.design.standoffs import best_standoffs
 from workbench.calibration.design.tables import parameter_forecast_table, range_forecast_table
 from workbench.calibration.verdict.observability import direction_lines
+from workbench.cli.console import result_console
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig, load_rig
 from workbench.report.terminal_table import TerminalTable
@@ -38,7 +37,7 @@ def design_calibration(
     result = forecast(rig, chosen, repeats)
     if as_json:
         print(json.dumps(asdict(result)))
-    _print(rig, result, proposed=standoffs is None)
+    _print(rig, result, standoffs is None, as_json)
 
 
 def _given(rig: Rig, text: str) -> tuple[float, ...]:
@@ -65,8 +64,8 @@ def _given(rig: Rig, text: str) -> tuple[float, ...]:
     return tuple(found)
 
 
-def _print(rig: Rig, result: CalibrationForecast, proposed: bool) -> None:
-    console = Console(stderr=True, markup=False)
+def _print(rig: Rig, result: CalibrationForecast, proposed: bool, as_json: bool) -> None:
+    console = result_console(as_json)
     standoffs = ", ".join(f"{s:g}" for s in result.standoffs_mm)
     console.print(
         f"{'proposed standoffs' if proposed else 'standoffs'} (mm): {standoffs};"

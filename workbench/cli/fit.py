@@ -9,8 +9,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from workbench.calibration.data.boards import BoardView
 from workbench.calibration.data.observations import Observation
 from workbench.calibration.data.spot_rows import observations_of_rows
@@ -22,6 +20,7 @@ from workbench.calibration.verdict.records import fit_finished, parameter_record
 from workbench.calibration.verdict.tables import derived_table
 from workbench.cli.brief_notes import brief_notes, merge_equal_kinds
 from workbench.cli.captures_source import calibration_table
+from workbench.cli.console import result_console
 from workbench.cli.invocation import command_line
 from workbench.cli.verdict import Verdict, VerdictShownError, and_more, show_verdict, split_reason
 from workbench.model.acceptance import Acceptance
@@ -148,7 +147,7 @@ def fit_captures(request: Request, as_json: bool, details: bool = False) -> None
         print(json.dumps(_as_json(fitted, assessment)))
     show_verdict(_verdict(found, request, details))
     if details:
-        _print_tables(fitted, assessment)
+        _print_tables(fitted, assessment, as_json)
     if refused:
         raise VerdictShownError(f"the calibration is refused; {request.output} is not written")
 
@@ -340,8 +339,8 @@ def _leave_out_option(found: FittedSource) -> str:
     return f" ({options})" if options else ""
 
 
-def _print_tables(fitted: CalibrationFit, assessment: Assessment) -> None:
-    console = Console(stderr=True, markup=False)
+def _print_tables(fitted: CalibrationFit, assessment: Assessment, as_json: bool) -> None:
+    console = result_console(as_json)
     console.print(TerminalTable(parameter_table(parameter_records(fitted))))
     console.print(TerminalTable(derived_table(derive(fitted))))
     if fitted.terms:

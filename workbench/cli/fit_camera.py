@@ -6,12 +6,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from workbench.calibration.estimation.fit import CalibrationFit
 from workbench.calibration.verdict.camera import render_camera
 from workbench.calibration.verdict.records import parameter_records
 from workbench.cli.brief_notes import brief_notes, merge_equal_kinds
+from workbench.cli.console import result_console
 from workbench.cli.verdict import Verdict, VerdictShownError, and_more, show_verdict, split_reason
 from workbench.model.camera_file import CameraCalibration
 from workbench.model.fit_tables import parameter_table
@@ -51,7 +50,7 @@ def show_camera(
         print(json.dumps(_as_json(fitted, calibration)))
     show_verdict(_verdict(fitted, calibration, output, accept, details))
     if details:
-        _print_tables(fitted, calibration)
+        _print_tables(fitted, calibration, as_json)
     if refused:
         raise VerdictShownError(f"the calibration is refused; {output} is not written")
 
@@ -114,8 +113,8 @@ def _as_json(fitted: CalibrationFit, calibration: CameraCalibration) -> dict[str
     }
 
 
-def _print_tables(fitted: CalibrationFit, calibration: CameraCalibration) -> None:
-    console = Console(stderr=True, markup=False)
+def _print_tables(fitted: CalibrationFit, calibration: CameraCalibration, as_json: bool) -> None:
+    console = result_console(as_json)
     summary = calibration.workbench_camera.fit
     console.print(TerminalTable(parameter_table(parameter_records(fitted)[fitted.layout.lens])))
     console.print(TerminalTable(_view_table(calibration)))

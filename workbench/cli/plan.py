@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
+from workbench.cli.console import result_console
 from workbench.model.errors import BadInputError
 from workbench.model.number_text import duration
 from workbench.model.table import Column, Table
@@ -40,7 +39,7 @@ def print_plan(
         raise BadInputError(f"{sessions}: expected a folder of sessions, got a file")
     durations = learn_durations(sessions, plan.rig.rig)
     steps = plan.steps()
-    console = Console(stderr=True, markup=False)
+    console = result_console()
     if plan.calibration is not None:
         console.print(plan.calibration.loaded(now()).text, highlight=False)
     console.print(TerminalTable(plan_table(steps, durations)))

@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from rich.console import Console
-
-from workbench.cli.console import print_message
+from workbench.cli.console import print_message, result_console
 from workbench.cli.in_force import note_if_not_in_force, sessions_of
 from workbench.cli.reading_json import plain
 from workbench.model.captures import check_images, errors_name_file, parse_captures, read_captures_file
@@ -45,8 +43,7 @@ def range_captures(captures: Path, calibration: Path, as_json: bool) -> None:
             readings.append(reading)
             if as_json:
                 print(json.dumps(plain(reading)), flush=True)
-    console = Console(stderr=True, markup=False)
-    console.print(reading_list(readings), highlight=False)
+    result_console(as_json).print(reading_list(readings), highlight=False)
 
 
 def _table(captures: Path) -> Path:

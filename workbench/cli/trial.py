@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
-
+from workbench.cli.console import result_console
 from workbench.model.errors import BadInputError
 from workbench.model.table import Cell
 from workbench.report.terminal_table import TerminalTable
@@ -24,7 +23,7 @@ sensors in a laboratory end at 10 m."""
 
 
 def analyse_readings(kind: str, paths: Sequence[Path], as_json: bool) -> None:
-    """Analyse files of readings: JSON on standard output, table and notes on standard error.
+    """Analyse files of readings: table and notes, with JSON these on standard error.
 
     Raises:
         BadInputError: a file is wrong, or there are several for a gauge R&R study.
@@ -36,7 +35,7 @@ def analyse_readings(kind: str, paths: Sequence[Path], as_json: bool) -> None:
     result = analyse(kind, load_sessions(paths))
     if as_json:
         print(json.dumps(_plain(result)))
-    console = Console(stderr=True, markup=False)
+    console = result_console(as_json)
     console.print(TerminalTable(result.table))
     for note in _notes(result):
         console.print(f"note: {note}", highlight=False)

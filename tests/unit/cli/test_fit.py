@@ -154,19 +154,19 @@ def test_a_refused_calibration_is_reported_and_not_written(workbench: Run, tmp_p
     assert output.read_text() == "as it was\n"
 
 
-def test_without_json_nothing_is_on_stdout(workbench: Run, tmp_path: Path) -> None:
+def test_the_verdict_is_on_standard_error(workbench: Run, tmp_path: Path) -> None:
     outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml")
     assert outcome.out == ""
     *_, written = outcome.err.splitlines()
     assert written.endswith(f"{tmp_path / 'c.yaml'} written")
 
 
-def test_details_are_below_the_verdict(workbench: Run, tmp_path: Path) -> None:
+def test_details_are_on_standard_output(workbench: Run, tmp_path: Path) -> None:
     outcome = workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", tmp_path / "c.yaml", "--details")
-    lines = outcome.err.strip().splitlines()
-    assert lines[0].startswith("ACCEPTED ")
-    heading = next(n for n, line in enumerate(lines) if line.startswith("Parameters"))
-    assert max(len(line) for line in lines[heading:]) <= 80
+    assert outcome.err.strip().startswith("ACCEPTED ")
+    lines = outcome.out.strip().splitlines()
+    assert lines[0].startswith("Parameters")
+    assert max(len(line) for line in lines) <= 80
 
 
 class TestAnotherModel:

@@ -79,7 +79,7 @@ def test_plan_states_the_age_of_an_existing_calibration(workbench: Run, tmp_path
     refused(workbench("plan", procedure, "--rig", rig), 2, "--calibration")
     outcome = workbench("plan", procedure, "--rig", rig, "--calibration", calibration)
     assert outcome.code == 0
-    assert "days old" in " ".join(outcome.err.split())
+    assert "days old" in " ".join(outcome.out.split())
     rig.write_text(rig.read_text().replace("serial: emulated-1", "serial: emulated-9"))
     refused(workbench("plan", procedure, "--rig", rig, "--calibration", calibration), 2, "emulated-9")
 
@@ -97,4 +97,4 @@ def test_plan_names_the_spots_that_a_trial_will_lose(
     rig.write_text(rig.read_text().replace("width_px: 640", "width_px: 600"))
     outcome = workbench("plan", procedure, "--rig", rig)
     assert outcome.code == 0
-    assert (f"p.4/{standoff_mm}mm" in outcome.err) == is_lost
+    assert (f"p.4/{standoff_mm}mm" in outcome.out) == is_lost

@@ -38,6 +38,14 @@ def test_range_from_the_yaml_alone(workbench: Run, tmp_path: Path) -> None:
     assert "closest" in outcome.err
 
 
+def test_without_json_the_list_is_standard_output(workbench: Run, tmp_path: Path) -> None:
+    calibration = tmp_path / "c.yaml"
+    workbench("fit", WEBCAM, "--rig", WEBCAM_RIG, "-o", calibration)
+    outcome = workbench("range", WEBCAM, "--calibration", calibration)
+    assert outcome.code == 0
+    assert "row 2" in outcome.out
+
+
 def test_a_rig_is_no_calibration(workbench: Run) -> None:
     outcome = workbench("range", WEBCAM, "--calibration", WEBCAM_RIG)
     refused(outcome, 2, "expected a calibration, with the key laser_ranger; this is a rig")

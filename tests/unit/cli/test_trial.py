@@ -39,10 +39,10 @@ def test_json_has_the_rows_of_the_table(workbench: Run, readings: Path, kind: st
     assert result["autocorrelation"]["lag1"] == 0
 
 
-def test_the_table_goes_to_the_terminal(workbench: Run, readings: Path) -> None:
+def test_the_table_is_standard_output(workbench: Run, readings: Path) -> None:
     outcome = workbench("trial", "repeatability", readings)
-    assert (outcome.code, outcome.out) == (0, "")
-    assert all(word in outcome.err for word in ("s_r", "s_R", "1000"))
+    assert (outcome.code, outcome.err) == (0, "")
+    assert all(word in outcome.out for word in ("s_r", "s_R", "1000"))
 
 
 def test_clipped_and_missing_readings_are_noted(workbench: Run, tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_readings_in_metres_have_a_note(workbench: Run, tmp_path: Path) -> None:
         frame[USED].to_csv(path, index=False)
         outcome = workbench("trial", "accuracy", path)
         assert outcome.code == 0
-        assert ("true_mm" in outcome.err) == noted
+        assert ("true_mm" in outcome.out) == noted
 
 
 def test_intervals_are_not_called_wider_where_none_is_printed(workbench: Run, tmp_path: Path) -> None:
@@ -97,8 +97,8 @@ def test_intervals_are_not_called_wider_where_none_is_printed(workbench: Run, tm
     path.write_text("\n".join(["true_mm,measured_mm", *rows]))
     for kind, widened in (("linearity", False), ("gauge-rr", False), ("repeatability", True)):
         outcome = workbench("trial", kind, path)
-        assert "autocorrelated" in outcome.err
-        assert ("widened" in " ".join(outcome.err.split())) == widened
+        assert "autocorrelated" in outcome.out
+        assert ("widened" in " ".join(outcome.out.split())) == widened
 
 
 def test_a_public_table_of_an_ultrasonic_sensor_gives_its_author_s_numbers(workbench: Run) -> None:

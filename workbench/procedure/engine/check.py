@@ -12,7 +12,6 @@ from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.model.world import World
 from workbench.model.yamlfile import Document, Mistake, include_files, kind_of, line_of, read_document
-from workbench.optics.emitters import emitter_problems
 from workbench.procedure.engine.existing_calibration import GIVES
 from workbench.procedure.engine.procedure_file import Procedure
 from workbench.procedure.engine.registry import step_kinds
@@ -94,8 +93,12 @@ def _in_rig(document: Document) -> Iterator[Mistake]:
     if not of_rig and not document.data.get("lasers"):
         yield _Note(1, "no lasers: only its camera can be fitted, to views of its board")
     rig = None if of_rig else Rig.model_validate(document.data)
-    for index, error in () if rig is None else emitter_problems(rig):
-        line = line_of(document.data, ("lasers", index, "emitter"))
-        yield Mistake(line, f"lasers[{index}].emitter: {error}")
+    if rig is not None and any(len(together) > 1 for together in rig.emitters):
+        # Imported here: only rays of several beams need JAX, which takes long to load.
+        from workbench.optics.emitters import emitter_problems
+
+        for index, error in emitter_problems(rig):
+            line = line_of(document.data, ("lasers", index, "emitter"))
+            yield Mistake(line, f"lasers[{index}].emitter: {error}")
     of_bench = map(document.mistake, bench_problems(document.data, rig))
     yield from (one for one in of_bench if one not in of_rig)
