@@ -62,6 +62,7 @@ SPELLED = {
     r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$": "letters (A to z), digits, _ . and -, not . first, such as flat.1",
     r"^(#[0-9a-fA-F]{6})?$": "# and six digits (0 to 9, a to f), or nothing, such as #56b4e9",
     r"^[ -~]{4}$": "four letters, such as YUYV or GREY",
+    r"^head[A-Za-z0-9_.-]*\.yaml$": "a name that begins with head and ends with .yaml, such as head-2.yaml",
     r"^calibration[A-Za-z0-9_.-]*\.yaml$": "a name that begins with calibration and ends with .yaml, such as"
     " calibration-night.yaml, of letters (A to z), digits, _, . and -",
     r"^([A-Z]{2})?$": "two capital letters, such as DE",
