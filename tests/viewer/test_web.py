@@ -21,7 +21,7 @@ from tests.viewer.conftest import Recorded
 from workbench.model.chart import PALETTE
 from workbench.viewer.window import LOOPBACK, free_port
 
-START_S = 30.0
+START_S = 120.0
 SERVE = """
 import sys
 from pathlib import Path
