@@ -8,7 +8,7 @@ import pytest
 # As the command line does. Two workers with two threads each on two cores spend most of their time waiting.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# No test asserts a time: hypothesis would assert 200 ms for each example.
+# Hypothesis would fail an example that takes more than 200 ms, as on a busy computer.
 hypothesis.settings.register_profile("workbench", deadline=None)
 hypothesis.settings.load_profile("workbench")
 

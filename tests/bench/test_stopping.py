@@ -70,7 +70,6 @@ def wait_for_captures(folder: Path, process: subprocess.Popen[str]) -> Path:
     raise AssertionError(f"no captures: {process.stderr.read() if process.stderr else ''}")
 
 
-@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("number", "times"),
     [
@@ -116,7 +115,6 @@ def test_a_controller_that_does_not_confirm_is_not_believed(tmp_path: Path) -> N
     assert process.returncode == 7, err
 
 
-@pytest.mark.long_cases
 @pytest.mark.parametrize("after_s", [0.0, pytest.param(0.15, marks=pytest.mark.thorough), 0.5])
 def test_stops_do_not_take_the_place_of_an_off_that_is_not_confirmed(tmp_path: Path, after_s: float) -> None:
     """Two SIGINT, counted from the first lit laser; before it, there is nothing to switch off."""
@@ -144,7 +142,6 @@ def test_an_off_that_is_not_confirmed_without_standard_error(tmp_path: Path) -> 
     assert list(read_journal(session)), "nothing else was written into it"
 
 
-@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("steps", "words"),
     [

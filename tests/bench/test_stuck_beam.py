@@ -36,7 +36,6 @@ def test_a_group_ends_with_a_look_for_beams(tmp_path: Path, monkeypatch: pytest.
     assert not any(isinstance(e, PlacementFinished) for e in events)
 
 
-@pytest.mark.long_cases
 @pytest.mark.parametrize("standoff_mm", [125, 300, 1500])
 def test_beams_that_burn_from_the_first_shot_on(tmp_path: Path, standoff_mm: float) -> None:
     """Lit and dark frames are alike: no exposure is bright enough, and a long one must not hide them."""

@@ -72,7 +72,6 @@ def test_killed_at_a_record(tmp_path: Path, whole: Path, killer: Killer, how: st
     assert 0 <= again <= GROUP, "at most the placement that was under way is captured again"
 
 
-@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("first", "second"),
     [

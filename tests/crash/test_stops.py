@@ -37,7 +37,6 @@ def assert_goes_on(session: Path, whole: Path) -> None:
     assert results(session) == results(whole)
 
 
-@pytest.mark.long_cases
 @pytest.mark.parametrize(
     ("n", "room"),
     [
@@ -89,7 +88,6 @@ def test_frames_that_find_no_room(tmp_path: Path, whole: Path) -> None:
     assert results(session) == results(whole)
 
 
-@pytest.mark.long_cases
 @pytest.mark.parametrize("shots", [0, 1, 3])
 def test_a_stop_between_shots_is_resumed(tmp_path: Path, whole: Path, shots: int) -> None:
     taken: list[ev.Record] = []

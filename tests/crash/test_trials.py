@@ -36,7 +36,6 @@ def test_number_of_records(whole: Path) -> None:
     assert len(list(read_journal(whole))) == RECORDS
 
 
-@pytest.mark.long_cases
 @pytest.mark.parametrize(
     "record",
     [pytest.param(n, marks=() if n % 2 == 0 else pytest.mark.thorough) for n in range(RECORDS)],

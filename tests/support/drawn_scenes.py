@@ -23,7 +23,7 @@ BRIGHT_ELECTRONS = 15_000.0
 SPECKLE_SD_PX = 0.04
 HALF_PX = 24
 """Half the side of the square that a spot lights."""
-DARK_FRAMES = 5
+OFF_FRAMES = 5
 COLUMNS = ("u_px", "v_px", "u_sd_px", "v_sd_px", "flux_dn", "width_px", "u_speckle_sd_px", "v_speckle_sd_px")
 
 
@@ -79,7 +79,7 @@ class DrawnScene:
         return self.captured[-1]
 
     def _frames(self, fired: tuple[str, ...]) -> tuple[Image, Image]:
-        """Lit and dark frame."""
+        """Frame with the lasers on, and one with them off."""
         lit = [place for laser_id, place in self._places.items() if laser_id in fired]
         electrons, width = self._light
         rng = np.random.default_rng([self.seed, *(self.ranger.sensor.ids.index(i) for i in fired)])
@@ -95,13 +95,13 @@ class DrawnScene:
             share = spot(light[square].shape, place[0] - col, place[1] - row, width, width)
             light[square] += electrons * share
             is_lit[square] = True
-        on, off = dark_frame(self.seed % DARK_FRAMES).copy(), dark_frame((self.seed + 1) % DARK_FRAMES)
+        on, off = off_frame(self.seed % OFF_FRAMES).copy(), off_frame((self.seed + 1) % OFF_FRAMES)
         on[is_lit] = SENSOR.expose(light[is_lit], rng)
         return on, off
 
 
 @cache
-def dark_frame(number: int) -> Image:
+def off_frame(number: int) -> Image:
     """A frame of the ambient light alone."""
     return SENSOR.expose(np.full(SHAPE, AMBIENT_ELECTRONS), np.random.default_rng(number))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -70,6 +70,16 @@ def thesis_rig(noise_px: float = 0.03, speckle_px: float = 0.04) -> Rig:
         ),
         noise=NoiseSpec(spot_sd_px=noise_px, speckle_sd_px=speckle_px),
     )
+
+
+def grating_rig(beams: Iterable[Mapping[str, Prior]]) -> Rig:
+    """A rig of beams G0, G1, ... of one emitter 60 mm beside the camera, each with its own entries."""
+    rig = thesis_rig()
+    common = {"emitter": "g", "x_mm": prior(60.0, 0.2)}
+    lasers = tuple(
+        rig.lasers[0].model_copy(update={"id": f"G{n}", **common, **own}) for n, own in enumerate(beams)
+    )
+    return rig.model_copy(update={"lasers": lasers})
 
 
 FISHEYE_STANDOFFS_MM = (40.0, 50.0, 65.0, 85.0, 115.0, 160.0, 230.0, 350.0, 600.0, 1000.0, 1800.0)

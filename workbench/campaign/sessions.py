@@ -165,7 +165,7 @@ def _run_aside(plan: Plan, session: Path) -> None:
     prompts, and signals are left to the worker.
 
     Raises:
-        StoppedError: the session did not finish; nothing of it is kept.
+        StoppedError: the session did not finish; none of its files is kept.
         BadInputError: the procedures cannot be run.
     """
     aside = session.parent / f".{session.name}-{uuid4().hex}"

@@ -37,7 +37,7 @@ def design_calibration(
     result = forecast(rig, chosen, repeats)
     if as_json:
         print(json.dumps(asdict(result)))
-    _print(rig, result, standoffs is None, as_json)
+    _print(rig, result, proposed=standoffs is None, as_json=as_json)
 
 
 def _given(rig: Rig, text: str) -> tuple[float, ...]:

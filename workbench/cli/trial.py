@@ -23,7 +23,7 @@ sensors in a laboratory end at 10 m."""
 
 
 def analyse_readings(kind: str, paths: Sequence[Path], as_json: bool) -> None:
-    """Analyse files of readings: table and notes, with JSON these on standard error.
+    """Analyse files of readings; print table and notes (`result_console`), with `as_json` the result too.
 
     Raises:
         BadInputError: a file is wrong, or there are several for a gauge R&R study.

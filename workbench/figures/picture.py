@@ -1,7 +1,4 @@
-"""Picture of a chart for the viewer, with the place of its axes in pixels.
-
-Matplotlib is loaded with the first picture: it takes a quarter of the time in which `workbench run` starts.
-"""
+"""Picture of a chart for the viewer, with the place of its axes in pixels."""
 
 from __future__ import annotations
 
@@ -9,6 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 
+from matplotlib.figure import Figure
+
+from workbench.figures.figure import draw
+from workbench.figures.plot_style import own_style
 from workbench.model.chart import Chart
 
 SIZE_PX = (1100, 400)
@@ -39,9 +40,6 @@ def picture(chart: Chart, colors: Mapping[str, str], size_px: tuple[int, int] = 
         colors: colours (`#rrggbb`) by series name, for example of lasers.
         size_px: width and height.
     """
-    from workbench.figures.figure import draw
-    from workbench.figures.plot_style import own_style
-
     width, height = size_px
     file = BytesIO()
     with own_style(dark=True):
@@ -66,10 +64,6 @@ def picture(chart: Chart, colors: Mapping[str, str], size_px: tuple[int, int] = 
 
 def note(text: str, size_px: tuple[int, int] = SIZE_PX) -> bytes:
     """PNG picture of a text, in place of a chart without points."""
-    from matplotlib.figure import Figure
-
-    from workbench.figures.plot_style import own_style
-
     file = BytesIO()
     with own_style(dark=True):
         figure = Figure(figsize=(size_px[0] / DPI, size_px[1] / DPI))

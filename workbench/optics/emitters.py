@@ -53,12 +53,12 @@ def beams_in_order(rig: Rig, together: Sequence[LaserSpec]) -> tuple[tuple[Laser
         for depth in depths_mm(rig)
     )
     if near != far:
+        nearest_mm, farthest_mm = rig.bench.reach_mm
         first, second = next((a, b) for a, b in pairwise(near) if far.index(a) > far.index(b))
         raise BadInputError(
-            f"rig {rig.rig}: expected beams of emitter {name} that do not cross within"
-            " {:g} to {:g} mm, as their order assigns their spots;".format(*rig.bench.reach_mm)
-            + f" got {together[first].id} and {together[second].id}, which do;"
-            " correct their x_mm, y_mm, tx and ty, or bench.reach_mm"
+            f"rig {rig.rig}: expected beams of emitter {name} that do not cross within {nearest_mm:g} to"
+            f" {farthest_mm:g} mm, because their order assigns their spots; got {together[first].id} and"
+            f" {together[second].id}, which cross; correct their x_mm, y_mm, tx and ty, or bench.reach_mm"
         )
     return tuple(together[n] for n in near), rows[0].direction
 

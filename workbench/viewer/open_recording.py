@@ -60,7 +60,7 @@ class OpenRecording:
         self._exposure = Moment(0, 0, 0)
         self._frames: tuple[Image, Image | None] | None = None
         self._shown: tuple[str, str] | None = None
-        """Path and checksum of the lit frame that the recording shows."""
+        """Path and checksum of the frame, lasers on, that the recording shows."""
         self._spots: tuple[Spot, ...] = ()
         self._title = ""
         self._step = ""
@@ -358,7 +358,7 @@ class OpenRecording:
         frame.log_scanlines(self.stream, lines, self._colors)
 
     def _show_frame(self, event: ev.CaptureTaken) -> None:
-        """Log the lit frame of a capture, once where several lasers share it.
+        """Log the frame of a capture with lasers on, once where several lasers share it.
 
         A row of a captures file may state positions without any frame.
         """

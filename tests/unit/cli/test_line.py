@@ -315,7 +315,7 @@ def test_a_signal_just_before_the_read_ends_the_line(monkeypatch: pytest.MonkeyP
             raise StoppedError("stopped by SIGINT")
         return select_(*arguments)
 
-    with open(slave, encoding="utf-8") as terminal:  # noqa: PTH123 - a handle
+    with os.fdopen(slave, encoding="utf-8") as terminal:
         monkeypatch.setattr("sys.stdin", terminal)
         monkeypatch.setattr("workbench.cli.line.select.select", waiting)
         with pytest.raises(StoppedError):

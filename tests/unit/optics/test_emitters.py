@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from tests.support.rigs import World, prior, thesis_rig
+from tests.support.rigs import World, grating_rig, prior
 from workbench.model.errors import BadInputError
 from workbench.model.rig import Rig
 from workbench.optics.emitters import beams_in_order, beams_together, depths_mm, emitter_problems
@@ -17,21 +17,9 @@ REACH_MM = (100.0, 3000.0)
 
 def fan(*beams: tuple[float, float], offset_mm: float = 0.0) -> Rig:
     """Beams of one emitter in a vertical plane beside the camera: y and ty of each."""
-    rig = thesis_rig()
+    rig = grating_rig({"y_mm": prior(y, 0.0), "ty": prior(ty, 0.0)} for y, ty in beams)
     bench = rig.bench.model_copy(update={"reach_mm": REACH_MM, "offset_mm": prior(offset_mm, 0.0)})
-    lasers = tuple(
-        rig.lasers[0].model_copy(
-            update={
-                "id": f"G{n}",
-                "emitter": "g",
-                "x_mm": prior(60.0, 0.2),
-                "y_mm": prior(y, 0.0),
-                "ty": prior(ty, 0.0),
-            }
-        )
-        for n, (y, ty) in enumerate(beams)
-    )
-    return rig.model_copy(update={"lasers": lasers, "bench": bench})
+    return rig.model_copy(update={"bench": bench})
 
 
 def crossing_at(depth_mm: float) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
@@ -53,7 +41,7 @@ def test_the_order_is_that_of_the_spots_at_every_depth(order: tuple[int, ...]) -
 @pytest.mark.parametrize("depth_mm", [110.0, 1000.0, 1500.0, 2900.0])
 def test_beams_that_cross_within_the_reach_are_refused_by_name(depth_mm: float) -> None:
     rig = fan(*crossing_at(depth_mm))
-    with pytest.raises(BadInputError, match="got G1 and G0, which do") as caught:
+    with pytest.raises(BadInputError, match="got G1 and G0, which cross") as caught:
         beams_in_order(rig, rig.lasers)
     assert "cross within 100 to 3000 mm" in str(caught.value)
     assert caught.value.exit_code == 2

@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.support.rigs import FISHEYE_STANDOFFS_MM, PROVENANCE, World, fisheye_rig, prior, thesis_rig
+from tests.support.rigs import (
+    FISHEYE_STANDOFFS_MM,
+    PROVENANCE,
+    World,
+    fisheye_rig,
+    grating_rig,
+    prior,
+    thesis_rig,
+)
 from tests.support.scanned_head import SimulatedHead, inclined_rig
 from workbench.calibration.data import spot_rows
 from workbench.calibration.data.observations import PlacementInfo
@@ -106,20 +114,8 @@ def test_the_band_of_a_turned_head_holds_its_spots_at_that_reading_alone(seed: i
 
 def grating(count: int, along_baseline: bool = False) -> Rig:
     """A rig whose lasers are beams of one emitter 60 mm beside the camera, the last in the file first."""
-    rig = thesis_rig()
     slopes = [0.1 * (n - count // 2) for n in reversed(range(count))]
-    lasers = tuple(
-        rig.lasers[0].model_copy(
-            update={
-                "id": f"G{n}",
-                "emitter": "g",
-                "x_mm": prior(60.0, 0.2),
-                "tx" if along_baseline else "ty": prior(slope, 0.005),
-            }
-        )
-        for n, slope in enumerate(slopes)
-    )
-    return rig.model_copy(update={"lasers": lasers})
+    return grating_rig({"tx" if along_baseline else "ty": prior(slope, 0.005)} for slope in slopes)
 
 
 @pytest.mark.parametrize("along_baseline", [False, True])

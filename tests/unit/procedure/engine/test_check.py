@@ -114,7 +114,7 @@ def test_mistakes_of_a_rig_do_not_hide_those_of_its_driver(tmp_path: Path) -> No
         (
             "y_mm: {value: 0.0, sd: 0.77}\n    tx: {value: 0.0, sd: 0.019}\n    ty: {value: -0.23363",
             "y_mm: {value: 10.0, sd: 0.77}\n    tx: {value: 0.0, sd: 0.019}\n    ty: {value: -0.23363",
-            "got G03 and G01, which do",
+            "got G03 and G01, which cross",
         ),
     ],
 )
